@@ -1,0 +1,101 @@
+"""Writes new coordinates into the old file: every byte that is not a coordinate of a moved node stays as it was.
+
+A reader tells where the coordinates stand (slots); this module alone replaces them. A node may stand in several
+places (each triangle of an STL file repeats its corners), hence ``node``, the node of each row of slots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Slots(Protocol):
+    """Where the coordinates of a file stand."""
+
+    def replace(self, data: bytes, old: NDArray[np.float64], new: NDArray[np.float64]) -> bytes:
+        """The file with each coordinate of ``new`` (N×dim) that differs in value from ``old`` written in its slot."""
+        ...
+
+
+@dataclass(frozen=True)
+class TextSlots:
+    """Decimal numbers in a text. starts, ends: (rows × dim) byte span of each; node: (rows,) the node of each row."""
+
+    starts: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    node: NDArray[np.int64]
+
+    def replace(self, data: bytes, old: NDArray[np.float64], new: NDArray[np.float64]) -> bytes:
+        """See Slots. Numbers are written as the shortest decimal that reads back as the same float64."""
+        dim = self.starts.shape[1]
+        changed = (old != new)[self.node][:, :dim]
+        starts, ends = self.starts[changed], self.ends[changed]
+        values = new[self.node][:, :dim][changed]
+        order = np.argsort(starts, kind="stable")
+        pieces: list[bytes] = []
+        at = 0
+        for start, end, value in zip(
+            starts[order].tolist(), ends[order].tolist(), values[order].tolist(), strict=True
+        ):
+            pieces += (data[at:start], repr(value).encode())
+            at = end
+        pieces.append(data[at:])
+        return b"".join(pieces)
+
+
+@dataclass(frozen=True)
+class BinarySlots:
+    """Binary floats. offsets: (rows × dim) first byte of each; dtype: '<f4', '>f8', …; node: (rows,) see TextSlots."""
+
+    offsets: NDArray[np.int64]
+    dtype: str
+    node: NDArray[np.int64]
+
+    def replace(self, data: bytes, old: NDArray[np.float64], new: NDArray[np.float64]) -> bytes:
+        """See Slots."""
+        dim = self.offsets.shape[1]
+        changed = (old != new)[self.node][:, :dim]
+        values = new[self.node][:, :dim][changed].astype(self.dtype)
+        width = values.dtype.itemsize
+        array = np.frombuffer(data, dtype=np.uint8).copy()
+        array[self.offsets[changed][:, None] + np.arange(width)] = values.view(np.uint8).reshape(-1, width)
+        return array.tobytes()
+
+
+@dataclass(frozen=True)
+class EncodedSlots:
+    """Coordinates inside an encoded block (base64, compressed), which a function of the format writes again."""
+
+    rewrite: Callable[[bytes, NDArray[np.float64], NDArray[np.float64]], bytes]
+
+    def replace(self, data: bytes, old: NDArray[np.float64], new: NDArray[np.float64]) -> bytes:
+        """See Slots."""
+        return self.rewrite(data, old, new)
+
+
+@dataclass(frozen=True)
+class FileSource:
+    """The bytes that a mesh was read from (the Source of a Mesh).
+
+    format: its name in the table of formats. data: the file that holds the coordinates, under the suffix ``main``.
+    points: the coordinates as read. companions: other files of the same mesh by suffix, which never change
+    (Triangle's ``.ele``).
+    """
+
+    format: str
+    main: str
+    data: bytes
+    points: NDArray[np.float64]
+    slots: Slots
+    companions: Mapping[str, bytes] = field(default_factory=dict)
+
+    def splice(self, points: NDArray[np.float64]) -> dict[str, bytes]:
+        """Suffix → bytes of each file of the mesh, with the coordinates of ``points`` (N×dim) in their slots."""
+        same = points.shape == self.points.shape and bool((points == self.points).all())
+        data = self.data if same else self.slots.replace(self.data, self.points, points)
+        return {self.main: data, **self.companions}
