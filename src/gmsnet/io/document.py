@@ -1,0 +1,52 @@
+"""What a reader finds in a file and what a writer makes of a mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.io.splice import Slots
+from gmsnet.mesh import CellBlock, Mesh
+
+
+@dataclass(frozen=True)
+class Parsed:
+    """The facts of a file: the fields of a Mesh, and where its coordinates stand."""
+
+    points: NDArray[np.float64]
+    cells: Sequence[CellBlock]
+    slots: Slots
+    region_names: Mapping[tuple[int, int], str] = field(default_factory=dict)
+    point_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
+    single: bool = False
+
+
+@dataclass(frozen=True)
+class Written:
+    """The files of a converted mesh (suffix → bytes), and what the format could not hold, in words."""
+
+    files: Mapping[str, bytes]
+    lost: list[str] = field(default_factory=list)
+
+
+class Format(Protocol):
+    """A file format: one module of this folder.
+
+    suffixes: the endings that it goes by, lower case; the first holds the coordinates. name: what messages call it.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+
+    def read(self, files: Mapping[str, bytes]) -> Parsed:
+        """The facts of the file(s), suffix → bytes. Raises FormatError naming the line (or byte) and the mend."""
+        ...
+
+    def write(self, mesh: Mesh) -> Written:
+        """The mesh in this format. Raises FormatError if it cannot hold the cells at all."""
+        ...
