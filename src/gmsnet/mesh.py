@@ -73,7 +73,8 @@ class Mesh:
     points: (N × 2 or N × 3) float64. cells: blocks in file order. region_names: (dimension, region) → name, the
     dimension 1 for markers made of lines, 2 for regions made of faces. point_data: name → (N, …). cell_data: name →
     one array per block. single: the file keeps coordinates in single precision, so results must be exact in float32.
-    source: the file it was read from, None if it was made in memory.
+    source: the file it was read from, None if it was made in memory. node_sets: name → node ids, named groups of nodes
+    beside those that the cells make (meshio's point sets).
 
     Raises InputError where a coordinate is not finite or a cell names a node that does not exist.
     """
@@ -85,6 +86,7 @@ class Mesh:
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
     single: bool = False
     source: Source | None = None
+    node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=np.float64, order="C", copy=True)
@@ -111,7 +113,7 @@ class Mesh:
                 raise InputError(f"cell data {name!r} does not have one row for each cell of each block")
         object.__setattr__(self, "points", _read_only(points))
         object.__setattr__(self, "cells", cells)
-        for name in ("region_names", "point_data", "cell_data"):
+        for name in ("region_names", "point_data", "cell_data", "node_sets"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     def with_points(self, points: NDArray[np.float64]) -> Mesh:
@@ -141,8 +143,8 @@ class Mesh:
 
     @property
     def markers(self) -> dict[str, NDArray[np.int64]]:
-        """Name of each marker and region → its node ids. One without a name goes by its number."""
-        nodes: dict[str, list[NDArray[np.int64]]] = {}
+        """Name of each marker, region and node set → its node ids. One without a name goes by its number."""
+        nodes: dict[str, list[NDArray[np.int64]]] = {name: [ids] for name, ids in self.node_sets.items()}
         for block in self.cells:
             for region in np.unique(block.regions).tolist():
                 name = self.region_names.get((block.dimension, region), str(region))
