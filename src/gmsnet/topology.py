@@ -40,6 +40,11 @@ class Stars:
         """How many colours there are; the blocks of colour c are first[c] … first[c + 1] − 1."""
         return len(self.first) - 1
 
+    @cached_property
+    def most(self) -> int:
+        """The largest degree."""
+        return int(self.degree.max(initial=0))
+
 
 @dataclass(frozen=True, eq=False)
 class Topology:

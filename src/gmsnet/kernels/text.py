@@ -160,3 +160,21 @@ def gather_tokens(data, spans, out):
     for k in range(len(spans)):
         for j in range(spans[k, 1] - spans[k, 0]):
             out[k, j] = data[spans[k, 0] + j]
+
+
+@kernel
+def cut_at_slash(data, spans):
+    """Ends each token at its first slash; behind it there may be digits, signs and slashes only.
+
+    Returns the number of the first token in which something else follows, or -1.
+    """
+    for k in range(len(spans)):
+        at, end = spans[k, 0], spans[k, 1]
+        while at < end and data[at] != 47:
+            at += 1
+        spans[k, 1] = at
+        while at < end:
+            if not (47 <= data[at] <= 57 or data[at] == 43 or data[at] == 45):
+                return k
+            at += 1
+    return -1

@@ -1,0 +1,77 @@
+"""Better elements for any mesh file: mesh smoothing that moves nodes, changes nothing else and never inverts a cell.
+
+    import gmsnet
+    result = gmsnet.smooth((points, triangles))   # or a Mesh, a meshio, meshlane or PyVista object
+    result.points, result.before.qhat, result.after.qhat
+
+    mesh = gmsnet.read("wing.su2")
+    gmsnet.write(gmsnet.smooth(mesh).mesh, "wing-smoothed.su2")
+
+The public names are loaded on first use, so that ``import gmsnet`` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module as _import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gmsnet.engine import SmoothResult, Sweep, quality, smooth
+    from gmsnet.errors import FormatError, GmsnetError, InputError, MissingExtraError
+    from gmsnet.generate import random_mesh
+    from gmsnet.io import read, write
+    from gmsnet.measure import QualityReport
+    from gmsnet.mesh import CellBlock, Mesh
+    from gmsnet.methods import METHODS
+
+_HOME = {
+    "SmoothResult": "engine",
+    "Sweep": "engine",
+    "quality": "engine",
+    "smooth": "engine",
+    "FormatError": "errors",
+    "GmsnetError": "errors",
+    "InputError": "errors",
+    "MissingExtraError": "errors",
+    "random_mesh": "generate",
+    "read": "io",
+    "write": "io",
+    "QualityReport": "measure",
+    "CellBlock": "mesh",
+    "Mesh": "mesh",
+    "METHODS": "methods",
+}
+
+__all__ = [
+    "METHODS",
+    "CellBlock",
+    "FormatError",
+    "GmsnetError",
+    "InputError",
+    "Mesh",
+    "MissingExtraError",
+    "QualityReport",
+    "SmoothResult",
+    "Sweep",
+    "quality",
+    "random_mesh",
+    "read",
+    "smooth",
+    "write",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("gmsnet")
+    if name in _HOME:
+        value = getattr(_import_module(f"gmsnet.{_HOME[name]}"), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'gmsnet' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__, "__version__"])

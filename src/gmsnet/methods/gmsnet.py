@@ -1,0 +1,62 @@
+"""GMSNet, the paper's graph neural network, compiled. The formulas stand in kernels/gmsnet.py, the model as the paper
+prints it in learn/model.py."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet import weights
+from gmsnet.kernels import gmsnet as kernels
+from gmsnet.methods.base import Method, Options, Precision
+from gmsnet.topology import Stars
+
+
+class GmsNet:
+    """The network with one set of weights."""
+
+    def __init__(self, trained: weights.Weights) -> None:
+        self.hidden = trained.hidden
+        self.folded = fold(trained)
+
+    def sweep(
+        self,
+        points: NDArray[np.float64],
+        stars: Stars,
+        first: int,
+        last: int,
+        precision: Precision,
+        tally: NDArray[np.int64],
+    ) -> None:
+        """See methods.base.Smoother."""
+        kernels.sweep(
+            points, stars.centre, stars.rings, stars.offset, stars.degree, stars.count, first, last,
+            stars.most, precision.unit, precision.single, self.folded, self.hidden, tally,
+        )  # fmt: skip
+
+
+def fold(trained: weights.Weights) -> NDArray[np.float32]:
+    """The weights as the kernel reads them, flat float32.
+
+    Per channel (W_l's two, b_l, γ, β, α), then W₁·W_g and W₁ (H × H each, row-major), W₁·b_g + b₁ (H), W₂ (2 × H), b₂.
+    """
+    t = {name: tensor.astype(np.float64) for name, tensor in trained.tensors.items()}
+    first, last = t["mlp.0.weight"], t["mlp.1.weight"]
+    columns = (t["linear.weight"], t["linear.bias"], t["norm.weight"], t["norm.bias"], t["norm.mean_scale"])
+    parts = (
+        np.column_stack(columns),
+        first @ t["gcn.weight"],
+        first,
+        first @ t["gcn.bias"] + t["mlp.0.bias"],
+        last,
+        t["mlp.1.bias"],
+    )
+    return np.concatenate([part.ravel() for part in parts]).astype(np.float32)
+
+
+METHOD = Method(
+    name="gmsnet",
+    summary="the paper's graph neural network: one look at a node's one-ring, one shift",
+    source="Wang, Chen, Yan, Liu: Proposing an intelligent mesh smoothing method with graph neural networks (2023)",
+    create=lambda options: GmsNet(weights.load(options.weights)),
+)
