@@ -100,7 +100,7 @@ def test_halfway_cases_and_extremes_are_exact() -> None:
         "1e12345",
         "--1",
         "١",
-    ],  # fmt: skip
+    ],
 )
 def test_what_is_no_plain_number_is_refused_with_its_line(bad: str) -> None:
     data = b"1 2\n" + bad.encode() + b" 4"

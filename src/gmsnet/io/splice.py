@@ -13,6 +13,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.mesh import CellBlock
+
 
 class Slots(Protocol):
     """Where the coordinates of a file stand."""
@@ -78,13 +80,13 @@ class EncodedSlots:
         return self.rewrite(data, old, new)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FileSource:
     """The bytes that a mesh was read from (the Source of a Mesh).
 
     format: its name in the table of formats. data: the file that holds the coordinates, under the suffix ``main``.
-    points: the coordinates as read. companions: other files of the same mesh by suffix, which never change
-    (Triangle's ``.ele``).
+    points, cells: the coordinates and cells as read. companions: other files of the same mesh by suffix, which never
+    change (Triangle's ``.ele``).
     """
 
     format: str
@@ -92,7 +94,17 @@ class FileSource:
     data: bytes
     points: NDArray[np.float64]
     slots: Slots
+    cells: tuple[CellBlock, ...] = ()
     companions: Mapping[str, bytes] = field(default_factory=dict)
+
+    def has_cells(self, cells: tuple[CellBlock, ...]) -> bool:
+        """Whether ``cells`` are those of the file, so that its text can stand for them."""
+        if cells is self.cells:
+            return True
+        return len(cells) == len(self.cells) and all(
+            a.kind == b.kind and np.array_equal(a.nodes, b.nodes) and np.array_equal(a.regions, b.regions)
+            for a, b in zip(cells, self.cells, strict=True)
+        )
 
     def splice(self, points: NDArray[np.float64]) -> dict[str, bytes]:
         """Suffix → bytes of each file of the mesh, with the coordinates of ``points`` (N×dim) in their slots."""

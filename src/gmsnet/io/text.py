@@ -147,6 +147,18 @@ def gather(data: bytes, spans: Spans) -> NDArray[np.bytes_]:
     return out.view(f"S{width}").reshape(-1)
 
 
+def before_slash(data: bytes, spans: Spans) -> Spans:
+    """The part of each token before its first slash (``12/3/4`` → ``12``).
+
+    Raises FormatError naming the line where something but numbers and slashes follows.
+    """
+    cut = np.array(spans, order="C")
+    bad = int(kernels.cut_at_slash(_bytes(data), cut))
+    if bad >= 0:
+        fail(data, int(spans[bad, 0]), f"numbers separated by slashes were expected, found {word(data, spans[bad])}")
+    return cut
+
+
 def token(data: bytes, span: Spans) -> bytes:
     """The bytes of one token (2,)."""
     return data[int(span[0]) : int(span[1])]

@@ -1,0 +1,115 @@
+"""What all writers share when a mesh goes into another format: what the target cannot hold, said in words."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import FormatError
+from gmsnet.mesh import CellBlock, Mesh
+
+
+def in_plane(mesh: Mesh, title: str) -> tuple[NDArray[np.float64], list[str]]:
+    """The points (N × 2) of a planar mesh and, in words, the coordinate that was left out (nothing if it is z = 0).
+
+    Raises FormatError where no coordinate is constant.
+    """
+    if mesh.points.shape[1] == 2:
+        return mesh.points, []
+    if mesh.plane is None:
+        raise FormatError(
+            f"{title} holds meshes in the plane only, and this one varies in x, y and z: "
+            "write a format with three coordinates, such as .vtk or .msh"
+        )
+    (flat,) = {0, 1, 2} - set(mesh.plane)
+    values = np.unique(mesh.points[:, flat])
+    lost = []
+    if flat != 2 or values.tolist() not in ([0.0], []):
+        what = repr(float(values[0])) if len(values) == 1 else f"{values[0]} to {values[-1]}"
+        lost.append(f"{title} has two coordinates: {'xyz'[flat]} = {what} was left out")
+    return mesh.points[:, list(mesh.plane)], lost
+
+
+def in_space(mesh: Mesh) -> NDArray[np.float64]:
+    """The points as (N × 3); a mesh with two coordinates gets z = 0."""
+    return np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
+
+
+def check_kinds(mesh: Mesh, title: str, kinds: Collection[str]) -> None:
+    """Raises FormatError where the mesh has cells whose type is not among ``kinds``."""
+    for block in mesh.cells:
+        if block.kind not in kinds and len(block.nodes):
+            raise FormatError(f"{title} cannot hold cells of type {block.kind!r}: write another format, such as .vtu")
+
+
+def lost_data(mesh: Mesh, title: str, kept: Collection[str] = ()) -> list[str]:
+    """The point and cell data that a format cannot hold, but for the names in ``kept``."""
+    lost = []
+    for what, fields in (("point", mesh.point_data), ("cell", mesh.cell_data)):
+        names = [repr(name) for name in fields if name not in kept]
+        if names:
+            lost.append(f"{title} cannot hold {what} data: {', '.join(names)} {were(len(names))} left out")
+    return lost
+
+
+def lost_names(mesh: Mesh, title: str, dimensions: Collection[int] = (0, 1, 2, 3)) -> list[str]:
+    """The names of regions and markers that a format keeps as mere numbers."""
+    names = [f"{name!r} ({number})" for (dim, number), name in mesh.region_names.items() if dim in dimensions]
+    if not names:
+        return []
+    return [f"{title} numbers its regions and markers: the names {', '.join(names)} were left out"]
+
+
+def lost_cells(mesh: Mesh, title: str, dimensions: Collection[int]) -> list[str]:
+    """The vertex and line cells that a format leaves out."""
+    lost = []
+    for dim, word in ((0, "vertex"), (1, "line")):
+        count = sum(len(b.nodes) for b in mesh.cells if b.dimension == dim)
+        if dim in dimensions and count:
+            names = ", ".join(marker_names(mesh, dim))
+            lost.append(f"{title} cannot hold {word} cells: {count} {were(count)} left out (markers {names})")
+    return lost
+
+
+def lost_regions(mesh: Mesh, title: str, dimension: int = 2) -> list[str]:
+    """The regions of cells of one dimension, where a format merges them; one region alone is no loss unless named."""
+    found = regions_of(mesh.cells, dimension)
+    if len(found) > 1:
+        return [f"{title} cannot hold cell regions: {len(found)} regions were merged"]
+    if found and (dimension, found[0]) in mesh.region_names:
+        name = mesh.region_names[dimension, found[0]]
+        return [f"{title} cannot hold cell regions: the name {name!r} was left out"]
+    return []
+
+
+def regions_of(cells: Iterable[CellBlock], dimension: int) -> list[int]:
+    """The region numbers of all cells of one dimension, ascending."""
+    parts = [np.unique(b.regions) for b in cells if b.dimension == dimension]
+    return np.unique(np.concatenate(parts)).tolist() if parts else []
+
+
+def marker_name(mesh: Mesh, dimension: int, region: int) -> str:
+    """The name of a region, its number where it has none."""
+    return mesh.region_names.get((dimension, region), str(region))
+
+
+def marker_names(mesh: Mesh, dimension: int) -> list[str]:
+    """The names of all regions of one dimension."""
+    return [repr(marker_name(mesh, dimension, region)) for region in regions_of(mesh.cells, dimension)]
+
+
+def decimals(values: NDArray[np.float64]) -> list[str]:
+    """Rows (N × k) as text: the shortest decimals that read back as the same float64, separated by a blank."""
+    return [" ".join(map(repr, row)) for row in values.tolist()]
+
+
+def integers(values: NDArray[np.int64]) -> list[str]:
+    """Rows (N × k) of integers as text."""
+    return [" ".join(map(str, row)) for row in values.tolist()]
+
+
+def were(count: int) -> str:
+    """The verb that goes with a count."""
+    return "was" if count == 1 else "were"

@@ -1,0 +1,170 @@
+"""The pair of files of Shewchuk's Triangle: ``.node`` holds the points, ``.ele`` the triangles.
+
+Points are numbered from 0 or from 1, as the first of them says. The first attribute of a triangle is its region.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import FormatError
+from gmsnet.io import convert
+from gmsnet.io.document import Parsed, Written
+from gmsnet.io.splice import TextSlots
+from gmsnet.io.text import Rows, Spans, blank, fail, scan_rows, to_count, to_floats, to_ints
+from gmsnet.mesh import CellBlock, Mesh
+
+name = "Triangle"
+suffixes = (".node", ".ele")
+
+MARKER = "triangle:marker"  # the point data that keeps the boundary markers
+ATTRIBUTE = "triangle:attribute"  # + its number: further attributes of points and triangles
+
+# Triangle puts the node on the side opposite corner k into place 3 + k; the order elsewhere is by side 01, 12, 20.
+TO_SIDES, FROM_SIDES = [0, 1, 2, 5, 3, 4], [0, 1, 2, 4, 5, 3]
+
+
+def read(files: Mapping[str, bytes]) -> Parsed:
+    """See Format. Points with a boundary marker other than 0 become vertex cells with the marker as region."""
+    node = blank(files[".node"], rb"#[^\r\n]*")
+    points, ids, spans, data = _points(node)
+    try:
+        ele = blank(files[".ele"], rb"#[^\r\n]*")
+        cells, names, cell_data = _triangles(ele, ids)
+    except FormatError as error:
+        raise FormatError(f"in the .ele file beside it: {error}") from None
+    markers = data.get(MARKER)
+    if markers is not None and markers.any():
+        marked = np.flatnonzero(markers)
+        cells.append(CellBlock("vertex", marked[:, None], markers[marked]))
+        empty = np.zeros(len(marked))
+        cell_data = {key: (*arrays, empty) for key, arrays in cell_data.items()}
+    slots = TextSlots(spans[..., 0], spans[..., 1], np.arange(len(points)))
+    return Parsed(points, cells, slots, names, data, cell_data)
+
+
+def _header(text: bytes, words: int, what: str) -> tuple[NDArray[np.int64], Rows]:
+    """The numbers of the first line, and the rows of which it announces how many there are; no others may follow."""
+    head = scan_rows(text, 0, 1)
+    if len(head.spans) < words:
+        fail(text, head.where(0), f"the first line must have {words} numbers, found {len(head.spans)}")
+    numbers = to_ints(text, head.spans[:words])
+    for span in head.spans[:words]:
+        to_count(text, span, what)
+    rows = scan_rows(text, head.end, int(numbers[0]))
+    rest = scan_rows(text, rows.end if len(rows) else head.end, None)
+    if len(rest):
+        fail(text, rest.where(0), f"the file goes on behind the {numbers[0]} {what} that its first line announces")
+    return numbers, rows
+
+
+def _width(text: bytes, rows: Rows, width: int, what: str) -> None:
+    short = np.flatnonzero(rows.lengths < width)
+    if short.size:
+        k = int(short[0])
+        fail(text, rows.where(k), f"{what} takes {width} numbers here, found {rows.lengths[k]}")
+
+
+def _points(
+    text: bytes,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], Spans, dict[str, NDArray[Any]]]:
+    """Coordinates, numbers of the points, spans of the coordinates, point data."""
+    (_, dimension, attributes, markers), rows = _header(text, 4, "points")
+    if dimension != 2:
+        fail(text, 0, f"the points have {dimension} coordinates: only meshes in the plane (2) can be read")
+    if markers > 1:
+        fail(text, 0, f"{markers} boundary markers a point: there can be 0 or 1")
+    _width(text, rows, 3 + int(attributes) + int(markers), "a point")
+    ids = to_ints(text, rows.column(0))
+    order = np.argsort(ids, kind="stable")
+    twice = np.flatnonzero(np.diff(ids[order]) == 0)
+    if twice.size:
+        k = int(order[twice[0] + 1])
+        fail(text, rows.where(k), f"the point {ids[k]} is given twice")
+    spans = np.stack([rows.column(1), rows.column(2)], axis=1)
+    data: dict[str, NDArray[Any]] = {
+        f"{ATTRIBUTE}{k + 1}": to_floats(text, rows.column(3 + k)) for k in range(int(attributes))
+    }
+    if markers:
+        data[MARKER] = to_ints(text, rows.column(3 + int(attributes)))
+    return to_floats(text, spans), ids, spans, data
+
+
+def _triangles(
+    text: bytes, ids: NDArray[np.int64]
+) -> tuple[list[CellBlock], dict[tuple[int, int], str], dict[str, tuple[NDArray[Any], ...]]]:
+    (_, size, attributes), rows = _header(text, 3, "triangles")
+    if size not in (3, 6):
+        fail(text, 0, f"triangles with {size} nodes: there can be 3 or 6")
+    _width(text, rows, 1 + int(size) + int(attributes), "a triangle")
+    to_ints(text, rows.column(0))
+    spans = np.stack([rows.column(1 + k) for k in range(int(size))], axis=1)
+    named = to_ints(text, spans)
+    order = np.argsort(ids, kind="stable")
+    place = np.searchsorted(ids[order], named).clip(max=max(0, len(ids) - 1))
+    bad = np.flatnonzero((ids[order][place] != named).ravel()) if len(ids) else np.arange(named.size)
+    if bad.size:
+        known = f"{ids.min()} to {ids.max()}" if len(ids) else "none"
+        offset = int(spans.reshape(-1, 2)[bad[0], 0])
+        fail(text, offset, f"a triangle names the node {named.ravel()[bad[0]]}, but the nodes are {known}")
+    nodes = order[place] if len(ids) else named
+    values = [to_floats(text, rows.column(1 + int(size) + k)) for k in range(int(attributes))]
+    regions, names = _regions(values[0]) if values else (np.zeros(len(rows), dtype=np.int64), {})
+    block = CellBlock("triangle", nodes, regions) if size == 3 else CellBlock("triangle6", nodes[:, TO_SIDES], regions)
+    cell_data: dict[str, tuple[NDArray[Any], ...]] = {f"{ATTRIBUTE}{k + 2}": (column,) for k, column in enumerate(values[1:])}
+    return [block], names, cell_data
+
+
+def _regions(values: NDArray[np.float64]) -> tuple[NDArray[np.int64], dict[tuple[int, int], str]]:
+    """Whole numbers are regions as they are; if there are others, regions count from 1 and have them as names."""
+    if (np.abs(values) < 2.0**53).all() and (values == np.rint(values)).all():
+        return values.astype(np.int64), {}
+    known, regions = np.unique(values, return_inverse=True)
+    return regions.reshape(-1) + 1, {(2, k + 1): repr(value) for k, value in enumerate(known.tolist())}
+
+
+def write(mesh: Mesh) -> Written:
+    """See Format. Lines and vertices live on as boundary markers of their nodes."""
+    convert.check_kinds(mesh, name, ("triangle", "triangle6", "line", "line3", "vertex"))
+    faces = [block for block in mesh.cells if block.dimension == 2 and len(block.nodes)]
+    if len({block.kind for block in faces}) > 1:
+        raise FormatError("Triangle cannot hold three-node and six-node triangles in one file: write .vtu or .msh")
+    points, lost = convert.in_plane(mesh, name)
+    markers, words = _markers(mesh)
+    quadratic = bool(faces) and faces[0].kind == "triangle6"
+    nodes = np.concatenate([b.nodes[:, FROM_SIDES] if quadratic else b.nodes for b in faces] or [np.empty((0, 3), int)])
+    regions = np.concatenate([b.regions for b in faces] or [np.empty(0, int)])
+
+    lines = [f"{len(points)} 2 0 1"]
+    rows = zip(convert.decimals(points), markers.tolist(), strict=True)
+    lines += [f"{k} {row} {marker}" for k, (row, marker) in enumerate(rows, 1)]
+    node = "\n".join(lines) + "\n"
+    cells = np.column_stack([np.arange(1, len(nodes) + 1), nodes + 1, regions])
+    ele = "\n".join([f"{len(nodes)} {nodes.shape[1]} 1", *convert.integers(cells)]) + "\n"
+    lost += words + convert.lost_names(mesh, name, (2,)) + convert.lost_data(mesh, name, kept=(MARKER,))
+    return Written({".node": node.encode(), ".ele": ele.encode()}, lost)
+
+
+def _markers(mesh: Mesh) -> tuple[NDArray[np.int64], list[str]]:
+    """A boundary marker for each point, and what of the line and vertex cells is lost thereby."""
+    markers = np.zeros(len(mesh.points), dtype=np.int64)
+    used = sorted({(b.dimension, r) for b in mesh.cells if b.dimension < 2 for r in np.unique(b.regions).tolist()})
+    plain = len({r for _, r in used}) == len(used) and all(r != 0 for _, r in used)
+    number = {pair: pair[1] if plain else k for k, pair in enumerate(used, 1)}
+    lines = 0
+    for block in mesh.cells:
+        if block.dimension < 2:
+            lines += len(block.nodes) * (block.dimension == 1)
+            for region in np.unique(block.regions).tolist():
+                markers[block.nodes[block.regions == region]] = number[block.dimension, region]
+    lost = []
+    if lines:
+        lost.append(f"{name} cannot hold line cells: {lines} {convert.were(lines)} turned into markers of their nodes")
+    named = [f"{mesh.region_names[pair]!r} ({k})" for pair, k in number.items() if pair in mesh.region_names]
+    if named:
+        lost.append(f"{name} numbers its markers: the names {', '.join(named)} were left out")
+    return markers, lost
