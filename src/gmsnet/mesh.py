@@ -28,7 +28,10 @@ NODES = {"vertex": 1, "line": 2, "line3": 3, "line4": 4, "triangle": 3, "triangl
 class Source(Protocol):
     """The file that a mesh was read from: it can write itself again with new coordinates and nothing else changed."""
 
-    format: str
+    @property
+    def format(self) -> str:
+        """Its name in the table of formats."""
+        ...
 
     def splice(self, points: NDArray[np.float64]) -> Mapping[str, bytes]:
         """The files (suffix → bytes) with the coordinates of ``points`` (N×dim) wherever they differ from the file's."""

@@ -45,12 +45,12 @@ def check_kinds(mesh: Mesh, title: str, kinds: Collection[str]) -> None:
 
 
 def lost_data(mesh: Mesh, title: str, kept: Collection[str] = ()) -> list[str]:
-    """The point and cell data that a format cannot hold, but for the names in ``kept``."""
+    """The point data, cell data and node sets that a format cannot hold, but for the names in ``kept``."""
     lost = []
-    for what, fields in (("point", mesh.point_data), ("cell", mesh.cell_data)):
+    for what, fields in (("point data", mesh.point_data), ("cell data", mesh.cell_data), ("node sets", mesh.node_sets)):
         names = [repr(name) for name in fields if name not in kept]
         if names:
-            lost.append(f"{title} cannot hold {what} data: {', '.join(names)} {were(len(names))} left out")
+            lost.append(f"{title} cannot hold {what}: {', '.join(names)} {were(len(names))} left out")
     return lost
 
 

@@ -83,7 +83,8 @@ def _regions(text: bytes, rows: Rows, keys: NDArray[np.bytes_]) -> tuple[NDArray
         words = [token(text, span) for span in rows.row(k)]
         state[words[0]] = b" ".join(words[1:]).decode("utf-8", "backslashreplace")
         numbers.append(known.setdefault((state.get(b"usemtl", ""), state.get(b"g", "")), len(known)))
-    regions: NDArray[np.int64] = np.array(numbers, dtype=np.int64)[np.searchsorted(changes, np.arange(len(rows)), side="right")]
+    state_of_row = np.searchsorted(changes, np.arange(len(rows)), side="right")
+    regions: NDArray[np.int64] = np.array(numbers, dtype=np.int64)[state_of_row]
     return regions, [" / ".join(filter(None, pair)) for pair in known]
 
 

@@ -41,9 +41,7 @@ class TextSlots:
         order = np.argsort(starts, kind="stable")
         pieces: list[bytes] = []
         at = 0
-        for start, end, value in zip(
-            starts[order].tolist(), ends[order].tolist(), values[order].tolist(), strict=True
-        ):
+        for start, end, value in zip(starts[order].tolist(), ends[order].tolist(), values[order].tolist(), strict=True):
             pieces += (data[at:start], repr(value).encode())
             at = end
         pieces.append(data[at:])

@@ -1,0 +1,99 @@
+"""Files that are either written whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import stat
+from collections.abc import Mapping
+
+from gmsnet.errors import InputError
+
+
+def replace_files(files: Mapping[str, bytes]) -> None:
+    """Writes files (path → bytes): each new content goes to a temporary file beside its target, reaches the disk, and
+    only when all of them have done so are the targets replaced.
+
+    A link is followed, an existing file keeps its permissions. What is no regular file (a pipe, a device) is written
+    straight. Raises InputError where a target cannot be written; then, as after any other interruption, no temporary
+    file is left and no target is half-written.
+    """
+    temporary: list[tuple[str, str]] = []
+    try:
+        for path, data in files.items():
+            try:
+                _check(path)
+                if _is_special(path):
+                    with open(path, "wb") as stream:
+                        stream.write(data)
+                else:
+                    target = os.path.realpath(path)
+                    name = os.path.join(os.path.dirname(target), f".gmsnet-{secrets.token_hex(6)}.tmp")
+                    temporary.append((name, target))
+                    _write(name, target, data)
+            except OSError as error:
+                raise InputError(f"{path}: cannot be written: {reason(error)}") from None
+        for name, target in temporary:
+            try:
+                os.replace(name, target)
+            except OSError as error:
+                raise InputError(f"{target}: cannot be written: {reason(error)}") from None
+        for folder in {os.path.dirname(target) for _, target in temporary}:
+            _settle(folder)
+    finally:
+        for name, _ in temporary:
+            with contextlib.suppress(FileNotFoundError):  # it was renamed, or never made
+                os.unlink(name)
+
+
+def reason(error: OSError) -> str:
+    """What the system says, without numbers and paths."""
+    text = error.strerror or type(error).__name__
+    return text[:1].lower() + text[1:]
+
+
+def _is_special(path: str) -> bool:
+    """Whether a path leads to something that exists and is no regular file."""
+    return os.path.exists(path) and not os.path.isfile(path)
+
+
+def _check(path: str) -> None:
+    folder = os.path.dirname(os.path.realpath(path))
+    if os.path.isdir(path) or path.endswith(("/", os.sep)):
+        raise InputError(f"{path}: this is a folder; give the name of a file")
+    if _is_special(path):
+        return
+    if not os.path.isdir(folder):
+        raise InputError(f"{path}: the folder {folder} does not exist; make it first")
+    if os.path.exists(path) and not os.access(path, os.W_OK):
+        raise InputError(f"{path}: the file is write-protected")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: the folder {folder} is write-protected")
+
+
+def _write(name: str, target: str, data: bytes) -> None:
+    """A new file with the permissions and owner of the target, if that exists, on the disk when this returns."""
+    descriptor = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    with os.fdopen(descriptor, "wb") as stream:
+        stream.write(data)
+        stream.flush()
+        if os.path.exists(target):
+            old = os.stat(target)
+            if hasattr(os, "chown"):
+                with contextlib.suppress(PermissionError):  # only the superuser may give files away
+                    os.chown(name, old.st_uid, old.st_gid)
+            os.chmod(name, stat.S_IMODE(old.st_mode))
+        os.fsync(stream.fileno())
+
+
+def _settle(folder: str) -> None:
+    """Brings the new names in a folder to the disk, where the system can do that."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        with contextlib.suppress(OSError):  # not every file system knows how; the files themselves are there
+            os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

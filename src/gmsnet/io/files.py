@@ -1,0 +1,168 @@
+"""Reading and writing whole files: which format, what can go wrong, and nothing ever half-written."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+
+from gmsnet.errors import FormatError, InputError
+from gmsnet.io.atomic import reason, replace_files
+from gmsnet.io.document import Parsed
+from gmsnet.io.formats import FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
+from gmsnet.io.splice import FileSource
+from gmsnet.mesh import Mesh
+
+STANDARD_INPUT = ("-", "/dev/stdin")
+STANDARD_OUTPUT = ("-", "/dev/stdout")
+
+
+def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
+    """The mesh in a file; ``mesh.source`` keeps the file, so that ``write`` can put new coordinates into it.
+
+    path: the file; ``-`` is the standard input. Of Triangle's pair either file may be named. format: a name of the
+    table of formats (su2, gmsh, vtk, vtu, medit, triangle, stl, obj, off, ply); by default the suffix tells, or the
+    contents where there is none to tell (standard input, pipes).
+
+    Raises InputError where the file cannot be opened or the format is unknown, FormatError (naming the line) where it
+    is damaged or not of that format.
+    """
+    name = os.fspath(path)
+    shown = "standard input" if name in STANDARD_INPUT else name
+    entry, files = _open(name, shown, format)
+    if len(files) > 1:
+        shown = _beside(name, entry.suffixes[0])
+    try:
+        check_contents(files[entry.suffixes[0]], entry.key)
+        return _mesh(entry.load().read(files), entry, files)
+    except MemoryError:
+        raise InputError(f"{shown}: there is not enough memory for this mesh") from None
+    except InputError as error:
+        raise FormatError(f"{shown}: {error}") from None
+
+
+def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, bytes]]:
+    """The format and the bytes of each file of the mesh by suffix."""
+    stream = name in STANDARD_INPUT or _is_stream(name)
+    if os.path.isdir(name):
+        raise InputError(f"{name}: this is a folder; give the name of a file")
+    if not stream and not os.path.exists(name):
+        raise InputError(f"{name}: there is no such file")
+    if format is None and stream:
+        data = _bytes(name)
+        key = sniff(data)
+        if key is None:
+            raise InputError(f"{shown}: its format cannot be seen; name it with --format ({', '.join(FORMATS)})")
+        entry = FORMATS[key]
+        return entry, {entry.suffixes[0]: data}
+    entry = entry_of(format) if format is not None else FORMATS[format_of_suffix(name, os.path.splitext(name)[1])]
+    if len(entry.suffixes) == 1:
+        return entry, {entry.suffixes[0]: _bytes(name)}
+    if stream:
+        raise InputError(f"{shown}: {entry.title} takes several files and cannot be read from a stream")
+    return entry, {suffix: _bytes(_beside(name, suffix)) for suffix in entry.suffixes}
+
+
+def _is_stream(name: str) -> bool:
+    """Whether a path leads to a pipe or a device."""
+    return os.path.exists(name) and not os.path.isfile(name) and not os.path.isdir(name)
+
+
+def _bytes(name: str) -> bytes:
+    try:
+        if name in STANDARD_INPUT:
+            return sys.stdin.buffer.read()
+        with open(name, "rb") as stream:
+            return stream.read()
+    except FileNotFoundError:
+        raise InputError(f"{name}: there is no such file") from None
+    except IsADirectoryError:
+        raise InputError(f"{name}: this is a folder; give the name of a file") from None
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read: {reason(error)}") from None
+    except MemoryError:
+        raise InputError(f"{name}: there is not enough memory for this file") from None
+
+
+def _beside(name: str, suffix: str) -> str:
+    """The name of a companion file, its suffix in capitals if that of ``name`` is."""
+    stem, given = os.path.splitext(name)
+    known_suffix = any(given.lower() in entry.suffixes for entry in FORMATS.values())
+    stem, given = (stem, given) if known_suffix else (name, "")
+    return stem + (suffix.upper() if given.isupper() else suffix)
+
+
+def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, bytes]) -> Mesh:
+    if not len(parsed.points):
+        raise FormatError("the file holds no points")
+    if not any(len(block.nodes) for block in parsed.cells):
+        raise FormatError("the file holds no cells")
+    mesh = Mesh(
+        parsed.points,
+        tuple(parsed.cells),
+        parsed.region_names,
+        parsed.point_data,
+        parsed.cell_data,
+        parsed.single,
+    )
+    main = entry.suffixes[0]
+    companions = {suffix: data for suffix, data in files.items() if suffix != main}
+    source = FileSource(entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions)
+    return replace(mesh, source=source)
+
+
+def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -> list[str]:
+    """Writes a mesh to a file and returns, in words, what the target's format could not hold.
+
+    A mesh that was read from a file of the same format, and has the cells that it had, is written as that file with
+    the new coordinates in the places of the old ones; then nothing is lost. Any other is converted.
+
+    path: the file; ``-`` is the standard output, and pipes and devices are written straight. Everything else is
+    replaced in one step, once all is on the disk. format: as in ``read``; by default the suffix tells, or the format
+    that the mesh was read from where there is none to tell.
+
+    Raises InputError where the file cannot be written, FormatError where the format cannot hold the mesh.
+    """
+    name = os.fspath(path)
+    stream = name in STANDARD_OUTPUT or _is_stream(name)
+    shown = "standard output" if name in STANDARD_OUTPUT else name
+    if os.path.isdir(name):
+        raise InputError(f"{name}: this is a folder; give the name of a file")
+    if format is not None:
+        entry = entry_of(format)
+    elif stream and mesh.source is not None:
+        entry = entry_of(mesh.source.format)
+    elif stream:
+        raise InputError(f"{shown}: name the format with --format ({', '.join(FORMATS)})")
+    else:
+        entry = FORMATS[format_of_suffix(name, os.path.splitext(name)[1])]
+    source = mesh.source
+    lost: list[str] = []
+    try:
+        if isinstance(source, FileSource) and source.format == entry.key and source.has_cells(mesh.cells):
+            files: Mapping[str, bytes] = source.splice(mesh.points)
+        else:
+            written = entry.load().write(mesh)
+            files, lost = written.files, written.lost
+    except MemoryError:
+        raise InputError(f"{shown}: there is not enough memory to write this mesh") from None
+    except InputError as error:
+        raise FormatError(f"{shown}: {error}") from None
+    if len(files) > 1 and stream:
+        raise InputError(f"{shown}: {entry.title} takes several files and cannot be written to a stream")
+    if name in STANDARD_OUTPUT:
+        _to_standard_output(*files.values())
+    elif len(files) > 1:
+        replace_files({_beside(name, suffix): data for suffix, data in files.items()})
+    else:
+        replace_files(dict.fromkeys([name], *files.values()))
+    return lost
+
+
+def _to_standard_output(data: bytes) -> None:
+    try:
+        sys.stdout.buffer.write(data)
+        sys.stdout.buffer.flush()
+    except OSError as error:
+        raise InputError(f"standard output: cannot be written: {reason(error)}") from None

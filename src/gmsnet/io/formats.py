@@ -1,0 +1,131 @@
+"""The table of file formats, and what a file looks like from within whatever its name says."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from importlib import import_module
+from typing import cast
+
+from gmsnet.errors import FormatError, InputError
+from gmsnet.io.document import Format
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A format in the table.
+
+    key: the name that ``--format`` takes. title: what messages call it. suffixes: lower case, the first is that of the
+    file with the coordinates.
+    """
+
+    key: str
+    title: str
+    suffixes: tuple[str, ...]
+
+    def load(self) -> Format:
+        """The module that reads and writes the format, imported on first use."""
+        return cast(Format, import_module(f"gmsnet.io.{self.key}"))
+
+
+FORMATS = {
+    entry.key: entry
+    for entry in (
+        Entry("su2", "SU2", (".su2",)),
+        Entry("gmsh", "Gmsh", (".msh",)),
+        Entry("vtk", "VTK", (".vtk",)),
+        Entry("vtu", "VTU", (".vtu",)),
+        Entry("medit", "Medit", (".mesh",)),
+        Entry("triangle", "Triangle", (".node", ".ele")),
+        Entry("stl", "STL", (".stl",)),
+        Entry("obj", "OBJ", (".obj",)),
+        Entry("off", "OFF", (".off",)),
+        Entry("ply", "PLY", (".ply",)),
+    )
+}
+BY_SUFFIX = {suffix: key for key, entry in FORMATS.items() for suffix in entry.suffixes}
+
+MENDS = {  # files that one may well have, but that are not read
+    ".meshb": "binary Medit is not read: convert it to text (.mesh)",
+    ".poly": "a .poly file is the input of Triangle: run Triangle on it and give the .node file",
+    ".cgns": "CGNS is not read: convert it to .su2, .vtu or .msh",
+    ".geo": "a .geo file is a geometry: mesh it with Gmsh and give the .msh file",
+    ".gz": "unpack it first",
+    ".zip": "unpack it first",
+}
+
+# What files begin with, white space aside. The last group are known by sight, but not read.
+SIGNS = {
+    "gmsh": rb"\$(MeshFormat|Comments|NOD|Nodes|PhysicalNames)\b",
+    "vtk": rb"#\s*vtk DataFile Version",
+    "vtu": rb"(<\?xml[^>]*>\s*)?(<!--(?s:.*?)-->\s*)*<VTKFile\b[^>]*\bUnstructuredGrid",
+    "ply": rb"ply\s*\r?\n\s*(format|comment|obj_info)\b",
+    "stl": rb"(?i:solid\b[^\r\n]*[\r\n]+\s*(facet|endsolid)\b)",
+    "medit": rb"([#][^\r\n]*\s+)*MeshVersionFormatted\b",
+    "off": rb"([#][^\r\n]*\s+)*(ST)?C?N?4?n?OFF\b",
+    "su2": rb"(%[^\r\n]*\s+)*(NDIME|NZONE|NELEM|NPOIN|NMARK|IZONE|NCHUNK|AOA|FFD_NBOX)\s*=",
+    "obj": rb"([#][^\r\n]*\s+)*((mtllib|o|g|usemtl)\s+\S+\s+|s\s+(off|\d+)\s+)*v[nt]?[ \t]+[-+.\d]+[ \t]+[-+.\d]",
+}
+STRANGERS = {
+    "an MFEM mesh": rb"MFEM (NC )?mesh v",
+    "a VTK file of another kind (not an UnstructuredGrid)": rb"(<\?xml[^>]*>\s*)?<VTKFile\b",
+    "an HDF5 file (CGNS, XDMF or the like)": rb"\x89HDF\r\n",
+    "an Abaqus or CalculiX file": rb"\*(Heading|Node|Part)\b",
+    "a zip archive": rb"PK\x03\x04",
+    "compressed with gzip": rb"\x1f\x8b",
+    "a binary Medit mesh": rb"\x01\0\0\0[\x01-\x04]\0\0\0\x03\0\0\0|\0\0\0\x01\0\0\0[\x01-\x04]\0\0\0\x03",
+}
+HEAD = 4096  # bytes that are looked at
+
+
+def known() -> str:
+    """The suffixes that are read and written, in words."""
+    return ", ".join(suffix for entry in FORMATS.values() for suffix in entry.suffixes)
+
+
+def entry_of(key: str) -> Entry:
+    """The format with a name of the table. Raises InputError listing the names."""
+    if key.lower() not in FORMATS:
+        raise InputError(f"unknown format {key!r}: known are {', '.join(FORMATS)}")
+    return FORMATS[key.lower()]
+
+
+def format_of_suffix(path: str, suffix: str) -> str:
+    """The name of the format that goes by a suffix. Raises InputError naming the file and the known suffixes."""
+    if suffix.lower() in BY_SUFFIX:
+        return BY_SUFFIX[suffix.lower()]
+    if suffix.lower() in MENDS:
+        raise InputError(f"{path}: {MENDS[suffix.lower()]}")
+    what = f"the suffix {suffix!r} is unknown" if suffix else "the name has no suffix"
+    raise InputError(f"{path}: {what}; known are {known()}; or name the format with --format")
+
+
+def sniff(data: bytes) -> str | None:
+    """The name of the format that the first bytes show, None where they do not."""
+    head = data[:HEAD].removeprefix(b"\xef\xbb\xbf")
+    for key, sign in SIGNS.items():
+        if re.match(rb"\s*" + sign, head):
+            return key
+    if len(data) > 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
+        return "stl"
+    return None
+
+
+def check_contents(data: bytes, key: str) -> None:
+    """Raises FormatError where a file is empty, is no mesh at all, or shows another format than ``key``."""
+    if not data.strip():
+        raise FormatError("the file is empty")
+    title = FORMATS[key].title
+    shown = sniff(data)
+    if shown == key:
+        return
+    if shown is not None:
+        right = f"{FORMATS[shown].suffixes[0]} or pass --format {shown}"
+        raise FormatError(f"this looks like a {FORMATS[shown].title} file, not {title}; rename it to {right}")
+    for what, sign in STRANGERS.items():
+        if re.match(sign, data[:HEAD]):
+            raise FormatError(f"this is {what}, not a {title} file; convert it first ({known()} are read)")
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise FormatError("the text is in UTF-16; save it as plain text (ASCII or UTF-8)")
+    if b"\0" in data[:HEAD]:
+        raise FormatError(f"this is binary data, not a {title} file")
