@@ -1,0 +1,112 @@
+"""Trained weights: safetensors files that carry in their metadata how they were made. Read without torch."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError, safe_open
+
+from gmsnet.errors import InputError
+
+FORMAT_VERSION = "1"
+LEAST_HIDDEN, MOST_HIDDEN = 4, 64
+SHIPPED = {"gmsnet": "gmsnet-h8.safetensors"}  # model → file beside this module
+
+
+def shapes(hidden: int) -> dict[str, tuple[int, ...]]:
+    """Name → shape of each tensor of GMSNet with H hidden features (float32; matrices as output × input).
+
+    linear: W_l, b_l of equation (4). norm: γ, β, α of GraphNorm, (5). gcn: W_g, b_g, (7). mlp: (8).
+    """
+    h = hidden
+    return {
+        "linear.weight": (h, 2),
+        "linear.bias": (h,),
+        "norm.weight": (h,),
+        "norm.bias": (h,),
+        "norm.mean_scale": (h,),
+        "gcn.weight": (h, h),
+        "gcn.bias": (h,),
+        "mlp.0.weight": (h, h),
+        "mlp.0.bias": (h,),
+        "mlp.1.weight": (2, h),
+        "mlp.1.bias": (2,),
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """The parameters of a network.
+
+    model: "gmsnet". hidden: H. tensors: name → float32 array, read-only, see ``shapes``. metadata: the recipe, the
+    versions of the packages, the validation curve, …, all as text.
+    """
+
+    model: str
+    hidden: int
+    tensors: Mapping[str, NDArray[np.float32]]
+    metadata: Mapping[str, str]
+
+    @property
+    def parameters(self) -> int:
+        """How many numbers they are."""
+        return sum(tensor.size for tensor in self.tensors.values())
+
+
+def load(path: str | os.PathLike[str] | None = None, *, model: str = "gmsnet") -> Weights:
+    """The weights in a file, by default those that come with the package.
+
+    Raises InputError, with the file first, where it is missing or cut off, is no safetensors file, belongs to another
+    model or format version, has a hidden width outside 4 to 64, or its tensors have the wrong names, shapes, type or
+    values that are not finite.
+    """
+    if model not in SHIPPED:
+        raise InputError(f"there are no weights for a model {model!r}; there are some for {', '.join(SHIPPED)}")
+    if path is None:
+        with as_file(files(__name__) / SHIPPED[model]) as shipped:
+            return _load(shipped, model)
+    return _load(Path(path), model)
+
+
+def _load(path: Path, model: str) -> Weights:
+    if not path.is_file():
+        raise InputError(f"{path}: {'is no file' if path.exists() else 'there is no such file of weights'}")
+    try:
+        with safe_open(path, framework="numpy") as file:
+            metadata = dict(file.metadata() or {})
+            tensors = {name: np.asarray(file.get_tensor(name)) for name in file.keys()}  # noqa: SIM118 (not a dict)
+    except (SafetensorError, OSError, TypeError, AttributeError, KeyError) as error:
+        raise InputError(f"{path}: cannot be read as safetensors weights ({error}); is it whole?") from error
+    if metadata.get("model") != model:
+        found = f"of the model {metadata['model']!r}" if "model" in metadata else "without the name of a model"
+        raise InputError(f"{path}: weights {found}, where those of {model!r} are needed (gmsnet train makes them)")
+    if metadata.get("format_version") != FORMAT_VERSION:
+        raise InputError(
+            f"{path}: weights of format version {metadata.get('format_version')!r}, "
+            f"but this gmsnet reads version {FORMAT_VERSION!r}"
+        )
+    hidden = tensors["linear.bias"].size if "linear.bias" in tensors else 0
+    if not LEAST_HIDDEN <= hidden <= MOST_HIDDEN:
+        raise InputError(
+            f"{path}: the hidden width must lie between {LEAST_HIDDEN} and {MOST_HIDDEN}, here it is {hidden}"
+        )
+    expected = shapes(hidden)
+    if tensors.keys() != expected.keys():
+        names = ", ".join(sorted(tensors.keys() ^ expected.keys()))
+        raise InputError(f"{path}: not the tensors of {model!r}; missing or unknown: {names}")
+    for name, tensor in tensors.items():
+        if tensor.shape != expected[name]:
+            raise InputError(f"{path}: {name} must have the shape {expected[name]}, here it is {tensor.shape}")
+        if tensor.dtype != np.float32:
+            raise InputError(f"{path}: {name} must be of type float32, here it is {tensor.dtype}")
+        if not np.isfinite(tensor).all():
+            raise InputError(f"{path}: {name} holds values that are not finite")
+        tensor.flags.writeable = False
+    return Weights(model, hidden, MappingProxyType(tensors), MappingProxyType(metadata))
