@@ -1,0 +1,296 @@
+"""Legacy VTK files (``.vtk``): unstructured grids and polygonal data, text and binary, versions 1.0 to 5.1.
+
+POINTS are followed by lists of cells; CELL_DATA and POINT_DATA by arrays of attributes. Until version 4 each list of
+nodes has its length in front; since version 5 there are two arrays, OFFSETS and CONNECTIVITY, instead.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NoReturn
+from urllib.parse import quote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import FormatError
+from gmsnet.io import convert, vtk_cells
+from gmsnet.io.document import Parsed, Written
+from gmsnet.io.vtk_stream import TYPES, Array, Line, Stream, field_name, word_of
+from gmsnet.mesh import Mesh
+
+name = "VTK"
+suffixes = (".vtk",)
+
+LISTS = {"VERTICES": vtk_cells.POLYVERTEX, "LINES": vtk_cells.POLYLINE, "POLYGONS": vtk_cells.POLYGON}
+ATTRIBUTES = {  # keyword: how its line goes on, components
+    "VECTORS": ("VECTORS name type", 3),
+    "NORMALS": ("NORMALS name type", 3),
+    "TENSORS": ("TENSORS name type", 9),
+    "TENSORS6": ("TENSORS6 name type", 6),
+    "GLOBAL_IDS": ("GLOBAL_IDS name type", 1),
+    "PEDIGREE_IDS": ("PEDIGREE_IDS name type", 1),
+    "EDGE_FLAGS": ("EDGE_FLAGS name type", 1),
+}
+TYPE_NAMES = {kind: called for called, kind in TYPES.items() if called not in ("vtkidtype", "signed_char")} | {
+    "i8": "long",
+    "u8": "unsigned_long",
+}
+_HEAD = re.compile(
+    rb"#\s*vtk\s+DataFile\s+Version\s+(\d+)\.\d+[^\r\n]*(?:\r\n?|\n)"
+    rb"[^\r\n]*(?:\r\n?|\n)\s*(ASCII|BINARY)[ \t]*(?:\r\n?|\n)",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class CellLists:
+    """Lists of nodes: list k has the nodes first[k] to first[k + 1] - 1. at: the place of each in the array."""
+
+    first: NDArray[np.int64]
+    nodes: NDArray[np.int64]
+    at: NDArray[np.int64]
+    array: Array
+
+
+@dataclass
+class Contents:
+    """What the sections of a file add up to. fields: of the points and of the cells, with their announced number."""
+
+    points: Array | None = None
+    lists: dict[str, CellLists] = field(default_factory=dict)
+    types: NDArray[np.int64] | None = None
+    fields: dict[str, list[tuple[str, NDArray[Any]]]] = field(default_factory=dict)
+    counts: dict[str, tuple[int, Line]] = field(default_factory=dict)
+
+
+def read(files: Mapping[str, bytes]) -> Parsed:
+    """See Format."""
+    data = files[".vtk"]
+    head = _HEAD.match(data)
+    if head is None:
+        raise FormatError("line 1: not a legacy VTK file: it must start with '# vtk DataFile Version', a title and "
+                          "ASCII or BINARY")  # fmt: skip
+    stream = Stream(data, head.end(), head[2].upper() == b"BINARY")
+    line = stream.line()
+    if line.key != "DATASET":
+        stream.fail(line.start, "expected DATASET")
+    (dataset,) = stream.expect(line, "DATASET type")
+    if dataset.upper() not in ("UNSTRUCTURED_GRID", "POLYDATA"):
+        stream.fail(line.start, f"a DATASET of type {word_of(dataset)} is not supported: "
+                                "write it as an UNSTRUCTURED_GRID")  # fmt: skip
+    found = Contents()
+    while (line := stream.line()).words:
+        _section(stream, line, found)
+    return _assemble(stream, found, dataset.upper() == "POLYDATA")
+
+
+def _section(stream: Stream, line: Line, found: Contents) -> None:
+    key = line.key
+    if key in found.lists or key in found.counts or (key == "POINTS" and found.points is not None):
+        stream.fail(line.start, f"{key} is given twice")
+    if key == "POINTS":
+        count, kind = stream.expect(line, "POINTS count type")
+        if kind.lower() not in ("float", "double"):
+            stream.fail(line.start, f"POINTS of type {word_of(kind)} are not supported: write them as double")
+        found.points = stream.array(line, 3 * stream.count(line, count), kind)
+    elif key == "CELLS" or key in LISTS:
+        found.lists[key] = _lists(stream, line)
+    elif key == "TRIANGLE_STRIPS":
+        stream.fail(line.start, "TRIANGLE_STRIPS are not supported: turn them into triangles first")
+    elif key == "CELL_TYPES":
+        (count,) = stream.expect(line, "CELL_TYPES count")
+        found.types = stream.array(line, stream.count(line, count), "int").values()
+    elif key in ("POINT_DATA", "CELL_DATA"):
+        (count,) = stream.expect(line, f"{key} count")
+        found.counts[key] = stream.count(line, count), line
+        found.fields[key] = []
+    elif not found.fields:
+        if key != "FIELD":
+            stream.fail(line.start, f"unknown keyword {word_of(line.words[0])}")
+        _field(stream, line, None)  # facts about the whole grid
+    else:
+        place = list(found.fields)[-1]
+        found.fields[place] += _attribute(stream, line, found.counts[place][0])
+
+
+def _lists(stream: Stream, line: Line) -> CellLists:
+    lists, size = (stream.count(line, text) for text in stream.expect(line, f"{line.key} count size"))
+    if not stream.next_is(b"OFFSETS"):
+        array = stream.array(line, size, "int")
+        return counted_lists(array, lists, line.key)
+    offsets, nodes = (
+        stream.array(part, count, stream.expect(part, f"{key} type")[0])
+        for key, count in (("OFFSETS", lists), ("CONNECTIVITY", size))
+        for part in [_keyword(stream, key)]
+    )
+    first = offsets.values()
+    if not lists:
+        first = np.zeros(1, dtype=np.int64)
+    wrong = np.flatnonzero(np.diff(first, append=size) < 0)
+    if first[0] or first[-1] != size or wrong.size:
+        offsets.fail(int(wrong[0]) if wrong.size else 0, f"OFFSETS must rise from 0 to the {size} of CONNECTIVITY")
+    return CellLists(first, nodes.values(), np.arange(size), nodes)
+
+
+def _keyword(stream: Stream, key: str) -> Line:
+    line = stream.line()
+    if line.key != key:
+        stream.fail(line.start, f"expected {key}")
+    return line
+
+
+def counted_lists(array: Array, count: int, key: str) -> CellLists:
+    """``count`` lists of nodes, each with its length in front, which together are the whole array."""
+    numbers = array.values()
+    stride = len(numbers) // count if count else 0
+    if count and stride * count == len(numbers) and (numbers[::stride] == stride - 1).all():
+        starts, sizes = np.arange(0, len(numbers), stride), np.full(count, stride - 1)
+    else:
+        found, at, lengths = [], 0, numbers.tolist()
+        for k in range(count):
+            if at >= len(lengths) or lengths[at] < 0 or at + lengths[at] >= len(lengths):
+                array.fail(min(at, len(lengths) - 1), f"list {k} of {key} goes beyond the {len(lengths)} numbers that "
+                                                      "were announced")  # fmt: skip
+            found.append(at)
+            at += 1 + lengths[at]
+        if at != len(lengths):
+            array.fail(at, f"the {count} lists of {key} end before the {len(lengths)} numbers that were announced")
+        starts = np.array(found, dtype=np.int64)
+        sizes = numbers[starts] if count else np.empty(0, dtype=np.int64)
+    at_node = np.ones(len(numbers), dtype=bool)
+    at_node[starts] = False
+    places = np.flatnonzero(at_node)
+    return CellLists(np.concatenate([[0], np.cumsum(sizes)]), numbers[places], places, array)
+
+
+def _attribute(stream: Stream, line: Line, count: int) -> list[tuple[str, NDArray[Any]]]:
+    key = line.key
+    if key == "FIELD":
+        return _field(stream, line, count)
+    if key == "LOOKUP_TABLE":  # colours, which are not kept
+        size = stream.count(line, stream.expect(line, "LOOKUP_TABLE name size")[1])
+        stream.array(line, 4 * size, "unsigned_char" if stream.binary else "float").values()
+        return []
+    kind = "unsigned_char" if stream.binary else "float"
+    if key == "SCALARS":
+        called, kind, *more = stream.expect(line, "SCALARS name type components", 1)
+        width = stream.count(line, more[0]) if more else 1
+        table = _keyword(stream, "LOOKUP_TABLE")
+        stream.expect(table, "LOOKUP_TABLE name")
+    elif key == "COLOR_SCALARS":
+        called, text = stream.expect(line, "COLOR_SCALARS name components")
+        width = stream.count(line, text)
+    elif key == "TEXTURE_COORDINATES":
+        called, text, kind = stream.expect(line, "TEXTURE_COORDINATES name components type")
+        width = stream.count(line, text)
+    elif key in ATTRIBUTES:
+        usage, width = ATTRIBUTES[key]
+        called, kind = stream.expect(line, usage)
+    else:
+        stream.fail(line.start, f"unknown keyword {word_of(line.words[0])}")
+    return [(field_name(called), _values(stream, line, count, width, kind))]
+
+
+def _field(stream: Stream, line: Line, rows: int | None) -> list[tuple[str, NDArray[Any]]]:
+    """The arrays of a FIELD, which must have ``rows`` rows (None: any number, and they are not kept)."""
+    found = []
+    for _ in range(stream.count(line, stream.expect(line, "FIELD name arrays")[1])):
+        head = stream.line()
+        if head.key == "NULL_ARRAY":
+            continue
+        called, components, tuples, kind = [head.words[0] if head.words else "", *stream.expect(head, _ARRAY)]
+        width, length = stream.count(head, components), stream.count(head, tuples)
+        if rows is not None and length != rows:
+            stream.fail(head.start, f"the array {word_of(called)} has {length} rows instead of {rows}")
+        if kind.lower() in ("string", "utf8_string"):
+            stream.skip_strings(width * length)
+        else:
+            values = _values(stream, head, length, width, kind)
+            found += [] if rows is None else [(field_name(called), values)]
+    return found
+
+
+_ARRAY = "name components rows type"
+
+
+def _values(stream: Stream, line: Line, rows: int, width: int, kind: str) -> NDArray[Any]:
+    """An attribute: (rows,) or (rows, width), of the type that the file declares."""
+    if kind.lower() == "bit":
+        values: NDArray[Any] = stream.bits(rows * width).astype(np.uint8)
+    else:
+        array = stream.array(line, rows * width, kind)
+        values = array.values()
+        exact = values.astype(array.kind)
+        values = exact if array.kind[0] == "f" or np.array_equal(exact, values) else values
+    return values if width == 1 else values.reshape(rows, width)
+
+
+def _assemble(stream: Stream, found: Contents, polygonal: bool) -> Parsed:
+    keys = list(LISTS) if polygonal else ["CELLS"]
+    lists = {key: found.lists[key] for key in keys if key in found.lists}
+    there = {"POINTS": found.points is not None, "CELLS": polygonal or "CELLS" in lists}
+    there["CELL_TYPES"] = polygonal or found.types is not None
+    if found.points is None or not all(there.values()):
+        raise FormatError(f"{' and '.join(k for k in there if not there[k])} missing: the file is cut off")
+    if set(found.lists) - set(keys) or (polygonal and found.types is not None):
+        raise FormatError(f"{', '.join(found.lists)}: these lists do not belong into this type of DATASET")
+    none = [np.empty(0, dtype=np.int64)]
+    sizes = np.concatenate(none + [np.diff(part.first) for part in lists.values()])
+    nodes = np.concatenate(none + [part.nodes for part in lists.values()])
+    codes = found.types
+    if codes is None:
+        codes = np.concatenate(none + [np.full(len(part.first) - 1, LISTS[key]) for key, part in lists.items()])
+    if len(codes) != len(sizes):
+        raise FormatError(f"there are {len(sizes)} CELLS, but {len(codes)} CELL_TYPES")
+    points = found.points.values(finite=True).reshape(-1, 3)
+    for key, expected in (("POINT_DATA", len(points)), ("CELL_DATA", len(codes))):
+        if key in found.counts and found.counts[key][0] != expected:
+            announced, line = found.counts[key]
+            stream.fail(line.start, f"{key} has {announced} rows instead of {expected}")
+
+    def blame(index: int, message: str) -> NoReturn:
+        for part in lists.values():
+            if index < len(part.nodes):
+                part.array.fail(int(part.at[index]), message)
+            index -= len(part.nodes)
+        raise FormatError(message)
+
+    return vtk_cells.parsed(
+        points,
+        found.points.source.slots(found.points.at.reshape(-1, 3), found.points.kind),
+        found.points.kind == "f4",
+        codes,
+        np.concatenate([[0], np.cumsum(sizes)]),
+        nodes,
+        found.fields.get("POINT_DATA", []),
+        found.fields.get("CELL_DATA", []),
+        blame,
+    )
+
+
+def write(mesh: Mesh) -> Written:
+    """See Format. An unstructured grid of version 4.2 as text, points in double precision."""
+    codes, sizes, nodes = vtk_cells.cells_out(mesh, name)
+    point_fields, cell_fields, lost = vtk_cells.fields_out(mesh, name)
+    ends = np.cumsum(sizes)
+    lists = [
+        f"{len(part)} {' '.join(map(str, part))}\n"
+        for part in (nodes[a:b].tolist() for a, b in zip((ends - sizes).tolist(), ends.tolist(), strict=True))
+    ]
+    text = [
+        "# vtk DataFile Version 4.2\nmesh\nASCII\nDATASET UNSTRUCTURED_GRID\n",
+        f"POINTS {len(mesh.points)} double\n{vtk_cells.rows_text(convert.in_space(mesh))}",
+        f"CELLS {len(codes)} {len(codes) + len(nodes)}\n{''.join(lists)}",
+        f"CELL_TYPES {len(codes)}\n{vtk_cells.rows_text(codes[:, None])}",
+    ]
+    for key, count, fields in (("POINT_DATA", len(mesh.points), point_fields), ("CELL_DATA", len(codes), cell_fields)):
+        if fields:
+            text.append(f"{key} {count}\nFIELD FieldData {len(fields)}\n")
+        for called, array in fields:
+            kind = TYPE_NAMES[array.dtype.newbyteorder("=").str[1:]]
+            text.append(f"{quote(called) or 'field'} {array.shape[1]} {len(array)} {kind}\n")
+            text.append(vtk_cells.rows_text(array))
+    return Written({".vtk": "".join(text).encode("ascii")}, lost)
