@@ -19,7 +19,7 @@ from gmsnet.kernels import stars
 from gmsnet.kernels.compile import LANES, fast_kernel, kernel
 
 EPSILON = np.float32(1e-5)  # of both norms, as in PyTorch and PyTorch Geometric
-ONE, ZERO = np.float32(1.0), np.float32(0.0)
+ZERO, ONE, TWO = np.float32(0.0), np.float32(1.0), np.float32(2.0)
 
 
 @fast_kernel
@@ -50,71 +50,97 @@ def moments(local, n, m):
 
 
 @fast_kernel
-def propose(local, n, weights, hidden, m, c, s, h, shift):
-    """Shifts (2·LANES, over the star's size) for a block of stars; m, c, s, h: work of 5, H, H, H rows of LANES.
+def propose(local, n, weights, hidden, m, row, features, decoded, shift):
+    """Shifts (2·LANES, over the star's size) for a block of stars. weights: what ``fold`` returns, flat float32.
 
-    weights: what ``fold`` returns, flat float32.
+    Work: m (5 rows of LANES), row (4), features (2 per channel, the channels padded to a multiple of 4 with zeros that
+    stay), decoded (1 per channel). Related rows lie in one array, at fixed distances, so that the loops over lanes
+    need few run-time checks for overlap: with more of them they would not be vectorised.
     """
     moments(local, n, m)
     centre = ONE / np.float32(n + 1)
-    spoke = ONE / (np.float32(2.0) * np.sqrt(np.float32(n + 1)))
-    gx, gy = np.empty(LANES, dtype=np.float32), np.empty(LANES, dtype=np.float32)
+    spoke = ONE / (TWO * np.sqrt(np.float32(n + 1)))
     for k in range(hidden):
         wx, wy, b = weights[6 * k], weights[6 * k + 1], weights[6 * k + 2]
         gamma, beta, alpha = weights[6 * k + 3], weights[6 * k + 4], weights[6 * k + 5]
         rest = (ONE - alpha) * (ONE - alpha)
-        row = k * LANES
-        for lane in range(LANES):
+        for lane in range(LANES):  # row: g·w_x, g·w_y, c, sum over the ring
             mu = wx * m[lane] + wy * m[LANES + lane] + b
-            second = wx * (wx * m[2 * LANES + lane] + np.float32(2.0) * wy * m[3 * LANES + lane])
+            second = wx * (wx * m[2 * LANES + lane] + TWO * wy * m[3 * LANES + lane])
             second += wy * wy * m[4 * LANES + lane] + rest * mu * mu
             g = gamma / np.sqrt(max(second, ZERO) + EPSILON)
-            gx[lane] = g * wx
-            gy[lane] = g * wy
-            c[row + lane] = g * (b - alpha * mu) + beta
-            h[lane] = ZERO
-        for j in range(n):
-            for lane in range(LANES):
-                value = gx[lane] * local[2 * j * LANES + lane] + gy[lane] * local[(2 * j + 1) * LANES + lane]
-                h[lane] += max(value + c[row + lane], ZERO)
+            row[lane] = g * wx
+            row[LANES + lane] = g * wy
+            row[2 * LANES + lane] = g * (b - alpha * mu) + beta
+            row[3 * LANES + lane] = ZERO
+        add_ring(local, n, row)
+        feature = features[2 * k * LANES : 2 * (k + 1) * LANES]
         for lane in range(LANES):
-            s[row + lane] = spoke * h[lane] + centre * max(c[row + lane], ZERO)
-    decode(weights, hidden, c, s, h, shift)
+            c = row[2 * LANES + lane]
+            feature[lane] = spoke * row[3 * LANES + lane] + centre * max(c, ZERO)
+            feature[LANES + lane] = c
+    decode(weights, hidden, features, row, decoded, shift)
 
 
 @fast_kernel
-def decode(weights, hidden, c, s, h, shift):
+def add_ring(local, n, row):
+    """Adds ReLU(x̂) of the ring's nodes to row 3, three nodes at a time."""
+    j = 0
+    while j + 3 <= n:
+        p = local[2 * j * LANES : 2 * (j + 3) * LANES]
+        for lane in range(LANES):
+            a, b, c = row[lane], row[LANES + lane], row[2 * LANES + lane]
+            first = max(a * p[lane] + b * p[LANES + lane] + c, ZERO)
+            second = max(a * p[2 * LANES + lane] + b * p[3 * LANES + lane] + c, ZERO)
+            third = max(a * p[4 * LANES + lane] + b * p[5 * LANES + lane] + c, ZERO)
+            row[3 * LANES + lane] += first + second + third
+        j += 3
+    while j < n:
+        p = local[2 * j * LANES : 2 * (j + 1) * LANES]
+        for lane in range(LANES):
+            value = row[lane] * p[lane] + row[LANES + lane] * p[LANES + lane] + row[2 * LANES + lane]
+            row[3 * LANES + lane] += max(value, ZERO)
+        j += 1
+
+
+@fast_kernel
+def decode(weights, hidden, features, row, decoded, shift):
     """Equations 7 and 8: residual graph convolution at the centre, then Linear → InstanceNorm → ReLU → Linear."""
-    mix = 6 * hidden
-    skip = mix + hidden * hidden
-    bias = skip + hidden * hidden
-    out = bias + hidden
+    padded = 4 * ((hidden + 3) // 4)
+    mix = weights[6 * hidden : 6 * hidden + 2 * hidden * padded]
+    rest = weights[6 * hidden + 2 * hidden * padded :]  # the bias (H), W₂ (2 × H), b₂
     inverse = ONE / np.float32(hidden)
-    mean, spread = np.empty(LANES, dtype=np.float32), np.empty(LANES, dtype=np.float32)
-    for lane in range(LANES):
-        mean[lane] = spread[lane] = ZERO
+    for lane in range(2 * LANES):  # row: mean, then 1/√(variance + ε)
+        row[lane] = ZERO
     for k in range(hidden):
-        row = k * LANES
+        d = decoded[k * LANES : (k + 1) * LANES]
         for lane in range(LANES):
-            h[row + lane] = weights[bias + k]
-        for i in range(hidden):
-            a, b = weights[mix + k * hidden + i], weights[skip + k * hidden + i]
+            d[lane] = rest[k]
+        for i in range(0, padded, 4):
+            w = mix[2 * (k * padded + i) : 2 * (k * padded + i + 4)]
+            a0, a1, a2, a3, a4, a5, a6, a7 = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7]
+            f = features[2 * i * LANES : 2 * (i + 4) * LANES]
             for lane in range(LANES):
-                h[row + lane] += a * s[i * LANES + lane] + b * c[i * LANES + lane]
+                left = a0 * f[lane] + a1 * f[LANES + lane] + a2 * f[2 * LANES + lane] + a3 * f[3 * LANES + lane]
+                right = a4 * f[4 * LANES + lane] + a5 * f[5 * LANES + lane]
+                right += a6 * f[6 * LANES + lane] + a7 * f[7 * LANES + lane]
+                d[lane] += left + right
         for lane in range(LANES):
-            mean[lane] += h[row + lane] * inverse
+            row[lane] += d[lane] * inverse
     for k in range(hidden):
+        d = decoded[k * LANES : (k + 1) * LANES]
         for lane in range(LANES):
-            d = h[k * LANES + lane] - mean[lane]
-            spread[lane] += d * d * inverse
+            off = d[lane] - row[lane]
+            row[LANES + lane] += off * off * inverse
     for lane in range(LANES):
-        spread[lane] = ONE / np.sqrt(spread[lane] + EPSILON)
-        shift[lane] = weights[out + 2 * hidden]
-        shift[LANES + lane] = weights[out + 2 * hidden + 1]
+        row[LANES + lane] = ONE / np.sqrt(row[LANES + lane] + EPSILON)
+        shift[lane] = rest[3 * hidden]
+        shift[LANES + lane] = rest[3 * hidden + 1]
     for k in range(hidden):
-        a, b = weights[out + k], weights[out + hidden + k]
+        a, b = rest[hidden + k], rest[2 * hidden + k]
+        d = decoded[k * LANES : (k + 1) * LANES]
         for lane in range(LANES):
-            value = max((h[k * LANES + lane] - mean[lane]) * spread[lane], ZERO)
+            value = max((d[lane] - row[lane]) * row[LANES + lane], ZERO)
             shift[lane] += a * value
             shift[LANES + lane] += b * value
 
@@ -125,17 +151,14 @@ def sweep(points, centre, rings, offset, degree, count, first, last, most, unit,
 
     most: the largest degree; unit, single: see kernels.stars; tally: (3,) int64, added to.
     """
-    x, ring = np.empty(2 * LANES), np.empty(2 * most * LANES)
+    x, ring, work = np.empty(2 * LANES), np.empty(2 * most * LANES), np.empty(8 * LANES)
     local = np.empty(2 * most * LANES, dtype=np.float32)
-    size, delta, margin, target = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(2 * LANES)
-    shift, m = np.empty(2 * LANES, dtype=np.float32), np.empty(5 * LANES, dtype=np.float32)
-    c = np.empty(hidden * LANES, dtype=np.float32)
-    s, h = np.empty_like(c), np.empty_like(c)
+    shift, row = np.empty(2 * LANES, dtype=np.float32), np.empty(4 * LANES, dtype=np.float32)
+    m, decoded = np.empty(5 * LANES, dtype=np.float32), np.empty(hidden * LANES, dtype=np.float32)
+    features = np.zeros(8 * ((hidden + 3) // 4) * LANES, dtype=np.float32)
     for block in range(first, last):
         n = degree[block]
         stars.gather(points, centre, rings, block, offset[block], n, x, ring)
-        stars.localise(x, ring, n, size, local)
-        propose(local, n, weights, hidden, m, c, s, h, shift)
-        stars.commit(
-            points, centre, block, count[block], x, ring, n, size, shift, unit, single, target, delta, margin, tally
-        )
+        stars.localise(x, ring, n, work, local)
+        propose(local, n, weights, hidden, m, row, features, decoded, shift)
+        stars.commit(points, centre, block, count[block], x, ring, n, work, shift, unit, single, tally)

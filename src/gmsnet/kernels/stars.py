@@ -19,6 +19,7 @@ from gmsnet.kernels.predicates import SHEWCHUK, UNDERFLOW, determinant_and_bound
 
 HALVINGS = 20
 MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
+SIZE, REACH, TARGET, MARGIN = 0, 1, 2, 4  # rows of a block's work array; TARGET has two
 
 
 @kernel
@@ -36,59 +37,63 @@ def gather(points, centre, rings, block, offset, n, x, ring):
 
 
 @fast_kernel
-def localise(x, ring, n, size, local):
-    """Ring minus centre over the size of the star, in float32; size: the larger side of its bounding box (float64).
+def localise(x, ring, n, work, local):
+    """Ring minus centre over the size of the star, in float32.
 
-    This is the paper's normalisation: one factor d = max(Δx, Δy) over the n + 1 nodes, the free node at the origin.
+    This is the paper's normalisation: one factor d = max(Δx, Δy), the larger side of the bounding box of the n + 1
+    nodes, the free node at the origin. d goes to row SIZE of ``work`` (rows of LANES), the largest absolute coordinate
+    of the star to row REACH.
     """
-    left, right, bottom, top = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
-    for lane in range(LANES):
-        left[lane] = right[lane] = x[lane]
-        bottom[lane] = top[lane] = x[LANES + lane]
+    for lane in range(LANES):  # rows 4 to 7: left, right, bottom, top
+        work[4 * LANES + lane] = work[5 * LANES + lane] = x[lane]
+        work[6 * LANES + lane] = work[7 * LANES + lane] = x[LANES + lane]
     for j in range(n):
+        p = ring[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
-            a, b = ring[2 * j * LANES + lane], ring[(2 * j + 1) * LANES + lane]
-            left[lane], right[lane] = min(left[lane], a), max(right[lane], a)
-            bottom[lane], top[lane] = min(bottom[lane], b), max(top[lane], b)
+            work[4 * LANES + lane] = min(work[4 * LANES + lane], p[lane])
+            work[5 * LANES + lane] = max(work[5 * LANES + lane], p[lane])
+            work[6 * LANES + lane] = min(work[6 * LANES + lane], p[LANES + lane])
+            work[7 * LANES + lane] = max(work[7 * LANES + lane], p[LANES + lane])
     for lane in range(LANES):
-        size[lane] = max(right[lane] - left[lane], top[lane] - bottom[lane])
-        left[lane] = 1.0 / size[lane] if size[lane] > 0.0 else 0.0
+        left, right = work[4 * LANES + lane], work[5 * LANES + lane]
+        bottom, top = work[6 * LANES + lane], work[7 * LANES + lane]
+        size = max(right - left, top - bottom)
+        work[SIZE * LANES + lane] = size
+        work[REACH * LANES + lane] = max(max(-left, right), max(-bottom, top))
+        work[4 * LANES + lane] = 1.0 / size if size > 0.0 else 0.0
     for j in range(n):
+        p = ring[2 * j * LANES : 2 * (j + 1) * LANES]
+        q = local[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
-            local[2 * j * LANES + lane] = (ring[2 * j * LANES + lane] - x[lane]) * left[lane]
-            local[(2 * j + 1) * LANES + lane] = (ring[(2 * j + 1) * LANES + lane] - x[LANES + lane]) * left[lane]
+            q[lane] = (p[lane] - x[lane]) * work[4 * LANES + lane]
+            q[LANES + lane] = (p[LANES + lane] - x[LANES + lane]) * work[4 * LANES + lane]
 
 
 @kernel
-def margins(target, x, ring, n, unit, delta, margin):
-    """For each lane the least certified surplus of a triangle with the free node at ``target``: allowed if positive.
+def margins(ring, n, work):
+    """For each lane the least certified surplus of a triangle with the free node at its target; positive: allowed.
 
-    delta: (LANES,) receives the uncertainty of the star's coordinates.
+    Rows of work: reads TARGET and the one after it, and REACH, which becomes the uncertainty δ; writes MARGIN.
     """
     for lane in range(LANES):
-        margin[lane] = np.inf
-        delta[lane] = max(
-            max(abs(x[lane]), abs(x[LANES + lane])), max(abs(target[lane]), abs(target[LANES + lane]))
-        )
-    for j in range(2 * n):
-        for lane in range(LANES):
-            delta[lane] = max(delta[lane], abs(ring[j * LANES + lane]))
-    for lane in range(LANES):
-        delta[lane] *= unit
+        work[MARGIN * LANES + lane] = np.inf
     for j in range(n):
-        a = 2 * (n - 1 if j == 0 else j - 1) * LANES
-        b = 2 * j * LANES
+        i = n - 1 if j == 0 else j - 1
+        p = ring[2 * i * LANES : 2 * (i + 1) * LANES]
+        q = ring[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
-            px = ring[a + lane] - target[lane]
-            py = ring[a + LANES + lane] - target[LANES + lane]
-            qx = ring[b + lane] - target[lane]
-            qy = ring[b + LANES + lane] - target[LANES + lane]
+            delta = work[REACH * LANES + lane]
+            px = p[lane] - work[TARGET * LANES + lane]
+            py = p[LANES + lane] - work[(TARGET + 1) * LANES + lane]
+            qx = q[lane] - work[TARGET * LANES + lane]
+            qy = q[LANES + lane] - work[(TARGET + 1) * LANES + lane]
             left = px * qy
             right = py * qx
-            around = abs(px) + abs(py) + abs(qx) + abs(qy) + 4.0 * delta[lane]
-            bound = SHEWCHUK * (abs(left) + abs(right)) + UNDERFLOW + 4.0 * delta[lane] * around
+            around = abs(px) + abs(py) + abs(qx) + abs(qy) + 4.0 * delta
+            bound = SHEWCHUK * (abs(left) + abs(right)) + UNDERFLOW + 4.0 * delta * around
             surplus = (left - right) - bound
-            margin[lane] = min(margin[lane], surplus)
+            least = work[MARGIN * LANES + lane]
+            work[MARGIN * LANES + lane] = surplus if not surplus >= least else least  # a NaN stays
 
 
 @kernel
@@ -109,23 +114,33 @@ def allowed(tx, ty, x, ring, n, lane, delta):
 
 
 @kernel
-def commit(points, centre, block, count, x, ring, n, size, shift, unit, single, target, delta, margin, tally):
-    """Moves the free nodes of a block by size·shift, truncated by the guard; counts what happened in ``tally``."""
+def commit(points, centre, block, count, x, ring, n, work, shift, unit, single, tally):
+    """Moves the free nodes of a block by size·shift, truncated by the guard; counts what happened in ``tally``.
+
+    work: rows of LANES as ``localise`` leaves them; shift: (2·LANES,) over the star's size.
+    """
     for lane in range(LANES):
-        target[lane] = x[lane] + size[lane] * shift[lane]
-        target[LANES + lane] = x[LANES + lane] + size[lane] * shift[LANES + lane]
+        tx = x[lane] + work[SIZE * LANES + lane] * shift[lane]
+        ty = x[LANES + lane] + work[SIZE * LANES + lane] * shift[LANES + lane]
+        work[TARGET * LANES + lane] = tx
+        work[(TARGET + 1) * LANES + lane] = ty
     if single:
-        for lane in range(2 * LANES):
-            target[lane] = np.float64(np.float32(target[lane]))
-    margins(target, x, ring, n, unit, delta, margin)
+        for lane in range(TARGET * LANES, (TARGET + 2) * LANES):
+            work[lane] = np.float64(np.float32(work[lane]))
+    for lane in range(LANES):
+        target = max(abs(work[TARGET * LANES + lane]), abs(work[(TARGET + 1) * LANES + lane]))
+        work[REACH * LANES + lane] = unit * max(work[REACH * LANES + lane], target)
+    margins(ring, n, work)
     for lane in range(count):
         i = centre[block * LANES + lane]
-        if margin[lane] > 0.0:
-            tally[MOVED] += target[lane] != x[lane] or target[LANES + lane] != x[LANES + lane]
-            points[i, 0] = target[lane]
-            points[i, 1] = target[LANES + lane]
+        if work[MARGIN * LANES + lane] > 0.0:
+            tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
+            tally[MOVED] += tx != x[lane] or ty != x[LANES + lane]
+            points[i, 0] = tx
+            points[i, 1] = ty
         else:
-            truncate(points, i, x, ring, n, lane, size[lane], shift, delta[lane], single, tally)
+            size, delta = work[SIZE * LANES + lane], work[REACH * LANES + lane]
+            truncate(points, i, x, ring, n, lane, size, shift, delta, single, tally)
 
 
 @kernel

@@ -38,15 +38,16 @@ class GmsNet:
 def fold(trained: weights.Weights) -> NDArray[np.float32]:
     """The weights as the kernel reads them, flat float32.
 
-    Per channel (W_l's two, b_l, γ, β, α), then W₁·W_g and W₁ (H × H each, row-major), W₁·b_g + b₁ (H), W₂ (2 × H), b₂.
+    Per channel (W_l's two, b_l, γ, β, α); then, row by row, W₁·W_g and W₁ column by column in turns, with columns of
+    zeros up to a multiple of four; then W₁·b_g + b₁ (H), W₂ (2 × H), b₂ (2).
     """
     t = {name: tensor.astype(np.float64) for name, tensor in trained.tensors.items()}
     first, last = t["mlp.0.weight"], t["mlp.1.weight"]
     columns = (t["linear.weight"], t["linear.bias"], t["norm.weight"], t["norm.bias"], t["norm.mean_scale"])
+    mix = np.stack([first @ t["gcn.weight"], first], axis=2)  # (H, H, 2)
     parts = (
         np.column_stack(columns),
-        first @ t["gcn.weight"],
-        first,
+        np.pad(mix, ((0, 0), (0, -trained.hidden % 4), (0, 0))),
         first @ t["gcn.bias"] + t["mlp.0.bias"],
         last,
         t["mlp.1.bias"],
