@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 
 from gmsnet.errors import InputError
+from gmsnet.io.atomic import replace_files
 from gmsnet.learn.backend import torch
-from gmsnet.learn.files import safetensors_bytes, write_atomic
+from gmsnet.learn.encoding import safetensors_bytes
 from gmsnet.learn.options import TrainOptions
 
 NAME = "checkpoint.safetensors"
@@ -45,7 +46,7 @@ class State:
         for index, moments in self.optimizer.state_dict()["state"].items():
             tensors |= {f"adam/{index}/{name}": value.numpy() for name, value in moments.items()}
         metadata = {"options": json.dumps(options.as_dict()), "schedule": json.dumps(self.schedule.state_dict())}
-        write_atomic(folder / NAME, safetensors_bytes(tensors, metadata))
+        replace_files({str(folder / NAME): safetensors_bytes(tensors, metadata)})
 
     def restore(self, folder: Path) -> None:
         """Take over the state in a folder. Raises InputError where it cannot be read."""

@@ -16,9 +16,13 @@ def csv_bytes(history: Sequence[tuple[float, float, float]]) -> bytes:
     return (HEADER + "".join(rows)).encode()
 
 
-def png_bytes(history: Sequence[tuple[float, float, float]], marks: Mapping[str, float]) -> bytes:
-    """Both curves over the epochs, and the marks as horizontal lines. Needs matplotlib (MissingExtraError)."""
+def check_plotting() -> None:
+    """Raises MissingExtraError where matplotlib is not installed, before any work."""
     check_target("curves.png")
+
+
+def png_bytes(history: Sequence[tuple[float, float, float]], marks: Mapping[str, float]) -> bytes:
+    """Both curves over the epochs, and the marks as horizontal lines."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.0, 4.2), layout="constrained")

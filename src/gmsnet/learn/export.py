@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.learn.data import DESCRIPTION
-from gmsnet.learn.files import safetensors_bytes
+from gmsnet.learn.encoding import safetensors_bytes
 from gmsnet.learn.options import TrainOptions
 from gmsnet.weights import FORMAT_VERSION
 

@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from gmsnet.errors import InputError
+from gmsnet.io.atomic import replace_files
 from gmsnet.learn import data
 from gmsnet.learn.backend import Data, torch
 from gmsnet.learn.checkpoint import NAME, Schedule, State, saved_options
-from gmsnet.learn.curves import csv_bytes, png_bytes
+from gmsnet.learn.curves import check_plotting, csv_bytes, png_bytes
 from gmsnet.learn.export import weights_bytes
-from gmsnet.learn.files import write_atomic
 from gmsnet.learn.losses import metric_loss, truncation
 from gmsnet.learn.model import GMSNet, wheels
 from gmsnet.learn.optimum import optimal_position
@@ -96,6 +96,7 @@ def train(
     The result depends on the options alone, bit for bit on the same machine, whether interrupted or not.
     Raises InputError where the folder holds a checkpoint and ``resume`` is not set, or the other way round.
     """
+    check_plotting()
     _check_folder(options, folder, resume=resume)
     with _reproducible():
         parts = [data.Stars.of_mesh(mesh) for mesh in data.meshes(options.mesh_seed)]
@@ -164,7 +165,7 @@ def _epoch(state: State, options: TrainOptions, training: _TrainingSet, validati
     state.schedule.step(validation_loss)
     if validation_loss < min((row[1] for row in state.history), default=np.inf):
         state.best = {name: value.clone() for name, value in state.net.state_dict().items()}
-    state.history.append((float(loss), validation_loss, float(rate)))
+    state.history.append((float(loss.detach()), validation_loss, float(rate)))
     return Progress(epoch + 1, options.epochs, *state.history[-1])
 
 
@@ -185,8 +186,7 @@ def _finish(state: State, options: TrainOptions, folder: Path, validation: Batch
         "history.csv": csv_bytes(state.history),
         "curves.png": png_bytes(state.history, shown),
     }
-    for name, content in contents.items():
-        write_atomic(folder / name, content)
+    replace_files({str(folder / name): content for name, content in contents.items()})
     written = [folder / name for name in (*contents, NAME)]
     return TrainResult(options, len(curve), True, {"validation_loss": min(curve), **marks}, written)
 

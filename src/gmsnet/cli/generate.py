@@ -1,0 +1,54 @@
+"""gmsnet generate: random test meshes in any format that is written."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import typer
+
+
+def generate(
+    out: Annotated[str, typer.Argument(metavar="OUT", help="The file to write; its suffix tells the format.")],
+    shape: Annotated[
+        str, typer.Option(help="square, circle, plate (a square with a round hole) or lshape.")
+    ] = "square",
+    nodes: Annotated[int, typer.Option(help="Random nodes inside.")] = 1000,
+    size: Annotated[float, typer.Option(help="Side of the square around the shape.")] = 1.0,
+    boundary: Annotated[str, typer.Option(help="Spacing of the nodes on the boundary: even or random.")] = "even",
+    seed: Annotated[int, typer.Option(help="The same seed makes the same mesh.")] = 0,
+    jitter: Annotated[
+        float, typer.Option(help="Then throw each inner node up to this many of its mean edge lengths away.")
+    ] = 0.0,
+    tangled: Annotated[bool, typer.Option("--tangled", help="With --jitter: let cells be inverted by it.")] = False,
+    format: Annotated[str | None, typer.Option(help="The format, where the suffix does not tell it.")] = None,
+) -> None:
+    """Make a random Delaunay mesh, with bad elements on purpose, and write it to OUT.
+
+    Nodes are uniform in the shape; the boundary is held by markers (bottom, right, circle, hole, …).
+    """
+    import numpy as np
+
+    from gmsnet.errors import InputError
+    from gmsnet.generate import disturb, random_mesh
+    from gmsnet.io import write
+
+    if tangled and not jitter:
+        raise InputError("--tangled needs --jitter: how far may nodes be thrown?")
+    if not (math.isfinite(jitter) and jitter >= 0):
+        raise InputError(f"--jitter must be 0 or more, got {jitter}")
+    mesh = random_mesh(nodes, shape, size=size, boundary=boundary, seed=seed)
+    triangles, lines = mesh.cells
+    if jitter:
+        inner = np.ones(len(mesh.points), dtype=bool)
+        inner[lines.nodes] = False
+        mesh = disturb(mesh, inner, jitter, seed=seed, keep_valid=not tangled)
+    lost = write(mesh, out, format)
+    aside = out == "-"  # then the mesh itself goes to the standard output
+    typer.echo(
+        f"{'standard output' if aside else out}: {shape} with {len(mesh.points):,} nodes, "
+        f"{len(triangles.nodes):,} triangles and {len(lines.nodes):,} boundary edges (seed {seed})",
+        err=aside,
+    )
+    for loss in lost:
+        typer.echo(f"not in the file: {loss}", err=aside)

@@ -1,0 +1,125 @@
+"""gmsnet train: trains GMSNet on random squares, without labels, and writes its weights."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from gmsnet.learn.options import TrainOptions
+    from gmsnet.learn.train import Progress, TrainResult
+
+STOPPED = 130  # exit code after Ctrl-C, as shells count it
+
+
+def train(
+    context: typer.Context,
+    out: Annotated[Path, typer.Option(help="Folder for weights, curves and checkpoint.")] = Path("gmsnet-training"),
+    hidden: Annotated[int, typer.Option(help="Hidden features H; 2H² + 10H + 2 parameters.")] = 8,
+    epochs: Annotated[int, typer.Option(help="Adam steps, one an epoch.")] = 4000,
+    nodes_per_mesh: Annotated[int, typer.Option(help="Nodes that an epoch draws from each training mesh.")] = 32,
+    learning_rate: Annotated[float, typer.Option(help="Learning rate at the start.")] = 1e-2,
+    decay: Annotated[float, typer.Option(help="Factor of the learning rate when validation stalls.")] = 0.5,
+    patience: Annotated[int, typer.Option(help="Epochs without a better validation loss until then.")] = 150,
+    seed: Annotated[int, typer.Option(help="Of the first weights and of the nodes that are drawn.")] = 0,
+    mesh_seed: Annotated[int, typer.Option(help="Of the 20 random squares.")] = 0,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on from the checkpoint in --out, with its options.")
+    ] = False,
+) -> None:
+    """Train GMSNet on 20 random Delaunay squares (12 to train, 4 to validate, 4 to test), without labels.
+
+    Writes gmsnet-hH.safetensors (for gmsnet smooth --weights), history.csv, curves.png and checkpoint.safetensors.
+    """
+    from gmsnet.learn.train import train as run
+
+    options = _options(context, out, resume=resume)
+    typer.echo(f"{options.command}: H = {options.hidden}, {options.epochs:,} epochs, into {out}", err=True)
+    with _stop_on_signal() as should_stop, _bar(options.epochs) as on_epoch:
+        result = run(options, out, resume=resume, on_epoch=on_epoch, should_stop=should_stop)
+    if not result.finished:
+        typer.echo(
+            f"stopped after {result.epochs:,} of {options.epochs:,} epochs (validation loss so far "
+            f"{result.losses['validation_loss']:.4f}); go on with: gmsnet train --resume --out {out}",
+            err=True,
+        )
+        raise typer.Exit(STOPPED)
+    _report(result)
+
+
+def _options(context: typer.Context, out: Path, *, resume: bool) -> TrainOptions:
+    """The options as given; when resuming, those of the checkpoint with what was given on top."""
+    from gmsnet.learn.checkpoint import saved_options
+    from gmsnet.learn.options import TrainOptions
+
+    saved = saved_options(out) if resume else None
+    values: dict[str, Any] = {name: context.params[name] for name in TrainOptions().as_dict()}
+    if saved is None:
+        return TrainOptions(**values)
+    return replace(saved, **{name: value for name, value in values.items() if _is_given(context, name)})
+
+
+def _is_given(context: typer.Context, name: str) -> bool:
+    source = context.get_parameter_source(name)
+    return source is not None and source.name != "DEFAULT"
+
+
+@contextmanager
+def _stop_on_signal() -> Iterator[Callable[[], bool]]:
+    """Ctrl-C and SIGTERM end the training after the current epoch; a second one ends it at once."""
+    caught: list[int] = []
+
+    def handle(number: int, frame: object) -> None:
+        if caught:
+            raise KeyboardInterrupt
+        caught.append(number)
+
+    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(caught)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _bar(epochs: int) -> Iterator[Callable[[Progress], None]]:
+    """A progress bar on standard error, if that is a terminal."""
+    from rich.console import Console
+    from rich import progress as parts
+
+    console = Console(stderr=True)
+    columns = (
+        parts.TextColumn("training"),
+        parts.BarColumn(),
+        parts.MofNCompleteColumn(),
+        parts.TextColumn("{task.fields[losses]}"),
+        parts.TimeRemainingColumn(),
+    )
+    with parts.Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("training", total=epochs, losses="")
+
+        def on_epoch(at: Progress) -> None:
+            losses = f"loss {at.train_loss:.4f}, validation {at.validation_loss:.4f}, rate {at.learning_rate:.1g}"
+            bar.update(task, completed=at.epoch, losses=losses)
+
+        yield on_epoch
+
+
+def _report(result: TrainResult) -> None:
+    losses = result.losses
+    best, before, optimum = (losses[f"validation_loss{name}"] for name in ("", "_before", "_optimum"))
+    share = (before - best) / (before - optimum)
+    typer.echo(
+        f"validation loss {best:.4f}, {share:.0%} of the way from {before:.4f} before "
+        f"to {optimum:.4f}, the optimum of each star by itself"
+    )
+    typer.echo(f"test loss {losses['test_loss']:.4f}, before {losses['test_loss_before']:.4f}")
+    for path in result.files:
+        typer.echo(f"wrote {path}")
