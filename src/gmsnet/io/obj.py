@@ -67,7 +67,7 @@ def _coordinates(text: bytes, rows: Rows, is_point: NDArray[np.bool_]) -> Spans:
         where = rows.where(int(np.flatnonzero(is_point)[bad[0]]))
         fail(text, where, f"three coordinates (and a weight or a colour) were expected, found {lengths[bad[0]]} words")
     first = rows.first[:-1][is_point]
-    spans = rows.spans[first[:, None] + np.arange(1, 4)]
+    spans: Spans = rows.spans[first[:, None] + np.arange(1, 4)]
     for j in range(4, 8):  # what follows must be numbers as well, or else a line was cut or joined
         to_floats(text, rows.spans[first[lengths >= j] + j])
     return spans

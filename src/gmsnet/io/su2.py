@@ -29,6 +29,7 @@ SIZES = {1: 1, 3: 2, 5: 3, 9: 4}
 COUNTS = {"NDIME": "dimensions", "NZONE": "zones", "NPOIN": "points", "NELEM": "elements", "NMARK": "markers",
           "MARKER_ELEMS": "marker elements"}  # fmt: skip
 _LINE_END = re.compile(rb"[\r\n]")
+REQUIRED = ("NDIME", "NPOIN", "NELEM", "NMARK")  # SU2 wants all four; without NMARK a cut could not be seen
 ROWS = ("NPOIN", "NELEM", "MARKER_ELEMS")
 
 
@@ -57,12 +58,12 @@ def read(files: Mapping[str, bytes]) -> Parsed:
     data = files[".su2"]
     text = blank(data, rb"%[^\r\n]*")
     found = _collect(text)
-    if found.points is None or found.elements is None or "NDIME" not in found.counts:
-        missing = [k for k in ("NDIME", "NPOIN", "NELEM") if k not in found.counts]
-        raise FormatError(f"{' and '.join(missing)} is missing: the file is cut off or no SU2 mesh")
-    announced = found.counts.get("NMARK", 0)
-    if announced != len(found.markers):
-        raise FormatError(f"NMARK announces {announced} markers, but the file has {len(found.markers)}")
+    missing = [key for key in REQUIRED if key not in found.counts]
+    if missing or found.points is None or found.elements is None:
+        hint = " (a mesh without markers says NMARK= 0)" if missing == ["NMARK"] else ""
+        raise FormatError(f"{', '.join(missing)} missing: the file is cut off or no SU2 mesh{hint}")
+    if found.counts["NMARK"] != len(found.markers):
+        raise FormatError(f"NMARK announces {found.counts['NMARK']} markers, but the file has {len(found.markers)}")
 
     spans = _points(text, found.points)
     points = to_floats(text, spans)
@@ -92,7 +93,8 @@ def _sections(text: bytes) -> Iterator[Section]:
     first = scan_rows(text, 0, stop=heads[0][0] if heads else None)
     if len(first):
         fail(text, first.where(0), f"a keyword such as NDIME= was expected, found {word(text, first.row(0)[0])}")
-    for (start, equals, end), (stop, _, _) in zip(heads, [*heads[1:], (len(text), 0, 0)], strict=True):
+    for k, (start, equals, end) in enumerate(heads):
+        stop = heads[k + 1][0] if k + 1 < len(heads) else len(text)
         key = text[start:equals].strip()
         if not key.replace(b"_", b"").isalnum():
             fail(
