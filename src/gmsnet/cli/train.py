@@ -91,8 +91,8 @@ def _stop_on_signal() -> Iterator[Callable[[], bool]]:
 @contextmanager
 def _bar(epochs: int) -> Iterator[Callable[[Progress], None]]:
     """A progress bar on standard error, if that is a terminal."""
-    from rich.console import Console
     from rich import progress as parts
+    from rich.console import Console
 
     console = Console(stderr=True)
     columns = (

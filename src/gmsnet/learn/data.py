@@ -43,12 +43,18 @@ class Stars:
 
     @classmethod
     def of_mesh(cls, mesh: Mesh) -> Stars:
-        """The stars of all free nodes of a mesh in the plane, in the order of their numbers."""
+        """The stars of all free nodes of a planar mesh, in the order of their ids.
+
+        Each ring starts at its smallest id: the sums of a training then depend on the mesh alone.
+        """
         topology = Topology.of(mesh)
-        start = topology.start.astype(np.int64)
-        first, degree = start[topology.free], (start[1:] - start[:-1])[topology.free]
-        place = np.minimum(np.arange(degree.max(initial=0)), degree[:, None] - 1)
-        return cls.of(mesh.points[topology.free], mesh.points[topology.ring[first[:, None] + place]], degree)
+        start, ring = topology.patches
+        degree = np.diff(start).astype(np.int64)
+        column = np.arange(degree.max(initial=0))
+        ids = ring[start[:-1, None] + np.minimum(column, degree[:, None] - 1)]  # (F × M), padded with the last one
+        turned = (ids.argmin(axis=1)[:, None] + column) % degree[:, None]
+        points = mesh.points[:, list(mesh.plane or (0, 1))]
+        return cls.of(points[topology.free], points[np.take_along_axis(ids, turned, axis=1)], degree)
 
     def __len__(self) -> int:
         return len(self.degree)
