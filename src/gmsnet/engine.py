@@ -172,7 +172,7 @@ class _Run:
         self.precision = Precision(2.0**-24 if mesh.single else 2.0**-53, mesh.single)
         self.start = planar_points(mesh)[topology.memory]
         self.points = self.start.copy()
-        self.triangles = np.ascontiguousarray(topology.position[topology.triangles])
+        self.triangles = topology.near
         self.threads = threads
         self.history: list[Sweep] = []
         self.sums = np.empty((-(-len(self.triangles) // LANES), 7))
@@ -235,7 +235,7 @@ class _Run:
 
     def _standing(self, share: _Share | None = None) -> _Standing:
         """The sums over all triangles of the coordinates as they are."""
-        turn = self.topology.turn
+        turn = self.topology.near_turn
 
         def add(first: int, last: int) -> None:
             kernels.summarise(self.points, self.triangles, turn, first, last, self.sums)

@@ -1,27 +1,26 @@
 """What follows from a mesh's connectivity: winding, boundary, interfaces, which nodes are held and why, the patches.
 
 Built once per connectivity. Coordinates enter in two places only: which of the two sides of a part is up (its larger
-area is the positive one), and the memory order of the stars, which does not influence results.
+area is the positive one), and the memory order of the nodes, which does not influence results.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.errors import InputError
+from gmsnet.faces import SMOOTHED, Faces
 from gmsnet.kernels import connectivity, layout
-from gmsnet.mesh import CORNERS, CellBlock, Mesh
+from gmsnet.mesh import CellBlock, Mesh
 
 Ints = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 
-SMOOTHED = ("triangle",)  # the cell types whose nodes may move
-MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would no longer be a block
+MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would no longer fit any cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +49,16 @@ class Stars:
 class Topology:
     """The connectivity of a mesh, seen from its nodes.
 
-    triangles: (T, 3) corner nodes of all cells with three corners, in file order (six-node triangles by their
-    corners); cell: (T,) the index of each among all cells of the mesh; turn: (T,) int8, −1 where it has to be read
-    backwards for all of its part to be wound alike with positive area. held: reason → node ids, the first reason that
-    applies. free: (F,) ids of the nodes that may move. start (N + 1), ring: the rings of the free nodes,
-    counter-clockwise, in CSR form by node id. colours: (N,) no two free nodes of one cell share a colour; −1 where
-    held. parts: how many pieces the faces form over shared edges. memory: (N,) node ids in memory order.
+    plane: the two axes of a planar mesh, else None. triangles: (T, 3) corner nodes of all cells with three corners, in
+    file order (six-node triangles by their corners); cell: (T,) the index of each among all cells of the mesh; turn:
+    (T,) int8, −1 where it has to be read backwards for all of its part to be wound alike with positive area.
+    parts: how many pieces the faces form over shared edges. held: reason → node ids, the first reason that applies.
+    free: (F,) ids of the nodes that may move, ascending.
+    memory: (N,) node ids in memory order. In that order, by places in memory: near (T, 3) and near_turn (T,), the
+    triangles; rings, their CSR start (N + 1) and the colours (N,), of which no two free nodes of one cell share one
+    (−1 where held).
     """
 
-    nodes: int
     plane: tuple[int, int] | None
     triangles: Ints
     cell: NDArray[np.int64]
@@ -66,134 +66,108 @@ class Topology:
     parts: int
     held: dict[str, NDArray[np.int64]]
     free: Ints
-    start: Ints
-    ring: Ints
-    colours: Ints
     memory: Ints
+    near: Ints
+    near_turn: NDArray[np.int8]
+    near_start: Ints
+    near_ring: Ints
+    near_colours: Ints
 
     @classmethod
     def of(cls, mesh: Mesh, fixed: Flags | None = None) -> Topology:
         """The topology of a mesh; ``fixed`` (N,) bool holds further nodes ("fixed by the user")."""
         nodes = len(mesh.points)
-        faces = _Faces.of(mesh)
         planar = _planar_points(mesh)
-        corner, first = faces.corner, faces.first
+        memory = layout.morton_order(planar)
+        position = _inverse(memory)
+        written = Faces.of(mesh)
+        faces = written.renumbered(position)
+        first, corner = faces.first, faces.corner
         face, head = connectivity.half_edges(first, corner)
         twin = connectivity.match(corner, head, nodes)
         part, turn, consistent = connectivity.wind(first, corner, twin, face)
         if mesh.plane is not None:
-            area = connectivity.part_areas(planar, first, corner, part, turn, len(consistent))
+            area = connectivity.part_areas(planar[memory], first, corner, part, turn, len(consistent))
             turn = np.where(area[part] < 0, -turn, turn).astype(np.int8)
 
-        boundary, interface, crowded = (np.zeros(nodes, dtype=bool) for _ in range(3))
+        boundary, interface, crowded, unwound = (np.zeros(nodes, dtype=bool) for _ in range(4))
         connectivity.mark_edges(corner, head, twin, face, faces.region, boundary, interface, crowded)
-        unwound = np.zeros(nodes, dtype=bool)
-        unwound[corner[~consistent[part][face]]] = True
+        if not consistent.all():
+            unwound[corner[~consistent[part][face]]] = True
+        unused = ~_used_by(mesh, lambda block: True)
         reasons = {
-            "boundary": boundary,
-            "interface between regions": interface,
-            "node of a line or vertex cell": _used_by(mesh, lambda b: b.dimension < 2),
-            "node of a cell that is not smoothed": _used_by(mesh, lambda b: b.dimension > 1 and b.kind not in SMOOTHED),
-            "non-manifold edge": crowded,
-            "part that cannot be wound consistently": unwound,
+            "not used by any cell": unused,
+            "boundary": boundary[position],
+            "interface between regions": interface[position],
+            "node of a line or vertex cell": _used_by(mesh, lambda block: block.dimension < 2),
+            "node of a cell that is not smoothed": _used_by(
+                mesh, lambda block: block.dimension > 1 and block.kind not in SMOOTHED
+            ),
+            "non-manifold edge": crowded[position],
+            "part that cannot be wound consistently": unwound[position],
             "fixed by the user": np.zeros(nodes, dtype=bool) if fixed is None else fixed,
         }
         candidate = ~np.logical_or.reduce(list(reasons.values()))
         state, start, ring = connectivity.walk_fans(
-            first, corner, head, twin, face, turn, faces.smoothable, candidate, nodes
+            first, corner, head, twin, face, turn, faces.smoothable, candidate[memory], nodes
         )
-        unused = ~_used_by(mesh, lambda b: True)
-        hub = start[1:] - start[:-1] > MOST_NEIGHBOURS
-        fan = candidate & ~unused & (state != connectivity.FREE)
-        reasons = {"not used by any cell": unused, **reasons, "star is not one closed fan": fan}
-        reasons[f"more than {MOST_NEIGHBOURS} neighbours"] = hub
-        is_free = candidate & ~unused & ~fan & ~hub
+        hub = (np.diff(start) > MOST_NEIGHBOURS)[position]
+        fan = candidate & (state != connectivity.FREE)[position]
+        reasons |= {"star is not one closed fan": fan, f"more than {MOST_NEIGHBOURS} neighbours": hub}
+        is_free = candidate & ~fan & ~hub
         free = np.flatnonzero(is_free).astype(np.int32)
-        whole = faces.corners == 3
+        whole, near = faces.triangles()
+        three, triangles = written.triangles()
+        back = np.empty(len(written), dtype=np.int8)
+        back[faces.origin] = turn
         return cls(
-            nodes=nodes,
             plane=mesh.plane,
-            triangles=corner[faces.triangle_corners].reshape(-1, 3),
-            cell=faces.cell[whole],
-            turn=turn[whole],
+            triangles=triangles,
+            cell=written.cell[three],
+            turn=back[three],
             parts=len(consistent),
             held=_first_reason(reasons),
             free=free,
-            start=start,
-            ring=ring,
-            colours=connectivity.colour(free, start, ring, is_free),
-            memory=layout.morton_order(planar),
+            memory=memory,
+            near=near,
+            near_turn=turn[whole],
+            near_start=start,
+            near_ring=ring,
+            # In the order of the node ids, so that colours follow from the connectivity alone.
+            near_colours=connectivity.colour(position[free], start, ring, is_free[memory]),
         )
-
-    @cached_property
-    def position(self) -> Ints:
-        """(N,) place of each node in memory order."""
-        position = np.empty(self.nodes, dtype=np.int32)
-        position[self.memory] = np.arange(self.nodes, dtype=np.int32)
-        return position
 
     @cached_property
     def stars(self) -> Stars:
         """The patches in the order in which they are smoothed."""
-        by_memory = self.memory[self.colours[self.memory] >= 0]
-        degrees = self.start[1:] - self.start[:-1]
-        most = int(degrees.max(initial=0, where=self.colours >= 0))
-        colours = int(self.colours.max(initial=-1)) + 1
-        arrays = layout.blocks(by_memory, self.position, self.start, self.ring, self.colours, most, colours)
-        return Stars(*arrays)
+        free = np.flatnonzero(self.near_colours >= 0).astype(np.int32)
+        most = int(np.diff(self.near_start)[free].max(initial=0))
+        colours = int(self.near_colours.max(initial=-1)) + 1
+        return Stars(*layout.blocks(free, self.near_start, self.near_ring, self.near_colours, most, colours))
 
-    def ring_of(self, node: int) -> Ints:
-        """The neighbours of a free node, counter-clockwise (empty for a held one)."""
-        return self.ring[self.start[node] : self.start[node + 1]]
+    @cached_property
+    def patches(self) -> tuple[Ints, Ints]:
+        """The rings of the free nodes by node ids, counter-clockwise: start (F + 1) and ring, row i of node free[i]."""
+        place = _inverse(self.memory)[self.free]
+        degree = np.diff(self.near_start)[place]
+        start = np.zeros(len(place) + 1, dtype=np.int32)
+        np.cumsum(degree, out=start[1:])
+        within = np.arange(start[-1]) - np.repeat(start[:-1], degree)
+        return start, self.memory[self.near_ring[np.repeat(self.near_start[place], degree) + within]]
 
-
-@dataclass(frozen=True)
-class _Faces:
-    """The two-dimensional cells as polygons (their corners), in CSR form."""
-
-    first: Ints
-    corner: Ints
-    corners: Ints  # how many corners each has
-    region: NDArray[np.int64]
-    smoothable: Flags
-    cell: NDArray[np.int64]
-    triangle_corners: Flags  # per corner: does it belong to a face with three?
-
-    @classmethod
-    def of(cls, mesh: Mesh) -> _Faces:
-        corner, corners, region, smoothable, cell = [], [], [], [], []
-        before = 0
-        for block in mesh.cells:
-            count = len(block.nodes)
-            if block.dimension == 2:
-                size = CORNERS.get(block.kind, block.nodes.shape[1])
-                corner.append(block.nodes[:, :size].ravel())
-                corners.append(np.full(count, size))
-                region.append(block.regions)
-                smoothable.append(np.full(count, block.kind in SMOOTHED))
-                cell.append(np.arange(before, before + count))
-            before += count
-        if sum(len(c) for c in corner) >= 2**31:
-            raise InputError("the mesh has more than 2³¹ cell corners, which is more than gmsnet can number")
-        sizes = _joined(corners, np.int32)
-        first = np.zeros(len(sizes) + 1, dtype=np.int32)
-        np.cumsum(sizes, out=first[1:])
-        return cls(
-            first=first,
-            corner=_joined(corner, np.int32),
-            corners=sizes,
-            region=_joined(region, np.int64),
-            smoothable=_joined(smoothable, np.bool_),
-            cell=_joined(cell, np.int64),
-            triangle_corners=np.repeat(sizes == 3, sizes),
-        )
+    @cached_property
+    def colours(self) -> Ints:
+        """(N,) colour of each node by id, −1 where held."""
+        return self.near_colours[_inverse(self.memory)]
 
 
-def _joined(arrays: list[NDArray[Any]], dtype: type) -> NDArray[Any]:
-    return np.concatenate(arrays).astype(dtype, copy=False) if arrays else np.empty(0, dtype=dtype)
+def _inverse(order: Ints) -> Ints:
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order), dtype=order.dtype)
+    return place
 
 
-def _used_by(mesh: Mesh, chosen: Any) -> Flags:
+def _used_by(mesh: Mesh, chosen: Callable[[CellBlock], bool]) -> Flags:
     flags = np.zeros(len(mesh.points), dtype=bool)
     for block in mesh.cells:
         if chosen(block):
@@ -229,6 +203,3 @@ def scale_exponent(mesh: Mesh) -> int:
     """The power of two by which ``planar_points`` divides."""
     largest = float(np.abs(_planar_points(mesh)).max(initial=0.0))
     return int(np.frexp(largest)[1]) if largest > 0.0 else 0
-
-
-__all__ = ["CellBlock", "Stars", "Topology", "planar_points", "scale_exponent"]

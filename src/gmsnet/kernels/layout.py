@@ -45,19 +45,41 @@ def morton_order(points):
 
 
 @kernel
-def blocks(by_memory, position, start, ring, colours, degrees_most, colours_most):
+def order_faces(first, corner, position):
+    """Faces by the lowest place of their nodes in memory: the order, and first and corner in that order and by place."""
+    faces = len(first) - 1
+    lowest = np.empty(faces, dtype=np.int32)
+    for f in range(faces):
+        least = position[corner[first[f]]] if first[f] < first[f + 1] else 0
+        for h in range(first[f] + 1, first[f + 1]):
+            least = min(least, position[corner[h]])
+        lowest[f] = least
+    order, _ = counting_order(lowest, len(position))
+    new_first = np.zeros(faces + 1, dtype=np.int32)
+    new_corner = np.empty_like(corner)
+    end = 0
+    for k in range(faces):
+        f = order[k]
+        for h in range(first[f], first[f + 1]):
+            new_corner[end] = position[corner[h]]
+            end += 1
+        new_first[k + 1] = end
+    return order, new_first, new_corner
+
+
+@kernel
+def blocks(free, start, ring, colours, degrees_most, colours_most):
     """Stars in blocks of LANES of one colour and degree, in memory order within each colour and degree.
 
-    by_memory: (F,) free node ids in memory order; position: (N,) place of each node in memory; start, ring: their
-    rings in CSR form by node id; colours: (N,). Returns
-    centre (blocks·LANES,) and rings (flat) in places in memory, offset (blocks,) of each block's rings, degree, count
+    All nodes by their places in memory. free: (F,) ascending; start, ring: their rings in CSR form; colours: (N,).
+    Returns centre (blocks·LANES,) and rings (flat), offset (blocks,) of each block's rings, degree, count
     (stars in the block; the lanes left over repeat the last one), first (colours + 1) block of each colour.
     A block's rings stand as [ring node][lane].
     """
-    free = len(by_memory)
-    key = np.empty(free, dtype=np.int32)
-    for i in range(free):
-        v = by_memory[i]
+    stars = len(free)
+    key = np.empty(stars, dtype=np.int32)
+    for i in range(stars):
+        v = free[i]
         key[i] = colours[v] * (degrees_most + 1) + start[v + 1] - start[v]
     order, group = counting_order(key, (degrees_most + 1) * colours_most)
     number, length = 0, 0
@@ -75,13 +97,12 @@ def blocks(by_memory, position, start, ring, colours, degrees_most, colours_most
     for g in range(len(group) - 1):
         n = g % (degrees_most + 1)
         for at in range(group[g], group[g + 1], LANES):
-            stars = min(LANES, group[g + 1] - at)
-            offset[b], degree[b], count[b] = end, n, stars
+            offset[b], degree[b], count[b] = end, n, min(LANES, group[g + 1] - at)
             for lane in range(LANES):
-                v = by_memory[order[at + min(lane, stars - 1)]]
-                centre[b * LANES + lane] = position[v]
+                v = free[order[at + min(lane, count[b] - 1)]]
+                centre[b * LANES + lane] = v
                 for j in range(n):
-                    rings[end + j * LANES + lane] = position[ring[start[v] + j]]
+                    rings[end + j * LANES + lane] = ring[start[v] + j]
             end += n * LANES
             b += 1
         first[g // (degrees_most + 1) + 1] = b
