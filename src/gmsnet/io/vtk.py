@@ -290,7 +290,7 @@ def write(mesh: Mesh) -> Written:
         if fields:
             text.append(f"{key} {count}\nFIELD FieldData {len(fields)}\n")
         for called, array in fields:
-            kind = TYPE_NAMES[array.dtype.newbyteorder("=").str[1:]]
+            kind = TYPE_NAMES[array.dtype.str[1:]]
             text.append(f"{quote(called) or 'field'} {array.shape[1]} {len(array)} {kind}\n")
             text.append(vtk_cells.rows_text(array))
     return Written({".vtk": "".join(text).encode("ascii")}, lost)

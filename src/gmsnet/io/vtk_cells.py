@@ -111,6 +111,7 @@ def fields_out(mesh: Mesh, title: str) -> tuple[Fields, Fields, list[str]]:
                 array = array.astype(np.uint8)
             elif array.dtype.kind == "f" and array.dtype.itemsize not in (4, 8):
                 array = array.astype(np.float64)
+            array = array.astype(array.dtype.newbyteorder("="))
             out[k].append((name, array.reshape(len(array), -1)))
     return out[0], out[1], lost
 

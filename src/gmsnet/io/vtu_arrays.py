@@ -1,0 +1,138 @@
+"""Encoded arrays of VTU files: base64 or raw, compressed or not, read and written again with other numbers.
+
+An array that is not compressed has its number of bytes in front. A compressed one has a header, (blocks, bytes of a
+block, bytes of the last block if it is shorter, compressed bytes of each block), and then its blocks. In base64
+the header of a compressed array is encoded on its own; that of another one together with the numbers or on its own.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmsnet.errors import FormatError
+
+MOST_INFLATED = 1100  # times its length: more than zlib can reach (1032), and more than any file may ask for
+_LEVELS = (1, 5, 6, 9)  # of compression, by the two bits in which zlib notes how hard it tried
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """How a file encodes its arrays. header: the type of the numbers in headers, with the byte order."""
+
+    header: str
+    compressed: bool
+    base64: bool
+
+    @property
+    def width(self) -> int:
+        """Bytes of a number in a header."""
+        return np.dtype(self.header).itemsize
+
+
+@dataclass(frozen=True)
+class Encoded:
+    """An array as it stands in the file.
+
+    payload: the bytes of its numbers. length: the bytes that it takes in the file. apart: whether the header was
+    encoded in base64 on its own. blocks: of a compressed array, the compressed bytes of each block. head: the first
+    three numbers of its header (blocks, bytes of a block, bytes of the last one).
+    """
+
+    encoding: Encoding
+    payload: bytes
+    length: int
+    apart: bool
+    blocks: tuple[bytes, ...] = ()
+    head: tuple[int, int, int] = (0, 0, 0)
+
+    def written(self, payload: bytes) -> bytes:
+        """The array with other numbers (as many bytes), encoded in the same way; blocks without a change stay."""
+        kind = self.encoding.header
+        if not self.encoding.compressed:
+            return self._text(np.array([len(payload)], dtype=kind).tobytes(), payload)
+        size = self.head[1]
+        blocks = []
+        for k, old in enumerate(self.blocks):
+            part = payload[k * size : (k + 1) * size]
+            same = part == self.payload[k * size : (k + 1) * size]
+            blocks.append(old if same else zlib.compress(part, _LEVELS[old[1] >> 6]))
+        return self._text(np.array([*self.head, *map(len, blocks)], dtype=kind).tobytes(), b"".join(blocks))
+
+    def _text(self, header: bytes, body: bytes) -> bytes:
+        if not self.encoding.base64:
+            return header + body
+        if self.apart:
+            return base64.b64encode(header) + base64.b64encode(body)
+        return base64.b64encode(header + body)
+
+
+def decode(data: memoryview, encoding: Encoding, expected: int) -> Encoded:
+    """The array at the beginning of ``data``, whose numbers must take ``expected`` bytes.
+
+    Raises FormatError where it ends early, has another size or cannot be unpacked; no more memory is taken than the
+    length of the data allows.
+    """
+    return _compressed(data, encoding, expected) if encoding.compressed else _plain(data, encoding, expected)
+
+
+def _plain(data: memoryview, encoding: Encoding, expected: int) -> Encoded:
+    width = encoding.width
+    head, at = _take(data, 0, width, encoding)
+    size = int(np.frombuffer(head, dtype=encoding.header, count=1)[0])
+    if size != expected:
+        raise FormatError(f"it has {size} bytes instead of {expected}")
+    apart = len(head) == width  # else the first group of characters holds bytes of the numbers too
+    start, skip = (at, 0) if apart else (0, width)
+    both, end = _take(data, start, skip + size, encoding)
+    return Encoded(encoding, both[skip : skip + size], end, apart)
+
+
+def _compressed(data: memoryview, encoding: Encoding, expected: int) -> Encoded:
+    width = encoding.width
+    start, _ = _take(data, 0, 3 * width, encoding)
+    count, block_size, last = np.frombuffer(start, dtype=encoding.header, count=3).tolist()
+    total = count * block_size - (block_size - last if last else 0)
+    if total != expected or last > block_size:
+        raise FormatError(f"it has {total} bytes instead of {expected}")
+    head, at = _take(data, 0, (3 + count) * width, encoding)
+    lengths = np.frombuffer(head, dtype=encoding.header, count=3 + count)[3:].tolist()
+    stored = sum(lengths)
+    if stored > len(data) or expected > MOST_INFLATED * stored:
+        raise FormatError(f"{expected} bytes cannot come from {stored} compressed bytes")
+    body, end = _take(data, at, stored, encoding)
+    parts, blocks, at = [], [], 0
+    for k, length in enumerate(lengths):
+        block = body[at : at + length]
+        at += length
+        size = last if last and k == count - 1 else block_size
+        unpacker = zlib.decompressobj()
+        try:
+            part = unpacker.decompress(block, size + 1)
+        except zlib.error as error:
+            raise FormatError(f"block {k} cannot be decompressed: {error}") from None
+        if len(part) != size or not unpacker.eof or unpacker.unused_data:
+            raise FormatError(f"block {k} does not decompress to the {size} bytes that its header announces")
+        parts.append(part)
+        blocks.append(block)
+    return Encoded(encoding, b"".join(parts), end, True, tuple(blocks), (count, block_size, last))
+
+
+def _take(data: memoryview, at: int, size: int, encoding: Encoding) -> tuple[bytes, int]:
+    """At least ``size`` bytes that begin at byte ``at`` of the file (in base64 up to two more), and where they end."""
+    length = (size + 2) // 3 * 4 if encoding.base64 else size
+    found = bytes(data[at : at + length])
+    if len(found) < length:
+        raise FormatError(f"it ends after {len(found)} of {length} bytes: the file is cut off")
+    if encoding.base64:
+        try:
+            found = base64.b64decode(found, validate=True)
+        except binascii.Error as error:
+            raise FormatError(f"it is not in base64: {error}") from None
+        if len(found) < size:
+            raise FormatError("it is not in base64: there is padding inside")
+    return found, at + length

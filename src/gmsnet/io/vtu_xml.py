@@ -1,0 +1,171 @@
+"""The XML of a VTU file: which arrays it holds and at which bytes their tags and their contents stand.
+
+Raw appended data are no XML: the parser stops where they begin, and the end tags behind them are looked for by hand.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+from gmsnet.errors import FormatError
+from gmsnet.io.text import fail
+
+SECTIONS = ("PointData", "CellData", "Points", "Cells")
+
+_TAG = re.compile(rb"<(?:[^<\"'>]|\"[^\"]*\"|'[^']*')*>")
+_TAIL = re.compile(rb"</AppendedData\s*>\s*</VTKFile\s*>\s*\Z")
+
+
+@dataclass(frozen=True)
+class DataArray:
+    """An array. tag: first byte of its start tag and the byte behind it; body: likewise of what it contains."""
+
+    section: str
+    element: str
+    attributes: Mapping[str, str]
+    tag: tuple[int, int]
+    body: tuple[int, int]
+
+
+@dataclass
+class Document:
+    """A VTU file.
+
+    text: its bytes with comments and what arrays contain beside their numbers blanked out, every other byte in place.
+    root, pieces: the attributes of these elements. appended: the encoding of the appended data, and their bytes.
+    """
+
+    text: bytes
+    root: dict[str, str] = field(default_factory=dict)
+    pieces: list[dict[str, str]] = field(default_factory=list)
+    arrays: list[DataArray] = field(default_factory=list)
+    appended: tuple[str, int, int] | None = None
+
+
+class _RawDataFollow(Exception):
+    """The parser has met the start tag of raw appended data."""
+
+
+def parse(data: bytes) -> Document:
+    """The structure of the file. Raises FormatError where it is not well formed or no VTU file."""
+    start = data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1]
+    if start != b"<":
+        raise FormatError("line 1: not an XML file: a VTU file starts with '<VTKFile' or '<?xml'")
+    walker = _Walker(data)
+    try:
+        walker.parser.Parse(data, True)
+    except _RawDataFollow:
+        walker.find_raw_data()
+    except expat.ExpatError as error:
+        raise FormatError(f"line {error.lineno}: the XML is not well formed: {expat.ErrorString(error.code)}") from None
+    except (LookupError, ValueError) as error:
+        if isinstance(error, FormatError):
+            raise
+        raise FormatError(f"the XML has an encoding that is not supported, write it as UTF-8: {error}") from None
+    document = walker.document
+    if walker.hidden:
+        text = bytearray(data)
+        for first, end in walker.hidden:
+            text[first:end] = re.sub(rb"[^\r\n]", b" ", data[first:end])
+        document.text = bytes(text)
+    return document
+
+
+class _Walker:
+    """Follows the parser's events and notes where things stand."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data, self.document = data, Document(data)
+        self.path: list[str] = []
+        self.tags: list[tuple[int, int]] = []
+        self.open: tuple[str, str, dict[str, str], tuple[int, int]] | None = None
+        self.hidden: list[tuple[int, int]] = []
+        self.parser = expat.ParserCreate()
+        self.parser.StartElementHandler = self.begin
+        self.parser.EndElementHandler = self.finish
+        self.parser.CommentHandler = self.comment
+        self.parser.ProcessingInstructionHandler = self.instruction
+        self.parser.StartDoctypeDeclHandler = self.doctype
+
+    @property
+    def at(self) -> int:
+        return self.parser.CurrentByteIndex
+
+    def fail(self, message: str) -> None:
+        fail(self.data, self.at, message)
+
+    def doctype(self, *_: object) -> None:
+        self.fail("a DOCTYPE is not allowed in a VTU file: remove it")
+
+    def comment(self, _: str) -> None:
+        self.hidden.append((self.at, self.data.index(b"-->", self.at) + 3))
+
+    def instruction(self, *_: object) -> None:
+        self.hidden.append((self.at, self.data.index(b"?>", self.at) + 2))
+
+    def tag(self) -> tuple[int, int]:
+        match = _TAG.match(self.data, self.at)
+        if match is None:
+            raise FormatError("the XML has an encoding that is not supported: write it as UTF-8")
+        return match.span()
+
+    def begin(self, name: str, attributes: dict[str, str]) -> None:
+        depth = len(self.path)
+        if depth == 0:
+            self.document.root = attributes
+            if name != "VTKFile":
+                self.fail(f"the root element is {name[:24]!r} instead of 'VTKFile'")
+            kind = attributes.get("type")
+            if kind == "PUnstructuredGrid":
+                self.fail("a PUnstructuredGrid only names other files: smooth each of its pieces, or merge them first")
+            if kind != "UnstructuredGrid":
+                self.fail(f"a VTKFile of type {str(kind)[:24]!r} is not supported: write it as an UnstructuredGrid")
+        elif self.path == ["VTKFile", "UnstructuredGrid"] and name == "Piece":
+            if self.document.pieces:
+                self.fail("several pieces in one file are not supported: merge them first")
+            self.document.pieces.append(attributes)
+        elif self.path == ["VTKFile"] and name == "AppendedData":
+            encoding = attributes.get("encoding", "raw")
+            if self.document.appended is not None or encoding not in ("raw", "base64"):
+                self.fail(f"AppendedData with the encoding {encoding[:24]!r} are unknown or given twice")
+            self.document.appended = encoding, self.tag()[1], -1
+            if encoding == "raw":
+                raise _RawDataFollow
+        elif name in ("DataArray", "Array") and self.open is None:
+            section = self.path[-1] if self.path[:3] == ["VTKFile", "UnstructuredGrid", "Piece"] and depth == 4 else ""
+            self.open = section, name, attributes, self.tag()
+        self.path.append(name)
+        self.tags.append(self.tag())
+
+    def finish(self, name: str) -> None:
+        self.path.pop()
+        tag = self.tags.pop()
+        empty = self.data[tag[1] - 2 : tag[1]] == b"/>"
+        first, end = (tag[1], tag[1]) if empty else self.tag()
+        if self.open is not None and self.open[3] == tag:
+            section, element, attributes, _ = self.open
+            self.open = None
+            self.document.arrays.append(DataArray(section, element, attributes, tag, (tag[1], first)))
+        elif self.open is not None and self.tags[-1] == self.open[3]:
+            self.hidden.append((tag[0], end))  # a child, and all that it contains
+        elif name == "AppendedData" and self.path == ["VTKFile"] and self.document.appended is not None:
+            encoding, _, _ = self.document.appended
+            self.document.appended = encoding, self.underscore(tag[1], first), first
+
+    def find_raw_data(self) -> None:
+        """Raw appended data lie between the first underscore and the last end tags."""
+        assert self.document.appended is not None
+        encoding, start, _ = self.document.appended
+        tail = _TAIL.search(self.data, max(start, self.data.rfind(b"</AppendedData")))
+        if tail is None:
+            raise FormatError("the file does not end with </AppendedData></VTKFile>: it is cut off")
+        self.document.appended = encoding, self.underscore(start, tail.start()), tail.start()
+
+    def underscore(self, start: int, stop: int) -> int:
+        found = re.compile(rb"\s*_").match(self.data, start, stop)
+        if found is None:
+            fail(self.data, start, "an underscore is missing at the beginning of AppendedData")
+        return found.end()
