@@ -22,7 +22,7 @@ Restore = Callable[[NDArray[np.float64]], Any]
 # Cell fields whose name says that they number regions. Elementary tags ("gmsh:geometrical") do not count.
 REGION_FIELD = re.compile(
     r"(gmsh:|medit:|cell)?_?(mat|material|region|zone|domain|subdomain|physical|attribute|entity|ref|tag|part|block|group)"
-    r"s?(_?(id|index)s?)?",
+    r"s?(_?(ids?|index))?",
     re.IGNORECASE,
 )
 VTK_KIND = {

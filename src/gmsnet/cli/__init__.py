@@ -1,0 +1,102 @@
+"""The command line: one subcommand a file. This one joins them, and turns errors into one line and an exit code.
+
+Nothing heavy is imported before a subcommand runs, so that help and completion answer at once.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from gmsnet.cli import generate, methods, quality, smooth, train
+from gmsnet.errors import GmsnetError
+
+DONE, TARGET_NOT_MET, BAD_INPUT = 0, 1, 2
+BUG, INTERRUPTED, BROKEN_PIPE = 70, 130, 141  # as the shells and sysexits.h have them
+
+# Whichever Click the installed Typer uses, its own or the package: this is the base of all its usage errors.
+UsageError: type[Exception] = next(base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException")
+
+app = typer.Typer(
+    name="gmsnet",
+    help="Better elements for any mesh file: moves nodes, changes nothing else and never inverts a cell.",
+    epilog="Exit codes: 0 done, 1 the target quality is not met, 2 bad usage or input.",
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command()(smooth.smooth)
+app.command()(quality.quality)
+app.command()(methods.methods)
+app.command()(generate.generate)
+app.command()(train.train)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"gmsnet {version('gmsnet')}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _gmsnet(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+        raise typer.Exit(BAD_INPUT)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code: 0, 1, 2; 130 interrupted, 141 broken pipe, 70 a bug of ours."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # a name that the terminal cannot show must not end the run
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        code = app(arguments, prog_name="gmsnet", standalone_mode=False)
+        sys.stdout.flush()
+    except (SystemExit, GmsnetError, UsageError, OSError) as error:
+        if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
+            return _close_pipe()
+        if isinstance(error, SystemExit):
+            raise
+        return _fail(error.format_message() if isinstance(error, UsageError) else _describe(error))  # type: ignore[attr-defined]
+    except (KeyboardInterrupt, typer.Abort):
+        print("gmsnet: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except Exception as error:
+        if os.environ.get("GMSNET_DEBUG"):
+            raise
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        print(
+            f"gmsnet: internal error: {what}; please report it; GMSNET_DEBUG=1 shows the traceback",
+            file=sys.stderr,
+        )
+        return BUG
+    return code if isinstance(code, int) else DONE
+
+
+def _describe(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{os.fsdecode(error.filename)}: {error.strerror}"
+    return str(error)
+
+
+def _fail(message: str) -> int:
+    print(f"gmsnet: error: {' '.join(message.split())}", file=sys.stderr)
+    return BAD_INPUT
+
+
+def _close_pipe() -> int:
+    """The reader of our output went away: that is no error, and Python shall not complain when it flushes at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return BROKEN_PIPE

@@ -1,0 +1,60 @@
+"""``--fix``: markers, node ids or a file of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from gmsnet.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from gmsnet.mesh import Mesh
+
+
+def fixed_nodes(mesh: Mesh, given: Sequence[str]) -> NDArray[np.bool_]:
+    """(N,) bool: the nodes that the values of ``--fix`` name.
+
+    Each is the name of a marker, region or node set; node ids such as ``3,7,12``, counted from 0; or ``@FILE`` with
+    ids. A marker whose name is a number goes before a node of that number (``100,`` is always the node).
+    Raises InputError for names and ids that the mesh does not have and for files that are no list of ids.
+    """
+    import numpy as np
+
+    from gmsnet.fixed import fixed_mask
+
+    mask = np.zeros(len(mesh.points), dtype=bool)
+    for value in given:
+        if value.startswith("@"):
+            mask |= fixed_mask(mesh, _from_file(value[1:], len(mask)))
+        elif value not in mesh.markers and re.fullmatch(r"\s*\d+\s*(,\s*\d+\s*)*,?\s*", value):
+            mask |= fixed_mask(mesh, [_node(text, len(mask), "--fix") for text in value.split(",") if text.strip()])
+        else:
+            mask |= fixed_mask(mesh, value)
+    return mask
+
+
+def _from_file(path: str, count: int) -> list[int]:
+    try:
+        with open(path, encoding="utf-8") as file:
+            lines = file.read().splitlines()
+    except OSError as error:
+        raise InputError(f"{path}: the list of nodes cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: this is not a list of nodes: give whole numbers, counted from 0") from error
+    return [
+        _node(text, count, f"{path}, line {number}")
+        for number, line in enumerate(lines, start=1)
+        for text in line.partition("#")[0].replace(",", " ").split()
+    ]
+
+
+def _node(text: str, count: int, where: str) -> int:
+    if not re.fullmatch(r"\s*\d{1,18}\s*", text):
+        raise InputError(f"{where}: {text!r} is not a node: give whole numbers, counted from 0")
+    if int(text) >= count:
+        raise InputError(f"{where}: there is no node {int(text)}; the mesh has the nodes 0 to {count - 1}")
+    return int(text)

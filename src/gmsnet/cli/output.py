@@ -1,0 +1,57 @@
+"""How the command line speaks: tables and text that survive pipes and plain terminals, and strict JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+PIPE_WIDTH = 1000  # where nobody looks, nothing is wrapped
+
+
+class _Console(Console):
+    """A console that leaves it to ``main`` to notice that nobody reads any more."""
+
+    def on_broken_pipe(self) -> None:
+        """Rich calls this while it handles the BrokenPipeError, which goes on from here."""
+        raise
+
+
+def console(stderr: bool = False) -> Console:
+    """Where text goes. Names of files may hold brackets and colons, so no markup is read in them."""
+    terminal = (sys.stderr if stderr else sys.stdout).isatty()
+    made = _Console(stderr=stderr, markup=False, highlight=False, emoji=False, soft_wrap=True)
+    if not terminal:
+        made.width = PIPE_WIDTH
+    return made
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """A table with its first column to the left and the others, figures, to the right."""
+    made = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold")
+    for index, name in enumerate(columns):
+        made.add_column(name, justify="left" if index == 0 else "right", no_wrap=True)
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+def print_json(document: Mapping[str, Any]) -> None:
+    """The one JSON document on the standard output; what is not a finite number is null."""
+    sys.stdout.write(json.dumps(_strict(document), indent=2, allow_nan=False) + "\n")
+
+
+def _strict(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _strict(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_strict(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

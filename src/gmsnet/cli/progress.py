@@ -1,0 +1,52 @@
+"""A progress bar on standard error, where that is a terminal; elsewhere nothing at all."""
+
+from __future__ import annotations
+
+import sys
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from rich import progress as parts
+
+from gmsnet.cli.output import console
+
+if TYPE_CHECKING:
+    from gmsnet.engine import Sweep
+
+
+class Progress:
+    """What is being done, and how far the sweeps are. A context manager."""
+
+    def __init__(self, sweeps: int, *, enabled: bool) -> None:
+        columns = (
+            parts.SpinnerColumn(),
+            parts.TextColumn("{task.description}", markup=False),
+            parts.BarColumn(),
+            parts.TextColumn("{task.fields[standing]}", markup=False),
+        )
+        shown = enabled and sys.stderr.isatty()
+        self._bar = parts.Progress(*columns, console=console(stderr=True), transient=True, disable=not shown)
+        self._task = self._bar.add_task("", total=None, standing="")
+        self._sweeps = sweeps
+
+    def __enter__(self) -> Progress:
+        self._bar.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, at: TracebackType | None) -> None:
+        self._bar.stop()
+
+    def stage(self, text: str) -> None:
+        """Say what begins now."""
+        self._bar.update(self._task, description=text, total=None, standing="")
+
+    def sweep(self, sweep: Sweep) -> None:
+        """The callback of ``smooth``: show the sweep and the mesh after it."""
+        inverted = f", {sweep.inverted:,} inverted" if sweep.inverted else ""
+        self._bar.update(
+            self._task,
+            description=f"sweep {sweep.index} of at most {self._sweeps}",
+            total=self._sweeps,
+            completed=sweep.index,
+            standing=f"1/q mean {sweep.mean_shape:.4f}, min {sweep.min_shape:.4f}{inverted}",
+        )

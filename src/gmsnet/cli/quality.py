@@ -1,0 +1,72 @@
+"""``gmsnet quality``: how good the triangles of a mesh are."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from gmsnet.errors import InputError
+
+
+def quality(
+    input: Annotated[str, typer.Argument(metavar="IN", help="The mesh file; - reads the standard input.")],
+    threshold: Annotated[
+        float | None,
+        typer.Option(help="Name the cells whose 1/q is below this; exit code 1 if there are any."),
+    ] = None,
+    format: Annotated[str | None, typer.Option(help="Format of IN, where its suffix does not tell it.")] = None,
+    plot: Annotated[str | None, typer.Option(metavar="FILE", help="Draw the mesh (.png, .svg or .pdf).")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
+) -> None:
+    """Measure the triangles of a mesh: angles, 1/q, 1/q_V, inverted cells, and where the worst ones are."""
+    from gmsnet.cli.target import check_writable, refuse_same
+
+    if threshold is not None and not -1.0 <= threshold <= 1.0:
+        raise InputError(f"--threshold is a value of 1/q and must lie between -1 and 1, got {threshold:g}")
+    if plot is not None:
+        from gmsnet.plot import check_target
+
+        check_target(plot)
+        refuse_same(input, [plot])
+        check_writable(plot)
+
+    from gmsnet import io
+    from gmsnet.cli import output, report
+    from gmsnet.engine import quality as measure
+
+    mesh = io.read(input, format)
+    volumes = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
+    if volumes:
+        raise InputError(
+            f"{input}: this is a volume mesh ({', '.join(volumes)}): only triangles can be measured so far"
+        )
+    found = measure(mesh)
+    worst = report.worst_cells(mesh, found)
+    if plot is not None:
+        from gmsnet.plot import plot_quality
+
+        plot_quality(mesh, plot)
+    few = 0 if threshold is None else int((found.shape < threshold).sum())
+    if json:
+        document = {"input": input, "nodes": len(mesh.points), "planar": mesh.plane is not None, **found.summary()}
+        if threshold is not None:
+            document |= {"threshold": threshold, "below_threshold": few}
+        output.print_json({**document, "worst": worst, "plot": plot})
+    else:
+        console = output.console()
+        console.print(f"{input}: {report.counts(mesh)}")
+        if len(found.cell):
+            console.print()
+            console.print(report.figures({"now": found}))
+            console.print("worst cells (number from 0)")
+            console.print(report.worst_table(worst))
+        else:
+            console.print("there are no triangles to measure")
+        if mesh.plane is None:
+            console.print("the mesh is a surface in space: its cells have no sign, none counts as inverted")
+        if plot is not None:
+            console.print(f"picture: {plot}")
+    if threshold is not None and few:
+        typer.echo(f"gmsnet: below the threshold {threshold:g}: {report.below(found, threshold)}", err=True)
+        raise typer.Exit(1)

@@ -1,0 +1,125 @@
+"""What the command line says about the quality of a mesh: tables, the worst cells with their place, JSON documents."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.table import Table
+
+from gmsnet.cli.output import table
+from gmsnet.mesh import CORNERS, Mesh
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from gmsnet.measure import QualityReport
+
+WORST = 5  # cells are shown
+NAMED = 10  # cells are named in one line
+
+FIGURES = (  # of QualityReport.summary(): label, path, number of decimals
+    ("inverted cells", ("inverted",), 0),
+    ("1/q min", ("shape", "min"), 4),
+    ("1/q 1st percentile", ("shape", "p1"), 4),
+    ("1/q mean", ("shape", "mean"), 4),
+    ("cells with 1/q < 0.3", ("shape", "below_0.3"), 0),
+    ("1/q_V min", ("aspect", "min"), 4),
+    ("1/q_V mean", ("aspect", "mean"), 4),
+    ("smallest angle, min", ("min_angle", "min"), 2),
+    ("smallest angle, mean", ("min_angle", "mean"), 2),
+    ("largest angle, max", ("max_angle", "max"), 2),
+    ("largest angle, mean", ("max_angle", "mean"), 2),
+    ("q-hat with 1/q", ("qhat",), 4),
+    ("q-hat with 1/q_V", ("qhat_aspect",), 4),
+)
+
+
+def figures(reports: Mapping[str, QualityReport]) -> Table:
+    """One row for each figure of quality, one column for each report."""
+    summaries = [report.summary() for report in reports.values()]
+    rows = [
+        [label, *(_text(_at(summary, path), decimals) for summary in summaries)] for label, path, decimals in FIGURES
+    ]
+    return table(["", *reports], rows)
+
+
+def counts(mesh: Mesh) -> str:
+    """How many nodes and cells of which kind a mesh has, in words."""
+    cells: dict[str, int] = {}
+    for block in mesh.cells:
+        cells[block.kind] = cells.get(block.kind, 0) + len(block.nodes)
+    return ", ".join([amount(len(mesh.points), "node"), *(amount(n, f"{kind} cell") for kind, n in cells.items())])
+
+
+def amount(count: int, what: str) -> str:
+    """A count with its noun, in the plural where it needs one."""
+    return f"{count:,} {what}" if count == 1 else f"{count:,} {what}s"
+
+
+def worst_cells(mesh: Mesh, report: QualityReport, held: NDArray[np.bool_] | None = None) -> list[dict[str, Any]]:
+    """The cells of least 1/q, the worst first: number from 0, measures, place, and how many corners are held."""
+    rows = []
+    for row in report.worst(WORST).tolist():
+        cell = int(report.cell[row])
+        found: dict[str, Any] = {
+            "cell": cell,
+            "shape": float(report.shape[row]),
+            "min_angle": float(report.min_angle[row]),
+            "max_angle": float(report.max_angle[row]),
+            "inverted": bool(report.valid[row] <= 0),
+            "centre": report.centre[row].tolist(),
+        }
+        if held is not None:
+            found["held_corners"] = int(held[corners_of(mesh, cell)].sum())
+        rows.append(found)
+    return rows
+
+
+def worst_table(cells: Sequence[Mapping[str, Any]]) -> Table:
+    """The answer of ``worst_cells`` as a table."""
+    columns = ["cell", "1/q", "smallest angle", "largest angle", "at"]
+    rows = [
+        [
+            f"{cell['cell']}{' (inverted)' if cell['inverted'] else ''}",
+            f"{cell['shape']:.4f}",
+            f"{cell['min_angle']:.2f}",
+            f"{cell['max_angle']:.2f}",
+            " ".join(f"{value:.6g}" for value in cell["centre"]),
+            *([f"{cell['held_corners']} of 3"] if "held_corners" in cell else []),
+        ]
+        for cell in cells
+    ]
+    with_held = any("held_corners" in cell for cell in cells)
+    return table([*columns, *(["held corners"] if with_held else [])], rows)
+
+
+def corners_of(mesh: Mesh, cell: int) -> NDArray[np.int64]:
+    """The corner nodes of a cell by its index among all cells of the mesh."""
+    for block in mesh.cells:
+        if cell < len(block.nodes):
+            return block.nodes[cell, : CORNERS.get(block.kind, block.nodes.shape[1])]
+        cell -= len(block.nodes)
+    raise IndexError(cell)
+
+
+def below(report: QualityReport, limit: float) -> str:
+    """Which cells have a smaller 1/q than the limit, in words: how many, and the worst of them by number."""
+    rows = report.worst(int((report.shape < limit).sum()))
+    named = ", ".join(str(cell) for cell in report.cell[rows[:NAMED]].tolist())
+    more = ", …" if len(rows) > NAMED else ""
+    return f"{amount(len(rows), 'cell')} below it (number from 0, worst first: {named}{more})"
+
+
+def _at(summary: Mapping[str, Any], path: Sequence[str]) -> Any:
+    value: Any = summary
+    for key in path:
+        value = value.get(key) if isinstance(value, Mapping) else None
+    return value
+
+
+def _text(value: Any, decimals: int) -> str:
+    if value is None:
+        return "-"
+    return f"{value:,}" if decimals == 0 else f"{value:.{decimals}f}"
