@@ -50,7 +50,7 @@ class Stars:
         topology = Topology.of(mesh)
         start, ring = topology.patches
         degree = np.diff(start).astype(np.int64)
-        column = np.arange(degree.max(initial=0))
+        column = np.arange(degree.max(initial=3))
         ids = ring[start[:-1, None] + np.minimum(column, degree[:, None] - 1)]  # (F × M), padded with the last one
         turned = (ids.argmin(axis=1)[:, None] + column) % degree[:, None]
         points = mesh.points[:, list(mesh.plane or (0, 1))]
