@@ -240,13 +240,22 @@ def write(mesh: Mesh) -> Written:
     codes, sizes, nodes = vtk_cells.cells_out(mesh, name)
     point_fields, cell_fields, lost = vtk_cells.fields_out(mesh, name)
     points = convert.in_space(mesh)
-    columns = {"connectivity": nodes, "offsets": np.cumsum(sizes), "types": codes.astype(np.uint8)}
+    columns: dict[str, NDArray[Any]] = {
+        "connectivity": nodes,
+        "offsets": np.cumsum(sizes),
+        "types": codes.astype(np.uint8),
+    }
     cells: vtk_cells.Fields = [(called, column[:, None]) for called, column in columns.items()]
     text = [
         '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">\n'
         f'<UnstructuredGrid>\n<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(codes)}">\n'
     ]
-    sections = {"PointData": point_fields, "CellData": cell_fields, "Points": [("Points", points)], "Cells": cells}
+    sections: dict[str, vtk_cells.Fields] = {
+        "PointData": point_fields,
+        "CellData": cell_fields,
+        "Points": [("Points", points)],
+        "Cells": cells,
+    }
     for section, fields in sections.items():
         text.append(f"<{section}>\n")
         for called, array in fields:

@@ -1,0 +1,178 @@
+"""PLY files (``.ply``), text and binary of both byte orders: vertices, faces, edges and the properties of each.
+
+The element ``vertex`` has x, y and z; ``face`` a list ``vertex_indices``; ``edge`` has ``vertex1`` and ``vertex2``.
+Other properties that are one number are data; those of faces whose names say so are regions. Other elements are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import FormatError
+from gmsnet.io import convert, ply_header
+from gmsnet.io.cell_table import Kind, check_range, table_blocks
+from gmsnet.io.document import Parsed, Written
+from gmsnet.io.ply_rows import Column, Table, tables
+from gmsnet.io.region_fields import names_a_region, regions_of
+from gmsnet.io.text import fail
+from gmsnet.io.vtk_cells import rows_text
+from gmsnet.io.words import Words
+from gmsnet.mesh import Mesh
+
+name = "PLY"
+suffixes = (".ply",)
+
+KINDS = {1: Kind("line"), 3: Kind("triangle"), 4: Kind("quad"), 5: Kind("polygon")}
+LISTS = ("vertex_indices", "vertex_index")
+TYPE_NAMES = {"i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": "int", "u4": "uint"}
+TYPE_NAMES |= {"f4": "float", "f8": "double"}
+
+
+def read(files: Mapping[str, bytes]) -> Parsed:
+    """See Format. A property that only faces or only edges have is 0 for the others."""
+    data = files[".ply"]
+    header = ply_header.parse(data)
+    known = {element.name: element for element in header.elements}
+    if "tristrips" in known:
+        fail(data, known["tristrips"].at, "triangle strips are not supported: turn them into faces first")
+    if "vertex" not in known or not {"face", "edge"} & set(known):
+        raise FormatError("the header has no element 'vertex', or neither 'face' nor 'edge': the file has no cells")
+    if not sum(known[key].count for key in ("face", "edge") if key in known):
+        raise FormatError("the file has no faces and no edges: there is nothing to smooth")
+    words, found = tables(data, header)
+    vertex = found["vertex"]
+    axes = [vertex.get(axis) for axis in "xyz"]
+    x, y, z = axes
+    if x is None or y is None or z is None or not x.property.kind == y.property.kind == z.property.kind in ("f4", "f8"):
+        message = "vertices must have the properties x, y and z, all of type float or all double"
+        fail(data, known["vertex"].at, message)
+    places = np.stack([x.at, y.at, z.at], axis=1)
+    kind = x.property.kind
+    points = words.values(places, kind)
+    parts = [
+        (key, _faces if key == "face" else _edges) for key in known if key in ("face", "edge") and known[key].count
+    ]
+    codes, sizes, nodes = (
+        np.concatenate(arrays)
+        for arrays in zip(*(make(words, found[key], len(points)) for key, make in parts), strict=True)
+    )
+    fields = _fields(words, [found[key] for key, _ in parts], [known[key].count for key, _ in parts])
+    first = np.concatenate([[0], np.cumsum(sizes)])
+    regions = regions_of(fields.items(), len(codes))
+    cells, cell_data = table_blocks(KINDS, codes, first, nodes, regions, fields)
+    point_data = {
+        key: _values(words, column) for key, column in vertex.items() if key not in "xyz" and column.sizes is None
+    }
+    return Parsed(points, cells, words.slots(places, kind), {}, point_data, cell_data, kind == "f4")
+
+
+_Cells = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]  # codes, sizes, nodes
+
+
+def _faces(words: Words, table: Table, count: int) -> _Cells:
+    lists = [table[key] for key in LISTS if key in table and table[key].sizes is not None]
+    if len(lists) != 1 or lists[0].property.kind[0] == "f":
+        raise FormatError("faces must have one list of integers 'vertex_indices'")
+    column = lists[0]
+    sizes, places = column.sizes, column.flat(words)
+    assert sizes is not None
+    if (short := np.flatnonzero(sizes < 3)).size:
+        words.fail(int(column.at[short[0]]), f"face {short[0]} (counted from 0) has {sizes[short[0]]} corners")
+    nodes = words.values(places, column.property.kind)
+    check_range(nodes, count, lambda k, message: words.fail(int(places[k]), message))
+    return np.minimum(sizes, 5), sizes, nodes
+
+
+def _edges(words: Words, table: Table, count: int) -> _Cells:
+    ends = [table.get(key) for key in ("vertex1", "vertex2")]
+    columns = [end for end in ends if end is not None and end.sizes is None and end.property.kind[0] != "f"]
+    if len(columns) != 2:
+        raise FormatError("edges must have the properties vertex1 and vertex2, both integers")
+    places = np.stack([column.at for column in columns], axis=1).ravel()
+    nodes = np.stack([words.values(column.at, column.property.kind) for column in columns], axis=1).ravel()
+    check_range(nodes, count, lambda k, message: words.fail(int(places[k]), message))
+    rows = len(nodes) // 2
+    return np.ones(rows, dtype=np.int64), np.full(rows, 2), nodes
+
+
+def _values(words: Words, column: Column) -> NDArray[Any]:
+    """The numbers of a property, in its type."""
+    kind = column.property.kind
+    values = words.values(column.at, kind, finite=False)
+    exact: NDArray[Any] = values.astype(kind)
+    return exact if kind[0] == "f" or np.array_equal(exact, values) else values
+
+
+def _fields(words: Words, parts: list[Table], counts: list[int]) -> dict[str, NDArray[Any]]:
+    """The data of all cells: property → one number for each row of each table."""
+    found: dict[str, list[NDArray[Any]]] = {}
+    for k, table in enumerate(parts):
+        for key, column in table.items():
+            if column.sizes is None and key not in ("vertex1", "vertex2"):
+                blank = [np.zeros(count, dtype=column.property.kind) for count in counts]
+                found.setdefault(key, blank)[k] = _values(words, column)
+    return {key: np.concatenate(arrays) for key, arrays in found.items()}
+
+
+def write(mesh: Mesh) -> Written:
+    """See Format. Text, coordinates in double precision; faces and edges, with the regions as a property."""
+    convert.check_kinds(mesh, name, ("vertex", "line", "triangle", "quad", "polygon"))
+    lost = [*convert.lost_cells(mesh, name, (0,)), *convert.lost_names(mesh, name, (1, 2))]
+    points = convert.in_space(mesh)
+    columns = {"x": points[:, 0], "y": points[:, 1], "z": points[:, 2]}
+    columns |= _kept(mesh.point_data, "point", ("x", "y", "z"), lost)
+    head = [f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n", _properties(columns)]
+    body = [_table(columns, [])]
+    fields = {key: np.concatenate([np.asarray(a) for a in parts]) for key, parts in mesh.cell_data.items() if parts}
+    cell_data = _kept(fields, "cell", (*LISTS, "vertex1", "vertex2"), lost)
+    regions = np.concatenate([block.regions for block in mesh.cells]) if mesh.cells else np.empty(0, dtype=np.int64)
+    if not np.array_equal(regions_of(cell_data.items(), len(regions)), regions):
+        cell_data = {key: array for key, array in cell_data.items() if not names_a_region(key)}
+        cell_data |= _kept({"region": regions}, "cell", (), lost)
+    dimension = np.concatenate([np.full(len(b.nodes), b.dimension) for b in mesh.cells]) if mesh.cells else regions
+    for dim in (2, 1):
+        rows = [row for block in mesh.cells if block.dimension == dim for row in block.nodes.tolist()]
+        if dim == 1 and not rows:
+            continue
+        chosen = {key: array[dimension == dim] for key, array in cell_data.items()}
+        if dim == 2:
+            length = "uchar" if max(map(len, rows), default=0) < 256 else "int"
+            lines = [" ".join(map(str, [len(row), *row])) for row in rows]
+            head.append(f"element face {len(rows)}\nproperty list {length} int vertex_indices\n")
+        else:
+            lines = [" ".join(map(str, row)) for row in rows]
+            head.append(f"element edge {len(rows)}\nproperty int vertex1\nproperty int vertex2\n")
+        head.append(_properties(chosen))
+        body.append(_table(chosen, lines))
+    return Written({".ply": "".join([*head, "end_header\n", *body]).encode("ascii")}, lost)
+
+
+def _kept(data: Mapping[str, NDArray[Any]], place: str, taken: tuple[str, ...], lost: list[str]) -> dict[str, Any]:
+    """The data that are one number with a name that PLY can write; the others are noted as lost."""
+    kept = {}
+    for key, values in data.items():
+        array = np.asarray(values)
+        plain = key.isascii() and key.isprintable() and key and " " not in key and key not in taken
+        if not plain or array.dtype.kind not in "iufb" or array.size != len(array):
+            lost.append(f"{name} cannot hold {place} data of this kind or name: {key!r} was left out")
+            continue
+        array = array.reshape(-1)
+        if array.dtype.kind in "iub":
+            kinds = [kind for kind in ("u1", "i4", "u4") if np.array_equal(array.astype(kind), array)]
+            array = array.astype(kinds[0] if kinds else "f8")
+        kept[key] = array.astype("f8") if array.dtype not in ("f4", "u1", "i4", "u4") else array
+    return kept
+
+
+def _properties(columns: Mapping[str, NDArray[Any]]) -> str:
+    return "".join(f"property {TYPE_NAMES[array.dtype.str[1:]]} {key}\n" for key, array in columns.items())
+
+
+def _table(columns: Mapping[str, NDArray[Any]], lines: list[str]) -> str:
+    """Rows of the columns, each behind its line if there are any."""
+    texts = [rows_text(array[:, None]).split("\n")[:-1] for array in columns.values()]
+    return "".join(" ".join(row) + "\n" for row in zip(*([lines] if lines else []), *texts, strict=True))
