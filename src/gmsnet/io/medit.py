@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
@@ -43,6 +45,14 @@ SKIPPED = {
 SKIPPED_VECTORS = ("Normals", "Tangents")
 SKIPPED_VALUES = ("AngleOfCornerBound",)  # one number, no count
 _WORD = re.compile(rb"\S")
+
+
+class Entries(NamedTuple):
+    """What follows a keyword: spans (n × width × 2) and numbers (n × width)."""
+
+    key: str
+    spans: Spans
+    numbers: NDArray[np.int64]
 
 
 class _Stream:
@@ -79,7 +89,8 @@ def read(files: Mapping[str, bytes]) -> Parsed:
     text = blank(data, rb"#[^\r\n]*")
     stream, seen = _Stream(text), dict[str, int]()
     spans, references = np.empty((0, 0, 2), dtype=np.int64), np.empty(0, dtype=np.int64)
-    entries: list[tuple[str, Spans]] = []  # cells, and what names held vertices and faces
+    points = np.empty((0, 2))
+    entries: list[Entries] = []
     dimension = 0
     for key, at in stream.keywords():
         if key in seen:
@@ -99,10 +110,12 @@ def read(files: Mapping[str, bytes]) -> Parsed:
             fail(text, at, f"Dimension is missing before {key[:24]}")
         elif key == "Vertices":
             rows = stream.take(stream.count("vertices") * (dimension + 1)).reshape(-1, dimension + 1, 2)
-            spans, references = rows[:, :dimension], to_ints(text, rows[:, dimension])
+            spans = rows[:, :dimension]
+            points, references = to_floats(text, spans), to_ints(text, rows[:, dimension])
         elif key in KINDS or key in HELD:
             width = NODES[KINDS[key]] + 1 if key in KINDS else 1
-            entries.append((key, stream.take(stream.count(key) * width).reshape(-1, width, 2)))
+            rows = stream.take(stream.count(key) * width).reshape(-1, width, 2)
+            entries.append(Entries(key, rows, to_ints(text, rows)))
         elif key in SKIPPED or key in SKIPPED_VECTORS:
             width = SKIPPED.get(key, dimension)
             to_floats(text, stream.take(stream.count(key) * width))
@@ -113,40 +126,36 @@ def read(files: Mapping[str, bytes]) -> Parsed:
     if "Vertices" not in seen:
         raise FormatError("Vertices are missing: the file is cut off or no Medit mesh")
 
-    points = to_floats(text, spans)
     cells, names = _cells(text, entries, len(points))
     point_data = {REFERENCE: references} if references.any() else {}
     slots = TextSlots(spans[..., 0], spans[..., 1], np.arange(len(points)))
     return Parsed(points, cells, slots, names, point_data)
 
 
-def _cells(
-    text: bytes, entries: list[tuple[str, Spans]], count: int
-) -> tuple[list[CellBlock], dict[tuple[int, int], str]]:
+def _cells(text: bytes, entries: list[Entries], count: int) -> tuple[list[CellBlock], dict[tuple[int, int], str]]:
+    """The cells, then the vertices that are held, with the names of these."""
     cells: list[CellBlock] = []
     names: dict[tuple[int, int], str] = {}
-    for key, spans in entries:
+    for key, spans, numbers in entries:
         if key in KINDS:
-            numbers = to_ints(text, spans)
-            nodes = numbers[:, :-1] - 1
-            check_nodes(text, spans[:, :-1], nodes, count, base=1)
-            cells.append(CellBlock(KINDS[key], nodes, numbers[:, -1]))
-    for key, spans in entries:
+            check_nodes(text, spans[:, :-1], numbers[:, :-1] - 1, count, base=1)
+            cells.append(CellBlock(KINDS[key], numbers[:, :-1] - 1, numbers[:, -1]))
+    faces = {block.kind: block.nodes for block in cells}
+    for key, spans, numbers in entries:
         if key in HELD:
-            nodes = to_ints(text, spans) - 1
+            nodes = numbers - 1
             if key.endswith("Vertices") or key == "Corners":
                 check_nodes(text, spans, nodes, count, base=1)
             else:
-                faces = [b.nodes for b in cells if b.kind == KINDS[key.removeprefix("Required")]]
-                all_faces = np.concatenate(faces) if faces else np.empty((0, 1), dtype=np.int64)
-                _check_faces(text, key, spans, nodes, len(all_faces))
-                nodes = np.unique(all_faces[nodes.ravel()]).reshape(-1, 1)
+                of = faces.get(KINDS[key.removeprefix("Required")], np.empty((0, 1), dtype=np.int64))
+                _check_faces(text, key, spans, nodes, len(of))
+                nodes = np.unique(of[nodes.ravel()]).reshape(-1, 1)
             cells.append(CellBlock("vertex", nodes, np.full(len(nodes), HELD[key])))
             names[0, HELD[key]] = key
     return cells, names
 
 
-def _check_faces(text: bytes, key: str, spans: Spans, faces: np.ndarray, count: int) -> None:
+def _check_faces(text: bytes, key: str, spans: Spans, faces: NDArray[np.int64], count: int) -> None:
     bad = np.flatnonzero(((faces < 0) | (faces >= count)).ravel())
     if bad.size:
         number = int(faces.ravel()[bad[0]]) + 1
