@@ -20,9 +20,9 @@ from gmsnet.errors import InputError
 from gmsnet.fixed import fixed_mask
 from gmsnet.kernels import quality as kernels
 from gmsnet.kernels.compile import LANES
+from gmsnet.measure import QualityReport, measure, weighted_metric
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Options, Precision, Smoother, method_named
-from gmsnet.measure import QualityReport, measure, weighted_metric
 from gmsnet.topology import Topology, planar_points, scale_exponent
 
 Floats = NDArray[np.float64]
@@ -178,9 +178,7 @@ class _Run:
         self.sums = np.empty((-(-len(self.triangles) // LANES), 7))
         self.best, self.best_standing = self.start, self._standing()
 
-    def to_the_end(
-        self, max_sweeps: int, target: float | None, callback: Callable[[Sweep], bool | None] | None
-    ) -> str:
+    def to_the_end(self, max_sweeps: int, target: float | None, callback: Callable[[Sweep], bool | None] | None) -> str:
         """Sweeps until a stop rule says why to stop."""
         if not len(self.topology.free):
             return NOTHING_TO_MOVE
@@ -274,8 +272,8 @@ class _Standing:
         low, high, shape = (float(sums[:, k].sum()) / triangles for k in range(3))
         worst_low, worst_high = float(sums[:, kernels.MIN_LOW].min()), float(sums[:, kernels.MAX_HIGH].max())
         worst_shape = float(sums[:, kernels.MIN_SHAPE].min())
-        angles = (math.degrees(a) for a in (low, worst_low, worst_high, high))
-        qhat = weighted_metric(*angles, shape, worst_shape)
+        low, worst_low, worst_high, high = map(math.degrees, (low, worst_low, worst_high, high))
+        qhat = weighted_metric(low, worst_low, worst_high, high, shape, worst_shape)
         return cls(int(sums[:, kernels.INVERTED].sum()), qhat, worst_shape, shape)
 
     def beats(self, other: _Standing) -> bool:

@@ -58,9 +58,7 @@ class QualityReport:
         if not len(inverse):
             return float("nan")
         low, high = self.min_angle, self.max_angle
-        return weighted_metric(
-            low.mean(), low.min(), high.max(), high.mean(), inverse.mean(), inverse.min()
-        )
+        return weighted_metric(low.mean(), low.min(), high.max(), high.mean(), inverse.mean(), inverse.min())
 
     def worst(self, count: int) -> NDArray[np.int64]:
         """Rows of the ``count`` triangles of least shape, the worst first."""
@@ -89,7 +87,7 @@ class QualityReport:
 def weighted_metric(
     low_mean: float, low_min: float, high_max: float, high_mean: float, inverse_mean: float, inverse_min: float
 ) -> float:
-    """q̂ = (1/6)[(α_mean + α_min + 120 − β_max − β_mean)/60 + (1/q)_mean + (1/q)_min], angles in degrees (equation 11)."""
+    """Equation 11: (1/6)[(α_mean + α_min + 120 − β_max − β_mean)/60 + (1/q)_mean + (1/q)_min], angles in degrees."""
     angles = (low_mean + low_min + 120.0 - high_max - high_mean) / 60.0
     return float((angles + inverse_mean + inverse_min) / 6.0)
 

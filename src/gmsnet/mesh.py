@@ -34,7 +34,7 @@ class Source(Protocol):
         ...
 
     def splice(self, points: NDArray[np.float64]) -> Mapping[str, bytes]:
-        """The files (suffix → bytes) with the coordinates of ``points`` (N×dim) wherever they differ from the file's."""
+        """The files (suffix → bytes) with the coordinates of ``points`` (N×dim) where they differ from the file's."""
         ...
 
 

@@ -1,0 +1,1 @@
+"""Compiled functions on plain arrays. They import nothing of the package."""

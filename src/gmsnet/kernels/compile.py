@@ -17,18 +17,19 @@ from typing import Any
 if folder := os.environ.get("GMSNET_CACHE"):
     os.environ.setdefault("NUMBA_CACHE_DIR", folder)  # Numba reads it when it is imported
 
-import numba  # noqa: E402  (after the folder is set)
+import numba
 
 LANES = 64  # stars or triangles that go through the processor abreast
 FAST = {"contract", "reassoc", "nsz", "arcp"}  # but NaN and infinity stay what they are: the guard refuses them
 
 
 def _compile(function: Callable[..., Any], fastmath: set[str] | bool) -> Callable[..., Any]:
-    options = {"nogil": True, "error_model": "numpy", "fastmath": fastmath}
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": fastmath}
     try:
-        return numba.njit(cache=True, **options)(function)  # type: ignore[no-any-return]
+        compiled: Callable[..., Any] = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no folder for the cache can be written
-        return numba.njit(**options)(function)  # type: ignore[no-any-return]
+        compiled = numba.njit(**options)(function)
+    return compiled
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,5 +1,4 @@
-"""GMSNet (Wang et al. 2023, equations 4 to 8) for a block of stars, in float32, without a pass per neighbour and channel
-for the norm.
+"""GMSNet (Wang et al. 2023, equations 4 to 8) for a block of stars, in float32, the norm in closed form.
 
 The features X_h = X·W_l + b_l are affine in the coordinates, so GraphNorm follows from the mean m and the covariance C
 of the n + 1 nodes of a star: with μ = w·m + b a channel's mean, its second moment after the shift by αμ is

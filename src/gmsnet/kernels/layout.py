@@ -32,7 +32,9 @@ def morton_order(points):
     extent = max(right - left, top - bottom)
     scale = 65535.0 / extent if extent > 0.0 else 0.0
     for i in range(n):
-        code = spread(np.int64((points[i, 0] - left) * scale)) | (spread(np.int64((points[i, 1] - bottom) * scale)) << 1)
+        code = spread(np.int64((points[i, 0] - left) * scale)) | (
+            spread(np.int64((points[i, 1] - bottom) * scale)) << 1
+        )
         lower[i] = code & 0xFFFF
         upper[i] = code >> 16
     order, _ = counting_order(lower, 65536)
@@ -46,7 +48,7 @@ def morton_order(points):
 
 @kernel
 def order_faces(first, corner, position):
-    """Faces by the lowest place of their nodes in memory: the order, and first and corner in that order and by place."""
+    """Faces by the lowest place of their nodes in memory: the order; first and corner in that order and by place."""
     faces = len(first) - 1
     lowest = np.empty(faces, dtype=np.int32)
     for f in range(faces):

@@ -134,10 +134,10 @@ def per_cell(points, triangles, turn, low, high, shape, aspect):
         low[t] = math.atan2(abs(cross), largest) if largest > 0.0 else 0.0
         smallest = min(at_a, at_b, at_c)
         high[t] = math.atan2(abs(cross), smallest) if cross != 0.0 or smallest != 0.0 else math.pi
-        l, m, n = math.hypot(px, py), math.hypot(qx, qy), math.hypot(rx, ry)
+        k, m, n = math.hypot(px, py), math.hypot(qx, qy), math.hypot(rx, ry)
         signed = TWO_SQRT3 * turn[t] * cross
-        shape[t] = signed / max(l * l + m * m + n * n, TINY)
-        aspect[t] = signed / max(max(l, m, n) * (l + m + n), TINY)
+        shape[t] = signed / max(k * k + m * m + n * n, TINY)
+        aspect[t] = signed / max(max(k, m, n) * (k + m + n), TINY)
 
 
 @fast_kernel
@@ -156,8 +156,8 @@ def per_surface_cell(points, triangles, low, high, shape, aspect):
         largest, smallest = max(at_a, at_b, at_c), min(at_a, at_b, at_c)
         low[t] = math.atan2(area, largest) if largest > 0.0 else 0.0
         high[t] = math.atan2(area, smallest) if area != 0.0 or smallest != 0.0 else math.pi
-        l = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+        k = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
         m = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
         n = math.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2])
-        shape[t] = TWO_SQRT3 * area / max(l * l + m * m + n * n, TINY)
-        aspect[t] = TWO_SQRT3 * area / max(max(l, m, n) * (l + m + n), TINY)
+        shape[t] = TWO_SQRT3 * area / max(k * k + m * m + n * n, TINY)
+        aspect[t] = TWO_SQRT3 * area / max(max(k, m, n) * (k + m + n), TINY)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from gmsnet import weights
 from gmsnet.kernels import gmsnet as kernels
-from gmsnet.methods.base import Method, Options, Precision
+from gmsnet.methods.base import Method, Precision
 from gmsnet.topology import Stars
 
 

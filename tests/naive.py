@@ -1,0 +1,98 @@
+"""Slow, obvious twins of the compiled kernels. Nothing here is clever: loops, sets and fractions."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+
+
+def exact_area_sign(a, b, c) -> int:
+    """Sign of the area of a triangle, in rational arithmetic."""
+    (ax, ay), (bx, by), (cx, cy) = ([Fraction(float(v)) for v in p] for p in (a, b, c))
+    area = (ax - cx) * (by - cy) - (ay - cy) * (bx - cx)
+    return (area > 0) - (area < 0)
+
+
+def signs(points, triangles, turn) -> list[int]:
+    return [int(w) * exact_area_sign(*(points[i] for i in t)) for t, w in zip(triangles, turn, strict=True)]
+
+
+def quality(a, b, c) -> tuple[float, float, float, float]:
+    """Smallest angle, largest angle (degrees), 1/q, 1/q_V of one triangle."""
+    sides = [math.dist(b, c), math.dist(c, a), math.dist(a, b)]
+    angles = []
+    for p, q, r in ((a, b, c), (b, c, a), (c, a, b)):
+        u, v = (q[0] - p[0], q[1] - p[1]), (r[0] - p[0], r[1] - p[1])
+        angles.append(math.degrees(math.atan2(abs(u[0] * v[1] - u[1] * v[0]), u[0] * v[0] + u[1] * v[1])))
+    area = 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    shape = 4 * math.sqrt(3) * area / sum(s * s for s in sides)
+    return min(angles), max(angles), shape, 4 * math.sqrt(3) * area / (max(sides) * sum(sides))
+
+
+def qhat(triangles) -> float:
+    """Equation 11 over (low, high, 1/q) rows."""
+    low, high, inverse = (np.array(column) for column in zip(*triangles, strict=True))
+    angles = (low.mean() + low.min() + 120 - high.max() - high.mean()) / 60
+    return float((angles + inverse.mean() + inverse.min()) / 6)
+
+
+def held_nodes(nodes, triangles, regions, others=(), lines=()) -> set[int]:
+    """Nodes that must not move, by the rules read off the definition: see Topology."""
+    held = set(range(nodes)) - {v for t in triangles for v in t}
+    edges: dict[frozenset[int], list[int]] = {}
+    for f, cell in enumerate([*triangles, *others]):
+        for i in range(len(cell)):
+            edges.setdefault(frozenset((cell[i], cell[(i + 1) % len(cell)])), []).append(f)
+    for edge, faces in edges.items():
+        if len(faces) != 2 or len({regions[f] for f in faces}) > 1:
+            held |= edge
+    held |= {v for cell in [*others, *lines] for v in cell}
+    for v in range(nodes):
+        links = [set(t) - {v} for t in triangles if v in t]
+        if not links:
+            continue
+        ring = {n for link in links for n in link}
+        reached = {next(iter(ring))}
+        while True:
+            more = {n for link in links if link & reached for n in link} | reached
+            if more == reached:
+                break
+            reached = more
+        two = all(sum(n in link for link in links) == 2 for n in ring)
+        if reached != ring or not two or len(ring) < 3 or any(len(link) != 2 for link in links):
+            held.add(v)
+    return held
+
+
+def gmsnet_shift(centre, ring, tensors):
+    """Equations 4 to 8 for one star, float64, loop by loop: the shift in the coordinates of the star."""
+    t = {name: np.asarray(value, dtype=np.float64) for name, value in tensors.items()}
+    nodes = np.array([centre, *ring], dtype=np.float64)
+    d = np.ptp(nodes, axis=0).max()
+    x = (nodes - nodes[0]) / d
+    n, hidden = len(ring), len(t["linear.bias"])
+    features = np.array([[t["linear.weight"][h] @ p + t["linear.bias"][h] for h in range(hidden)] for p in x])
+    normed = np.empty_like(features)
+    for h in range(hidden):
+        moved = features[:, h] - t["norm.mean_scale"][h] * features[:, h].mean()
+        normed[:, h] = t["norm.weight"][h] * moved / math.sqrt((moved**2).mean() + 1e-5) + t["norm.bias"][h]
+    adjacency = np.eye(n + 1)
+    for j in range(n):
+        adjacency[0, j + 1] = adjacency[j + 1, 0] = 1
+        k = (j + 1) % n
+        adjacency[j + 1, k + 1] = adjacency[k + 1, j + 1] = 1
+    scale = np.diag(1 / np.sqrt(adjacency.sum(axis=1)))
+    convolved = scale @ adjacency @ scale @ np.maximum(normed, 0) @ t["gcn.weight"].T + t["gcn.bias"] + normed
+    inner = t["mlp.0.weight"] @ convolved[0] + t["mlp.0.bias"]
+    inner = np.maximum((inner - inner.mean()) / math.sqrt(inner.var() + 1e-5), 0)
+    return d * (t["mlp.1.weight"] @ inner + t["mlp.1.bias"])
+
+
+def certified(a, b, c, unit=2.0**-53) -> bool:
+    """Is a triangle positive for certain if each coordinate may be off by ``unit`` of the largest of its own star?
+
+    A necessary condition that does not know the bound: it must at least be positive exactly.
+    """
+    return exact_area_sign(a, b, c) > 0

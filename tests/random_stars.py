@@ -1,0 +1,49 @@
+"""Random stars and weights for the tests."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmsnet.kernels import gmsnet as kernels_gmsnet
+from gmsnet.kernels import stars as kernels_stars
+from gmsnet.kernels.compile import LANES
+from gmsnet.methods.gmsnet import fold
+from gmsnet.weights import Weights, shapes
+
+
+def star(rng, degree, size=1.0, offset=0.0):
+    """A star-shaped polygon around a node that is not quite its centre: (centre, ring counter-clockwise)."""
+    angles = np.sort(rng.random(degree) + np.arange(degree)) * 2 * np.pi / degree
+    radius = 0.2 + rng.random(degree)
+    ring = size * np.column_stack([radius * np.cos(angles), radius * np.sin(angles)])
+    centre = size * 0.1 * (rng.random(2) - 0.5)
+    direction = rng.normal(size=2)
+    away = offset * size * direction / np.linalg.norm(direction)
+    return centre + away, ring + away
+
+
+def random_weights(rng, hidden=8, scale=0.3):
+    """Weights of an untrained network, with every parameter away from its neutral value."""
+    tensors = {name: (scale * rng.normal(size=shape)).astype(np.float32) for name, shape in shapes(hidden).items()}
+    tensors["norm.weight"] += np.float32(1)
+    tensors["norm.mean_scale"] += np.float32(0.8)
+    return Weights(model="gmsnet", hidden=hidden, tensors=tensors, metadata={})
+
+
+def compiled_shifts(stars, weights):
+    """The shifts that the compiled network proposes for (centre, ring) pairs, in the coordinates of each star."""
+    out = np.empty((len(stars), 2))
+    folded, hidden = fold(weights), weights.hidden
+    x, work = np.empty(2 * LANES), np.empty(8 * LANES)
+    shift, row = np.empty(2 * LANES, dtype=np.float32), np.empty(4 * LANES, dtype=np.float32)
+    m, decoded = np.empty(5 * LANES, dtype=np.float32), np.empty(hidden * LANES, dtype=np.float32)
+    features = np.zeros(8 * ((hidden + 3) // 4) * LANES, dtype=np.float32)
+    for k, (centre, ring) in enumerate(stars):
+        n, lane = len(ring), k % LANES  # every lane takes its turn; all hold the same star
+        flat = np.repeat(np.asarray(ring).ravel(), LANES)
+        local = np.empty(2 * n * LANES, dtype=np.float32)
+        x[:LANES], x[LANES:] = centre
+        kernels_stars.localise(x, flat, n, work, local)
+        kernels_gmsnet.propose(local, n, folded, hidden, m, row, features, decoded, shift)
+        out[k] = work[lane] * shift[[lane, LANES + lane]].astype(np.float64)
+    return out

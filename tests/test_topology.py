@@ -1,0 +1,190 @@
+from __future__ import annotations
+
+import naive
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import Delaunay
+
+from gmsnet import CellBlock, Mesh
+from gmsnet.topology import Topology
+
+
+def mesh_of(points, triangles, regions=None, extra=()):
+    triangles = np.asarray(triangles, dtype=int).reshape(-1, 3)
+    regions = np.zeros(len(triangles), dtype=int) if regions is None else regions
+    return Mesh(points, (CellBlock("triangle", triangles, regions), *extra))
+
+
+def wheel(degree, centre=(0.0, 0.0)):
+    angle = 2 * np.pi * np.arange(degree) / degree
+    points = np.vstack([centre, np.column_stack([np.cos(angle), np.sin(angle)]) + centre])
+    triangles = [(0, 1 + i, 1 + (i + 1) % degree) for i in range(degree)]
+    return points, np.array(triangles)
+
+
+def check_against_twin(mesh, topology, others=(), lines=()):
+    triangles = mesh.cells[0].nodes.tolist()
+    regions = [*mesh.cells[0].regions.tolist(), *[-1] * len(others)]
+    held = naive.held_nodes(len(mesh.points), triangles, regions, others, lines)
+    unwound = set(topology.held.get("part that cannot be wound consistently", np.empty(0, int)).tolist())
+    free = set(topology.free.tolist())
+    assert free == set(range(len(mesh.points))) - held - unwound
+    counted = [i for ids in topology.held.values() for i in ids.tolist()]
+    assert sorted([*counted, *free]) == list(range(len(mesh.points)))  # each node once
+    start, ring = topology.patches
+    turn = topology.turn
+    for i, v in enumerate(topology.free.tolist()):
+        around = ring[start[i] : start[i + 1]].tolist()
+        wanted = {
+            tuple(t if w > 0 else t[::-1])
+            for t, w in zip(topology.triangles.tolist(), turn.tolist(), strict=True)
+            if v in t
+        }
+        rotated = {t[k:] + t[:k] for t in wanted for k in range(3)}
+        assert len(wanted) == len(around)
+        for a, b in zip(around, around[1:] + around[:1], strict=True):
+            assert (v, a, b) in rotated
+        colours = topology.colours
+        assert all(colours[v] != colours[u] for u in around)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(4, 60), st.integers(1, 3))
+@settings(max_examples=80, deadline=None)
+def test_random_triangulations_with_holes_regions_and_mixed_winding(seed, nodes, regions):
+    rng = np.random.default_rng(seed)
+    points = rng.random((nodes, 2))
+    triangles = Delaunay(points).simplices
+    triangles = triangles[rng.random(len(triangles)) < rng.choice([1.0, 0.9, 0.5])]
+    triangles = np.array([np.roll(t[:: rng.choice([1, -1])], rng.integers(3)) for t in triangles]).reshape(-1, 3)
+    if rng.random() < 0.3 and len(triangles):
+        triangles = np.vstack([triangles, triangles[rng.integers(len(triangles), size=2)]])  # duplicates
+    if rng.random() < 0.3:
+        triangles = np.vstack([triangles, [[0, 0, 1]]])  # a cell that names a node twice
+    mesh = mesh_of(points, triangles, rng.integers(regions, size=len(triangles)))
+    check_against_twin(mesh, Topology.of(mesh))
+
+
+@pytest.mark.parametrize("degree", [3, 4, 7, 64, 65, 100, 1000])
+def test_wheels_of_any_degree(degree):
+    points, triangles = wheel(degree)
+    topology = Topology.of(mesh_of(points, triangles))
+    assert topology.free.tolist() == [0]
+    start, ring = topology.patches
+    assert sorted(ring.tolist()) == list(range(1, degree + 1))
+    assert topology.stars.degree.tolist() == [degree]
+    assert start.tolist() == [0, degree]
+
+
+def test_a_hub_of_too_many_neighbours_is_held():
+    points, triangles = wheel(5000)
+    topology = Topology.of(mesh_of(points, triangles))
+    assert topology.held["more than 4096 neighbours"].tolist() == [0]
+
+
+def test_two_wheels_that_touch_in_a_node_are_two_parts_and_wound_each_for_itself():
+    a, triangles = wheel(6)
+    b, _ = wheel(6, centre=(2.0, 0.0))
+    points = np.vstack([a, b])
+    second = triangles + 7
+    second[second == 7 + 4] = 1  # the rightmost node of the one is the leftmost of the other: a bow-tie
+    mesh = mesh_of(points, np.vstack([triangles, second[:, ::-1]]))
+    topology = Topology.of(mesh)
+    assert topology.parts == 2
+    assert topology.turn.tolist() == [1] * 6 + [-1] * 6
+    assert topology.free.tolist() == [0, 7]
+    assert topology.held["not used by any cell"].tolist() == [11]
+
+
+def test_nodes_of_a_non_manifold_edge_are_held():
+    points, triangles = wheel(6)
+    points = np.vstack([points, [[0.1, 3.0]]])
+    mesh = mesh_of(points, np.vstack([triangles, [[0, 1, 7]]]))
+    topology = Topology.of(mesh)
+    assert topology.free.size == 0
+    check_against_twin(mesh, topology)
+
+
+def test_a_strip_with_a_twist_is_held():
+    """Five triangles that form a Möbius strip: no winding suits all, whatever the points."""
+    triangles = [(i, (i + 1) % 5, (i + 2) % 5) for i in range(5)]
+    points = np.random.default_rng(0).random((5, 2))
+    topology = Topology.of(mesh_of(points, triangles))
+    assert topology.free.size == 0
+
+
+def test_interfaces_lines_vertices_and_foreign_cells_hold_their_nodes():
+    rng = np.random.default_rng(5)
+    points = rng.random((40, 2))
+    triangles = Delaunay(points).simplices
+    everything = mesh_of(points, triangles)
+    free = Topology.of(everything).free.tolist()
+    line = CellBlock("line", np.array([free[:2]]), np.array([7]))
+    vertex = CellBlock("vertex", np.array([[free[2]]]), np.array([1]))
+    held = Topology.of(mesh_of(points, triangles, extra=(line, vertex)))
+    assert held.free.tolist() == free[3:]
+    assert held.held["node of a line or vertex cell"].tolist() == free[:3]
+    regions = np.zeros(len(triangles), dtype=int)
+    regions[np.flatnonzero((triangles == free[0]).any(axis=1))[0]] = 1
+    assert free[0] not in Topology.of(mesh_of(points, triangles, regions)).free
+
+
+def test_triangles_beside_quads_and_six_node_triangles():
+    points = np.array([[x, y] for y in range(4) for x in range(4)], dtype=float)
+    quads, triangles = [], []
+    for y in range(3):
+        for x in range(3):
+            a = 4 * y + x
+            if x == 0:
+                quads.append((a, a + 1, a + 5, a + 4))
+            else:
+                triangles += [(a, a + 1, a + 5), (a, a + 5, a + 4)]
+    mesh = Mesh(points, (
+        CellBlock("triangle", np.array(triangles), np.zeros(len(triangles), dtype=int)),
+        CellBlock("quad", np.array(quads), np.full(len(quads), 0)),
+    ))  # fmt: skip
+    topology = Topology.of(mesh)
+    assert topology.free.tolist() == [6, 10]
+    assert topology.held["node of a cell that is not smoothed"].tolist() == [5, 9]
+    six = CellBlock("triangle6", np.array([[0, 1, 5, 2, 3, 4]]), np.zeros(1, dtype=int))
+    only = Topology.of(Mesh(points, (six,)))
+    assert only.triangles.tolist() == [[0, 1, 5]]
+    assert only.free.size == 0
+
+
+def test_colours_and_patches_do_not_depend_on_the_coordinates():
+    rng = np.random.default_rng(8)
+    points = rng.random((200, 2))
+    triangles = Delaunay(points).simplices
+    turned = points @ np.array([[0.6, 0.8], [-0.8, 0.6]])
+    one, two = Topology.of(mesh_of(points, triangles)), Topology.of(mesh_of(turned, triangles))
+    np.testing.assert_array_equal(one.colours, two.colours)
+    assert sorted(map(sorted, np.split(one.patches[1], one.patches[0][1:-1]))) == sorted(
+        map(sorted, np.split(two.patches[1], two.patches[0][1:-1]))
+    )
+
+
+def test_blocks_hold_every_star_once():
+    rng = np.random.default_rng(9)
+    points = rng.random((3000, 2))
+    topology = Topology.of(mesh_of(points, Delaunay(points).simplices))
+    stars = topology.stars
+    seen = []
+    for c in range(stars.colours):
+        for b in range(stars.first[c], stars.first[c + 1]):
+            places = stars.centre[64 * b : 64 * b + stars.count[b]]
+            assert (topology.near_colours[places] == c).all()
+            assert (np.diff(topology.near_start)[places] == stars.degree[b]).all()
+            seen += topology.memory[places].tolist()
+            block = stars.rings[stars.offset[b] : stars.offset[b] + 64 * stars.degree[b]].reshape(-1, 64)
+            for lane, place in enumerate(places):
+                wanted = topology.near_ring[topology.near_start[place] : topology.near_start[place + 1]]
+                assert block[:, lane].tolist() == wanted.tolist()
+    assert sorted(seen) == topology.free.tolist()
+
+
+def test_meshes_without_faces_or_points():
+    assert Topology.of(Mesh(np.empty((0, 2)), ())).free.size == 0
+    lone = Topology.of(Mesh(np.zeros((3, 2)), ()))
+    assert lone.held["not used by any cell"].tolist() == [0, 1, 2]
