@@ -33,13 +33,13 @@ def read(files: Mapping[str, bytes]) -> Parsed:
     data = files[".obj"]
     text = blank(data, rb"#[^\r\n]*")
     rows = scan_rows(text, 0)
+    _no_broken_lines(text, rows)
     heads = rows.column(0)
     keys = gather(text, np.stack([heads[:, 0], np.minimum(heads[:, 1], heads[:, 0] + 8)], axis=1))
     unknown = np.flatnonzero(~np.isin(keys, KEYS))
     if unknown.size:
         k = int(unknown[0])
         fail(text, rows.where(k), f"a line that starts with {word(text, heads[k])} cannot be read here")
-    _no_broken_lines(text, rows)
 
     is_point = keys == b"v"
     spans = _coordinates(text, rows, is_point)

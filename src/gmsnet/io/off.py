@@ -40,9 +40,10 @@ def read(files: Mapping[str, bytes]) -> Parsed:
     to_ints(text, counts)
 
     rows = scan_rows(text, end, number)
-    short = np.flatnonzero(rows.lengths < 3)
-    if short.size:
-        fail(text, rows.where(int(short[0])), f"three coordinates were expected, found {rows.lengths[short[0]]} words")
+    odd = np.flatnonzero((rows.lengths < 3) | (rows.lengths != rows.lengths[:1]))
+    if odd.size:
+        found, usual = rows.lengths[odd[0]], max(3, int(rows.lengths[0]))
+        fail(text, rows.where(int(odd[0])), f"a point takes {usual} numbers here, found {found} words")
     spans = np.stack([rows.column(j) for j in range(3)], axis=1)
     points = to_floats(text, spans)
     end = rows.end if len(rows) else end
