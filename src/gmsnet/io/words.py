@@ -22,9 +22,10 @@ _NOT_FINITE = re.compile(rb"(?i)([+-]?)(nan|inf(?:inity)?)(?:\([a-z]*\))?")
 
 
 class Words(Protocol):
-    """The numbers of a file. ``at``: the address that ``take`` goes on from."""
+    """The numbers of a file. ``at``: the address that ``take`` goes on from; ``end``: the one behind the last."""
 
     at: int
+    end: int
 
     def size(self, kind: str) -> int:
         """How far the address behind a number of this type is from its own."""
@@ -54,7 +55,7 @@ class TextWords:
     """See Words: the tokens of a text."""
 
     def __init__(self, data: bytes, spans: Spans) -> None:
-        self.data, self.spans, self.at = data, spans, 0
+        self.data, self.spans, self.at, self.end = data, spans, 0, len(spans)
 
     def size(self, kind: str) -> int:
         """See Words."""
@@ -62,7 +63,7 @@ class TextWords:
 
     def take(self, count: int, kind: str) -> Addresses:
         """See Words."""
-        left = len(self.spans) - self.at
+        left = self.end - self.at
         if not 0 <= count <= left:
             self.fail(self.at, f"expected {count} numbers, found {left}")
         self.at += count
@@ -82,15 +83,14 @@ class TextWords:
 
     def fail(self, address: int, message: str) -> NoReturn:
         """See Words."""
-        fail(self.data, int(self.spans[address, 0]) if address < len(self.spans) else len(self.data), message)
+        fail(self.data, int(self.spans[address, 0]) if address < self.end else len(self.data), message)
 
 
 class ByteWords:
-    """See Words: binary numbers. order: ``<`` little endian or ``>`` big endian. stop: the byte behind the last."""
+    """See Words: binary numbers. order: ``<`` little endian or ``>`` big endian."""
 
-    def __init__(self, data: bytes, order: str, at: int = 0, stop: int | None = None) -> None:
-        self.data, self.order, self.at = data, order, at
-        self.stop = len(data) if stop is None else stop
+    def __init__(self, data: bytes, order: str, at: int = 0) -> None:
+        self.data, self.order, self.at, self.end = data, order, at, len(data)
 
     def size(self, kind: str) -> int:
         """See Words."""
@@ -98,7 +98,7 @@ class ByteWords:
 
     def take(self, count: int, kind: str) -> Addresses:
         """See Words."""
-        size, left = self.size(kind), self.stop - self.at
+        size, left = self.size(kind), self.end - self.at
         if not 0 <= count * size <= left:
             fail_at(self.at, f"expected {count} numbers of {size} bytes, but only {max(0, left)} bytes follow")
         start, self.at = self.at, self.at + count * size

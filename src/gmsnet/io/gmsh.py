@@ -1,0 +1,243 @@
+"""Gmsh files (``.msh``) of versions 2.2 and 4.1, text and binary.
+
+The region of a cell is its physical tag: 2.2 notes it with each element; 4.1 with the entity that the element belongs
+to, which may have several. Sections may come in any order, nodes may have any tags; sections that do not concern
+nodes, elements and physical groups are kept as they are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import FormatError
+from gmsnet.io import convert
+from gmsnet.io import gmsh_sections as sections
+from gmsnet.io.cell_table import table_blocks
+from gmsnet.io.document import Parsed, Written
+from gmsnet.io.gmsh_sections import KINDS, Contents, Elements, Nodes, Source
+from gmsnet.mesh import Mesh
+
+name = "Gmsh"
+suffixes = (".msh",)
+
+CODES = {kind.name: code for code, kind in KINDS.items()}
+_HEAD = re.compile(rb"\s*\$MeshFormat\s+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*(?:\r\n?|\n)")
+_NAME = re.compile(rb'\s*([0-3])\s+(-?\d{1,18})\s+"([^"\r\n]*)"')
+
+
+def read(files: Mapping[str, bytes]) -> Parsed:
+    """See Format."""
+    data = files[".msh"]
+    source, old = _open(data)
+    found, seen = Contents(), set[bytes]()
+    while title := source.word():
+        here = source.at - len(title)
+        if not title.startswith(b"$") or title in seen:
+            source.fail(here, f"expected a new section, found {sections.show(title)!r}")
+        if title in _READERS:
+            seen.add(title)
+        _section(source, title[1:], found, old)
+    missing = [key for key, part in (("$Nodes", found.nodes), ("$Elements", found.elements)) if part is None]
+    if found.nodes is None or found.elements is None:
+        raise FormatError(f"{' and '.join(missing)} missing: the file is cut off")
+    if not len(found.elements.codes):
+        raise FormatError("the file has no elements: there is nothing to smooth")
+    return _assemble(found, found.nodes, found.elements)
+
+
+_READERS = (b"$PhysicalNames", b"$Entities", b"$PartitionedEntities", b"$Nodes", b"$Elements")
+
+
+def _open(data: bytes) -> tuple[Source, bool]:
+    """The file behind its first section, and whether its version is 2.2."""
+    head = _HEAD.match(data)
+    if head is None and not data.lstrip().startswith(b"$NOD"):
+        raise FormatError("line 1: not a Gmsh file: it must start with $MeshFormat, the version, 0 or 1, and 8")
+    version = head[1].decode("latin-1") if head else "1"
+    if head is None or version not in ("2.2", "4.1"):
+        mend = "convert it with 'gmsh OLD.msh -save -format msh41 -o NEW.msh'"
+        raise FormatError(f"Gmsh's format {version[:24]!r} is not supported, 2.2 and 4.1 are: {mend}")
+    if head[2] not in (b"0", b"1") or head[3] != b"8":
+        raise FormatError("$MeshFormat must say 0 (text) or 1 (binary) and the size 8 of its numbers")
+    at, order = head.end(), ""
+    if head[2] == b"1":
+        one, at = data[at : at + 4], at + 4
+        order = {b"\1\0\0\0": "<", b"\0\0\0\1": ">"}.get(one, "")
+        if not order:
+            raise FormatError(f"byte {at - 4}: the number 1 must follow, which tells the byte order")
+    source = Source(data, at, order)
+    here = source.at
+    if source.word() != b"$EndMeshFormat":
+        source.fail(here, "expected $EndMeshFormat")
+    return source, version == "2.2"
+
+
+def _section(source: Source, title: bytes, found: Contents, old: bool) -> None:
+    """Reads on to the end of the section that has begun."""
+    if title == b"ParametricNodes":
+        source.fail(source.at, "$ParametricNodes are not supported: save the mesh without parametric coordinates")
+    if title == b"PhysicalNames":
+        _physical_names(source, found)
+    elif title not in (b"Entities", b"PartitionedEntities", b"Nodes", b"Elements") or (old and b"Entities" in title):
+        source.skip_section(title)
+    else:
+        count = 0
+        if old and source.order:  # the count is text, and binary numbers follow
+            here, text = source.at, source.word()
+            if not re.fullmatch(rb"\d{1,18}", text):
+                source.fail(here, f"a count was expected, found {sections.show(text)!r}")
+            count = int(text)
+        words = source.words(title)
+        if old and not source.order:
+            (count,) = sections.counts(words, 1)
+        if title == b"Nodes":
+            found.nodes = sections.nodes_old(words, count) if old else sections.nodes_new(words)
+        elif title == b"Elements":
+            found.elements = sections.elements_old(words, count) if old else sections.elements_new(words)
+        else:
+            found.physical |= sections.entities(words, title == b"PartitionedEntities")
+        source.close(title, words)
+
+
+def _physical_names(source: Source, found: Contents) -> None:
+    here, text = source.at, source.word()
+    if not re.fullmatch(rb"\d{1,18}", text):
+        source.fail(here, f"a count was expected, found {sections.show(text)!r}")
+    for _ in range(int(text)):
+        match = _NAME.match(source.data, source.at)
+        if match is None:
+            source.fail(source.at, 'expected a physical name: dimension, number, "name"')
+        source.at = match.end()
+        try:
+            called = match[3].decode("utf-8")
+        except UnicodeDecodeError:
+            called = match[3].decode("latin-1")
+        found.names[int(match[1]), int(match[2])] = called
+    here = source.at
+    if source.word() != b"$EndPhysicalNames":
+        source.fail(here, "$PhysicalNames does not end where its count says")
+
+
+def _assemble(found: Contents, nodes: Nodes, elements: Elements) -> Parsed:
+    order = np.argsort(nodes.tags, kind="stable")
+    tags = nodes.tags[order]
+    if (twice := np.flatnonzero(np.diff(tags) == 0)).size:
+        k = int(order[twice[0] + 1])
+        nodes.words.fail(int(nodes.tags_at[k]), f"the node {nodes.tags[k]} is given twice")
+    place = np.searchsorted(tags, elements.nodes)
+    known = (place < len(tags)) & (np.append(tags, 0)[place] == elements.nodes)
+    if not known.all():
+        k = int(np.argmin(known))
+        elements.words.fail(
+            int(elements.at[k]), f"an element names the node {elements.nodes[k]}, which is not in $Nodes"
+        )
+    names = dict(found.names)
+    regions = elements.physical
+    if regions is None:
+        regions = _regions(found, elements, names)
+    cells, _ = table_blocks(KINDS, elements.codes, elements.first, order[place], regions, {})
+    for block in cells:  # a negative tag means: the same group, turned round
+        for region in np.unique(block.regions[block.regions < 0]).tolist():
+            if (block.dimension, -region) in names:
+                names.setdefault((block.dimension, region), names[block.dimension, -region])
+    return Parsed(nodes.points, cells, nodes.words.slots(nodes.at, "f8"), names)
+
+
+def _regions(found: Contents, elements: Elements, names: dict[tuple[int, int], str]) -> NDArray[np.int64]:
+    """The physical tag of each element of version 4.1; each combination of several gets a number and a name."""
+    assert elements.entity is not None
+    entities, which = np.unique(elements.entity, axis=0, return_inverse=True)
+    groups = [found.physical.get((dim, tag), ()) for dim, tag in entities.tolist()]
+    tags = [abs(tag) for group in found.physical.values() for tag in group] + [abs(tag) for _, tag in names]
+    combined = sorted({group for group in groups if len(group) > 1})
+    number = {group: 1 + max(tags, default=0) + k for k, group in enumerate(combined)}
+    for (dim, _), group in zip(entities.tolist(), groups, strict=True):
+        if group in number:
+            parts = [names.get((dim, abs(tag)), str(tag)) for tag in group]
+            names[dim, number[group]] = " + ".join(parts)
+    numbers = [number.get(group, group[0] if group else 0) for group in groups]
+    return np.array(numbers, dtype=np.int64)[which.reshape(-1)]
+
+
+def write(mesh: Mesh) -> Written:
+    """See Format. Version 4.1 as text: an entity and a physical group for each dimension and region."""
+    convert.check_kinds(mesh, name, CODES)
+    points = convert.in_space(mesh)
+    lost = convert.lost_data(mesh, name)
+    groups = _groups(mesh)
+    physical, renumbered = _physical_tags(groups)
+    if renumbered:
+        lost.append(f"{name} cannot hold these region numbers, they got others: {', '.join(map(str, renumbered))}")
+    entities = {group: k + 1 for k, group in enumerate(groups)}
+    named = [(dim, region) for dim, region in groups if (dim, region) in mesh.region_names and physical[dim, region]]
+    text = ["$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"]
+    if named:
+        lines = [f'{dim} {physical[dim, r]} "{_plain(mesh.region_names[dim, r])}"\n' for dim, r in named]
+        text += [f"$PhysicalNames\n{len(lines)}\n", *lines, "$EndPhysicalNames\n"]
+    text.append(_entities_text(points, groups, physical, entities))
+    top = max((dim for dim, _ in groups), default=0)
+    home = next((tag for (dim, _), tag in entities.items() if dim == top), 1)
+    count = len(points)
+    text.append(f"$Nodes\n1 {count} {min(1, count)} {count}\n{top} {home} 0 {count}\n")
+    text += [f"{k}\n" for k in range(1, count + 1)]
+    text += [f"{row}\n" for row in convert.decimals(points)]
+    text.append("$EndNodes\n")
+    blocks = []
+    done = 0
+    for (dim, region), tag in entities.items():
+        for kind, nodes in groups[dim, region].items():
+            head = f"{dim} {tag} {CODES[kind]} {len(nodes)}\n"
+            place = KINDS[CODES[kind]].order
+            inverse = slice(None) if place is None else np.argsort(place)
+            numbered = np.column_stack([np.arange(done + 1, done + 1 + len(nodes)), nodes[:, inverse] + 1])
+            blocks.append(head + "".join(f"{row}\n" for row in convert.integers(numbered)))
+            done += len(nodes)
+    text += [f"$Elements\n{len(blocks)} {done} {min(1, done)} {done}\n", *blocks, "$EndElements\n"]
+    return Written({".msh": "".join(text).encode()}, lost)
+
+
+_Groups = dict[tuple[int, int], dict[str, NDArray[np.int64]]]  # (dimension, region) → kind → nodes of its cells
+
+
+def _groups(mesh: Mesh) -> _Groups:
+    found: dict[tuple[int, int], dict[str, list[NDArray[np.int64]]]] = {}
+    for block in mesh.cells:
+        for region in np.unique(block.regions).tolist():
+            kinds = found.setdefault((block.dimension, region), {})
+            kinds.setdefault(block.kind, []).append(block.nodes[block.regions == region])
+    return {key: {kind: np.concatenate(parts) for kind, parts in found[key].items()} for key in sorted(found)}
+
+
+def _physical_tags(groups: _Groups) -> tuple[dict[tuple[int, int], int], list[int]]:
+    """The physical tag of each group (0: none), and the regions that have another number than in the mesh."""
+    fits = {key: key[1] for key in groups if 0 <= key[1] < 2**31}
+    free = (k for k in range(1, 2**31) if k not in set(fits.values()))
+    others = {key: next(free) for key in groups if key not in fits}
+    return fits | others, sorted({region for _, region in others})
+
+
+def _entities_text(
+    points: NDArray[np.float64],
+    groups: _Groups,
+    physical: Mapping[tuple[int, int], int],
+    entities: Mapping[tuple[int, int], int],
+) -> str:
+    counts = [sum(dim == k for dim, _ in groups) for k in range(4)]
+    lines = [f"$Entities\n{' '.join(map(str, counts))}\n"]
+    for (dim, region), kinds in groups.items():
+        used = points[np.concatenate([nodes.ravel() for nodes in kinds.values()])]
+        corners = [used[0]] if dim == 0 else [used.min(axis=0), used.max(axis=0)]
+        box = " ".join(convert.decimals(np.array(corners).reshape(1, -1)))
+        tag = physical[dim, region]
+        group = f"1 {tag}" if tag else "0"
+        lines.append(f"{entities[dim, region]} {box} {group}{' 0' * (dim > 0)}\n")
+    return "".join(lines) + "$EndEntities\n"
+
+
+def _plain(text: str) -> str:
+    """A name without what would end it."""
+    return "".join("'" if c == '"' else c if c.isprintable() else " " for c in text)
