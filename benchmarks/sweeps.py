@@ -1,0 +1,107 @@
+"""Nanoseconds per node and sweep, and for the set-up, beside a SciPy sparse-matrix Laplacian sweep in the same run.
+
+    python benchmarks/sweeps.py [--nodes 1e4 1e5 1e6] [--threads 1 2] [--repeats 9] [--json FILE]
+
+L is the unit: one product of the averaging matrix with the coordinates, on one thread, nodes in the same memory order.
+All are timed in turns, and medians are printed, because machines are noisy. The mesh is a random square (Delaunay of
+uniform points) whose nodes stand in the file in random order.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from concurrent.futures import ThreadPoolExecutor
+from statistics import median
+
+import numpy as np
+import scipy.sparse
+from machine import describe
+
+import gmsnet
+from gmsnet.kernels import quality as measures
+from gmsnet.kernels.compile import LANES
+from gmsnet.methods import METHODS, Options, Precision, method_named
+from gmsnet.topology import Topology, planar_points
+
+
+def averaging_matrix(topology):
+    """Row i averages the ring of node i where it is free, and keeps it where it is held; by places in memory."""
+    start, ring = topology.near_start, topology.near_ring
+    nodes = len(start) - 1
+    degree = np.diff(start)
+    held = np.flatnonzero(degree == 0)
+    rows = np.concatenate([np.repeat(np.arange(nodes), degree), held])
+    columns = np.concatenate([ring, held])
+    values = np.concatenate([np.repeat(1.0 / np.maximum(degree, 1), degree), np.ones(len(held))])
+    return scipy.sparse.csr_matrix((values, (rows, columns)), shape=(nodes, nodes))
+
+
+def timed(work):
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+def measure(nodes, threads, repeats):
+    mesh = gmsnet.random_mesh(nodes, seed=0)
+    topology = Topology.of(mesh)
+    stars = topology.stars
+    points = planar_points(mesh)[topology.memory]
+    matrix = averaging_matrix(topology)
+    sums = np.empty((-(-len(topology.near) // LANES), 7))
+    precision = Precision(2.0**-53, False)
+    tally = np.zeros(3, dtype=np.int64)
+    jobs = {
+        "L": lambda: matrix @ points,
+        "set-up": lambda: Topology.of(mesh).stars,
+        "measures": lambda: measures.summarise(points, topology.near, topology.near_turn, 0, len(sums), sums),
+    }
+    pools = {count: ThreadPoolExecutor(count) for count in threads}
+    for name in METHODS:
+        smoother = method_named(name).create(Options())
+        for count, pool in pools.items():
+            state = points.copy()
+
+            def sweep(smoother=smoother, count=count, pool=pool, state=state):
+                for colour in range(stars.colours):
+                    ends = np.linspace(stars.first[colour], stars.first[colour + 1], count + 1).astype(int).tolist()
+                    if count == 1:
+                        smoother.sweep(state, stars, ends[0], ends[1], precision, tally)
+                    else:
+                        run = lambda first, last: smoother.sweep(  # noqa: E731
+                            state, stars, first, last, precision, np.zeros(3, dtype=np.int64)
+                        )
+                        list(pool.map(run, ends[:-1], ends[1:]))
+
+            jobs[f"{name}, {count} thread{'s' * (count > 1)}"] = sweep
+    seconds = {name: [] for name in jobs}
+    for _ in range(repeats + 1):
+        for name, job in jobs.items():
+            seconds[name].append(timed(job))
+    return {name: median(values[1:]) / nodes * 1e9 for name, values in seconds.items()}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--nodes", nargs="+", type=float, default=[1e4, 1e5, 1e6])
+    parser.add_argument("--threads", nargs="+", type=int, default=[1, 2])
+    parser.add_argument("--repeats", type=int, default=9)
+    parser.add_argument("--json")
+    options = parser.parse_args()
+    print(describe())
+    print(f"medians of {options.repeats} runs in turns; ns per node (per sweep), and in units of L")
+    results = {}
+    for nodes in map(int, options.nodes):
+        results[nodes] = figures = measure(nodes, options.threads, options.repeats)
+        print(f"\n{nodes:,} nodes")
+        for name, value in figures.items():
+            print(f"  {name:24} {value:8.1f} ns   {value / figures['L']:6.2f} L")
+    if options.json:
+        with open(options.json, "w", encoding="utf-8") as file:
+            json.dump({"machine": describe(), "ns_per_node": results}, file, indent=1)
+
+
+if __name__ == "__main__":
+    main()
