@@ -37,9 +37,11 @@ def train(
 
     Writes gmsnet-hH.safetensors (for gmsnet smooth --weights), history.csv, curves.png and checkpoint.safetensors.
     """
+    from gmsnet.learn.train import check_folder
     from gmsnet.learn.train import train as run
 
     options = _options(context, out, resume=resume)
+    check_folder(options, out, resume=resume)
     typer.echo(f"{options.command}: H = {options.hidden}, {options.epochs:,} epochs, into {out}", err=True)
     with _stop_on_signal() as should_stop, _bar(options.epochs) as on_epoch:
         result = run(options, out, resume=resume, on_epoch=on_epoch, should_stop=should_stop)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from gmsnet.errors import InputError
-from gmsnet.io.atomic import replace_files
+from gmsnet.io.atomic import reason, replace_files
 from gmsnet.learn import data
 from gmsnet.learn.backend import Data, torch
 from gmsnet.learn.checkpoint import NAME, Schedule, State, saved_options
@@ -97,7 +97,7 @@ def train(
     Raises InputError where the folder holds a checkpoint and ``resume`` is not set, or the other way round.
     """
     check_plotting()
-    _check_folder(options, folder, resume=resume)
+    check_folder(options, folder, resume=resume)
     with _reproducible():
         parts = [data.Stars.of_mesh(mesh) for mesh in data.meshes(options.mesh_seed)]
         first, second, _ = data.SPLIT
@@ -143,9 +143,8 @@ class _TrainingSet:
 
 
 def _start(options: TrainOptions) -> State:
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(options.seed)
-        net = GMSNet(options.hidden)
+    torch.manual_seed(options.seed)
+    net = GMSNet(options.hidden)
     optimizer = torch.optim.Adam(net.parameters(), lr=options.learning_rate)
     schedule = Schedule(optimizer, factor=options.decay, patience=options.patience)
     return State(net, optimizer, schedule, {}, [])
@@ -195,29 +194,30 @@ def _mean_loss(batch: Batch, position: torch.Tensor) -> float:
     return float(metric_loss(batch.ring, batch.degree, position).mean())
 
 
-def _check_folder(options: TrainOptions, folder: Path, *, resume: bool) -> None:
+def check_folder(options: TrainOptions, folder: Path, *, resume: bool) -> None:
+    """Raises InputError where a training with these options cannot start in, or go on in, this folder."""
+    saved = saved_options(folder)
+    if resume and saved is None:
+        raise InputError(f"{folder}: holds no {NAME}, so there is nothing to resume")
+    if saved is not None and not resume:
+        raise InputError(f"{folder}: holds a training already; go on with it (--resume) or take another --out")
+    if saved is not None and replace(saved, epochs=options.epochs) != options:
+        raise InputError(f"{folder}: the training there was started with other options: {saved.command}")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{folder}: this folder cannot be made: {error.strerror}") from error
-    saved = saved_options(folder)
-    if saved is not None and not resume:
-        raise InputError(f"{folder}: holds a training already; go on with it (--resume) or take another --out")
-    if saved is None and resume:
-        raise InputError(f"{folder}: holds no {NAME}, so there is nothing to resume")
-    if saved is not None and replace(saved, epochs=options.epochs) != options:
-        other = {k: v for k, v in saved.as_dict().items() if k != "epochs" and v != options.as_dict()[k]}
-        raise InputError(f"{folder}: the training there was started with other options: {other}")
+        raise InputError(f"{folder}: this folder cannot be made: {reason(error)}") from error
 
 
 @contextmanager
 def _reproducible() -> Iterator[None]:
-    """One thread and deterministic algorithms; afterwards as it was."""
+    """One thread, deterministic algorithms, its own random numbers; afterwards all is as it was."""
     threads, deterministic = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
     torch.set_num_threads(1)
     torch.use_deterministic_algorithms(True)
     try:
-        yield
+        with torch.random.fork_rng(devices=[]):
+            yield
     finally:
         torch.set_num_threads(threads)
         torch.use_deterministic_algorithms(deterministic)

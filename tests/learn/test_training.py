@@ -1,0 +1,239 @@
+from __future__ import annotations
+
+import csv
+import json
+import signal
+from contextlib import contextmanager
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from gmsnet import weights
+from gmsnet.cli import train as command
+from gmsnet.errors import InputError
+from gmsnet.learn import data
+from gmsnet.learn import train as training
+from gmsnet.learn.backend import torch
+from gmsnet.learn.checkpoint import NAME, saved_options
+from gmsnet.learn.model import GMSNet
+from gmsnet.learn.options import TrainOptions
+
+FILES = {"gmsnet-h4.safetensors", "history.csv", "curves.png", NAME}
+SHORT = TrainOptions(hidden=4, epochs=12, nodes_per_mesh=8, patience=2, seed=3, mesh_seed=1)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _small_meshes():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(data, "NODES", (15, 40))
+        patch.setattr(training, "CHECKPOINT_EVERY", 3)
+        yield
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory, _small_meshes):
+    """The files of a training with the options SHORT that nobody interrupted."""
+    folder = tmp_path_factory.mktemp("whole")
+    training.train(SHORT, folder)
+    return contents(folder)
+
+
+def test_the_same_options_make_the_same_bytes(tmp_path, whole):
+    seen = []
+    first = training.train(SHORT, tmp_path / "a", on_epoch=seen.append)
+    assert contents(tmp_path / "a") == whole
+    assert whole.keys() == FILES
+    assert [p.epoch for p in seen] == list(range(1, 13))
+    assert first.finished
+    assert {path.name for path in first.files} == FILES
+    assert first.losses["validation_loss"] == min(p.validation_loss for p in seen)
+    assert seen[-1].learning_rate < SHORT.learning_rate  # the plateau schedule has worked
+
+
+def test_another_seed_makes_other_weights_on_the_same_meshes(tmp_path):
+    options = [TrainOptions(hidden=4, epochs=1, seed=seed) for seed in (0, 1)]
+    a, b = (training.train(o, tmp_path / str(o.seed)) for o in options)
+    assert a.losses["validation_loss"] != b.losses["validation_loss"]
+    assert a.losses["validation_loss_before"] == b.losses["validation_loss_before"]
+
+
+def test_stopped_and_resumed_is_as_if_never_stopped(tmp_path, whole):
+    epochs = []
+    stopped = training.train(SHORT, tmp_path / "parts", on_epoch=epochs.append, should_stop=lambda: len(epochs) == 5)
+    assert not stopped.finished
+    assert stopped.epochs == 5
+    assert contents(tmp_path / "parts").keys() == {NAME}
+    training.train(SHORT, tmp_path / "parts", resume=True)
+    assert contents(tmp_path / "parts") == whole
+
+
+def test_killed_and_resumed_is_as_if_never_killed(tmp_path, whole):
+    def die(progress):
+        if progress.epoch == 8:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        training.train(SHORT, tmp_path / "parts", on_epoch=die)
+    again = []
+    training.train(SHORT, tmp_path / "parts", resume=True, on_epoch=again.append)
+    assert again[0].epoch == 7  # after the last checkpoint
+    assert contents(tmp_path / "parts") == whole
+
+
+def test_a_finished_training_can_be_prolonged(tmp_path, whole):
+    short = TrainOptions(**{**SHORT.as_dict(), "epochs": 4})
+    training.train(short, tmp_path / "parts")
+    training.train(SHORT, tmp_path / "parts", resume=True)
+    assert contents(tmp_path / "parts") == whole
+
+
+def test_it_learns_and_keeps_the_best(tmp_path):
+    options = TrainOptions(hidden=8, epochs=60)
+    result = training.train(options, tmp_path)
+    losses = result.losses
+    assert losses["validation_loss_optimum"] < losses["validation_loss"] < losses["validation_loss_before"]
+    assert losses["test_loss"] < losses["test_loss_before"]
+    rows = list(csv.DictReader((tmp_path / "history.csv").read_text().splitlines()))
+    assert [int(row["epoch"]) for row in rows] == list(range(1, 61))
+    assert min(float(row["validation_loss"]) for row in rows) == pytest.approx(losses["validation_loss"], abs=1e-8)
+
+    loaded = weights.load(tmp_path / "gmsnet-h8.safetensors")
+    parts = [data.Stars.of_mesh(mesh) for mesh in data.meshes(0)]
+    validation = training.Batch.of_stars(data.joined(parts[12:16]))
+    with torch.no_grad():
+        assert float(validation.loss(GMSNet.from_tensors(loaded.tensors))) == losses["validation_loss"]
+
+
+def test_metadata_tells_how_the_weights_were_made(tmp_path, whole):
+    (tmp_path / "w.safetensors").write_bytes(whole["gmsnet-h4.safetensors"])
+    metadata = weights.load(tmp_path / "w.safetensors").metadata
+    assert TrainOptions(**json.loads(metadata["recipe"])) == SHORT
+    assert metadata["command"] == SHORT.command
+    assert metadata["command"] == (
+        "gmsnet train --hidden 4 --epochs 12 --nodes-per-mesh 8 --patience 2 --seed 3 --mesh-seed 1"
+    )
+    assert metadata["parameters"] == "74"
+    assert metadata["seed"] == "3"
+    assert json.loads(metadata["versions"])["torch"] == torch.__version__
+    curve = json.loads(metadata["validation_curve"])
+    assert [epoch for epoch, _ in curve] == list(range(1, 13))
+    assert min(loss for _, loss in curve) == pytest.approx(float(metadata["validation_loss"]), abs=1e-5)
+    assert "20 random Delaunay squares" in metadata["data"]
+
+
+def test_settings_of_torch_are_as_before(tmp_path):
+    torch.manual_seed(5)
+    expected = torch.rand(3).tolist()
+    torch.manual_seed(5)
+    before = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    training.train(TrainOptions(hidden=4, epochs=1), tmp_path)
+    assert (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()) == before
+    assert torch.rand(3).tolist() == expected
+
+
+def test_meshes_with_fewer_nodes_than_asked_for_give_all(tmp_path):
+    losses = []
+    options = TrainOptions(hidden=4, epochs=2, nodes_per_mesh=1000)
+    training.train(options, tmp_path, on_epoch=losses.append, should_stop=lambda: True)
+    stars = training.Batch.of_stars(data.joined([data.Stars.of_mesh(mesh) for mesh in data.meshes(0)[:12]]))
+    torch.manual_seed(0)
+    assert losses[0].train_loss == pytest.approx(stars.loss(GMSNet(4)).item(), abs=1e-6)
+
+
+def test_folder_rules(tmp_path):
+    stop = {"should_stop": lambda: True}
+    training.train(SHORT, tmp_path / "a", **stop)
+    assert saved_options(tmp_path / "a") == SHORT
+    with pytest.raises(InputError, match="holds a training already"):
+        training.train(SHORT, tmp_path / "a", **stop)
+    with pytest.raises(InputError, match=r"other options: gmsnet train --hidden 4 .* --seed 3"):
+        training.train(TrainOptions(), tmp_path / "a", resume=True, **stop)
+    with pytest.raises(InputError, match="nothing to resume"):
+        training.train(SHORT, tmp_path / "b", resume=True, **stop)
+    assert not (tmp_path / "b").exists()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="file: this folder cannot be made: file exists"):
+        training.train(SHORT, tmp_path / "file", **stop)
+
+
+@pytest.mark.parametrize("damage", [lambda b: b[:-9], lambda b: b[:5], lambda b: b"", lambda b: b"\x00" * len(b)])
+def test_a_damaged_checkpoint_is_refused(tmp_path, damage):
+    training.train(SHORT, tmp_path, should_stop=lambda: True)
+    (tmp_path / NAME).write_bytes(damage((tmp_path / NAME).read_bytes()))
+    with pytest.raises(InputError, match=f"{NAME}: this checkpoint cannot be read"):
+        training.train(SHORT, tmp_path, resume=True)
+
+
+def test_divergence_is_told(tmp_path):
+    with pytest.raises(InputError, match=r"diverged in epoch .* lower --learning-rate"):
+        training.train(TrainOptions(hidden=4, learning_rate=1e20), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"hidden": 3}, "--hidden must lie between 4 and 64, got 3"),
+        ({"hidden": 65}, "--hidden must lie between 4 and 64, got 65"),
+        ({"epochs": 0}, "--epochs must be at least 1"),
+        ({"nodes_per_mesh": 0}, "--nodes-per-mesh must be at least 1"),
+        ({"seed": -1}, "--seed must be at least 0"),
+        ({"mesh_seed": -1}, "--mesh-seed must be at least 0"),
+        ({"patience": 0}, "--patience must be at least 1"),
+        ({"learning_rate": 0.0}, "--learning-rate must be a positive number"),
+        ({"learning_rate": float("nan")}, "--learning-rate must be a positive number"),
+        ({"decay": 1.0}, "--decay must lie between 0 and 1"),
+    ],
+)
+def test_bad_options_are_named(options, message):
+    with pytest.raises(InputError, match=message):
+        TrainOptions(**options)
+
+
+app = typer.Typer()
+app.command()(command.train)
+ARGUMENTS = SHORT.command.split()[2:]
+
+
+def test_command_trains_and_reports(tmp_path, whole):
+    result = CliRunner().invoke(app, [*ARGUMENTS, "--out", str(tmp_path / "run")])
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("validation loss 0.")
+    assert all(f"wrote {tmp_path / 'run' / name}" in result.stdout for name in FILES)
+    assert "\x1b" not in result.output  # no progress bar where there is no terminal
+    assert contents(tmp_path / "run") == whole
+
+
+def test_command_stops_with_a_checkpoint_and_resumes_with_its_options(tmp_path, whole, monkeypatch):
+    @contextmanager
+    def stop_at_once():
+        yield lambda: True
+
+    folder = ["--out", str(tmp_path / "run")]
+    with monkeypatch.context() as patch:
+        patch.setattr(command, "_stop_on_signal", stop_at_once)
+        result = CliRunner().invoke(app, [*ARGUMENTS, *folder])
+    assert result.exit_code == 130
+    assert "stopped after 1 of 12 epochs" in result.stderr
+    assert f"go on with: gmsnet train --resume --out {tmp_path / 'run'}" in result.stderr
+    result = CliRunner().invoke(app, ["--resume", *folder])
+    assert result.exit_code == 0, result.output
+    assert contents(tmp_path / "run") == whole
+    result = CliRunner().invoke(app, ["--resume", "--hidden", "8", *folder])
+    assert isinstance(result.exception, InputError)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_first_signal_asks_to_stop_and_the_second_interrupts(number):
+    before = signal.getsignal(number)
+    with command._stop_on_signal() as should_stop:
+        assert not should_stop()
+        signal.raise_signal(number)
+        assert should_stop()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(number)
+    assert signal.getsignal(number) is before
