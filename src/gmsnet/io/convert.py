@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,12 +103,21 @@ def marker_names(mesh: Mesh, dimension: int) -> list[str]:
 
 def decimals(values: NDArray[np.float64]) -> list[str]:
     """Rows (N × k) as text: the shortest decimals that read back as the same float64, separated by a blank."""
-    return [" ".join(map(repr, row)) for row in values.tolist()]
+    return _rows(values, "%r")
 
 
 def integers(values: NDArray[np.int64]) -> list[str]:
     """Rows (N × k) of integers as text."""
-    return [" ".join(map(str, row)) for row in values.tolist()]
+    return _rows(values, "%d")
+
+
+def _rows(values: NDArray[Any], form: str) -> list[str]:
+    """One format for many rows at once is several times as fast as one call for each."""
+    lines: list[str] = []
+    for part in np.array_split(values, len(values) // 4096 + 1):
+        template = "\n".join([" ".join([form] * part.shape[1])] * len(part))
+        lines += (template % tuple(part.ravel().tolist())).split("\n") if len(part) else []
+    return lines
 
 
 def were(count: int) -> str:

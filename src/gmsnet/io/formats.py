@@ -113,7 +113,7 @@ def sniff(data: bytes) -> str | None:
 
 def check_contents(data: bytes, key: str) -> None:
     """Raises FormatError where a file is empty, is no mesh at all, or shows another format than ``key``."""
-    if not data.strip():
+    if not re.search(rb"\S", data):
         raise FormatError("the file is empty")
     title = FORMATS[key].title
     shown = sniff(data)

@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.io.text import replace_numbers
 from gmsnet.mesh import CellBlock
 
 
@@ -36,16 +37,8 @@ class TextSlots:
         """See Slots. Numbers are written as the shortest decimal that reads back as the same float64."""
         dim = self.starts.shape[1]
         changed = (old != new)[self.node][:, :dim]
-        starts, ends = self.starts[changed], self.ends[changed]
-        values = new[self.node][:, :dim][changed]
-        order = np.argsort(starts, kind="stable")
-        pieces: list[bytes] = []
-        at = 0
-        for start, end, value in zip(starts[order].tolist(), ends[order].tolist(), values[order].tolist(), strict=True):
-            pieces += (data[at:start], repr(value).encode())
-            at = end
-        pieces.append(data[at:])
-        return b"".join(pieces)
+        spans = np.stack([self.starts[changed], self.ends[changed]], axis=1)
+        return replace_numbers(data, spans, new[self.node][:, :dim][changed])
 
 
 @dataclass(frozen=True)

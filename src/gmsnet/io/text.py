@@ -183,6 +183,17 @@ def fail(data: bytes, offset: int, message: str) -> NoReturn:
     raise FormatError(f"line {line_of(data, offset)}: {message}")
 
 
+def replace_numbers(data: bytes, spans: Spans, values: NDArray[np.float64]) -> bytes:
+    """A copy with the shortest decimals that read back as ``values`` (n,) in the place of the tokens (n, 2)."""
+    order = np.argsort(spans[:, 0], kind="stable")
+    spans = np.ascontiguousarray(spans[order])
+    text = " ".join(map(repr, values[order].tolist())).encode()
+    words = scan(text, 0, len(values))
+    out = np.empty(len(data) + int((np.diff(words) - np.diff(spans)).sum()), dtype=np.uint8)
+    kernels.replace_spans(_bytes(data), spans, _bytes(text), words, out)
+    return out.tobytes()
+
+
 def blank(data: bytes, pattern: bytes) -> bytes:
     """A copy in which what matches the regular expression is spaces; line ends stay, and every byte keeps its place."""
     return re.sub(pattern, lambda match: match[0].translate(_ALL_BLANK), data)

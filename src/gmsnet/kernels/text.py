@@ -178,3 +178,21 @@ def cut_at_slash(data, spans):
                 return k
             at += 1
     return -1
+
+
+@kernel
+def replace_spans(data, spans, text, words, out):
+    """Copies data into out, with word k of text in the place of span k; both (n, 2), spans ascending and disjoint."""
+    at = 0
+    end = 0
+    for k in range(len(spans)):
+        for j in range(at, spans[k, 0]):
+            out[end] = data[j]
+            end += 1
+        for j in range(words[k, 0], words[k, 1]):
+            out[end] = text[j]
+            end += 1
+        at = spans[k, 1]
+    for j in range(at, len(data)):
+        out[end] = data[j]
+        end += 1
