@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 PIPE_WIDTH = 1000  # where nobody looks, nothing is wrapped
+TABLE_WIDTH = 100  # a narrower terminal wraps the lines itself: better than figures cut short
 
 
 class _Console(Console):
@@ -27,8 +28,7 @@ def console(stderr: bool = False) -> Console:
     """Where text goes. Names of files may hold brackets and colons, so no markup is read in them."""
     terminal = (sys.stderr if stderr else sys.stdout).isatty()
     made = _Console(stderr=stderr, markup=False, highlight=False, emoji=False, soft_wrap=True)
-    if not terminal:
-        made.width = PIPE_WIDTH
+    made.width = max(made.width, TABLE_WIDTH) if terminal else PIPE_WIDTH
     return made
 
 

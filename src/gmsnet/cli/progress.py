@@ -7,8 +7,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from rich import progress as parts
-
-from gmsnet.cli.output import console
+from rich.console import Console
 
 if TYPE_CHECKING:
     from gmsnet.engine import Sweep
@@ -25,7 +24,7 @@ class Progress:
             parts.TextColumn("{task.fields[standing]}", markup=False),
         )
         shown = enabled and sys.stderr.isatty()
-        self._bar = parts.Progress(*columns, console=console(stderr=True), transient=True, disable=not shown)
+        self._bar = parts.Progress(*columns, console=Console(stderr=True), transient=True, disable=not shown)
         self._task = self._bar.add_task("", total=None, standing="")
         self._sweeps = sweeps
 

@@ -20,7 +20,7 @@ def quality(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
     """Measure the triangles of a mesh: angles, 1/q, 1/q_V, inverted cells, and where the worst ones are."""
-    from gmsnet.cli.target import check_writable, refuse_same
+    from gmsnet.cli.target import check_writable, files_of, refuse_same
 
     if threshold is not None and not -1.0 <= threshold <= 1.0:
         raise InputError(f"--threshold is a value of 1/q and must lie between -1 and 1, got {threshold:g}")
@@ -28,7 +28,7 @@ def quality(
         from gmsnet.plot import check_target
 
         check_target(plot)
-        refuse_same(input, [plot])
+        refuse_same(files_of(input), [plot])
         check_writable(plot)
 
     from gmsnet import io
@@ -59,7 +59,7 @@ def quality(
         if len(found.cell):
             console.print()
             console.print(report.figures({"now": found}))
-            console.print("worst cells (number from 0)")
+            console.print("\nworst cells (numbers from 0)")
             console.print(report.worst_table(worst))
         else:
             console.print("there are no triangles to measure")

@@ -21,16 +21,16 @@ NAMED = 10  # cells are named in one line
 
 FIGURES = (  # of QualityReport.summary(): label, path, number of decimals
     ("inverted cells", ("inverted",), 0),
-    ("1/q min", ("shape", "min"), 4),
-    ("1/q 1st percentile", ("shape", "p1"), 4),
-    ("1/q mean", ("shape", "mean"), 4),
+    ("1/q, least", ("shape", "min"), 4),
+    ("1/q, 1st percentile", ("shape", "p1"), 4),
+    ("1/q, mean", ("shape", "mean"), 4),
     ("cells with 1/q < 0.3", ("shape", "below_0.3"), 0),
-    ("1/q_V min", ("aspect", "min"), 4),
-    ("1/q_V mean", ("aspect", "mean"), 4),
-    ("smallest angle, min", ("min_angle", "min"), 2),
-    ("smallest angle, mean", ("min_angle", "mean"), 2),
-    ("largest angle, max", ("max_angle", "max"), 2),
-    ("largest angle, mean", ("max_angle", "mean"), 2),
+    ("1/q_V, least", ("aspect", "min"), 4),
+    ("1/q_V, mean", ("aspect", "mean"), 4),
+    ("min angle, least", ("min_angle", "min"), 2),
+    ("min angle, mean", ("min_angle", "mean"), 2),
+    ("max angle, greatest", ("max_angle", "max"), 2),
+    ("max angle, mean", ("max_angle", "mean"), 2),
     ("q-hat with 1/q", ("qhat",), 4),
     ("q-hat with 1/q_V", ("qhat_aspect",), 4),
 )
@@ -79,7 +79,7 @@ def worst_cells(mesh: Mesh, report: QualityReport, held: NDArray[np.bool_] | Non
 
 def worst_table(cells: Sequence[Mapping[str, Any]]) -> Table:
     """The answer of ``worst_cells`` as a table."""
-    columns = ["cell", "1/q", "smallest angle", "largest angle", "at"]
+    columns = ["cell", "1/q", "min angle", "max angle", "at"]
     rows = [
         [
             f"{cell['cell']}{' (inverted)' if cell['inverted'] else ''}",
@@ -109,7 +109,7 @@ def below(report: QualityReport, limit: float) -> str:
     rows = report.worst(int((report.shape < limit).sum()))
     named = ", ".join(str(cell) for cell in report.cell[rows[:NAMED]].tolist())
     more = ", …" if len(rows) > NAMED else ""
-    return f"{amount(len(rows), 'cell')} below it (number from 0, worst first: {named}{more})"
+    return f"{amount(len(rows), 'cell')} below it (numbers from 0, worst first: {named}{more})"
 
 
 def _at(summary: Mapping[str, Any], path: Sequence[str]) -> Any:

@@ -90,6 +90,7 @@ def smooth(
     from gmsnet.cli.fix import fixed_nodes
     from gmsnet.cli.progress import Progress
     from gmsnet.cli.smooth_report import Outcome
+    from gmsnet.engine import refuse_unless_planar
     from gmsnet.engine import smooth as run
     from gmsnet.methods import method_named
 
@@ -97,6 +98,10 @@ def smooth(
     with Progress(max_sweeps, enabled=not quiet) as progress:
         progress.stage(f"reading {input}")
         mesh = io.read(input, format)
+        try:
+            refuse_unless_planar(mesh)
+        except InputError as error:
+            raise InputError(f"{input}: {error}") from error
         fixed = fixed_nodes(mesh, fix or [])
         _check_conversion(mesh, target)
         progress.stage("preparing")

@@ -56,20 +56,22 @@ class Outcome:
     def print(self, aside: bool) -> None:
         """The tables; ``aside``: on standard error, because the mesh itself went to the standard output."""
         result, console = self.result, output.console(stderr=aside)
+        moved = result.moved.any()
         console.print(f"{self.input}: {report.counts(self.mesh)}")
         if len(result.after.cell):
             console.print()
             console.print(report.figures({"before": result.before, "after": result.after}))
-            console.print("worst cells now (number from 0)" if result.moved.any() else "worst cells (number from 0)")
+            console.print(f"\nworst cells{' now' if moved else ''} (numbers from 0)")
             console.print(report.worst_table(self.worst))
+            console.print()
         console.print(self.verdict())
-        if result.held:
-            held = sum(len(ids) for ids in result.held.values())
+        if result.held and self.free:
+            held = len(self.mesh.points) - self.free
             console.print(f"held: {held:,} of {report.amount(len(self.mesh.points), 'node')} ({self._reasons()})")
         if self.written is None:
             console.print(f"left as it is: {self.input}")
         elif not aside:
-            console.print(f"written: {self.written}{'' if result.moved.any() else ' (unchanged coordinates)'}")
+            console.print(f"written{'' if moved else ' unchanged'}: {self.written}")
         for loss in self.lost:
             console.print(f"lost in conversion: {loss}")
         if self.plot is not None:
@@ -77,18 +79,15 @@ class Outcome:
 
     def verdict(self) -> str:
         """One honest sentence on what was gained and why the run ended."""
-        result, nodes = self.result, len(self.mesh.points)
-        took = f"{result.seconds:.3g} s"
+        result = self.result
         if result.stop_reason == engine.NOTHING_TO_MOVE:
-            return f"nothing to move: all {report.amount(nodes, 'node')} are held; {took}"
-        sweeps = report.amount(result.sweeps, "sweep")
-        why = f"{self.method}, {sweeps}, {took}, stopped because of: {result.stop_reason}"
+            return f"nothing to move: all {report.amount(len(self.mesh.points), 'node')} are held ({self._reasons()})"
+        run = f"{self.method}, {report.amount(result.sweeps, 'sweep')} in {result.seconds:.3g} s: {result.stop_reason}"
         if not result.moved.any():
             if result.stop_reason == engine.TARGET_REACHED:
-                return f"the target is met already, so nothing was moved ({took})"
-            return f"no gain: no mesh on the way was better than the input ({why})"
-        moved = f"{int(result.moved.sum()):,} of {report.amount(self.free, 'free node')} moved"
-        return f"{moved} ({why})"
+                return "nothing was moved: the target is met already"
+            return f"no gain: no mesh on the way was better than the input ({run})"
+        return f"{int(result.moved.sum()):,} of {report.amount(self.free, 'free node')} moved ({run})"
 
     @property
     def free(self) -> int:

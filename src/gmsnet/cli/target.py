@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gmsnet.errors import InputError
@@ -38,16 +40,26 @@ def target_of(source: str, output: str | None, in_place: bool, format: str | Non
         format = entry_of(format).key
     if output == STREAM or is_stream(output):
         return Target(output, format)
+    refuse_folder(output)
     suffix = os.path.splitext(output)[1].lower()
     if format is None and suffix not in BY_SUFFIX:
         what = f"the suffix {suffix!r} is unknown" if suffix else "the name has no suffix"
         known = ", ".join(BY_SUFFIX)
         raise InputError(f"{output}: {what}; known are {known}; or name the format with --output-format")
     entry = FORMATS[format or BY_SUFFIX[suffix]]
-    written = [output, *(os.path.splitext(output)[0] + each for each in entry.suffixes if len(entry.suffixes) > 1)]
-    refuse_same(source, written)
+    refuse_same(files_of(source), files_of(output, entry.key))
     check_writable(output)
     return Target(output, entry.key)
+
+
+def files_of(path: str, format: str | None = None) -> list[str]:
+    """The files that a mesh of this name stands in: more than one where its format says so."""
+    from gmsnet.io.formats import BY_SUFFIX, FORMATS
+
+    stem, suffix = os.path.splitext(path)
+    key = format or BY_SUFFIX.get(suffix.lower())
+    suffixes = FORMATS[key].suffixes if key in FORMATS else ()
+    return [path, *(stem + each for each in suffixes if len(suffixes) > 1)]
 
 
 def is_stream(path: str) -> bool:
@@ -55,17 +67,22 @@ def is_stream(path: str) -> bool:
     return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
 
 
-def refuse_same(source: str, written: list[str]) -> None:
-    """InputError where one of the files to be written is the input, by whatever name."""
-    for path in written:
+def refuse_same(read: Sequence[str], written: Sequence[str]) -> None:
+    """InputError where one of the files to be written is one that is read, by whatever name."""
+    for source, path in itertools.product(read, written):
         if os.path.isfile(source) and os.path.exists(path) and os.path.samefile(source, path):
             raise InputError(f"{path} is the input {source} itself: name another output, or use --in-place")
 
 
-def check_writable(path: str) -> None:
-    """InputError where a file cannot be written to this path, found out by making one beside it."""
+def refuse_folder(path: str) -> None:
+    """InputError where a path leads to a folder."""
     if os.path.isdir(path) or path.endswith(("/", os.sep)):
         raise InputError(f"{path}: this is a folder; give the name of a file")
+
+
+def check_writable(path: str) -> None:
+    """InputError where a file cannot be written to this path, found out by making one beside it."""
+    refuse_folder(path)
     if is_stream(path):
         return
     folder = os.path.dirname(os.path.realpath(path))

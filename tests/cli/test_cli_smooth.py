@@ -1,0 +1,291 @@
+"""gmsnet smooth: what is written, what is said, and the exit code."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import stat
+
+import numpy as np
+import pytest
+
+import gmsnet
+from gmsnet import engine
+from gmsnet.cli.progress import Progress
+
+
+def listing(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_the_result_is_that_of_the_api(run, square, tmp_path):
+    out = tmp_path / "out.su2"
+    before = square.read_bytes()
+    done = run("smooth", square, out, "--max-sweeps", 5)
+    assert (done.code, done.err) == (0, "")
+    assert square.read_bytes() == before
+    assert listing(tmp_path) == ["out.su2", "square.su2"]
+    expected = gmsnet.smooth(gmsnet.read(square), max_sweeps=5)
+    assert gmsnet.read(out).points.tolist() == expected.points.tolist()
+    assert expected.after.qhat > expected.before.qhat
+
+
+def test_the_tables_tell_before_after_worst_held_and_written(run, square, tmp_path):
+    out = tmp_path / "out.su2"
+    text = run("smooth", square, out).out
+    result = gmsnet.smooth(gmsnet.read(square))
+    row = next(line for line in text.splitlines() if line.startswith("1/q, least"))
+    assert row.split()[-2:] == [f"{result.before.shape.min():.4f}", f"{result.after.shape.min():.4f}"]
+    worst = int(result.after.cell[result.after.worst(1)[0]])
+    place = " ".join(f"{value:.6g}" for value in result.after.centre[result.after.worst(1)[0]])
+    assert re.search(rf"^{worst} .*{re.escape(place)} .* of 3$", text, re.MULTILINE)
+    assert f"boundary: {len(result.held['boundary'])}" in text
+    assert f"{result.sweeps} sweeps" in text
+    assert result.stop_reason in text
+    assert f"written: {out}" in text
+
+
+def test_text_in_a_pipe_is_plain_and_never_cut(run, square, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "20")
+    text = run("smooth", square, tmp_path / "out.su2").out
+    assert "\x1b" not in text
+    assert "…" not in text
+    assert re.search(r"^min angle, least +\d+\.\d\d +\d+\.\d\d$", text, re.MULTILINE)
+
+
+def test_json_holds_everything(run, square, tmp_path):
+    out = tmp_path / "out.vtk"
+    done = run("smooth", square, out, "--json", "--max-sweeps", 3, "--fix", "0,1")
+    assert (done.code, done.err) == (0, "")
+
+    def refuse(name):
+        raise AssertionError(f"{name} is no JSON")
+
+    document = json.loads(done.out, parse_constant=refuse)
+    result = gmsnet.smooth(gmsnet.read(square), max_sweeps=3)
+    assert document["before"] == result.before.summary()
+    assert document["after"] == result.after.summary()
+    assert document["moved"] == int(result.moved.sum())
+    assert document["held"] == {reason: len(ids) for reason, ids in result.held.items()}
+    assert [sweep["qhat"] for sweep in document["history"]] == [sweep.qhat for sweep in result.history]
+    assert document["output"] == str(out)
+    assert document["stop_reason"] == engine.MAX_SWEEPS
+    assert len(document["worst"]) == 5
+    assert any("bottom" in loss for loss in document["lost"])
+    assert document["target_met"] is True
+
+
+def test_quiet_says_nothing(run, square, tmp_path):
+    done = run("smooth", square, tmp_path / "out.su2", "--quiet")
+    assert (done.code, done.out, done.err) == (0, "", "")
+    assert (tmp_path / "out.su2").exists()
+
+
+def test_a_target_that_is_met(run, square, tmp_path):
+    result = gmsnet.smooth(gmsnet.read(square))
+    target = (result.before.shape.min() + result.after.shape.min()) / 2
+    done = run("smooth", square, tmp_path / "out.su2", "--target-quality", target)
+    assert (done.code, done.err) == (0, "")
+    assert engine.TARGET_REACHED in done.out
+
+
+def test_a_target_that_is_met_already(run, square, tmp_path):
+    smoothed = tmp_path / "smoothed.su2"
+    run("smooth", square, smoothed)
+    done = run("smooth", smoothed, tmp_path / "out.su2", "--target-quality", 0.001)
+    assert done.code == 0
+    assert "the target is met already" in done.out
+    assert (tmp_path / "out.su2").read_bytes() == smoothed.read_bytes()
+
+
+@pytest.mark.parametrize("flag", ["--quiet", "--json", None])
+def test_a_target_that_is_not_met_is_exit_1_and_names_the_cells(run, square, tmp_path, flag):
+    out = tmp_path / "out.su2"
+    done = run("smooth", square, out, "--target-quality", 0.99, *([flag] if flag else []))
+    assert done.code == 1
+    after = gmsnet.quality(gmsnet.read(out))
+    few = int((after.shape < 0.99).sum())
+    worst = int(after.cell[after.worst(1)[0]])
+    gap = 0.99 - after.shape.min()
+    assert re.fullmatch(
+        rf"gmsnet: target not met: the least 1/q is \S+, {gap:.4g} below 0\.99; {few:,} cells below it "
+        rf"\(numbers from 0, worst first: {worst}, .*\)\n",
+        done.err,
+    )
+    if flag == "--json":
+        document = json.loads(done.out)
+        assert (document["target_met"], document["below_target"]) == (False, few)
+    if flag == "--quiet":
+        assert done.out == ""
+
+
+def test_nothing_to_move_is_no_error(run, quads, tmp_path):
+    out = tmp_path / "out.vtk"
+    done = run("smooth", quads, out)
+    assert done.code == 0
+    assert "nothing to move: all 9 nodes are held (boundary: 8, node of a cell that is not smoothed: 1)" in done.out
+    assert f"written unchanged: {out}" in done.out
+    assert out.read_bytes() == quads.read_bytes()
+    assert json.loads(run("smooth", quads, out, "--json").out)["after"] == {"triangles": 0, "inverted": 0}
+
+
+def test_no_gain_is_said_and_the_mesh_is_written_unchanged(run, square, tmp_path):
+    out = tmp_path / "out.su2"
+    done = run("smooth", square, out, "--max-sweeps", 0)
+    assert done.code == 0
+    assert "no gain: no mesh on the way was better than the input" in done.out
+    assert out.read_bytes() == square.read_bytes()
+
+
+def test_in_place_keeps_permissions(run, square, tmp_path):
+    square.chmod(0o640)
+    before = gmsnet.quality(gmsnet.read(square))
+    done = run("smooth", square, "--in-place")
+    assert done.code == 0
+    assert gmsnet.quality(gmsnet.read(square)).qhat > before.qhat
+    assert stat.S_IMODE(square.stat().st_mode) == 0o640
+    assert listing(tmp_path) == ["square.su2"]
+
+
+def test_in_place_without_gain_does_not_touch_the_file(run, square):
+    before = square.stat()
+    done = run("smooth", square, "--in-place", "--max-sweeps", 0)
+    assert f"left as it is: {square}" in done.out
+    assert (square.stat().st_ino, square.stat().st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
+
+
+def test_an_existing_output_is_replaced(run, square, tmp_path):
+    out = tmp_path / "out.su2"
+    out.write_text("old")
+    assert run("smooth", square, out).code == 0
+    assert gmsnet.read(out).points.shape == gmsnet.read(square).points.shape
+
+
+def test_what_conversion_loses_is_named(run, square, tmp_path):
+    done = run("smooth", square, tmp_path / "out.off")
+    assert done.code == 0
+    assert "lost in conversion: " in done.out
+
+
+def test_the_output_format_can_be_named(run, square, tmp_path):
+    done = run("smooth", square, tmp_path / "out.dat", "--output-format", "su2")
+    assert done.code == 0
+    assert (tmp_path / "out.dat").read_bytes().startswith(b"NDIME")
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_plot(run, square, tmp_path, suffix):
+    picture = tmp_path / f"picture.{suffix}"
+    done = run("smooth", square, tmp_path / "out.su2", "--plot", picture)
+    assert done.code == 0
+    assert f"picture: {picture}" in done.out
+    assert picture.read_bytes()[:5] in (b"\x89PNG\r", b"<?xml", b"%PDF-")
+
+
+# ------------------------------------------------------------------ --fix
+
+
+def test_fixed_nodes_stay(run, square, tmp_path):
+    names = tmp_path / "ids.txt"
+    mesh = gmsnet.read(square)
+    free = np.flatnonzero(gmsnet.smooth(mesh).moved)
+    names.write_text(f"{free[2]}, {free[3]}\n# a comment\n{free[4]} # another\n")
+    out = tmp_path / "out.su2"
+    done = run("smooth", square, out, "--fix", f"{free[0]},{free[1]}", "--fix", f"@{names}", "--fix", "left")
+    assert done.code == 0
+    assert "fixed by the user: 5" in done.out
+    moved = (gmsnet.read(out).points != mesh.points).any(axis=1)
+    assert not moved[free[:5]].any()
+    assert moved[free[5:]].any()
+
+
+def test_a_marker_that_is_a_number_goes_before_a_node(run, tmp_path):
+    mesh = gmsnet.random_mesh(60, seed=1)
+    path = tmp_path / "numbers.mesh"
+    gmsnet.write(mesh, path)  # Medit keeps the numbers of markers, not their names
+    assert "1" in gmsnet.read(path).markers
+    region_nodes = len(gmsnet.read(path).markers["1"])
+    done = run("smooth", path, tmp_path / "out.mesh", "--fix", "1", "--json")
+    assert json.loads(done.out)["free"] <= len(mesh.points) - region_nodes
+    inner = int(np.flatnonzero(gmsnet.smooth(mesh).moved)[0])
+    held = json.loads(run("smooth", path, tmp_path / "out.mesh", "--fix", f"{inner},", "--json").out)["held"]
+    assert held["fixed by the user"] == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("lefft", "did you mean 'left'"),
+        ("999999", "there is no node 999999; the mesh has the nodes 0 to"),
+        ("1,2,x", "no marker '1,2,x'"),
+        ("", "no marker ''"),
+        ("@nowhere.txt", "nowhere.txt: the list of nodes cannot be read: No such file"),
+        ("@{folder}/words.txt", "words.txt, line 2: 'left' is not a node: give whole numbers"),
+        ("@{folder}/far.txt", "far.txt, line 1: there is no node 123456"),
+        ("@{folder}/binary.txt", "this is not a list of nodes"),
+    ],
+)
+def test_wrong_fixed_nodes(run, square, tmp_path, value, message):
+    (tmp_path / "words.txt").write_text("1 2\nleft\n")
+    (tmp_path / "far.txt").write_text("123456")
+    (tmp_path / "binary.txt").write_bytes(b"\xff\xfe\x00")
+    done = run("smooth", square, tmp_path / "out.su2", "--fix", value.format(folder=tmp_path))
+    assert done.code == 2
+    assert message in done.err
+    assert not (tmp_path / "out.su2").exists()
+
+
+# ------------------------------------------------------------------ interruptions
+
+
+def test_ctrl_c_writes_the_best_mesh_so_far(run, square, tmp_path, monkeypatch):
+    def stop(self, sweep):
+        if sweep.index == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Progress, "sweep", stop)
+    out = tmp_path / "out.su2"
+    done = run("smooth", square, out)
+    assert done.code == 0
+    assert "2 sweeps" in done.out
+    assert engine.INTERRUPTED in done.out
+    expected = gmsnet.smooth(gmsnet.read(square), max_sweeps=2)
+    assert gmsnet.read(out).points.tolist() == expected.points.tolist()
+
+
+def test_ctrl_c_before_the_smoothing_writes_nothing(run, square, tmp_path, monkeypatch):
+    def stop(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gmsnet.io.read", stop)
+    done = run("smooth", square, tmp_path / "out.su2")
+    assert (done.code, done.out) == (130, "")
+    assert "Traceback" not in done.err
+    assert listing(tmp_path) == ["square.su2"]
+
+
+def test_a_bug_is_one_line_and_a_traceback_on_demand(run, square, tmp_path, monkeypatch):
+    def fail(*arguments):
+        raise RuntimeError("boom\nbang")
+
+    monkeypatch.setattr("gmsnet.io.read", fail)
+    monkeypatch.delenv("GMSNET_DEBUG", raising=False)
+    done = run("smooth", square, tmp_path / "out.su2")
+    assert done.code == 70
+    assert done.err.startswith("gmsnet: internal error: RuntimeError: boom bang; please report it")
+    assert done.err.count("\n") == 1
+    monkeypatch.setenv("GMSNET_DEBUG", "1")
+    with pytest.raises(RuntimeError, match="boom"):
+        run("smooth", square, tmp_path / "out.su2")
+
+
+def test_a_full_disk_is_one_line(run, square, tmp_path, monkeypatch):
+    def full(descriptor):
+        raise OSError(28, os.strerror(28))
+
+    monkeypatch.setattr(os, "fsync", full)
+    done = run("smooth", square, tmp_path / "out.su2")
+    assert done.code == 2
+    assert "out.su2: cannot be written: no space left on device" in done.err
+    assert listing(tmp_path) == ["square.su2"]
