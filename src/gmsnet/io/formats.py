@@ -120,12 +120,14 @@ def check_contents(data: bytes, key: str) -> None:
     if shown == key:
         return
     if shown is not None:
-        right = f"{FORMATS[shown].suffixes[0]} or pass --format {shown}"
-        raise FormatError(f"this looks like a {FORMATS[shown].title} file, not {title}; rename it to {right}")
+        other = FORMATS[shown]
+        raise FormatError(
+            f"this looks like {other.title}, not {title}: rename it to {other.suffixes[0]} or pass --format {shown}"
+        )
     for what, sign in STRANGERS.items():
         if re.match(sign, data[:HEAD]):
-            raise FormatError(f"this is {what}, not a {title} file; convert it first ({known()} are read)")
+            raise FormatError(f"this is {what}, not {title}: convert it first ({known()} are read)")
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise FormatError("the text is in UTF-16; save it as plain text (ASCII or UTF-8)")
     if b"\0" in data[:HEAD]:
-        raise FormatError(f"this is binary data, not a {title} file")
+        raise FormatError(f"this is binary data, not {title}")

@@ -1,0 +1,119 @@
+"""New coordinates in the old file: exactly the tokens of moved nodes change."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gmsnet.io import read
+from gmsnet.io.splice import BinarySlots, FileSource, TextSlots
+from gmsnet.io.text import scan, to_floats
+from gmsnet.mesh import CellBlock
+
+TEXT = b"head 1.50 2e0 | +3.25\t.5\r\n7. 1E1 1.50 tail"
+SPANS = scan(TEXT, 0, 10)[[1, 2, 4, 5, 6, 7]].reshape(3, 2, 2)
+OLD = to_floats(TEXT, SPANS)
+SLOTS = TextSlots(SPANS[..., 0], SPANS[..., 1], np.arange(3))
+
+
+@given(st.lists(st.tuples(st.integers(0, 2), st.integers(0, 1), st.floats(allow_nan=False, allow_infinity=False))))
+def test_only_what_changed_in_value_is_written(changes: list[tuple[int, int, float]]) -> None:
+    new = OLD.copy()
+    for row, column, value in changes:
+        new[row, column] = value
+    expected, end = b"", 0
+    for (start, stop), old, value in zip(SPANS.reshape(-1, 2).tolist(), OLD.ravel(), new.ravel().tolist(), strict=True):
+        expected += TEXT[end:start] + (TEXT[start:stop] if old == value else repr(value).encode())
+        end = stop
+    expected += TEXT[end:]
+    assert SLOTS.replace(TEXT, OLD, new) == expected
+
+
+def test_slots_in_any_order_and_repeated_nodes() -> None:
+    swapped = TextSlots(SPANS[::-1, :, 0], SPANS[::-1, :, 1], np.array([0, 1, 0]))
+    old = np.array([[7.0, 10.0], [3.25, 0.5]])
+    new = np.array([[8.0, 10.0], [3.25, 0.25]])
+    assert swapped.replace(TEXT, old, new) == b"head 8.0 2e0 | +3.25\t0.25\r\n8.0 1E1 1.50 tail"
+
+
+@pytest.mark.parametrize("dtype", ["<f4", ">f4", "<f8", ">f8"])
+def test_binary_slots(dtype: str) -> None:
+    old = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    width = np.dtype(dtype).itemsize
+    data = b"ab" + old.astype(dtype).tobytes() + b"c" + old[:1].astype(dtype).tobytes()
+    starts = np.array([2, 2 + 3 * width, 3 + 6 * width])[:, None] + width * np.arange(3)
+    new = old.copy()
+    new[0, 1] = -7.5
+    got = BinarySlots(starts, dtype, np.array([0, 1, 0])).replace(data, old, new)
+    assert got == b"ab" + new.astype(dtype).tobytes() + b"c" + new[:1].astype(dtype).tobytes()
+
+
+def test_a_source_knows_its_cells() -> None:
+    cells = (CellBlock("triangle", [[0, 1, 2]], [4]),)
+    source = FileSource("su2", ".su2", TEXT, OLD, SLOTS, cells, {".ele": b"x"})
+    assert source.has_cells(cells)
+    assert source.has_cells((CellBlock("triangle", [[0, 1, 2]], [4]),))
+    assert not source.has_cells(())
+    for other in (CellBlock("triangle", [[0, 2, 1]], [4]), CellBlock("triangle", [[0, 1, 2]], [5])):
+        assert not source.has_cells((other,))
+    assert source.splice(OLD) == {".su2": TEXT, ".ele": b"x"}
+    assert source.splice(OLD.copy())[".su2"] is TEXT
+    new = OLD + 1.0
+    assert source.splice(new)[".su2"] == SLOTS.replace(TEXT, OLD, new)
+
+
+REAL = {
+    "mesh_NACA0012_inv.su2": (5233, {"triangle": 10216, "line": 250}),
+    "osteonT1_11.mesh": (1228, {"triangle": 2292}),
+    "square_triquad.mesh": (470, {"triangle": 458, "quad": 200}),
+    "cylinder_in_box.mesh": (764, {"tetra": 3344}),
+    "matrix_fiber.mesh": (2421, {"hexahedron": 1952}),
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_files(name: str) -> None:
+    folder = os.environ.get("GMSNET_MESHES")
+    if not folder:
+        pytest.skip("set GMSNET_MESHES to the folder of real meshes")
+    path = Path(folder) / name
+    mesh = read(path)
+    nodes, cells = REAL[name]
+    assert len(mesh.points) == nodes
+    assert {kind: sum(len(b.nodes) for b in mesh.cells if b.kind == kind) for kind in cells} == cells
+    assert {b.kind for b in mesh.cells} == set(cells)
+    assert mesh.source is not None
+    (was,) = mesh.source.splice(mesh.points).values()
+    assert was == path.read_bytes()
+
+    moved = mesh.points.copy()
+    moved[[3, nodes - 1], 0] += 0.1
+    (now,) = mesh.source.splice(moved).values()
+    old, new = was.split(b"\n"), now.split(b"\n")
+    assert len(old) == len(new)
+    different = [k for k, (a, b) in enumerate(zip(old, new, strict=True)) if a != b]
+    assert len(different) == 2
+    for line in different:
+        assert old[line].split()[1:] == new[line].split()[1:]
+
+
+def test_figures_of_real_files() -> None:
+    folder = os.environ.get("GMSNET_MESHES")
+    if not folder:
+        pytest.skip("set GMSNET_MESHES to the folder of real meshes")
+    airfoil = read(Path(folder) / "mesh_NACA0012_inv.su2")
+    assert dict(airfoil.region_names) == {(1, 1): "airfoil", (1, 2): "farfield"}
+    assert [len(b.nodes) for b in airfoil.cells] == [10216, 200, 50]
+    assert {name: len(ids) for name, ids in airfoil.markers.items() if name != "0"} == {"airfoil": 200, "farfield": 50}
+    bone = read(Path(folder) / "osteonT1_11.mesh")
+    assert len(np.unique(bone.cells[0].regions)) == 67
+    assert not bone.point_data
+    mixed = read(Path(folder) / "square_triquad.mesh")
+    assert [(b.kind, np.unique(b.regions).tolist()) for b in mixed.cells] == [("triangle", [2]), ("quad", [1])]
+    box = read(Path(folder) / "cylinder_in_box.mesh")
+    assert np.unique(box.cells[0].regions).tolist() == [444, 555]
