@@ -181,11 +181,11 @@ def nodes_new(words: Words) -> Nodes:
         (count,) = counts(words, 1)
         width = 3 + dimension * parametric
         heads.append((count, skip(words, (count, "u8")), skip(words, (count * width, "f8")), width))
-    number, tags, points, width = np.array(heads, dtype=np.int64).reshape(-1, 4).T
+    number, tags, points, widths = np.array(heads, dtype=np.int64).reshape(-1, 4).T
     if number.sum() != total:
         words.fail(words.at, f"$Nodes announces {total} nodes, but its blocks have {number.sum()}")
     unit = words.size("f8")
-    rows = np.repeat(points, number) + _rank(number) * np.repeat(width, number) * unit
+    rows = np.repeat(points, number) + _rank(number) * np.repeat(widths, number) * unit
     return _nodes(words, ranges(tags, number, words.size("u8")), "u8", rows[:, None] + unit * np.arange(3))
 
 
@@ -204,10 +204,10 @@ def elements_new(words: Words) -> Elements:
         (count,) = counts(words, 1)
         size = node_count(words, at, code)
         heads.append((dimension, tag, code, count, size, skip(words, (count * (1 + size), "u8"))))
-    dimensions, entities, codes, number, size, start = np.array(heads, dtype=np.int64).reshape(-1, 6).T
+    dimensions, entities, codes, number, counted, start = np.array(heads, dtype=np.int64).reshape(-1, 6).T
     if number.sum() != total:
         words.fail(words.at, f"$Elements announces {total} elements, but its blocks have {number.sum()}")
-    sizes = np.repeat(size, number)
+    sizes = np.repeat(counted, number)
     rows = np.repeat(start, number) + words.size("u8") * (1 + _rank(number) * (1 + sizes))
     entity = np.stack([np.repeat(dimensions, number), np.repeat(entities, number)], axis=1)
     return _elements(words, np.repeat(codes, number), sizes, rows, "u8", entity=entity)

@@ -68,8 +68,13 @@ def parsed(
         owner, first, nodes = split_cells(first, nodes, pieces, np.where(lines, 2, np.where(dots, 1, size)))
         codes, regions, size = codes[owner], regions[owner], np.diff(first)
         cell_fields = [(name, array[owner]) for name, array in cell_fields]
-    polygons = codes == POLYGON
-    codes = np.where(polygons & (size == 3), CODES["triangle"], np.where(polygons & (size == 4), CODES["quad"], codes))
+    for code, count, kind in (
+        (POLYVERTEX, 1, "vertex"),
+        (POLYLINE, 2, "line"),
+        (POLYGON, 3, "triangle"),
+        (POLYGON, 4, "quad"),
+    ):
+        codes = np.where((codes == code) & (size == count), CODES[kind], codes)
     cells, cell_data = table_blocks(KINDS, codes, first, nodes, regions, dict(cell_fields))
     return Parsed(points, cells, slots, {}, dict(point_fields), cell_data, single)
 
