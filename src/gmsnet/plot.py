@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".svg", ".pdf")
 DPI = 150
-BAD_TO_GOOD = ["#ffd60a", "#e9c46a", "#8fb8a0", "#3f7fb5", "#173f7a"]  # yellow … blue; also apart in grey print
+BAD_TO_GOOD = ["#ffd60a", "#e9c46a", "#8fb8a0", "#3f7fb5", "#103a80"]  # yellow … blue; also apart in grey print
 INVERTED = "#d1001f"
 OTHER_CELLS = "#e6e6e6"
 BEFORE, AFTER = "#e0a800", "#173f7a"  # the two histograms
 EDGE = "#ffffff"
 PANEL = 4.8  # inches
-RASTER = 20_000  # in SVG and PDF, more cells than this are drawn as an image: the file stays small
+MANY = 20_000  # more cells than this are an image in SVG and PDF, so that the file stays small, and share one style
 ZOOM_CELLS = 150  # about as many cells are seen around the worst one
 ZOOM_FROM = 0.2  # if they take less of the picture than this
 RING_BELOW = 0.03
@@ -221,21 +221,20 @@ def _draw(axes: Axes, view: _View, box: NDArray[np.float64]) -> ScalarMappable:
     thickness = _thickness(polygons) / max(span.max(), np.finfo(float).tiny) * PANEL * 72
     white = np.clip((thickness - 2.0) / 4.0, 0.0, 0.9)[:, None]
     edges = white * np.array(to_rgba(EDGE)) + (1.0 - white) * colours
-    raster = len(rows) > RASTER
+    many = len(rows) > MANY
+    widths: Any = 0.25 if many else np.clip(0.03 * thickness, 0.25, 0.6)
     for nodes in view.others:
         faces = view.points[nodes[seen(nodes)]]
-        axes.add_collection(PolyCollection(list(faces), facecolors=OTHER_CELLS, edgecolors=EDGE, linewidths=0.3))
-    axes.add_collection(
-        PolyCollection(
-            cast(Any, polygons),
-            facecolors=colours,
-            edgecolors=edges,
-            linewidths=np.clip(0.03 * thickness, 0.25, 0.6),
-            rasterized=raster,
-        )
+        other = PolyCollection(list(faces), facecolors=OTHER_CELLS, edgecolors=EDGE, linewidths=0.3, rasterized=many)
+        axes.add_collection(other, autolim=False)
+    cells = PolyCollection(
+        cast(Any, polygons), facecolors=colours, edgecolors=edges, linewidths=widths, rasterized=many
     )
-    lines = view.points[view.lines[seen(view.lines)]]
-    axes.add_collection(LineCollection(list(lines), colors="black", linewidths=0.9, rasterized=raster))
+    axes.add_collection(cells, autolim=False)
+    lines = LineCollection(
+        list(view.points[view.lines[seen(view.lines)]]), colors="black", linewidths=0.9, rasterized=many
+    )
+    axes.add_collection(lines, autolim=False)
     return mappable
 
 
