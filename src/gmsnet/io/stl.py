@@ -100,10 +100,10 @@ def _facets(data: bytes, start: int, stop: int) -> Spans:
         if expected != "*":
             wrong[:, k] = facets[:, k, 1] - facets[:, k, 0] != len(expected)
             whole = np.flatnonzero(~wrong[:, k])
-            letters = gather(data, facets[whole, k]).view(np.uint8).reshape(len(whole), -1) | 32  # lower case
-            wrong[whole, k] = (
-                (letters != np.frombuffer(expected.encode(), dtype=np.uint8)).any(axis=1) if whole.size else True
-            )
+            if whole.size:
+                letters = gather(data, facets[whole, k]).view(np.uint8).reshape(len(whole), len(expected))
+                lower = np.frombuffer(expected.encode(), dtype=np.uint8)
+                wrong[whole, k] = (letters | 32 != lower).any(axis=1)  # which makes capitals small
     if wrong.any():
         k = int(np.argmax(wrong))
         found = token(data, spans[k])[:24].decode("ascii", "replace")
