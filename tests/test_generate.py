@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 import typer
@@ -123,7 +125,7 @@ def test_ring_orientation_and_closing_corner_do_not_matter():
     plain = random_mesh(40, [outer, hole], seed=1)
     for rings in ([outer[::-1], hole], [outer, hole[::-1]], [np.vstack([outer, outer[:1]]), hole]):
         turned = random_mesh(40, rings, seed=1)
-        assert set(turned.markers) == {"domain", "outer", "hole 1"}
+        assert set(turned.markers) == {"domain", "outer", "hole_1"}
         assert len(turned.points) == len(plain.points)
         assert doubled_areas(turned.points, turned.cells[0].nodes).sum() == pytest.approx(2 * (12 - 0.5))
 
@@ -150,9 +152,9 @@ SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
         ({"shape": [[[0, 0], [1, 1], [1, 0], [0, 1]]]}, "may only meet at their corners"),
         ({"shape": [[[0, 0], [1, 0], [2, 0]]]}, "may only meet at their corners"),
         ({"shape": [[[0, 0], [2, 0], [1, 0], [1, 1]]]}, "may only meet at their corners"),
-        ({"shape": [SQUARE, [[0.5, 0.5], [1.5, 0.5], [0.7, 0.7]]]}, "'outer' .* and 'hole 1'"),
-        ({"shape": [SQUARE, [[2, 2], [3, 2], [2, 3]]]}, "'hole 1' must lie inside the first ring"),
-        ({"shape": [SQUARE, [[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]], [[0.4, 0.2], [0.6, 0.2], [0.5, 0.4]]]}, "'hole 2'"),
+        ({"shape": [SQUARE, [[0.5, 0.5], [1.5, 0.5], [0.7, 0.7]]]}, "'outer' .* and 'hole_1'"),
+        ({"shape": [SQUARE, [[2, 2], [3, 2], [2, 3]]]}, "'hole_1' must lie inside the first ring"),
+        ({"shape": [SQUARE, [[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]], [[0.4, 0.2], [0.6, 0.2], [0.5, 0.4]]]}, "'hole_2'"),
         ({"shape": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]], SQUARE]}, "'outer' must lie"),
     ],
 )  # fmt: skip
@@ -265,6 +267,36 @@ def test_command_writes_the_mesh_with_its_markers(tmp_path, app):
     assert {name: len(ids) for name, ids in mesh.markers.items() if name in expected.markers} == {
         name: len(ids) for name, ids in expected.markers.items() if name != "domain"
     }
+
+
+def test_command_takes_rings_from_a_file(tmp_path, app):
+    (tmp_path / "rings.json").write_text(json.dumps(POLYGON))
+    path = tmp_path / "polygon.su2"
+    result = CliRunner().invoke(app, [str(path), "--rings", str(tmp_path / "rings.json"), "--nodes", "40"])
+    assert result.exit_code == 0, result.output
+    mesh = gmsnet.read(path)
+    assert np.array_equal(mesh.points, random_mesh(40, POLYGON).points)
+    assert {"outer", "hole_1", "hole_2"} <= set(mesh.markers)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "rings.json: cannot be read: No such file"),
+        ("[[[0, 0]", "rings.json: no JSON"),
+        ("\x80", "rings.json: no JSON"),
+        ("{}", "rings.json: must hold a list of rings"),
+        ("[7]", "'outer' must be an array"),
+        ("[[[0, 0], [1, 0]]]", "'outer' must be an array of at least 3"),
+    ],
+)
+def test_command_refuses_bad_rings(tmp_path, app, text, message):
+    if text is not None:
+        (tmp_path / "rings.json").write_text(text, encoding="latin-1")
+    arguments = [str(tmp_path / "out.su2"), "--rings", str(tmp_path / "rings.json")]
+    result = CliRunner().invoke(app, arguments)
+    assert isinstance(result.exception, InputError)
+    assert message in str(result.exception)
 
 
 @pytest.mark.parametrize("tangled", [False, True])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -13,8 +15,12 @@ def generate(
     shape: Annotated[
         str, typer.Option(help="square, circle, plate (a square with a round hole) or lshape.")
     ] = "square",
+    rings: Annotated[
+        Path | None,
+        typer.Option(help="Instead of --shape: a JSON file [[[x, y], …], …], the outer ring first, then its holes."),
+    ] = None,
     nodes: Annotated[int, typer.Option(help="Random nodes inside.")] = 1000,
-    size: Annotated[float, typer.Option(help="Side of the square around the shape.")] = 1.0,
+    size: Annotated[float, typer.Option(help="Side of the square around the shape; factor for --rings.")] = 1.0,
     boundary: Annotated[str, typer.Option(help="Spacing of the nodes on the boundary: even or random.")] = "even",
     seed: Annotated[int, typer.Option(help="The same seed makes the same mesh.")] = 0,
     jitter: Annotated[
@@ -37,7 +43,8 @@ def generate(
         raise InputError("--tangled needs --jitter: how far may nodes be thrown?")
     if not (math.isfinite(jitter) and jitter >= 0):
         raise InputError(f"--jitter must be 0 or more, got {jitter}")
-    mesh = random_mesh(nodes, shape, size=size, boundary=boundary, seed=seed)
+    outline = shape if rings is None else _read_rings(rings)
+    mesh = random_mesh(nodes, outline, size=size, boundary=boundary, seed=seed)
     triangles, lines = mesh.cells
     if jitter:
         inner = np.ones(len(mesh.points), dtype=bool)
@@ -46,9 +53,24 @@ def generate(
     lost = write(mesh, out, format)
     aside = out == "-"  # then the mesh itself goes to the standard output
     typer.echo(
-        f"{'standard output' if aside else out}: {shape} with {len(mesh.points):,} nodes, "
+        f"{'standard output' if aside else out}: {shape if rings is None else rings} with {len(mesh.points):,} nodes, "
         f"{len(triangles.nodes):,} triangles and {len(lines.nodes):,} boundary edges (seed {seed})",
         err=aside,
     )
     for loss in lost:
         typer.echo(f"not in the file: {loss}", err=aside)
+
+
+def _read_rings(path: Path) -> list[Any]:
+    """What stands in a JSON file of rings; ``random_mesh`` checks the rings themselves."""
+    from gmsnet.errors import InputError
+
+    try:
+        given = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise InputError(f"{path}: no JSON: {error}") from error
+    if not isinstance(given, list):
+        raise InputError(f"{path}: must hold a list of rings, [[[x, y], …], …]")
+    return given

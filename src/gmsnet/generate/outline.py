@@ -65,7 +65,7 @@ SHAPES: dict[str, tuple[float, Callable[[float, Random], list[Ring]]]] = {
 
 def polygon(given: Sequence[ArrayLike]) -> list[Ring]:
     """The rings of a polygon, the outer one first, checked, oriented and named. Raises InputError."""
-    rings = [_ring(corners, "outer" if k == 0 else f"hole {k}") for k, corners in enumerate(given)]
+    rings = [_ring(corners, "outer" if k == 0 else f"hole_{k}") for k, corners in enumerate(given)]
     if not rings:
         raise InputError("a polygon needs at least one ring")
     _check_simple(rings)

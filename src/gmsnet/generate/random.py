@@ -31,7 +31,7 @@ def random_mesh(
     arguments give the same mesh.
 
     Returns counter-clockwise triangles of the region "domain", and the boundary as line cells by marker: the sides of
-    the named shapes ("bottom", "circle", "hole", …); for rings "outer", "hole 1", "hole 2", …
+    the named shapes ("bottom", "circle", "hole", …); for rings "outer", "hole_1", "hole_2", …
 
     Raises InputError for numbers out of range, an unknown shape, and rings that cross or are no polygon.
     """
