@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import gmsnet
 from gmsnet.adapters import to_mesh
 from gmsnet.errors import InputError
 from gmsnet.mesh import CellBlock, Mesh
@@ -274,6 +275,45 @@ def test_other_pyvista_meshes_name_the_mend(pv):
     strips = pv.PolyData(in_space(POINTS[:4]), strips=[4, 0, 1, 3, 2])
     with pytest.raises(InputError, match="triangulate"):
         to_mesh(strips)
+
+
+# ------------------------------------------------------------------ through smooth()
+
+
+def as_arrays(mesh):
+    return mesh.points, mesh.cells[0].nodes
+
+
+def as_meshio(mesh):
+    meshio = pytest.importorskip("meshio")
+    return meshio.Mesh(mesh.points, [("triangle", mesh.cells[0].nodes)])
+
+
+def as_pyvista(mesh):
+    faces = np.pad(mesh.cells[0].nodes, ((0, 0), (1, 0)), constant_values=3)
+    points = np.column_stack([mesh.points[:, :2], np.ones(len(mesh.points))]).astype(np.float32)
+    return pytest.importorskip("pyvista").PolyData(points, faces=faces.ravel())
+
+
+@pytest.mark.parametrize("form", [as_arrays, as_meshio, as_pyvista])
+def test_smooth_gives_back_what_it_got(form):
+    given = form(gmsnet.random_mesh(60, seed=3))
+    result = gmsnet.smooth(given)
+    assert type(result.mesh) is type(given)
+    assert result.after.qhat > result.before.qhat
+    back, _ = to_mesh(result.mesh)
+    assert (back.points == result.points).all()  # float32 comes back without another rounding
+    assert gmsnet.quality(result.mesh).qhat == result.after.qhat
+    assert gmsnet.quality(given).qhat == result.before.qhat
+
+
+def test_a_point_set_can_be_held():
+    given = as_meshio(gmsnet.random_mesh(60, seed=3))
+    free = np.flatnonzero(gmsnet.smooth(given).moved)
+    given.point_sets["probe"] = free[:2]
+    result = gmsnet.smooth(given, fixed="probe")
+    assert result.held["fixed by the user"].tolist() == free[:2].tolist()
+    assert not result.moved[free[:2]].any()
 
 
 def test_no_library_is_imported():

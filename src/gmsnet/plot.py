@@ -165,9 +165,10 @@ def _figure(views: list[_View]) -> Figure:
             _draw(zoom, view, window)
             zoom.spines[:].set_visible(True)
             cell = view.points[worst]
-            zoom.fill(*cell.T, fill=False, edgecolor="black", linewidth=1.2)
-            if np.ptp(cell, axis=0).max() < 2 * RING_BELOW * np.ptp(window, axis=0).max():
-                zoom.plot(*cell.mean(axis=0), "o", ms=30, mfc="none", mec="black", mew=1.2, clip_on=False)
+            if np.ptp(cell, axis=0).max() < 4 * RING_BELOW * np.ptp(window, axis=0).max():
+                zoom.plot(*cell.mean(axis=0), "o", ms=32, mfc="none", mec="black", mew=1.2, clip_on=False)
+            else:
+                zoom.fill(*cell.T, fill=False, edgecolor="black", linewidth=1.2)
             maps.append(zoom)
     figure.colorbar(mappable, ax=maps, label="1/q (1 equilateral, 0 flat; red: inverted)", aspect=40, pad=0.01)
     _histogram(figure.add_subplot(grid[-1, 0]), views, "shape", "1/q")

@@ -88,7 +88,8 @@ class Topology:
         part, turn, consistent = connectivity.wind(first, corner, twin, face)
         if mesh.plane is not None:
             area = connectivity.part_areas(planar[memory], first, corner, part, turn, len(consistent))
-            turn = np.where(area[part] < 0, -turn, turn).astype(np.int8)
+            if (area < 0).any():
+                turn = np.where(area[part] < 0, -turn, turn).astype(np.int8)
 
         boundary, interface, crowded, unwound = (np.zeros(nodes, dtype=bool) for _ in range(4))
         connectivity.mark_edges(corner, head, twin, face, faces.region, boundary, interface, crowded)

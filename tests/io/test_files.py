@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damage import cells_of, triangle_grid
+from hypothesis import given
+from hypothesis import strategies as st
 
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io import FORMATS, atomic, read, write
@@ -143,6 +145,12 @@ def test_what_is_no_mesh_is_refused_with_its_name(name: str, data: bytes, messag
     assert str(caught.value).startswith(str(tmp_path))
     assert "\n" not in str(caught.value)
     assert (tmp_path / name).read_bytes() == data
+
+
+@given(st.text("%#<!->?\n\r\t vofgs01.ASU2NDIME=", max_size=300).map(str.encode) | st.binary(max_size=100))
+def test_the_look_at_the_contents_ends(data: bytes) -> None:
+    for head in (b"", b"<!--x-->" * 400, b"%  \n \n" * 500, b"#  \n" * 800, b"g a\n" * 900, b"solid\n" + b"\n" * 4000):
+        assert sniff(head + data) in (None, *FORMATS)
 
 
 def test_what_cannot_be_opened(tmp_path: Path) -> None:

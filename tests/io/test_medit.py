@@ -4,8 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from damage import ENDS, GAPS, NUMBERS, cells_of, check_cuts, damaged, facts, read_or_refuse, regions_of, triangle_grid
-from hypothesis import given, settings
+from damage import (
+    ENDS,
+    FEW,
+    GAPS,
+    NUMBERS,
+    cells_of,
+    check_cuts,
+    damaged,
+    facts,
+    read_or_refuse,
+    regions_of,
+    triangle_grid,
+)
+from hypothesis import given
 from hypothesis import strategies as st
 
 from gmsnet.errors import FormatError
@@ -109,7 +121,7 @@ def test_every_spelling_reads_the_same(case: tuple[bytes, list[tuple[int, int]],
     assert facts(again)[1:] == facts(parsed)[1:]
 
 
-@settings(max_examples=15)
+@FEW
 @given(spellings())
 def test_a_cut_within_a_section_is_refused(case: tuple[bytes, list[tuple[int, int]], dict[str, object]]) -> None:
     # A file need not say where it ends: one that is cut between two sections reads without the rest.

@@ -186,3 +186,11 @@ def test_conversion_without_regions_writes_no_groups() -> None:
     assert cells_of(obj.read(written.files), "polygon") == [[0, 1, 2, 7, 6]]
     with pytest.raises(FormatError, match="OBJ cannot hold cells of type 'triangle6'"):
         obj.write(Mesh(mesh.points, (CellBlock("triangle6", [[0, 1, 2, 3, 4, 5]], [0]),)))
+
+
+def test_cell_data_that_say_only_the_regions_are_not_lost() -> None:
+    mesh = triangle_grid()
+    regions = tuple(block.regions for block in mesh.cells)
+    other = tuple(block.regions + 1 for block in mesh.cells)
+    written = obj.write(Mesh(mesh.points, mesh.cells, mesh.region_names, cell_data={"mat_id": regions, "p": other}))
+    assert written.lost == ["OBJ cannot hold cell data: 'p' was left out"]

@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from damage import ENDS, GAPS, NUMBERS, cells_of, check_cuts, damaged, facts, read_or_refuse, triangle_grid
-from hypothesis import given, settings
+from damage import (
+    ENDS,
+    FEW,
+    GAPS,
+    NUMBERS,
+    cells_of,
+    check_cuts,
+    damaged,
+    facts,
+    last_word,
+    read_or_refuse,
+    triangle_grid,
+)
+from hypothesis import given
 from hypothesis import strategies as st
 
 from gmsnet.errors import FormatError
 from gmsnet.io import off
-from gmsnet.io.text import blank
 from gmsnet.mesh import CellBlock, Mesh
 
 PLAIN = b"""OFF
@@ -66,11 +77,10 @@ def test_every_spelling_reads_the_same(case: tuple[bytes, dict[str, list[list[in
     assert facts(off.read({".off": again}))[1:] == facts(parsed)[1:]
 
 
-@settings(max_examples=25)
+@FEW
 @given(spellings())
 def test_a_cut_file_is_refused_or_the_same(case: tuple[bytes, dict[str, object]]) -> None:
-    text = blank(case[0], rb"#[^\r\n]*").rstrip()
-    start = len(text) - len(text.split()[-1])
+    start = last_word(case[0], rb"#[^\r\n]*")
     check_cuts(off, {".off": case[0]}, ".off", lambda rest: len(rest) > start)
 
 

@@ -4,13 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from damage import ENDS, GAPS, NUMBERS, cells_of, check_cuts, damaged, facts, read_or_refuse, regions_of, triangle_grid
-from hypothesis import given, settings
+from damage import (
+    ENDS,
+    FEW,
+    GAPS,
+    NUMBERS,
+    cells_of,
+    check_cuts,
+    damaged,
+    facts,
+    last_word,
+    read_or_refuse,
+    regions_of,
+    triangle_grid,
+)
+from hypothesis import given
 from hypothesis import strategies as st
 
 from gmsnet.errors import FormatError
 from gmsnet.io import triangle
-from gmsnet.io.text import blank
 from gmsnet.mesh import CellBlock, Mesh
 
 NODE = b"""4 2 1 1
@@ -91,18 +103,12 @@ def test_every_spelling_reads_the_same(case: tuple[dict[str, bytes], dict[str, l
     assert facts(triangle.read(again))[1:] == facts(parsed)[1:]
 
 
-@settings(max_examples=25)
+@FEW
 @given(spellings(), st.sampled_from([".node", ".ele"]))
 def test_a_cut_file_is_refused_or_the_same(case: tuple[dict[str, bytes], object], suffix: str) -> None:
     files, _ = case
-    start = last_number(files[suffix])
+    start = last_word(files[suffix], rb"#[^\r\n]*")
     check_cuts(triangle, files, suffix, lambda rest: len(rest) > start)
-
-
-def last_number(data: bytes) -> int:
-    """Where the last number begins that is not in a comment."""
-    text = blank(data, rb"#[^\r\n]*").rstrip()
-    return len(text) - len(text.split()[-1])
 
 
 def test_numbers_without_order() -> None:

@@ -169,6 +169,12 @@ def test_a_damaged_checkpoint_is_refused(tmp_path, damage):
         training.train(SHORT, tmp_path, resume=True)
 
 
+def test_another_file_of_the_name_is_refused(tmp_path, whole):
+    (tmp_path / NAME).write_bytes(whole["gmsnet-h4.safetensors"])
+    with pytest.raises(InputError, match="no checkpoint of this version of gmsnet"):
+        training.train(SHORT, tmp_path, resume=True)
+
+
 def test_divergence_is_told(tmp_path):
     with pytest.raises(InputError, match=r"diverged in epoch .* lower --learning-rate"):
         training.train(TrainOptions(hidden=4, learning_rate=1e20), tmp_path)

@@ -77,7 +77,7 @@ def smooth(
 
     Ctrl-C stops the smoothing; the best mesh so far is written.
     """
-    from gmsnet.cli.target import STREAM, target_of
+    from gmsnet.cli.target import STREAM, shown, target_of
 
     if json and output == STREAM:
         raise InputError("--json and OUT - both want the standard output: write the mesh to a file")
@@ -96,12 +96,12 @@ def smooth(
 
     method_named(method)
     with Progress(max_sweeps, enabled=not quiet) as progress:
-        progress.stage(f"reading {input}")
+        progress.stage(f"reading {shown(input)}")
         mesh = io.read(input, format)
         try:
             refuse_unless_planar(mesh)
         except InputError as error:
-            raise InputError(f"{input}: {error}") from error
+            raise InputError(f"{shown(input)}: {error}") from error
         fixed = fixed_nodes(mesh, fix or [])
         _check_conversion(mesh, target)
         progress.stage("preparing")

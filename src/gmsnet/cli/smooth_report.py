@@ -11,6 +11,7 @@ import numpy as np
 
 from gmsnet import engine
 from gmsnet.cli import output, report
+from gmsnet.cli.target import shown
 from gmsnet.engine import SmoothResult
 from gmsnet.mesh import Mesh
 
@@ -57,7 +58,7 @@ class Outcome:
         """The tables; ``aside``: on standard error, because the mesh itself went to the standard output."""
         result, console = self.result, output.console(stderr=aside)
         moved = result.moved.any()
-        console.print(f"{self.input}: {report.counts(self.mesh)}")
+        console.print(f"{shown(self.input)}: {report.counts(self.mesh)}")
         if len(result.after.cell):
             console.print()
             console.print(report.figures({"before": result.before, "after": result.after}))

@@ -52,6 +52,11 @@ def target_of(source: str, output: str | None, in_place: bool, format: str | Non
     return Target(output, entry.key)
 
 
+def shown(path: str) -> str:
+    """What messages call an input."""
+    return "standard input" if path == STREAM else path
+
+
 def files_of(path: str, format: str | None = None) -> list[str]:
     """The files that a mesh of this name stands in: more than one where its format says so."""
     from gmsnet.io.formats import BY_SUFFIX, FORMATS
@@ -87,7 +92,8 @@ def check_writable(path: str) -> None:
         return
     folder = os.path.dirname(os.path.realpath(path))
     if not os.path.isdir(folder):
-        raise InputError(f"{path}: the folder {folder} does not exist: make it first")
+        what = "is not a folder" if os.path.exists(folder) else "is a folder that does not exist: make it first"
+        raise InputError(f"{path}: {folder} {what}")
     if os.path.exists(path) and not os.access(path, os.W_OK):
         raise InputError(f"{path}: the file is write-protected: name another output")
     try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,14 +45,23 @@ def check_kinds(mesh: Mesh, title: str, kinds: Collection[str]) -> None:
             raise FormatError(f"{title} cannot hold cells of type {block.kind!r}: write another format, such as .vtu")
 
 
-def lost_data(mesh: Mesh, title: str, kept: Collection[str] = ()) -> list[str]:
-    """The point data, cell data and node sets that a format cannot hold, but for the names in ``kept``."""
+def lost_data(mesh: Mesh, title: str, kept: Collection[str] = (), regions: bool = False) -> list[str]:
+    """The point data, cell data and node sets that a format cannot hold, but for the names in ``kept``.
+
+    regions: the format holds the regions of cells, and with them the cell data that say nothing else.
+    """
+    if regions:
+        kept = [*kept, *(name for name in mesh.cell_data if _says_regions(mesh, name))]
     lost = []
     for what, fields in (("point data", mesh.point_data), ("cell data", mesh.cell_data), ("node sets", mesh.node_sets)):
         names = [repr(name) for name in fields if name not in kept]
         if names:
-            lost.append(f"{title} cannot hold {what}: {', '.join(names)} {were(len(names))} left out")
+            lost.append(f"{title} cannot hold {what}: {listed(names)} {were(len(names))} left out")
     return lost
+
+
+def _says_regions(mesh: Mesh, name: str) -> bool:
+    return all(np.array_equal(a, b.regions) for a, b in zip(mesh.cell_data[name], mesh.cells, strict=True))
 
 
 def lost_names(mesh: Mesh, title: str, dimensions: Collection[int] = (0, 1, 2, 3)) -> list[str]:
@@ -60,7 +69,7 @@ def lost_names(mesh: Mesh, title: str, dimensions: Collection[int] = (0, 1, 2, 3
     names = [f"{name!r} ({number})" for (dim, number), name in mesh.region_names.items() if dim in dimensions]
     if not names:
         return []
-    return [f"{title} numbers its regions and markers: the names {', '.join(names)} were left out"]
+    return [f"{title} numbers its regions and markers: {left_out('name', names)}"]
 
 
 def lost_cells(mesh: Mesh, title: str, dimensions: Collection[int]) -> list[str]:
@@ -69,7 +78,7 @@ def lost_cells(mesh: Mesh, title: str, dimensions: Collection[int]) -> list[str]
     for dim, word in ((0, "vertex"), (1, "line")):
         count = sum(len(b.nodes) for b in mesh.cells if b.dimension == dim)
         if dim in dimensions and count:
-            names = ", ".join(marker_names(mesh, dim))
+            names = listed(marker_names(mesh, dim))
             lost.append(f"{title} cannot hold {word} cells: {count} {were(count)} left out (markers {names})")
     return lost
 
@@ -123,3 +132,13 @@ def _rows(values: NDArray[Any], form: str) -> list[str]:
 def were(count: int) -> str:
     """The verb that goes with a count."""
     return "was" if count == 1 else "were"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in one line, the first ten where there are many."""
+    return ", ".join(names[:10]) + f" and {len(names) - 10} more" * (len(names) > 10)
+
+
+def left_out(word: str, names: Sequence[str]) -> str:
+    """That these names were left out."""
+    return f"the {word}{'s' * (len(names) > 1)} {listed(names)} {were(len(names))} left out"

@@ -54,18 +54,20 @@ MENDS = {  # files that one may well have, but that are not read
     ".zip": "unpack it first",
 }
 
-# What files begin with, white space aside. The last group are known by sight, but not read.
+# What files begin with, comments (a pattern that is taken out first) and white space aside.
+NONE, HASH, PERCENT, XML = rb"(?!)", rb"#[^\r\n]*", rb"%[^\r\n]*", rb"(?s)<\?.*?\?>|<!--.*?-->"
 SIGNS = {
-    "gmsh": rb"\$(MeshFormat|Comments|NOD|Nodes|PhysicalNames)\b",
-    "vtk": rb"#\s*vtk DataFile Version",
-    "vtu": rb"(<\?xml[^>]*>\s*)?(<!--(?s:.*?)-->\s*)*<VTKFile\b[^>]*\bUnstructuredGrid",
-    "ply": rb"ply\s*\r?\n\s*(format|comment|obj_info)\b",
-    "stl": rb"(?i:solid\b[^\r\n]*[\r\n]+\s*(facet|endsolid)\b)",
-    "medit": rb"([#][^\r\n]*\s+)*MeshVersionFormatted\b",
-    "off": rb"([#][^\r\n]*\s+)*(ST)?C?N?4?n?OFF\b",
-    "su2": rb"(%[^\r\n]*\s+)*(NDIME|NZONE|NELEM|NPOIN|NMARK|IZONE|NCHUNK|AOA|FFD_NBOX)\s*=",
-    "obj": rb"([#][^\r\n]*\s+)*((mtllib|o|g|usemtl)\s+\S+\s+|s\s+(off|\d+)\s+)*v[nt]?[ \t]+[-+.\d]+[ \t]+[-+.\d]",
+    "gmsh": (NONE, rb"\$(MeshFormat|Comments|NOD|Nodes|PhysicalNames)\b"),
+    "vtk": (NONE, rb"#\s*vtk DataFile Version"),
+    "vtu": (XML, rb"<VTKFile\b[^>]*\bUnstructuredGrid"),
+    "ply": (NONE, rb"ply\s*\r?\n\s*(format|comment|obj_info)\b"),
+    "stl": (NONE, rb"(?i:solid\b[^\r\n]*[\r\n]\s*(facet|endsolid)\b)"),
+    "medit": (HASH, rb"MeshVersionFormatted\b"),
+    "off": (HASH, rb"(ST)?C?N?4?n?OFF\b"),
+    "su2": (PERCENT, rb"(NDIME|NZONE|NELEM|NPOIN|NMARK|IZONE|NCHUNK|AOA|FFD_NBOX)\s*="),
+    "obj": (HASH, rb"((mtllib|o|g|usemtl|s)[ \t]+\S+[ \t]*[\r\n]\s*)*v[nt]?[ \t]+[-+.\d]+[ \t]+[-+.\d]"),
 }
+# Known by sight, but not read.
 STRANGERS = {
     "an MFEM mesh": rb"MFEM (NC )?mesh v",
     "a VTK file of another kind (not an UnstructuredGrid)": rb"(<\?xml[^>]*>\s*)?<VTKFile\b",
@@ -103,8 +105,8 @@ def format_of_suffix(path: str, suffix: str) -> str:
 def sniff(data: bytes) -> str | None:
     """The name of the format that the first bytes show, None where they do not."""
     head = data[:HEAD].removeprefix(b"\xef\xbb\xbf")
-    for key, sign in SIGNS.items():
-        if re.match(rb"\s*" + sign, head):
+    for key, (comment, sign) in SIGNS.items():
+        if re.match(sign, re.sub(comment, b"", head).lstrip()):
             return key
     if len(data) > 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
         return "stl"

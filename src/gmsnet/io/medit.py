@@ -186,7 +186,7 @@ def write(mesh: Mesh) -> Written:
     for key, entries in sections.items():
         lines += [key, str(len(entries)), *entries]
     lines.append("End")
-    lost = convert.lost_names(mesh, name, (1, 2, 3)) + convert.lost_data(mesh, name, kept=(REFERENCE,))
+    lost = convert.lost_names(mesh, name, (1, 2, 3)) + convert.lost_data(mesh, name, kept=(REFERENCE,), regions=True)
     if lost_vertices:
         lost.append(f"{name} has no markers of vertices: {lost_vertices} of them became RequiredVertices")
     return Written({".mesh": ("\n".join(lines) + "\n").encode()}, lost)

@@ -156,4 +156,4 @@ def write(mesh: Mesh) -> Written:
                     lines.append(wanted)
                     group = wanted
                 lines += rows[part[0] : part[-1] + 1]
-    return Written({".obj": ("\n".join(lines) + "\n").encode()}, convert.lost_data(mesh, name))
+    return Written({".obj": ("\n".join(lines) + "\n").encode()}, convert.lost_data(mesh, name, regions=True))

@@ -115,7 +115,9 @@ def _triangles(
     values = [to_floats(text, rows.column(1 + int(size) + k)) for k in range(int(attributes))]
     regions, names = _regions(values[0]) if values else (np.zeros(len(rows), dtype=np.int64), {})
     block = CellBlock("triangle", nodes, regions) if size == 3 else CellBlock("triangle6", nodes[:, TO_SIDES], regions)
-    cell_data: dict[str, tuple[NDArray[Any], ...]] = {f"{ATTRIBUTE}{k + 2}": (column,) for k, column in enumerate(values[1:])}
+    cell_data: dict[str, tuple[NDArray[Any], ...]] = {}
+    for k, column in enumerate(values[1:], 2):
+        cell_data[f"{ATTRIBUTE}{k}"] = (column,)
     return [block], names, cell_data
 
 
@@ -145,7 +147,7 @@ def write(mesh: Mesh) -> Written:
     node = "\n".join(lines) + "\n"
     cells = np.column_stack([np.arange(1, len(nodes) + 1), nodes + 1, regions])
     ele = "\n".join([f"{len(nodes)} {nodes.shape[1]} 1", *convert.integers(cells)]) + "\n"
-    lost += words + convert.lost_names(mesh, name, (2,)) + convert.lost_data(mesh, name, kept=(MARKER,))
+    lost += words + convert.lost_names(mesh, name, (2,)) + convert.lost_data(mesh, name, kept=(MARKER,), regions=True)
     return Written({".node": node.encode(), ".ele": ele.encode()}, lost)
 
 
@@ -166,5 +168,5 @@ def _markers(mesh: Mesh) -> tuple[NDArray[np.int64], list[str]]:
         lost.append(f"{name} cannot hold line cells: {lines} {convert.were(lines)} turned into markers of their nodes")
     named = [f"{mesh.region_names[pair]!r} ({k})" for pair, k in number.items() if pair in mesh.region_names]
     if named:
-        lost.append(f"{name} numbers its markers: the names {', '.join(named)} were left out")
+        lost.append(f"{name} numbers its markers: {convert.left_out('name', named)}")
     return markers, lost

@@ -48,17 +48,21 @@ def counting_order(key, size):
 def match(corner, head, nodes):
     """twin: the partner of each half-edge over its edge, ALONE, or CROWDED. Linear in the half-edges."""
     low = np.minimum(corner, head)
-    high = np.maximum(corner, head)
     by_low, start = counting_order(low, nodes)
+    ends = np.empty(len(corner), dtype=np.int32)  # the other end, in the order of by_low
+    for k in range(len(by_low)):
+        h = by_low[k]
+        ends[k] = max(corner[h], head[h])
     twin = np.full(len(corner), ALONE, dtype=np.int32)
-    seen = np.full(nodes, -1, dtype=np.int32)  # high end → the last half-edge that has it, within one low end
+    seen = np.full(nodes, -1, dtype=np.int32)  # other end → where its first half-edge stands in by_low
     for node in range(nodes):
         for k in range(start[node], start[node + 1]):
-            h = by_low[k]
-            other = seen[high[h]]
-            if other < 0 or low[other] != node:
-                seen[high[h]] = h
-            elif twin[other] == ALONE:
+            first = seen[ends[k]]
+            if first < start[node]:
+                seen[ends[k]] = k
+                continue
+            h, other = by_low[k], by_low[first]
+            if twin[other] == ALONE:
                 twin[other] = h
                 twin[h] = other
             else:  # a third face: all at this edge are crowded

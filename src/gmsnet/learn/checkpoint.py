@@ -66,10 +66,13 @@ class State:
 
 
 def saved_options(folder: Path) -> TrainOptions | None:
-    """The options of the training whose checkpoint lies in a folder; None if there is none."""
+    """The options of the training whose checkpoint lies in a folder; None if there is none. Raises InputError."""
     if not (folder / NAME).exists():
         return None
-    return TrainOptions(**json.loads(_read(folder)[1]["options"]))
+    try:
+        return TrainOptions(**json.loads(_read(folder)[1]["options"]))
+    except (KeyError, TypeError, json.JSONDecodeError) as error:
+        raise InputError(f"{folder / NAME}: no checkpoint of this version of gmsnet; take another --out") from error
 
 
 def _below(tensors: dict[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:
@@ -80,6 +83,6 @@ def _read(folder: Path) -> tuple[dict[str, torch.Tensor], dict[str, str]]:
     path = folder / NAME
     try:
         with safe_open(path, framework="pt") as file:
-            return {name: file.get_tensor(name) for name in file.keys()}, file.metadata()  # noqa: SIM118 (not a dict)
+            return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118 (not a dict)
     except (SafetensorError, OSError) as error:
         raise InputError(f"{path}: this checkpoint cannot be read ({error}); delete it to start anew") from error
