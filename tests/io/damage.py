@@ -15,7 +15,7 @@ from gmsnet.io.text import blank
 from gmsnet.mesh import CellBlock, Mesh
 
 # For tests that read a file hundreds of times for one example: to shrink a failure would take minutes.
-FEW = settings(max_examples=25, phases=(Phase.explicit, Phase.reuse, Phase.generate))
+FEW = settings(max_examples=10, phases=(Phase.explicit, Phase.reuse, Phase.generate))
 
 # Spellings of numbers, blanks, line ends.
 NUMBERS = st.floats(-1e6, 1e6).map(repr) | st.sampled_from(
