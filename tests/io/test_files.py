@@ -21,7 +21,7 @@ from gmsnet.io import FORMATS, atomic, read, write
 from gmsnet.io.formats import sniff
 from gmsnet.mesh import CellBlock, Mesh
 
-HERE = ("su2", "medit", "triangle", "obj", "off")
+TEXT_FORMATS = ("su2", "medit", "triangle", "obj", "off")
 
 
 @pytest.fixture
@@ -41,14 +41,14 @@ def nudged(mesh: Mesh) -> Mesh:
     return mesh.with_points(points)
 
 
-@pytest.mark.parametrize("key", HERE)
+@pytest.mark.parametrize("key", FORMATS)
 def test_the_table_agrees_with_the_modules(key: str) -> None:
     module = import_module(f"gmsnet.io.{key}")
     assert FORMATS[key].load() is module
     assert (module.name, module.suffixes) == (FORMATS[key].title, FORMATS[key].suffixes)
 
 
-@pytest.mark.parametrize("key", HERE)
+@pytest.mark.parametrize("key", TEXT_FORMATS)
 def test_read_write_and_splice(key: str, tmp_path: Path) -> None:
     suffixes = FORMATS[key].suffixes
     path, out = (tmp_path / f"{stem}{suffixes[0]}" for stem in ("in", "out"))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from gmsnet.io import read
 from gmsnet.io.splice import BinarySlots, FileSource, TextSlots
 from gmsnet.io.text import scan, to_floats
-from gmsnet.mesh import CellBlock
+from gmsnet.mesh import CellBlock, Mesh
 
 TEXT = b"head 1.50 2e0 | +3.25\t.5\r\n7. 1E1 1.50 tail"
 SPANS = scan(TEXT, 0, 10)[[1, 2, 4, 5, 6, 7]].reshape(3, 2, 2)
@@ -56,11 +56,12 @@ def test_binary_slots(dtype: str) -> None:
 def test_a_source_knows_its_cells() -> None:
     cells = (CellBlock("triangle", [[0, 1, 2]], [4]),)
     source = FileSource("su2", ".su2", TEXT, OLD, SLOTS, cells, {".ele": b"x"})
-    assert source.has_cells(cells)
-    assert source.has_cells((CellBlock("triangle", [[0, 1, 2]], [4]),))
-    assert not source.has_cells(())
+    assert source.fits(Mesh(OLD, cells))
+    assert source.fits(Mesh(OLD + 1, (CellBlock("triangle", [[0, 1, 2]], [4]),)))
+    assert not source.fits(Mesh(OLD, ()))
+    assert not source.fits(Mesh(np.vstack([OLD, OLD]), cells))
     for other in (CellBlock("triangle", [[0, 2, 1]], [4]), CellBlock("triangle", [[0, 1, 2]], [5])):
-        assert not source.has_cells((other,))
+        assert not source.fits(Mesh(OLD, (other,)))
     assert source.splice(OLD) == {".su2": TEXT, ".ele": b"x"}
     assert source.splice(OLD.copy())[".su2"] is TEXT
     new = OLD + 1.0

@@ -111,6 +111,11 @@ def test_a_cut_file_is_refused_or_the_same(case: tuple[dict[str, bytes], object]
     check_cuts(triangle, files, suffix, lambda rest: len(rest) > start)
 
 
+def test_a_false_number_of_attributes_costs_no_time() -> None:
+    parsed = triangle.read({".node": b"0 2 99999999999 0\n", ".ele": b"0 3 99999999999\n"})
+    assert not len(parsed.points)
+
+
 def test_numbers_without_order() -> None:
     node = b"3 2 0 0\n10 0 0\n30 1 0\n20 0 1\n"
     parsed = triangle.read({".node": node, ".ele": b"1 3 0\n1 10 30 20\n"})

@@ -140,7 +140,7 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     source = mesh.source
     lost: list[str] = []
     try:
-        if isinstance(source, FileSource) and source.format == entry.key and source.has_cells(mesh.cells):
+        if isinstance(source, FileSource) and source.format == entry.key and source.fits(mesh):
             files: Mapping[str, bytes] = source.splice(mesh.points)
         else:
             written = entry.load().write(mesh)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.io.text import replace_numbers
-from gmsnet.mesh import CellBlock
+from gmsnet.mesh import CellBlock, Mesh
 
 
 class Slots(Protocol):
@@ -88,13 +88,16 @@ class FileSource:
     cells: tuple[CellBlock, ...] = ()
     companions: Mapping[str, bytes] = field(default_factory=dict)
 
-    def has_cells(self, cells: tuple[CellBlock, ...]) -> bool:
-        """Whether ``cells`` are those of the file, so that its text can stand for them."""
-        if cells is self.cells:
-            return True
-        return len(cells) == len(self.cells) and all(
-            a.kind == b.kind and np.array_equal(a.nodes, b.nodes) and np.array_equal(a.regions, b.regions)
-            for a, b in zip(cells, self.cells, strict=True)
+    def fits(self, mesh: Mesh) -> bool:
+        """Whether a mesh has the cells of the file and as many points, so that its text can stand for them."""
+        if mesh.points.shape != self.points.shape:
+            return False
+        return mesh.cells is self.cells or (
+            len(mesh.cells) == len(self.cells)
+            and all(
+                a.kind == b.kind and np.array_equal(a.nodes, b.nodes) and np.array_equal(a.regions, b.regions)
+                for a, b in zip(mesh.cells, self.cells, strict=True)
+            )
         )
 
     def splice(self, points: NDArray[np.float64]) -> dict[str, bytes]:

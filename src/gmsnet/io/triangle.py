@@ -79,6 +79,7 @@ def _points(
     if markers > 1:
         fail(text, 0, f"{markers} boundary markers a point: there can be 0 or 1")
     _width(text, rows, 3 + int(attributes) + int(markers), "a point")
+    attributes = attributes if len(rows) else 0  # nothing bounds it then
     ids = to_ints(text, rows.column(0))
     order = np.argsort(ids, kind="stable")
     twice = np.flatnonzero(np.diff(ids[order]) == 0)
@@ -101,6 +102,7 @@ def _triangles(
     if size not in (3, 6):
         fail(text, 0, f"triangles with {size} nodes: there can be 3 or 6")
     _width(text, rows, 1 + int(size) + int(attributes), "a triangle")
+    attributes = attributes if len(rows) else 0  # nothing bounds it then
     to_ints(text, rows.column(0))
     spans = np.stack([rows.column(1 + k) for k in range(int(size))], axis=1)
     named = to_ints(text, spans)
