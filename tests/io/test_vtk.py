@@ -100,7 +100,7 @@ def test_any_spelling_of_the_numbers(data: st.DataObject) -> None:
     text = f"# vtk DataFile Version 2.0\nany title\nascii\n\nDataset unstructured_grid\nPOINTS 4 {kind}\n"
     text += "\n".join(gap.join(numbers[k : k + 6]) for k in (0, 6)) + "\n\n"
     text += f"CELLS 2 8{gap}\n3 0 1 2 3\n 0 2 3\nCELL_TYPES 2\n5{gap}5\nCELL_DATA 2\nSCALARS Mat_ID int 1\n"
-    text += f"LOOKUP_TABLE default\n4{gap}-2\nVECTORS v float\n1 nan 3 -inf 5 6\n"
+    text += f"LOOKUP_TABLE default\n4{gap}-2\nVECTORS v float\n1 nan 3 -inf 5e39 6\n"
     raw = text.replace("\n", end).encode()
     parsed = read(vtk_format, raw)
     assert parsed.points.ravel().tolist() == [float(n) for n in numbers]
@@ -206,6 +206,7 @@ CELLS = "CELLS 2 8\n3 0 1 2\n3 0 2 3\nCELL_TYPES 2\n5 5\n"
         (mesh_with("CELLS 0 0\nCELL_TYPES 0\n"), "no cells"),
         (PLAIN.replace("double", "int").encode(), "line 5: POINTS of type 'int' are not supported"),
         (PLAIN.replace("0.5 0.5", "nan 0.5").encode(), "line 7: a number was expected, found 'nan'"),
+        (PLAIN.replace("double", "float").replace("0.5 0.5", "1e39 0").encode(), "line 7: .* too large for the"),
         (PLAIN.replace("POINTS 5", "POINTS 999999999999").encode(), "expected .* more numbers"),
         (PLAIN.replace("CELLS 4 16", "CELLS 4 999999999999").encode(), "expected .* more numbers"),
         (PLAIN.replace("CELLS 4", "CELLS 999999999999").encode(), "list 4 of CELLS goes beyond"),

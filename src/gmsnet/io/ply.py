@@ -19,8 +19,7 @@ from gmsnet.io.document import Parsed, Written
 from gmsnet.io.ply_rows import Column, Table, tables
 from gmsnet.io.region_fields import names_a_region, regions_of
 from gmsnet.io.text import fail
-from gmsnet.io.vtk_cells import rows_text
-from gmsnet.io.words import Words
+from gmsnet.io.words import Words, typed
 from gmsnet.mesh import Mesh
 
 name = "PLY"
@@ -102,9 +101,7 @@ def _edges(words: Words, table: Table, count: int) -> _Cells:
 def _values(words: Words, column: Column) -> NDArray[Any]:
     """The numbers of a property, in its type."""
     kind = column.property.kind
-    values = words.values(column.at, kind, finite=False)
-    exact: NDArray[Any] = values.astype(kind)
-    return exact if kind[0] == "f" or np.array_equal(exact, values) else values
+    return typed(words.values(column.at, kind, finite=False), kind)
 
 
 def _fields(words: Words, parts: list[Table], counts: list[int]) -> dict[str, NDArray[Any]]:
@@ -174,5 +171,5 @@ def _properties(columns: Mapping[str, NDArray[Any]]) -> str:
 
 def _table(columns: Mapping[str, NDArray[Any]], lines: list[str]) -> str:
     """Rows of the columns, each behind its line if there are any."""
-    texts = [rows_text(array[:, None]).split("\n")[:-1] for array in columns.values()]
+    texts = [map(str, array if array.dtype == np.float32 else array.tolist()) for array in columns.values()]
     return "".join(" ".join(row) + "\n" for row in zip(*([lines] if lines else []), *texts, strict=True))

@@ -7,7 +7,7 @@ triangles, whatever it begins with; a text file has one or more solids, which ar
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from decimal import Decimal
 
 import numpy as np
@@ -26,7 +26,8 @@ suffixes = (".stl",)
 HEAD, RECORD = 84, 50  # bytes in front of the triangles of a binary file, and of each of them
 _VERTEX = ["vertex", "*", "*", "*"]
 _FACET = ["facet", "normal", "*", "*", "*", "outer", "loop", *_VERTEX, *_VERTEX, *_VERTEX, "endloop", "endfacet"]
-_SOLID = re.compile(rb"(?im)(?:^|(?<=\r))[ \t]*(end)?solid\b[ \t]*([^\r\n]*)")
+_SOLID = re.compile(rb"[sS][oO][lL][iI][dD]\b")
+_REST = re.compile(rb"[^\r\n]*")
 _WIDE = 64  # longer numbers are compared one by one
 _LONG_EXPONENT = re.compile(rb"[eE][+-]?\d{7}")
 _CORNERS = [[8, 9, 10], [12, 13, 14], [16, 17, 18]]  # where the coordinates are among the words of a facet
@@ -63,17 +64,16 @@ def _text(data: bytes) -> Parsed:
     names: dict[tuple[int, int], str] = {}
     spans: list[Spans] = []
     body, last = -1, 0  # where the facets of the open solid begin, and where the last solid ended
-    for match in _SOLID.finditer(data):
-        ends = match[1] is not None
-        if ends != (body >= 0):
-            fail(data, match.start(), "'endsolid' without 'solid'" if ends else "the solid before has no 'endsolid'")
-        if not ends:
-            if title := match[2].strip().decode("utf-8", "replace"):
-                names[2, len(spans) + 1] = title
-            body = match.end()
+    for start, is_end, title, stop in _solid_lines(data):
+        if is_end != (body >= 0):
+            fail(data, start, "'endsolid' without 'solid'" if is_end else "the solid before has no 'endsolid'")
+        if is_end:
+            spans.append(_facets(data, body, start))
+            body, last = -1, stop
         else:
-            spans.append(_facets(data, body, match.start()))
-            body, last = -1, match.end()
+            if title:
+                names[2, len(spans) + 1] = title
+            body = stop
     if body >= 0:
         fail(data, len(data), "'endsolid' is missing: the file is cut off")
     if data[last:].strip():
@@ -87,6 +87,23 @@ def _text(data: bytes) -> Parsed:
     points = to_floats(data, places[first])
     slots = TextSlots(places[..., 0], places[..., 1], node)
     return Parsed(points, [CellBlock("triangle", node.reshape(-1, 3), region)], slots, names)
+
+
+def _solid_lines(data: bytes) -> Iterator[tuple[int, bool, str, int]]:
+    """The lines that begin with solid or endsolid: first byte, is it the latter, the name, the byte behind it."""
+    at = 0
+    for match in _SOLID.finditer(data):
+        start = match.start()
+        is_end = data[start - 3 : start].lower() == b"end"
+        start -= 3 * is_end
+        edge = start
+        while edge > at and data[edge - 1] in b" \t":
+            edge -= 1
+        if match.start() >= at and (edge == 0 or data[edge - 1] in b"\r\n"):
+            rest = _REST.match(data, match.end())
+            assert rest is not None  # the pattern fits everywhere
+            at = rest.end()
+            yield start, is_end, rest[0].strip().decode("utf-8", "replace"), at
 
 
 def _facets(data: bytes, start: int, stop: int) -> Spans:

@@ -19,6 +19,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io import convert, vtk_cells
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.vtk_stream import TYPES, Array, Line, Stream, field_name, word_of
+from gmsnet.io.words import typed
 from gmsnet.mesh import Mesh
 
 name = "VTK"
@@ -222,9 +223,7 @@ def _values(stream: Stream, line: Line, rows: int, width: int, kind: str) -> NDA
         values: NDArray[Any] = stream.bits(rows * width).astype(np.uint8)
     else:
         array = stream.array(line, rows * width, kind)
-        values = array.values()
-        exact = values.astype(array.kind)
-        values = exact if array.kind[0] == "f" or np.array_equal(exact, values) else values
+        values = typed(array.values(), array.kind)
     return values if width == 1 else values.reshape(rows, width)
 
 
@@ -275,16 +274,15 @@ def write(mesh: Mesh) -> Written:
     """See Format. An unstructured grid of version 4.2 as text, points in double precision."""
     codes, sizes, nodes = vtk_cells.cells_out(mesh, name)
     point_fields, cell_fields, lost = vtk_cells.fields_out(mesh, name)
-    ends = np.cumsum(sizes)
-    lists = [
-        f"{len(part)} {' '.join(map(str, part))}\n"
-        for part in (nodes[a:b].tolist() for a, b in zip((ends - sizes).tolist(), ends.tolist(), strict=True))
-    ]
+    first = np.cumsum(sizes + 1) - sizes - 1
+    lists = np.empty(len(codes) + len(nodes), dtype=np.int64)
+    lists[first] = sizes
+    lists[np.delete(np.arange(len(lists)), first)] = nodes
     text = [
         "# vtk DataFile Version 4.2\nmesh\nASCII\nDATASET UNSTRUCTURED_GRID\n",
         f"POINTS {len(mesh.points)} double\n{vtk_cells.rows_text(convert.in_space(mesh))}",
-        f"CELLS {len(codes)} {len(codes) + len(nodes)}\n{''.join(lists)}",
-        f"CELL_TYPES {len(codes)}\n{vtk_cells.rows_text(codes[:, None])}",
+        f"CELLS {len(codes)} {len(codes) + len(nodes)}\n{vtk_cells.lines_text(lists)}",
+        f"CELL_TYPES {len(codes)}\n{vtk_cells.lines_text(codes)}",
     ]
     for key, count, fields in (("POINT_DATA", len(mesh.points), point_fields), ("CELL_DATA", len(codes), cell_fields)):
         if fields:

@@ -123,9 +123,11 @@ def fields_out(mesh: Mesh, title: str) -> tuple[Fields, Fields, list[str]]:
 
 def rows_text(array: NDArray[Any]) -> str:
     """A line for each row (n × m), each number as the shortest text that reads back as the same value of its type."""
-    rows = ([str(v) for v in row] for row in array) if array.dtype == np.float32 else map(_exact, array.tolist())
-    return "".join(" ".join(row) + "\n" for row in rows)
+    words = map(str, array.ravel() if array.dtype == np.float32 else array.ravel().tolist())
+    return "".join(" ".join(row) + "\n" for row in zip(*[words] * array.shape[1], strict=True))
 
 
-def _exact(row: list[Any]) -> list[str]:
-    return [repr(value) for value in row]
+def lines_text(array: NDArray[Any]) -> str:
+    """Integers (n,) as lines of a few each."""
+    words = list(map(str, array.tolist()))
+    return "".join(" ".join(words[k : k + 12]) + "\n" for k in range(0, len(words), 12))

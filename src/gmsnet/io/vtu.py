@@ -22,7 +22,7 @@ from gmsnet.io.splice import BinarySlots, EncodedSlots, Slots
 from gmsnet.io.text import fail, scan
 from gmsnet.io.vtu_arrays import MOST_INFLATED, Encoded, Encoding, decode
 from gmsnet.io.vtu_xml import DataArray, Document, parse
-from gmsnet.io.words import TextWords
+from gmsnet.io.words import TextWords, typed
 from gmsnet.mesh import Mesh
 
 name = "VTU"
@@ -119,9 +119,7 @@ class _Reader:
         if behind is not None and behind.end() < stop:
             fail(self.data, behind.end(), f"more than the expected {count} numbers")
         values = words.values(words.take(count, kind), kind, finite)
-        exact = values.astype(kind)
-        keep = not finite and (kind[0] == "f" or np.array_equal(exact, values))
-        return Numbers(exact if keep else values, words, None, start)
+        return Numbers(values if finite else typed(values, kind), words, None, start)
 
     def _stored(self, array: DataArray, how: str) -> tuple[int, memoryview, bool]:
         """Where an encoded array begins, the bytes from there on, and whether they are base64."""
@@ -240,30 +238,29 @@ def write(mesh: Mesh) -> Written:
     codes, sizes, nodes = vtk_cells.cells_out(mesh, name)
     point_fields, cell_fields, lost = vtk_cells.fields_out(mesh, name)
     points = convert.in_space(mesh)
-    columns: dict[str, NDArray[Any]] = {
+    cells: dict[str, NDArray[Any]] = {
         "connectivity": nodes,
         "offsets": np.cumsum(sizes),
         "types": codes.astype(np.uint8),
     }
-    cells: vtk_cells.Fields = [(called, column[:, None]) for called, column in columns.items()]
     text = [
         '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">\n'
         f'<UnstructuredGrid>\n<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(codes)}">\n'
     ]
-    sections: dict[str, vtk_cells.Fields] = {
-        "PointData": point_fields,
-        "CellData": cell_fields,
-        "Points": [("Points", points)],
-        "Cells": cells,
-    }
+    sections: dict[str, vtk_cells.Fields] = {"PointData": point_fields, "CellData": cell_fields}
+    sections["Points"] = [("Points", points)]
     for section, fields in sections.items():
         text.append(f"<{section}>\n")
         for called, array in fields:
-            kind = NAMES[array.dtype.str[1:]]
             shown = quoteattr("".join(c if c.isprintable() else "?" for c in called))
-            width = f' NumberOfComponents="{array.shape[1]}"' if section != "Cells" else ""
-            text.append(f'<DataArray type="{kind}" Name={shown}{width} format="ascii">\n')
-            text += [vtk_cells.rows_text(array), "</DataArray>\n"]
+            text += [
+                f'<DataArray type="{NAMES[array.dtype.str[1:]]}" Name={shown} NumberOfComponents="{array.shape[1]}" '
+            ]
+            text += ['format="ascii">\n', vtk_cells.rows_text(array), "</DataArray>\n"]
         text.append(f"</{section}>\n")
-    text.append("</Piece>\n</UnstructuredGrid>\n</VTKFile>\n")
+    text.append("<Cells>\n")
+    for called, column in cells.items():
+        text.append(f'<DataArray type="{NAMES[column.dtype.str[1:]]}" Name="{called}" format="ascii">\n')
+        text += [vtk_cells.lines_text(column), "</DataArray>\n"]
+    text.append("</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n")
     return Written({".vtu": "".join(text).encode()}, lost)

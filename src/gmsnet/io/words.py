@@ -74,7 +74,12 @@ class TextWords:
         spans = self.spans[addresses]
         if kind[0] != "f":
             return to_ints(self.data, spans)
-        return to_floats(self.data, spans) if finite else any_floats(self.data, spans)
+        if not finite:
+            return any_floats(self.data, spans)
+        numbers = to_floats(self.data, spans)
+        if kind == "f4" and (huge := np.flatnonzero(~np.isfinite(typed(numbers, kind)))).size:
+            self.fail(int(addresses.ravel()[huge[0]]), "a coordinate is too large for the type float of the file")
+        return numbers
 
     def slots(self, addresses: Addresses, kind: str, node: NDArray[np.int64] | None = None) -> TextSlots:
         """See Words."""
@@ -138,6 +143,13 @@ def gather(data: bytes, addresses: Addresses, dtype: str) -> NDArray[Any]:
         chosen = shift == first
         out[chosen] = numbers[addresses[chosen] // kind.itemsize]
     return out
+
+
+def typed(values: NDArray[Any], kind: str) -> NDArray[Any]:
+    """Numbers in the type that a file declares for them; integers that do not fit stay as they are."""
+    with np.errstate(over="ignore"):
+        exact = values.astype(kind)
+    return exact if kind[0] == "f" or np.array_equal(exact, values) else values
 
 
 def any_floats(data: bytes, spans: Spans) -> NDArray[np.float64]:
