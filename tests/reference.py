@@ -1,4 +1,4 @@
-"""The converged per-node optimum of MetricLoss, by a search that needs no derivative: what a network is held against."""
+"""The converged per-node optimum of MetricLoss, by a search without derivatives: what a network is held against."""
 
 from __future__ import annotations
 

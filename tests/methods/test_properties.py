@@ -30,7 +30,9 @@ def triangulation(rng, nodes, tangle=0.0):
     triangles = np.array([t[:: rng.choice([1, -1])] for t in triangles])
     regions = rng.integers(2, size=len(triangles)) if rng.random() < 0.3 else None
     mesh = mesh_of(points, triangles, regions)
-    return disturb(mesh, Topology.of(mesh).free, tangle, seed=int(rng.integers(2**31)), keep_valid=False) if tangle else mesh
+    if not tangle:
+        return mesh
+    return disturb(mesh, Topology.of(mesh).free, tangle, seed=int(rng.integers(2**31)), keep_valid=False)
 
 
 def exact_signs(mesh, turn):
