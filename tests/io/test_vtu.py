@@ -18,7 +18,8 @@ from hypothesis import strategies as st
 from vtk_variants import grid_of, mixed_mesh, points_by_vtk, vtu_variants
 
 from gmsnet.errors import FormatError
-from gmsnet.io import vtu
+from gmsnet.io import gmsh, ply, stl, vtu
+from gmsnet.io import vtk as vtk_format
 from gmsnet.io.vtu_arrays import Encoding, decode
 from gmsnet.mesh import CellBlock, Mesh
 
@@ -241,3 +242,11 @@ def test_a_real_file(tmp_path: Path) -> None:
     out = check_splice(vtu, data)
     points, _ = points_by_vtk(vtk.vtkXMLUnstructuredGridReader(), out, tmp_path / "out.vtu")
     assert np.array_equal(points, moved_points(parsed).astype(np.float32))
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".vtk", ".ply", ".msh", ".stl"])
+def test_named_groups_of_nodes_are_not_lost_in_silence(suffix: str) -> None:
+    mesh = triangle_grid(2)
+    grouped = Mesh(mesh.points, mesh.cells[:1], node_sets={"corner": np.array([0])})
+    writer = {".vtu": vtu, ".vtk": vtk_format, ".ply": ply, ".msh": gmsh, ".stl": stl}[suffix]
+    assert [text for text in writer.write(grouped).lost if "node sets: 'corner'" in text]

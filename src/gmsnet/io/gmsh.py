@@ -167,7 +167,7 @@ def write(mesh: Mesh) -> Written:
     """See Format. Version 4.1 as text: an entity and a physical group for each dimension and region."""
     convert.check_kinds(mesh, name, CODES)
     points = convert.in_space(mesh)
-    lost = convert.lost_data(mesh, name)
+    lost = convert.lost_data(mesh, name, regions=True)
     groups = _groups(mesh)
     physical, renumbered = _physical_tags(groups)
     if renumbered:

@@ -119,6 +119,7 @@ def write(mesh: Mesh) -> Written:
     """See Format. Text, coordinates in double precision; faces and edges, with the regions as a property."""
     convert.check_kinds(mesh, name, ("vertex", "line", "triangle", "quad", "polygon"))
     lost = [*convert.lost_cells(mesh, name, (0,)), *convert.lost_names(mesh, name, (1, 2))]
+    lost += convert.lost_data(mesh, name, [*mesh.point_data, *mesh.cell_data])
     points = convert.in_space(mesh)
     columns = {"x": points[:, 0], "y": points[:, 1], "z": points[:, 2]}
     columns |= _kept(mesh.point_data, "point", ("x", "y", "z"), lost)

@@ -175,7 +175,7 @@ def write(mesh: Mesh) -> Written:
     regions = np.concatenate([block.regions for block in blocks])
     known = np.unique(regions)
     lost = [f"{name} has no node numbers: nodes will be counted as triangles name them"]
-    lost += [*convert.lost_cells(mesh, name, (0, 1)), *convert.lost_data(mesh, name)]
+    lost += [*convert.lost_cells(mesh, name, (0, 1)), *convert.lost_data(mesh, name, regions=True)]
     if (unused := len(points) - len(np.unique(nodes))) > 0:
         lost.append(f"{name} cannot hold nodes without a triangle: {unused} {convert.were(unused)} left out")
     if len(np.unique(points[np.unique(nodes)], axis=0)) < len(np.unique(nodes)):

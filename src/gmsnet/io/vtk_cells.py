@@ -97,7 +97,7 @@ def fields_out(mesh: Mesh, title: str) -> tuple[Fields, Fields, list[str]]:
 
     The regions are the cell field ``region``, unless the cell data already tell them apart in the same way.
     """
-    lost = convert.lost_names(mesh, title)
+    lost = convert.lost_names(mesh, title) + convert.lost_data(mesh, title, [*mesh.point_data, *mesh.cell_data])
     cells = [(name, np.concatenate([np.asarray(a) for a in parts])) for name, parts in mesh.cell_data.items() if parts]
     regions = np.concatenate([np.empty(0, dtype=np.int64), *(block.regions for block in mesh.cells)])
     if not np.array_equal(regions_of(cells, len(regions)), regions):
