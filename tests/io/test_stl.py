@@ -209,7 +209,7 @@ def test_conversion_makes_a_solid_of_each_region() -> None:
 def test_what_stl_loses_is_named() -> None:
     points = np.array([[0, 0], [1, 0], [1, 1], [1, 0], [2, 1], [9, 9]], dtype=float)
     cells = CellBlock("triangle", np.array([[0, 1, 2], [3, 4, 2]]), np.zeros(2))
-    mesh = Mesh(points, (cells,), point_data={"t": np.zeros(6)}, cell_data={"c": (np.zeros(2),)})
+    mesh = Mesh(points, (cells,), point_data={"t": np.zeros(6)}, cell_data={"c": (np.arange(2),)})
     lost = stl.write(mesh).lost
     for words in ("no node numbers", "point data: 't'", "cell data: 'c'", "1 was left out", "same place"):
         assert [text for text in lost if words in text], words

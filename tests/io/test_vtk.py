@@ -196,6 +196,7 @@ CELLS = "CELLS 2 8\n3 0 1 2\n3 0 2 3\nCELL_TYPES 2\n5 5\n"
         (mesh_with("CELLS 2 8\n3 0 1 2\n3 0 2 3\nCELL_TYPES 2\n6 5\n"), "triangle strips are not supported"),
         (mesh_with("CELLS 2 8\n3 0 1 2\n3 0 2 3\nCELL_TYPES 2\n5 69\n"), "VTK type 69 are not supported"),
         (mesh_with("CELLS 2 8\n3 0 1 2\n3 0 2 3\nCELL_TYPES 3\n5 5 5\n"), "there are 2 CELLS, but 3 CELL_TYPES"),
+        (mesh_with("CELLS 2 0\n\nCELL_TYPES 2\n5 5\n"), "list 0 of CELLS goes beyond the 0 numbers"),
         (mesh_with(CELLS, "POINT_DATA 3\n"), "line 12: POINT_DATA has 3 rows instead of 4"),
         (mesh_with(CELLS, "CELL_DATA 2\nSCALARS a string\nLOOKUP_TABLE d\n1 2\n"), "unknown type of numbers 'string'"),
         (mesh_with(CELLS, "CELL_DATA 2\nSCALARS a int\n1 2\n"), "line 14: expected LOOKUP_TABLE"),
@@ -285,3 +286,10 @@ def test_real_files(file: str, nodes: int, cells: list[tuple[str, int]], regions
     check_splice(vtk_format, data)
     if "fixed" in parsed.point_data:
         assert int((parsed.point_data["fixed"] != 0).sum()) == {121: 40, 36: 20}[nodes]
+
+
+def test_a_nan_that_signals_is_data_like_any_other() -> None:
+    text = HEAD.format("3.0", "BINARY") + "POINTS 1 float\n"
+    data = text.encode() + bytes(12) + b"\nCELLS 1 4\n" + np.array([3, 0, 0, 0], ">i4").tobytes() + b"\nCELL_TYPES 1\n"
+    data += np.array([5], ">i4").tobytes() + b"\nCELL_DATA 1\nSCALARS a float\nLOOKUP_TABLE d\n\x7f\x80\0\1"
+    assert np.isnan(read(vtk_format, data).cell_data["a"][0]).all()

@@ -147,7 +147,7 @@ def counted_lists(array: Array, count: int, key: str) -> CellLists:
     """``count`` lists of nodes, each with its length in front, which together are the whole array."""
     numbers = array.values()
     stride = len(numbers) // count if count else 0
-    if count and stride * count == len(numbers) and (numbers[::stride] == stride - 1).all():
+    if stride and stride * count == len(numbers) and (numbers[::stride] == stride - 1).all():
         starts, sizes = np.arange(0, len(numbers), stride), np.full(count, stride - 1)
     else:
         found, at, lengths = [], 0, numbers.tolist()

@@ -117,7 +117,8 @@ class ByteWords:
         if finite and not np.isfinite(numbers).all():
             bad = int(addresses.ravel()[np.flatnonzero(~np.isfinite(numbers))[0]])
             self.fail(bad, "a coordinate is not a finite number")
-        return numbers.astype(np.float64)
+        with np.errstate(invalid="ignore"):  # a nan that signals becomes a quiet one
+            return numbers.astype(np.float64)
 
     def slots(self, addresses: Addresses, kind: str, node: NDArray[np.int64] | None = None) -> BinarySlots:
         """See Words."""
@@ -147,7 +148,7 @@ def gather(data: bytes, addresses: Addresses, dtype: str) -> NDArray[Any]:
 
 def typed(values: NDArray[Any], kind: str) -> NDArray[Any]:
     """Numbers in the type that a file declares for them; integers that do not fit stay as they are."""
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         exact = values.astype(kind)
     return exact if kind[0] == "f" or np.array_equal(exact, values) else values
 
