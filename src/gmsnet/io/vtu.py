@@ -197,6 +197,8 @@ def _slots(reader: _Reader, place: DataArray, found: Numbers, count: int) -> Slo
     def rewrite(data: bytes, old: NDArray[np.float64], new: NDArray[np.float64]) -> bytes:
         numbers = np.frombuffer(encoded.payload, dtype=kind).copy().reshape(-1, 3)
         changed = old != new
+        if not changed.any():
+            return data
         numbers[changed] = new[changed]
         return _replace(data, document, place, start, encoded, encoded.written(numbers.tobytes()))
 
