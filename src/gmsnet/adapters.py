@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,15 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.mesh import DIMENSION, CellBlock, Mesh
+from gmsnet.region_fields import combined, names_a_region
 
 Restore = Callable[[NDArray[np.float64]], Any]
 
-# Cell fields whose name says that they number regions. Elementary tags ("gmsh:geometrical") do not count.
-REGION_FIELD = re.compile(
-    r"(gmsh:|medit:|cell)?_?(mat|material|region|zone|domain|subdomain|physical|attribute|entity|ref|tag|part|block|group)"
-    r"s?(_?(ids?|index))?",
-    re.IGNORECASE,
-)
 VTK_KIND = {
     1: "vertex", 3: "line", 5: "triangle", 7: "polygon", 8: "pixel", 9: "quad", 10: "tetra", 11: "voxel",
     12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8", 24: "tetra10",
@@ -159,10 +153,10 @@ def _mesh(
     region_names: dict[tuple[int, int], str] = {}
     for dim in np.unique(dimension).tolist():
         of_dim = np.flatnonzero(dimension == dim)
-        fields = [values[of_dim] for name, values in cell_data.items() if REGION_FIELD.fullmatch(name)]
+        fields = [values[of_dim] for name, values in cell_data.items() if names_a_region(name)]
         # The outline of a named set of faces is a shape that the user has drawn, as much as the one of a region.
         fields += [np.isin(of_dim, cells) for cells in (cell_sets or {}).values()] if dim == 2 else []
-        region[of_dim] = _regions(fields, len(of_dim))
+        region[of_dim] = combined(fields, len(of_dim))
         for name, (named_dim, tag) in (names or {}).items():
             if physical is not None and named_dim == dim:
                 tagged = of_dim[np.ravel(physical[of_dim]) == tag]
@@ -185,20 +179,6 @@ def _mesh(
         node_sets=node_sets,
         single=array.dtype.kind == "f" and array.dtype.itemsize == 4,
     )
-
-
-def _regions(fields: Iterable[NDArray[Any]], count: int) -> NDArray[np.int64]:
-    """One number per cell, equal for two cells where all fields are; the numbers of the first field where they do."""
-    codes = np.zeros(count, dtype=np.int64)
-    kept: NDArray[np.int64] | None = None
-    for values in fields:
-        rows = np.asarray(values).reshape(count, -1)
-        code = np.unique(rows if rows.shape[1] > 1 else rows.ravel(), axis=0, return_inverse=True)[1].ravel()
-        if kept is None and rows.dtype.kind in "iu" and rows.shape[1] == 1:
-            kept = rows.ravel().astype(np.int64)
-        codes = np.unique(codes * (int(code.max(initial=0)) + 1) + code, return_inverse=True)[1].ravel()
-    finer = kept is None or len(np.unique(kept)) < int(codes.max(initial=-1)) + 1
-    return codes if kept is None or finer else kept
 
 
 def _pairs(cells: Any) -> list[tuple[str, Any]]:

@@ -66,7 +66,9 @@ def old(order: str = "", tags: Sequence[int] = TAGS, follow: bool = False) -> by
     return b"".join(out.parts)
 
 
-def new(order: str = "", tags: Sequence[int] = TAGS, parametric: bool = False, groups: dict[int, list[int]] | None = None) -> bytes:
+def new(
+    order: str = "", tags: Sequence[int] = TAGS, parametric: bool = False, groups: dict[int, list[int]] | None = None
+) -> bytes:
     """Version 4.1, the nodes in two blocks. parametric: u and v follow; groups: surface → physical tags."""
     out = Out(order)
     _head(out, "4.1")

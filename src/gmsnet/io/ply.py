@@ -17,10 +17,10 @@ from gmsnet.io import convert, ply_header
 from gmsnet.io.cell_table import Kind, check_range, table_blocks
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.ply_rows import Column, Table, tables
-from gmsnet.io.region_fields import names_a_region, regions_of
 from gmsnet.io.text import fail
 from gmsnet.io.words import Words, typed
 from gmsnet.mesh import Mesh
+from gmsnet.region_fields import names_a_region, regions_of
 
 name = "PLY"
 suffixes = (".ply",)

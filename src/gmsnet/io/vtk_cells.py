@@ -12,9 +12,9 @@ from gmsnet.errors import FormatError
 from gmsnet.io import convert
 from gmsnet.io.cell_table import Kind, check_range, split_cells, table_blocks
 from gmsnet.io.document import Parsed
-from gmsnet.io.region_fields import names_a_region, regions_of
 from gmsnet.io.splice import Slots
 from gmsnet.mesh import Mesh
+from gmsnet.region_fields import names_a_region, regions_of
 
 Fields = Sequence[tuple[str, NDArray[Any]]]  # name and values, in the order of the file
 

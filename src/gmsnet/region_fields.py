@@ -1,0 +1,65 @@
+"""Which cell fields tell regions (materials, parts, …) apart, and the region of each cell that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+WORDS = (
+    *("mat", "material", "region", "zone", "domain", "subdomain", "physical", "attribute"),
+    *("entity", "ref", "tag", "part", "block", "group"),
+)
+REGION_NAMES = frozenset(
+    "".join(parts)
+    for parts in product(
+        ("", "gmsh:", "medit:", "cell"),
+        ("", "_"),
+        WORDS,
+        ("", "s"),
+        ("", "id", "ids", "index", "_id", "_ids", "_index"),
+    )
+)
+
+
+def names_a_region(name: str) -> bool:
+    """Whether a cell field of this name tells regions apart (``material``, ``region_id``, ``gmsh:physical``, …)."""
+    return name.lower() in REGION_NAMES
+
+
+def regions_of(fields: Iterable[tuple[str, NDArray[Any]]], count: int) -> NDArray[np.int64]:
+    """(count,) the region of each cell, from those fields of one number a cell whose name says so; see ``combined``."""
+    return combined(
+        [array for name, array in fields if names_a_region(name) and len(array) == count and array.size == count],
+        count,
+    )
+
+
+def combined(fields: Sequence[NDArray[Any]], count: int) -> NDArray[np.int64]:
+    """(count,) one number per cell, equal for two cells where all fields (count, …) are.
+
+    0 without a field. One field of whole numbers gives its own numbers. Else the distinct values, of several fields the
+    distinct combinations, are counted from 1.
+    """
+    if not fields or not count:
+        return np.zeros(count, dtype=np.int64)
+    tables = [np.asarray(field).reshape(count, -1) for field in fields]
+    if len(tables) == 1 and tables[0].shape[1] == 1 and _whole(tables[0]):
+        return tables[0].ravel().astype(np.int64)
+    region = np.zeros(count, dtype=np.int64)
+    for table in tables:
+        rows = table if table.shape[1] > 1 else table.ravel()
+        which = np.unique(rows, axis=0, return_inverse=True)[1].reshape(count)
+        region = np.unique(region * (int(which.max()) + 1) + which, return_inverse=True)[1].reshape(count)
+    return region + 1
+
+
+def _whole(values: NDArray[Any]) -> bool:
+    """Are all of them whole numbers that an int64 holds?"""
+    if values.dtype.kind in "iub":
+        return True
+    finite = values.dtype.kind == "f" and bool(np.isfinite(values).all())
+    return finite and bool((values == np.rint(values)).all() and (abs(values) < 2**53).all())
