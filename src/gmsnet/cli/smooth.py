@@ -104,7 +104,7 @@ def smooth(
             raise InputError(f"{shown(input)}: {error}") from error
         fixed = fixed_nodes(mesh, fix or [])
         _check_conversion(mesh, target)
-        progress.stage("preparing")
+        progress.stage("preparing (the first run compiles: up to half a minute)")
         result = run(
             mesh,
             method,

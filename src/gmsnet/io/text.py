@@ -66,7 +66,7 @@ def scan(data: bytes, start: int, count: int, stop: int | None = None) -> Spans:
     spans = np.empty((min(count, room), 2), dtype=np.int64)
     found = int(kernels.find_tokens(_bytes(data), start, stop, spans))
     if found < count:
-        place = "the file ends" if stop == len(data) else "the section ends"
+        place = "the file ends: is it cut off?" if stop == len(data) else "the section ends"
         fail(data, stop, f"expected {count - found} more numbers, {place}")
     return spans
 
@@ -83,7 +83,7 @@ def scan_rows(data: bytes, start: int, count: int | None = None, stop: int | Non
     limit = len(data) if count is None else min(count, len(data))
     rows, tokens, end = map(int, kernels.find_rows(raw, start, stop, limit, none, none[:, 0]))
     if count is not None and rows < count:
-        place = "the file ends" if stop == len(data) else "the section ends"
+        place = "the file ends: is it cut off?" if stop == len(data) else "the section ends"
         fail(data, stop, f"expected {count - rows} more lines, {place}")
     spans, first = np.empty((tokens, 2), dtype=np.int64), np.full(rows + 1, tokens, dtype=np.int64)
     kernels.find_rows(raw, start, stop, limit, spans, first[:rows])
@@ -101,7 +101,8 @@ def to_floats(data: bytes, spans: Spans) -> NDArray[np.float64]:
     kernels.parse_floats(_bytes(data), spans, kernels.POWERS, values, state)
     bad = np.flatnonzero(state == kernels.BAD)
     if bad.size:
-        fail(data, int(spans[bad[0], 0]), f"a number was expected, found {word(data, spans[bad[0]])}")
+        found = word(data, spans[bad[0]])
+        fail(data, int(spans[bad[0], 0]), f"a number was expected, found {found}: write a finite decimal number there")
     slow = np.flatnonzero(state == kernels.LONG)
     wide = (spans[slow, 1] - spans[slow, 0]) > _WIDE
     for k in slow[wide].tolist():
