@@ -51,7 +51,7 @@ def measure(nodes, threads, repeats):
     points = planar_points(mesh)[topology.memory]
     matrix = averaging_matrix(topology)
     sums = np.empty((-(-len(topology.near) // LANES), 7))
-    precision = Precision(2.0**-53, False)
+    precision = Precision()
     tally = np.zeros(3, dtype=np.int64)
     jobs = {
         "L": lambda: matrix @ points,

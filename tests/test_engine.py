@@ -228,3 +228,36 @@ def test_volumes_and_curved_surfaces_are_refused():
         gmsnet.smooth(tetra)
     with pytest.raises(InputError, match="curved surface"):
         gmsnet.smooth((points, np.array([[0, 1, 2], [1, 2, 3]])))
+
+
+@pytest.mark.parametrize("size", [4e-310, 1e-200, 1e200, 1.5e308])
+def test_coordinates_at_the_ends_of_the_range(square, size):
+    mesh = Mesh(square.points * size, square.cells)
+    result = gmsnet.smooth(mesh, max_sweeps=3)
+    assert np.isfinite(result.points).all()
+    assert result.after.inverted == 0
+    assert result.after.qhat > result.before.qhat
+
+
+@pytest.mark.parametrize("size", [1e-37, 1e-41, 5e-44])
+def test_single_precision_next_to_zero(square, size):
+    mesh = Mesh(np.float64(np.float32(square.points * size)), square.cells, single=True)
+    result = gmsnet.smooth(mesh, max_sweeps=3)
+    np.testing.assert_array_equal(result.points, np.float64(np.float32(result.points)))
+    assert (result.after.valid[result.before.valid > 0] > 0).all()
+
+
+def test_an_interrupt_after_the_sweeps_loses_nothing(square, monkeypatch):
+    calls = []
+    measure = engine.measure
+
+    def interrupted(*arguments):
+        calls.append(1)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return measure(*arguments)
+
+    monkeypatch.setattr(engine, "measure", interrupted)
+    result = gmsnet.smooth(square, max_sweeps=3)
+    assert result.stop_reason == engine.INTERRUPTED
+    assert result.after.qhat > result.before.qhat

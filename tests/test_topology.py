@@ -188,3 +188,28 @@ def test_meshes_without_faces_or_points():
     assert Topology.of(Mesh(np.empty((0, 2)), ())).free.size == 0
     lone = Topology.of(Mesh(np.zeros((3, 2)), ()))
     assert lone.held["not used by any cell"].tolist() == [0, 1, 2]
+
+
+def octahedron():
+    """A closed surface: every edge has two faces."""
+    points = np.array([[1, 0], [-1, 0.1], [0, 1], [0.1, -1], [0.2, 0.1], [-0.1, 0.3]], dtype=float)
+    faces = [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
+    return points, faces
+
+
+@pytest.mark.parametrize("shift", [0.0, 1.0, 1e3])
+def test_a_closed_surface_pressed_flat_has_no_positive_side_and_is_held(shift):
+    points, faces = octahedron()
+    topology = Topology.of(mesh_of(points + shift, faces))
+    assert topology.held["part of zero area, which has no positive side"].size == 6
+    beside, triangles = wheel(6, centre=(9.0 + shift, 0.0))
+    both = Topology.of(mesh_of(np.vstack([points + shift, beside]), np.vstack([faces, triangles + 6])))
+    assert both.free.tolist() == [6]
+
+
+@pytest.mark.parametrize("size", [1e-320, 1e-200, 1e-160, 1e160, 1e300])
+def test_clockwise_meshes_of_any_size_are_wound_right(size):
+    points, triangles = wheel(6)
+    topology = Topology.of(mesh_of(points * size, triangles[:, ::-1]))
+    assert topology.turn.tolist() == [-1] * 6
+    assert topology.free.tolist() == [0]

@@ -111,10 +111,11 @@ def smooth(
     run = _Run(held_mesh, topology, smoother, threads or available_threads())
     stop_reason = run.to_the_end(max_sweeps, target_quality, callback)
 
-    points, moved = run.best_points()
-    after = measure(held_mesh.with_points(points), topology) if moved.any() else before
-    if (after.inverted, -after.qhat) > (before.inverted, -before.qhat):  # the sweeps' quick sums misjudged it
-        points, moved, after = held_mesh.points, np.zeros(len(moved), dtype=bool), before
+    try:
+        points, moved, after = run.outcome(before)
+    except KeyboardInterrupt:  # nothing is lost by finishing what takes less than a sweep
+        stop_reason = INTERRUPTED
+        points, moved, after = run.outcome(before)
     return SmoothResult(
         mesh=restore(points),
         points=points.copy(),
@@ -169,7 +170,7 @@ class _Run:
 
     def __init__(self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int) -> None:
         self.mesh, self.topology, self.smoother = mesh, topology, smoother
-        self.precision = Precision(2.0**-24 if mesh.single else 2.0**-53, mesh.single)
+        self.precision = Precision.of(single=mesh.single, exponent=scale_exponent(mesh))
         self.start = planar_points(mesh)[topology.memory]
         self.points = self.start.copy()
         self.triangles = topology.near
@@ -205,10 +206,19 @@ class _Run:
         points = self.mesh.points.copy()
         plane = self.mesh.plane
         assert plane is not None
-        points[np.ix_(ids, plane)] = self.best[elsewhere] * 2.0 ** scale_exponent(self.mesh)
+        points[np.ix_(ids, plane)] = np.ldexp(self.best[elsewhere], scale_exponent(self.mesh))
         moved = np.zeros(len(points), dtype=bool)
         moved[ids] = True
         return points, moved
+
+    def outcome(self, before: QualityReport) -> tuple[Floats, NDArray[np.bool_], QualityReport]:
+        """Points, which of them moved, and their measures; those of the input if the quick sums misjudged it."""
+        points, moved = self.best_points()
+        if moved.any():
+            after = measure(self.mesh.with_points(points), self.topology)
+            if (after.inverted, -after.qhat) <= (before.inverted, -before.qhat):
+                return points, moved, after
+        return self.mesh.points, np.zeros(len(points), dtype=bool), before
 
     def _sweep(self, share: _Share) -> Sweep:
         stars, tally = self.topology.stars, np.zeros(3, dtype=np.int64)

@@ -102,7 +102,7 @@ def measure(mesh: Mesh, topology: Topology | None = None) -> QualityReport:
     low, high, shape, aspect = (np.empty(len(triangles)) for _ in range(4))
     if mesh.plane is None:
         largest = float(np.abs(mesh.points).max(initial=0.0))
-        scaled = mesh.points * 0.5 ** int(np.frexp(largest)[1])
+        scaled = np.ldexp(mesh.points, -int(np.frexp(largest)[1]))
         kernels.per_surface_cell(scaled, triangles, low, high, shape, aspect)
         valid = (shape > 0).astype(np.int8)
     else:
@@ -111,7 +111,7 @@ def measure(mesh: Mesh, topology: Topology | None = None) -> QualityReport:
         valid = exact_signs(points, triangles, turn)
     return QualityReport(
         cell=topology.cell,
-        centre=mesh.points[triangles].mean(axis=1),
+        centre=(mesh.points[triangles] / 3.0).sum(axis=1),
         min_angle=np.degrees(low),
         max_angle=np.degrees(high),
         shape=shape,

@@ -20,6 +20,7 @@ from gmsnet.mesh import CellBlock, Mesh
 Ints = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 
+NO_AREA = 1e-9  # of the sum of its faces' areas: the area of such a part (a closed surface pressed flat) is noise
 MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would no longer fit any cache
 
 
@@ -77,7 +78,7 @@ class Topology:
     def of(cls, mesh: Mesh, fixed: Flags | None = None) -> Topology:
         """The topology of a mesh; ``fixed`` (N,) bool holds further nodes ("fixed by the user")."""
         nodes = len(mesh.points)
-        planar = _planar_points(mesh)
+        planar = planar_points(mesh)
         memory = layout.morton_order(planar)
         position = _inverse(memory)
         written = Faces.of(mesh)
@@ -87,14 +88,19 @@ class Topology:
         twin = connectivity.match(corner, head, nodes)
         part, turn, consistent = connectivity.wind(first, corner, twin, face)
         if mesh.plane is not None:
-            area = connectivity.part_areas(planar[memory], first, corner, part, turn, len(consistent))
+            area, extent = connectivity.part_areas(planar[memory], first, corner, part, turn, len(consistent))
             if (area < 0).any():
                 turn = np.where(area[part] < 0, -turn, turn).astype(np.int8)
+            flat = np.abs(area) <= NO_AREA * extent
+        else:
+            flat = np.zeros(len(consistent), dtype=bool)
 
-        boundary, interface, crowded, unwound = (np.zeros(nodes, dtype=bool) for _ in range(4))
+        boundary, interface, crowded, unwound, sideless = (np.zeros(nodes, dtype=bool) for _ in range(5))
         connectivity.mark_edges(corner, head, twin, face, faces.region, boundary, interface, crowded)
         if not consistent.all():
             unwound[corner[~consistent[part][face]]] = True
+        if flat.any():
+            sideless[corner[flat[part][face]]] = True
         unused = ~_used_by(mesh, lambda block: True)
         reasons = {
             "not used by any cell": unused,
@@ -106,6 +112,7 @@ class Topology:
             ),
             "non-manifold edge": crowded[position],
             "part that cannot be wound consistently": unwound[position],
+            "part of zero area, which has no positive side": sideless[position],
             "fixed by the user": np.zeros(nodes, dtype=bool) if fixed is None else fixed,
         }
         candidate = ~np.logical_or.reduce(list(reasons.values()))
@@ -187,20 +194,18 @@ def _first_reason(reasons: dict[str, Flags]) -> dict[str, NDArray[np.int64]]:
     return held
 
 
-def _planar_points(mesh: Mesh) -> NDArray[np.float64]:
-    """The points in the plane of the mesh (N, 2); for one that is not planar, its first two coordinates."""
-    return np.ascontiguousarray(mesh.points[:, mesh.plane or (0, 1)])
-
-
 def planar_points(mesh: Mesh) -> NDArray[np.float64]:
-    """The points in the plane of the mesh (N, 2), scaled by a power of two so that the largest coordinate is near 1.
+    """The points in the plane of the mesh (N, 2), divided by 2 to the power of ``scale_exponent``, which is exact.
 
-    The scaling is exact, and keeps products of tiny or huge coordinates from under- or overflowing.
+    The largest coordinate is then near 1, so that products of tiny or huge ones neither under- nor overflow. Of a mesh
+    that is not planar, the first two coordinates.
     """
-    return _planar_points(mesh) * 0.5 ** scale_exponent(mesh)
+    points = np.ascontiguousarray(mesh.points[:, mesh.plane or (0, 1)])
+    exponent = scale_exponent(mesh)
+    return np.ldexp(points, -exponent) if exponent else points
 
 
 def scale_exponent(mesh: Mesh) -> int:
-    """The power of two by which ``planar_points`` divides."""
-    largest = float(np.abs(_planar_points(mesh)).max(initial=0.0))
-    return int(np.frexp(largest)[1]) if largest > 0.0 else 0
+    """The power of two by which ``planar_points`` divides: none in single precision, where nothing can overflow."""
+    largest = float(np.abs(mesh.points[:, mesh.plane or (0, 1)]).max(initial=0.0))
+    return int(np.frexp(largest)[1]) if largest > 0.0 and not mesh.single else 0

@@ -31,7 +31,7 @@ def commit(stars_, shifts, unit=U64, single=False):
     shift = np.zeros(2 * LANES, dtype=np.float32)
     shift[:LANES], shift[LANES:] = np.asarray(shifts)[lanes].T
     tally = np.zeros(3, dtype=np.int64)
-    kernels.commit(points, centre, 0, count, x, ring, degree, work, shift, unit, single, tally)
+    kernels.commit(points, centre, 0, count, x, ring, degree, work, shift, unit, 0.0, single, tally)
     return points[:count], tally
 
 

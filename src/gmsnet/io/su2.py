@@ -140,7 +140,8 @@ def _count(text: bytes, section: Section, found: Contents) -> None:
             fail(text, at, f"{key} is given twice")
         found.counts[key] = count
     if len(rows) != count * (key in ROWS):
-        fail(text, at, f"{key}= {count} is followed by {len(rows)} rows instead of {count * (key in ROWS)}: is the file cut off?")
+        wanted = count * (key in ROWS)
+        fail(text, at, f"{key}= {count} is followed by {len(rows)} rows instead of {wanted}: is the file cut off?")
     if key == "NPOIN":
         found.points = rows
     elif key == "NELEM":

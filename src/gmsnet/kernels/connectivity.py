@@ -113,8 +113,9 @@ def wind(first, corner, twin, face):
 
 @kernel
 def part_areas(points, first, corner, part, turn, parts):
-    """Signed area of each part (float64), its faces read with their turns; coordinates relative to one corner."""
+    """Signed area of each part, its faces read with their turns, and the sum of their absolute areas (float64)."""
     area = np.zeros(parts)
+    extent = np.zeros(parts)
     for f in range(len(first) - 1):
         a = first[f]
         x, y = points[corner[a], 0], points[corner[a], 1]
@@ -123,7 +124,8 @@ def part_areas(points, first, corner, part, turn, parts):
             b, c = corner[h], corner[h + 1]
             twice += (points[b, 0] - x) * (points[c, 1] - y) - (points[b, 1] - y) * (points[c, 0] - x)
         area[part[f]] += 0.5 * twice * turn[f]
-    return area
+        extent[part[f]] += 0.5 * abs(twice)
+    return area, extent
 
 
 @kernel

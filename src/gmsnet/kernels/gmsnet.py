@@ -145,10 +145,10 @@ def decode(weights, hidden, features, row, decoded, shift):
 
 
 @kernel
-def sweep(points, centre, rings, offset, degree, count, first, last, most, unit, single, weights, hidden, tally):
+def sweep(points, centre, rings, offset, degree, count, first, last, most, unit, grain, single, weights, hidden, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. Arrays: topology.Stars.
 
-    most: the largest degree; unit, single: see kernels.stars; tally: (3,) int64, added to.
+    most: the largest degree; unit, grain, single: see kernels.stars.commit; tally: (3,) int64, added to.
     """
     x, ring, work = np.empty(2 * LANES), np.empty(2 * most * LANES), np.empty(8 * LANES)
     local = np.empty(2 * most * LANES, dtype=np.float32)
@@ -160,4 +160,4 @@ def sweep(points, centre, rings, offset, degree, count, first, last, most, unit,
         stars.gather(points, centre, rings, block, offset[block], n, x, ring)
         stars.localise(x, ring, n, work, local)
         propose(local, n, weights, hidden, m, row, features, decoded, shift)
-        stars.commit(points, centre, block, count[block], x, ring, n, work, shift, unit, single, tally)
+        stars.commit(points, centre, block, count[block], x, ring, n, work, shift, unit, grain, single, tally)

@@ -12,8 +12,6 @@ that the bound's own rounding does not matter.
 
 from __future__ import annotations
 
-import numpy as np
-
 from gmsnet.kernels.compile import kernel
 
 UNIT = 2.0**-53
@@ -55,12 +53,3 @@ def signs(points, triangles, turn, delta, out):
             out[t] = 0
             doubts += 1
     return doubts
-
-
-@kernel
-def largest_coordinate(points):
-    """The largest absolute value among the coordinates (N, 2)."""
-    largest = 0.0
-    for i in range(len(points)):
-        largest = max(largest, abs(points[i, 0]), abs(points[i, 1]))
-    return np.float64(largest)

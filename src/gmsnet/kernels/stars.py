@@ -4,10 +4,11 @@ A block is LANES stars of one colour and degree n. Its free nodes stand in ``x``
 as [ring node][axis][lane], flat. Stars of one colour share no cell, so a block may be committed at once.
 
 The guard. A triangle is *certified* if its determinant exceeds the error bound of kernels.predicates with the
-coordinates known up to ±δ, δ the file's unit of rounding times the star's largest coordinate: it is then positive in
-exact arithmetic, in float64, and as written. A move is allowed if each triangle of the star is certified after it, or
-was certainly inverted before and is certainly less so after it. So no valid cell becomes invalid, and invalid ones
-only get better. A shift that is not allowed is halved, as the paper's Algorithm 1 does, and dropped after HALVINGS.
+coordinates known up to ±δ, δ the file's unit of rounding times the star's largest coordinate plus the grain of the
+numbers next to zero: it is then positive in exact arithmetic, in float64, and as written. A move is allowed if each
+triangle of the star is certified after it, or was certainly inverted before and is certainly less so after it. So no
+valid cell becomes invalid, and invalid ones only get better. A shift that is not allowed is halved, as the paper's
+Algorithm 1 does, and dropped after HALVINGS.
 """
 
 from __future__ import annotations
@@ -93,7 +94,8 @@ def margins(ring, n, work):
             bound = SHEWCHUK * (abs(left) + abs(right)) + UNDERFLOW + 4.0 * delta * around
             surplus = (left - right) - bound
             least = work[MARGIN * LANES + lane]
-            work[MARGIN * LANES + lane] = surplus if not surplus >= least else least  # a NaN stays
+            # A target that is not finite makes every surplus NaN or −∞, and no comparison with it holds.
+            work[MARGIN * LANES + lane] = surplus if not surplus >= least else least
 
 
 @kernel
@@ -114,10 +116,11 @@ def allowed(tx, ty, x, ring, n, lane, delta):
 
 
 @kernel
-def commit(points, centre, block, count, x, ring, n, work, shift, unit, single, tally):
+def commit(points, centre, block, count, x, ring, n, work, shift, unit, grain, single, tally):
     """Moves the free nodes of a block by size·shift, truncated by the guard; counts what happened in ``tally``.
 
-    work: rows of LANES as ``localise`` leaves them; shift: (2·LANES,) over the star's size.
+    work: rows of LANES as ``localise`` leaves them; shift: (2·LANES,) over the star's size. unit, grain: the relative
+    and the absolute error of a coordinate once it is written; single: round new ones to float32.
     """
     for lane in range(LANES):
         tx = x[lane] + work[SIZE * LANES + lane] * shift[lane]
@@ -129,7 +132,7 @@ def commit(points, centre, block, count, x, ring, n, work, shift, unit, single, 
             work[lane] = np.float64(np.float32(work[lane]))
     for lane in range(LANES):
         target = max(abs(work[TARGET * LANES + lane]), abs(work[(TARGET + 1) * LANES + lane]))
-        work[REACH * LANES + lane] = unit * max(work[REACH * LANES + lane], target)
+        work[REACH * LANES + lane] = unit * max(work[REACH * LANES + lane], target) + grain
     margins(ring, n, work)
     for lane in range(count):
         i = centre[block * LANES + lane]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +19,21 @@ class Precision:
     """How exactly the coordinates of a mesh are known once they are written.
 
     unit: the largest relative error (2⁻⁵³ for float64 and decimal text, 2⁻²⁴ where a file keeps float32).
-    single: round every new coordinate to float32, because the file will.
+    grain: the largest absolute error next to zero, where floats are evenly spaced. single: round every new coordinate
+    to float32, because the file will.
     """
 
-    unit: float
-    single: bool
+    unit: float = 2.0**-53
+    grain: float = 0.0
+    single: bool = False
+
+    @classmethod
+    def of(cls, *, single: bool, exponent: int) -> Precision:
+        """For coordinates that have been divided by 2 to the power of ``exponent``."""
+        if single:
+            return cls(2.0**-24, math.ldexp(1.0, -150 - exponent), single=True)
+        grain = math.ldexp(1.0, -1075 - exponent)
+        return cls(grain=grain if grain > 1e-290 else 0.0)  # a subnormal one would only be slow
 
 
 class Smoother(Protocol):

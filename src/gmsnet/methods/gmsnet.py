@@ -31,7 +31,7 @@ class GmsNet:
         """See methods.base.Smoother."""
         kernels.sweep(
             points, stars.centre, stars.rings, stars.offset, stars.degree, stars.count, first, last,
-            stars.most, precision.unit, precision.single, self.folded, self.hidden, tally,
+            stars.most, precision.unit, precision.grain, precision.single, self.folded, self.hidden, tally,
         )  # fmt: skip
 
 
