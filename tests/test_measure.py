@@ -52,12 +52,12 @@ def test_it_equals_vtk():
 
 
 def test_the_sums_of_a_sweep_equal_the_report():
-    from gmsnet.engine import _Run
+    from gmsnet.run import Run
     from gmsnet.topology import Topology
 
     mesh = gmsnet.random_mesh(500, seed=1)
     report = measure(mesh)
-    standing = _Run(mesh, Topology.of(mesh), None, 1).best_standing
+    standing = Run(mesh, Topology.of(mesh), None, 1).best_standing
     assert standing.inverted == report.inverted == 0
     assert standing.qhat == pytest.approx(report.qhat, abs=1e-13)
     assert standing.min_shape == pytest.approx(report.shape.min(), rel=1e-12)
