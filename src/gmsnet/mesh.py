@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.arrays import coordinates, float64_rows, plain_array, read_only, whole_numbers
 from gmsnet.errors import InputError
 
 DIMENSION = {  # of the cell types that are known by name (meshio's names); all others count as volumes
@@ -44,7 +45,10 @@ class CellBlock:
 
     kind: meshio's name of the type ("triangle", "line", "vertex", "quad", "triangle6", …; "polygon" for five nodes
     or more). nodes: (cells × nodes per cell), indices into the points. regions: (cells,) the region of each cell;
-    for lines and vertices this is the marker that they belong to.
+    for lines and vertices this is the marker that they belong to. Both may be given as any array or list of whole
+    numbers; they are kept as read-only arrays that share no memory with anything writable.
+
+    Raises InputError for numbers that are not whole, masked values and arrays of the wrong shape.
     """
 
     kind: str
@@ -52,16 +56,18 @@ class CellBlock:
     regions: NDArray[np.int64]
 
     def __post_init__(self) -> None:
-        nodes = np.array(self.nodes, dtype=np.int64, copy=True)
-        regions = np.array(self.regions, dtype=np.int64, copy=True)
+        if not isinstance(self.kind, str):
+            raise InputError(f'the type of cells must be a name such as "triangle", got {self.kind!r}')
+        nodes = whole_numbers(self.nodes, f"the nodes of {self.kind!r} cells")
+        regions = whole_numbers(self.regions, f"the regions of {self.kind!r} cells", bools=True)
         if nodes.ndim != 2:
             raise InputError(f"cells of type {self.kind!r} must be an array (cells × nodes), got shape {nodes.shape}")
         if nodes.shape[1] != NODES.get(self.kind, nodes.shape[1]):
             raise InputError(f"a cell of type {self.kind!r} has {NODES[self.kind]} nodes, got {nodes.shape[1]}")
         if regions.shape != (len(nodes),):
             raise InputError(f"{len(nodes)} {self.kind} cells need one region each, got shape {regions.shape}")
-        object.__setattr__(self, "nodes", _read_only(nodes))
-        object.__setattr__(self, "regions", _read_only(regions))
+        object.__setattr__(self, "nodes", nodes)
+        object.__setattr__(self, "regions", regions)
 
     @property
     def dimension(self) -> int:
@@ -79,7 +85,10 @@ class Mesh:
     source: the file it was read from, None if it was made in memory. node_sets: name → node ids, named groups of nodes
     beside those that the cells make (meshio's point sets).
 
-    Raises InputError where a coordinate is not finite or a cell names a node that does not exist.
+    All arrays are read-only and share no memory with anything writable; those that are so already are not copied.
+
+    Raises InputError where a coordinate is not finite, a cell or a node set names a node that does not exist, data do
+    not have one row for each point or cell, or an argument is of the wrong type.
     """
 
     points: NDArray[np.float64]
@@ -92,32 +101,40 @@ class Mesh:
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        points = np.array(self.points, dtype=np.float64, order="C", copy=True)
-        if points.ndim != 2 or points.shape[1] not in (2, 3):
-            raise InputError(f"points must be an array of N×2 or N×3 numbers, got shape {points.shape}")
+        points = float64_rows(coordinates(self.points))
         finite = np.isfinite(points).all(axis=1)
         if not finite.all():
             bad = int(np.flatnonzero(~finite)[0])
             raise InputError(f"node {bad} (counted from 0) has a coordinate that is not finite: {points[bad].tolist()}")
-        cells = tuple(self.cells)
+        cells = _blocks(self.cells)
         for block in cells:
             if block.nodes.size and (block.nodes.min() < 0 or block.nodes.max() >= len(points)):
                 wrong = ((block.nodes < 0) | (block.nodes >= len(points))).any(axis=1)
                 row = int(np.flatnonzero(wrong)[0])
                 raise InputError(
                     f"{block.kind} {row} (counted from 0) names the nodes {block.nodes[row].tolist()}, "
-                    f"but the mesh has the nodes 0 to {len(points) - 1}"
+                    f"but the mesh has {in_words(len(points))}"
                 )
-        for name, values in self.point_data.items():
-            if len(values) != len(points):
-                raise InputError(f"point data {name!r} has {len(values)} rows for {len(points)} points")
-        for name, arrays in self.cell_data.items():
-            if [len(a) for a in arrays] != [len(b.nodes) for b in cells]:
-                raise InputError(f"cell data {name!r} does not have one row for each cell of each block")
-        object.__setattr__(self, "points", _read_only(points))
+        counts = [len(block.nodes) for block in cells]
+        checked: dict[str, Mapping[Any, Any]] = {
+            "region_names": _names(self.region_names),
+            "point_data": {
+                name: _rows(values, f"point data {name!r}", len(points))
+                for name, values in _items(self.point_data, "point_data")
+            },
+            "cell_data": {
+                name: _per_block(arrays, f"cell data {name!r}", counts)
+                for name, arrays in _items(self.cell_data, "cell_data")
+            },
+            "node_sets": {
+                name: _node_set(ids, f"node set {name!r}", len(points))
+                for name, ids in _items(self.node_sets, "node_sets")
+            },
+        }
+        object.__setattr__(self, "points", points)
         object.__setattr__(self, "cells", cells)
-        for name in ("region_names", "point_data", "cell_data", "node_sets"):
-            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+        for field_name, value in checked.items():
+            object.__setattr__(self, field_name, MappingProxyType(value))
 
     def with_points(self, points: NDArray[np.float64]) -> Mesh:
         """The same mesh with other coordinates (same shape as ``points``)."""
@@ -138,7 +155,7 @@ class Mesh:
             used[block.nodes] = True
         if not used.any():
             return (0, 1)
-        extent = np.ptp(self.points[used], axis=0)
+        extent = np.ptp(0.25 * self.points[used], axis=0)  # a quarter, lest it overflow
         for flat in (2, 1, 0):
             if extent[flat] <= 1e-9 * extent.max():
                 return {2: (0, 1), 1: (0, 2), 0: (1, 2)}[flat]
@@ -146,15 +163,71 @@ class Mesh:
 
     @property
     def markers(self) -> dict[str, NDArray[np.int64]]:
-        """Name of each marker, region and node set → its node ids. One without a name goes by its number."""
+        """Name of each marker, region and node set → its node ids.
+
+        A marker of lines or vertices without a name goes by its number; regions of faces and volumes need a name.
+        """
         nodes: dict[str, list[NDArray[np.int64]]] = {name: [ids] for name, ids in self.node_sets.items()}
         for block in self.cells:
             for region in np.unique(block.regions).tolist():
-                name = self.region_names.get((block.dimension, region), str(region))
+                name = self.region_names.get((block.dimension, region), str(region) if block.dimension < 2 else None)
+                if name is None:  # most often 0, the region of all cells: holding it would hold the whole mesh
+                    continue
                 nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
         return {name: np.unique(np.concatenate(ids)) for name, ids in nodes.items()}
 
 
-def _read_only(array: NDArray[Any]) -> NDArray[Any]:
-    array.flags.writeable = False
-    return array
+def in_words(nodes: int) -> str:
+    """Which nodes a mesh of so many has."""
+    return f"the nodes 0 to {nodes - 1}" if nodes else "no nodes"
+
+
+def _blocks(cells: Any) -> tuple[CellBlock, ...]:
+    mend = 'cells must be a list of CellBlocks, such as [CellBlock("triangle", nodes, regions)]'
+    if isinstance(cells, CellBlock) or not isinstance(cells, Iterable):
+        raise InputError(f"{mend}, got one {type(cells).__name__}")
+    blocks = tuple(cells)
+    for block in blocks:
+        if not isinstance(block, CellBlock):
+            raise InputError(f"{mend}, got a list with {type(block).__name__} in it")
+    return blocks
+
+
+def _items(fields: Any, what: str) -> Iterable[tuple[Any, Any]]:
+    if not isinstance(fields, Mapping):
+        raise InputError(f"{what} must be a mapping of names, such as a dict, got {type(fields).__name__}")
+    return fields.items()
+
+
+def _names(names: Any) -> dict[tuple[int, int], str]:
+    for key, name in _items(names, "region_names"):
+        if not (isinstance(key, tuple) and len(key) == 2 and isinstance(name, str)):
+            raise InputError(
+                f"region_names must be of the form {{(dimension, region): name}}, got {{{key!r}: {name!r}}}"
+            )
+    return dict(names)
+
+
+def _rows(values: Any, what: str, count: int) -> NDArray[Any]:
+    array = plain_array(values, what)
+    if array.ndim == 0 or len(array) != count:
+        rows = f"{len(array)} rows" if array.ndim else "no rows"
+        raise InputError(f"{what} has {rows} for {count} points")
+    return read_only(array)
+
+
+def _per_block(arrays: Any, what: str, counts: list[int]) -> tuple[NDArray[Any], ...]:
+    parts = [plain_array(part, what) for part in arrays] if isinstance(arrays, Iterable) else []
+    if [len(part) if part.ndim else -1 for part in parts] != counts:
+        raise InputError(f"{what} does not have one row for each cell of each block: give one array a block")
+    return tuple(map(read_only, parts))
+
+
+def _node_set(ids: Any, what: str, count: int) -> NDArray[np.int64]:
+    nodes = whole_numbers(ids, what)
+    if nodes.ndim != 1:
+        raise InputError(f"{what} must be a list of node ids, got shape {nodes.shape}")
+    if nodes.size and (nodes.min() < 0 or nodes.max() >= count):
+        wrong = nodes[(nodes < 0) | (nodes >= count)][0]
+        raise InputError(f"{what} names the node {wrong}, but the mesh has {in_words(count)}")
+    return nodes
