@@ -12,7 +12,7 @@ from gmsnet.fixed import fixed_mask
 from gmsnet.mesh import CellBlock, Mesh
 
 POINTS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [2.0, 2.0]])
-NAMES = {(1, 1): "inlet", (1, 2): "outlet"}
+NAMES = {(1, 1): "inlet", (1, 2): "outlet", (2, 7): "core"}
 CELLS = (CellBlock("triangle", [[0, 1, 2], [1, 3, 2]], [7, 8]), CellBlock("line", [[0, 1], [1, 3]], [1, 2]))
 
 
@@ -54,7 +54,7 @@ def ids_of(mesh, fixed=None):
         ([True, False, False, False, True], [0, 4]),
         (np.array([True, False, False, False, True], dtype=object), [0, 4]),
         ("inlet", [0, 1]),
-        ("7", [0, 1, 2]),
+        ("core", [0, 1, 2]),
         (["inlet", "outlet"], [0, 1, 3]),
         ({"inlet", "outlet"}, [0, 1, 3]),
         (np.array(["inlet", "outlet"]), [0, 1, 3]),
