@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from damage import triangle_grid
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gmsnet.io import read
+from gmsnet.io import FORMATS, read, write
 from gmsnet.io.splice import BinarySlots, FileSource, TextSlots
 from gmsnet.io.text import scan, to_floats
 from gmsnet.mesh import CellBlock, Mesh
@@ -66,6 +68,93 @@ def test_a_source_knows_its_cells() -> None:
     assert source.splice(OLD.copy())[".su2"] is TEXT
     new = OLD + 1.0
     assert source.splice(new)[".su2"] == SLOTS.replace(TEXT, OLD, new)
+
+
+FACTS = {
+    "region_names": {(2, 4): "core"},
+    "point_data": {"t": np.array([1.0, np.nan, 3.0]), "names": np.array(["a", "b", "c"], dtype=object)},
+    "cell_data": {"material": (np.array([4]),)},
+}
+
+
+def test_a_source_knows_all_else_that_it_read() -> None:
+    cells = (CellBlock("triangle", [[0, 1, 2]], [4]),)
+    mesh = Mesh(OLD, cells, **FACTS)
+    source = FileSource("su2", ".su2", TEXT, mesh.points, SLOTS, mesh.cells, {}, **FACTS)
+    assert source.fits(mesh)
+    assert source.fits(mesh.with_points(OLD + 1))
+    assert source.fits(replace(mesh, **{name: dict(value) for name, value in FACTS.items()}))  # equal, not the same
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"region_names": {}},
+        {"region_names": {(2, 4): "rim"}},
+        {"region_names": {(2, 4): "core", (1, 1): "wall"}},
+        {"point_data": {}},
+        {"point_data": {**FACTS["point_data"], "new": np.zeros(3)}},
+        {"point_data": {**FACTS["point_data"], "t": np.array([1.0, np.nan, 4.0])}},
+        {"point_data": {**FACTS["point_data"], "t": np.array([1.0, np.nan, 3.0], dtype=np.float32)}},
+        {"point_data": {**FACTS["point_data"], "t": np.array([[1.0], [np.nan], [3.0]])}},
+        {"point_data": {**FACTS["point_data"], "names": np.array(["a", "b", "d"], dtype=object)}},
+        {"point_data": {"t": FACTS["point_data"]["t"], "other": FACTS["point_data"]["names"]}},
+        {"cell_data": {}},
+        {"cell_data": {"material": (np.array([5]),)}},
+        {"node_sets": {"probe": [0]}},
+    ],
+)
+def test_a_mesh_with_other_data_or_names_does_not_fit(change: dict) -> None:
+    cells = (CellBlock("triangle", [[0, 1, 2]], [4]),)
+    mesh = Mesh(OLD, cells, **FACTS)
+    source = FileSource("su2", ".su2", TEXT, mesh.points, SLOTS, mesh.cells, {}, **FACTS)
+    assert not source.fits(replace(mesh, **change))
+
+
+@pytest.mark.parametrize("key", FORMATS)
+def test_new_coordinates_alone_are_spliced_in_every_format(key: str, tmp_path: Path) -> None:
+    path, out = (tmp_path / (stem + FORMATS[key].suffixes[0]) for stem in ("in", "out"))
+    write(triangle_grid(), path)
+    mesh = read(path)
+    points = mesh.points.copy()
+    points[12, 0] += 0.03125
+    moved = mesh.with_points(points)
+    assert mesh.source is not None
+    assert mesh.source.fits(moved)
+    assert write(moved, out) == []
+    assert out.read_bytes() == mesh.source.splice(points)[FORMATS[key].suffixes[0]]
+
+
+@pytest.mark.parametrize("key", ["vtk", "vtu", "gmsh"])
+def test_replaced_data_are_written(key: str, tmp_path: Path) -> None:
+    path, out = (tmp_path / (stem + FORMATS[key].suffixes[0]) for stem in ("in", "out"))
+    grid = triangle_grid()
+    write(replace(grid, point_data={"old": np.arange(float(len(grid.points)))}), path)
+    mesh = read(path)
+    values = np.arange(float(len(mesh.points))) ** 2
+    lost = write(replace(mesh, point_data={"new": values}), out)
+    again = read(out)
+    if "new" in again.point_data:
+        assert list(again.point_data) == ["new"]
+        assert again.point_data["new"].tolist() == values.tolist()
+    else:
+        assert any("'new'" in line for line in lost)
+    assert (again.points == mesh.points).all()
+
+
+def test_what_the_format_cannot_hold_of_a_change_is_named(tmp_path: Path) -> None:
+    path, out = tmp_path / "in.su2", tmp_path / "out.su2"
+    write(triangle_grid(), path)
+    mesh = read(path)
+    assert write(mesh, out) == []
+    (lost,) = write(replace(mesh, point_data={"new": np.zeros(len(mesh.points))}), out)
+    assert "'new'" in lost
+    (lost,) = write(replace(mesh, node_sets={"probe": [3]}), out)
+    assert "'probe'" in lost
+    renamed = {key: f"{name}-2" for key, name in mesh.region_names.items()}
+    assert write(replace(mesh, region_names=renamed), out) == []
+    assert dict(read(out).region_names) == renamed
+    assert renamed
 
 
 REAL = {

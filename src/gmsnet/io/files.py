@@ -108,15 +108,18 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, bytes]) -> Mesh:
     )
     main = entry.suffixes[0]
     companions = {suffix: data for suffix, data in files.items() if suffix != main}
-    source = FileSource(entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions)
+    source = FileSource(
+        entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions,
+        mesh.region_names, mesh.point_data, mesh.cell_data,
+    )  # fmt: skip
     return replace(mesh, source=source)
 
 
 def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -> list[str]:
     """Writes a mesh to a file and returns, in words, what the target's format could not hold.
 
-    A mesh that was read from a file of the same format, and has the cells that it had, is written as that file with
-    the new coordinates in the places of the old ones; then nothing is lost. Any other is converted.
+    A mesh that was read from a file of the same format, and differs from it in coordinates alone, is written as that
+    file with the new coordinates in the places of the old ones; then nothing is lost. Any other is converted.
 
     path: the file; ``-`` is the standard output, and pipes and devices are written straight. Everything else is
     replaced in one step, once all is on the disk. format: as in ``read``; by default the suffix tells, or the format

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,8 +76,8 @@ class FileSource:
     """The bytes that a mesh was read from (the Source of a Mesh).
 
     format: its name in the table of formats. data: the file that holds the coordinates, under the suffix ``main``.
-    points, cells: the coordinates and cells as read. companions: other files of the same mesh by suffix, which never
-    change (Triangle's ``.ele``).
+    points, cells, region_names, point_data, cell_data: as read (see Mesh). companions: other files of the same mesh by
+    suffix, which never change (Triangle's ``.ele``).
     """
 
     format: str
@@ -87,16 +87,29 @@ class FileSource:
     slots: Slots
     cells: tuple[CellBlock, ...] = ()
     companions: Mapping[str, bytes] = field(default_factory=dict)
+    region_names: Mapping[tuple[int, int], str] = field(default_factory=dict)
+    point_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
 
     def fits(self, mesh: Mesh) -> bool:
-        """Whether a mesh has the cells of the file and as many points, so that its text can stand for them."""
-        if mesh.points.shape != self.points.shape:
-            return False
-        return mesh.cells is self.cells or (
-            len(mesh.cells) == len(self.cells)
+        """Whether the file can stand for a mesh once its coordinates are replaced: everything else is as it was read.
+
+        No file has node sets of its own, so a mesh with some does not fit.
+        """
+        return (
+            mesh.points.shape == self.points.shape
+            and not mesh.node_sets
+            and dict(mesh.region_names) == dict(self.region_names)
+            and _same_cells(mesh.cells, self.cells)
+            and mesh.point_data.keys() == self.point_data.keys()
+            and all(_same(array, self.point_data[name]) for name, array in mesh.point_data.items())
+            and mesh.cell_data.keys() == self.cell_data.keys()
             and all(
-                a.kind == b.kind and np.array_equal(a.nodes, b.nodes) and np.array_equal(a.regions, b.regions)
-                for a, b in zip(mesh.cells, self.cells, strict=True)
+                _same(array, old)
+                for name, arrays in mesh.cell_data.items()
+                for array, old in zip(
+                    arrays, self.cell_data[name], strict=True
+                )  # one a block, and the blocks are equal
             )
         )
 
@@ -105,3 +118,22 @@ class FileSource:
         same = points.shape == self.points.shape and bool((points == self.points).all())
         data = self.data if same else self.slots.replace(self.data, self.points, points)
         return {self.main: data, **self.companions}
+
+
+def _same_cells(new: tuple[CellBlock, ...], old: tuple[CellBlock, ...]) -> bool:
+    return new is old or (
+        len(new) == len(old)
+        and all(
+            a is b or (a.kind == b.kind and _same(a.nodes, b.nodes) and _same(a.regions, b.regions))
+            for a, b in zip(new, old, strict=True)
+        )
+    )
+
+
+def _same(new: NDArray[Any], old: NDArray[Any]) -> bool:
+    """Whether two arrays have the same type and values, a nan being the same as itself."""
+    if new is old:
+        return True
+    if new.dtype != old.dtype or new.shape != old.shape:
+        return False
+    return new.tolist() == old.tolist() if new.dtype.hasobject else new.tobytes() == old.tobytes()
