@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gmsnet
-from gmsnet.adapters import to_mesh
+from gmsnet.adapters import KIND, to_mesh
 from gmsnet.errors import InputError
 from gmsnet.mesh import CellBlock, Mesh
 
@@ -83,6 +83,36 @@ def test_cells_by_kind(cells):
     assert back[1] is cells
 
 
+@pytest.mark.parametrize(
+    ("kind", "columns", "taken", "dimension"),
+    [
+        ("vertex", 1, "vertex", 0),
+        ("line3", 3, "line3", 1),
+        ("triangle6", 6, "triangle6", 2),
+        ("quad8", 8, "quad8", 2),
+        ("polygon", 5, "polygon", 2),
+        ("polygon5", 5, "polygon", 2),
+        ("polygon", 3, "triangle", 2),
+        ("tetra", 4, "tetra", 3),
+        ("tetra10", 10, "tetra10", 3),
+        ("hexahedron27", 27, "hexahedron27", 3),
+        ("wedge15", 15, "wedge15", 3),
+        ("pyramid13", 13, "pyramid13", 3),
+        ("VTK_LAGRANGE_WEDGE", 6, "VTK_LAGRANGE_WEDGE", 3),
+    ],
+)
+def test_known_types_of_cells_pass(kind, columns, taken, dimension):
+    mesh, _ = to_mesh((in_space(POINTS), {kind: np.arange(columns)[None] % 6}))
+    (block,) = mesh.cells
+    assert (block.kind, block.dimension) == (taken, dimension)
+
+
+def test_every_type_of_meshio_is_known():
+    names = pytest.importorskip("meshio._mesh").topological_dimension
+    assert "VTK_LAGRANGE_HEXAHEDRON" in names
+    assert not [name for name in names if not KIND.fullmatch(name)]
+
+
 def test_no_cells_at_all_is_a_mesh():
     mesh, _ = to_mesh((POINTS, []))
     assert mesh.cells[0].nodes.shape == (0, 3)
@@ -110,8 +140,16 @@ def test_restored_points_belong_to_the_caller():
         (POINTS, [[0, 1, 2], [0, 1]], "cells cannot be made an array"),
         (POINTS, FAN + 5, "names the nodes"),
         (POINTS, FAN - 1, "names the nodes"),
-        (POINTS, np.full((1, 3), 2**63, dtype=np.uint64), "which no mesh can have"),
+        (POINTS, np.full((1, 3), 2**63, dtype=np.uint64), r"below 2\*\*63, got 9223372036854775808"),
         (POINTS, {"triangle": FAN[:, :2]}, "has 3 nodes, got 2"),
+        (POINTS, np.ma.masked_equal(FAN, 4), "cells hold masked values"),
+        (POINTS, {"triangle": np.ma.masked_equal(FAN, 4)}, "triangle hold masked values"),
+        (POINTS, {"foo": FAN}, "unknown type of cells 'foo'; known are vertex, line, .*pyramid"),
+        (POINTS, {"tri": FAN}, "unknown type of cells 'tri'; did you mean 'triangle'"),
+        (POINTS, {"Triangles": FAN}, "unknown type of cells 'Triangles'; did you mean 'triangle'"),
+        (POINTS, [("triangle ", FAN)], "unknown type of cells 'triangle '; did you mean 'triangle'"),
+        (POINTS, {3: FAN}, "unknown type of cells 3; known are"),
+        (POINTS, {None: FAN}, "unknown type of cells None"),
     ],
 )
 def test_wrong_arrays_say_what_to_mend(points, cells, message):
@@ -318,7 +356,7 @@ def test_a_point_set_can_be_held():
 
 def test_no_library_is_imported():
     code = (
-        "import sys, numpy; from gmsnet.adapters import to_mesh;"
+        "import sys, numpy; from gmsnet.adapters import KIND, to_mesh;"
         "to_mesh((numpy.zeros((3, 2)), [[0, 1, 2]]));"
         "print([m for m in ('pyvista', 'meshio', 'meshlane', 'torch', 'matplotlib') if m in sys.modules])"
     )

@@ -6,15 +6,18 @@ Types are told by the names of their modules, so none of the libraries is import
 from __future__ import annotations
 
 import copy
+import difflib
 import itertools
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gmsnet.arrays import coordinates, plain_array, whole_numbers
 from gmsnet.errors import InputError
-from gmsnet.mesh import DIMENSION, CellBlock, Mesh
+from gmsnet.mesh import DIMENSION, NODES, CellBlock, Mesh
 from gmsnet.region_fields import combined, names_a_region
 
 Restore = Callable[[NDArray[np.float64]], Any]
@@ -25,6 +28,9 @@ VTK_KIND = {
     25: "hexahedron20", 28: "quad9", 34: "triangle7", 35: "line4",
 }  # fmt: skip
 VTK_CHAINS = {2: ("vertex", 1), 4: ("line", 2)}  # cells of any number of nodes that are taken as their pieces
+
+# meshio's names of cells, those of higher order ("tetra35") included.
+KIND = re.compile(r"vertex|(line|triangle|quad|polygon|tetra|hexahedron|wedge|pyramid)\d*|VTK_LAGRANGE_[A-Z]+")
 
 
 def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
@@ -62,7 +68,7 @@ def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
 
 def _from_arrays(thing: Any) -> tuple[Mesh, Restore]:
     points, given = thing
-    blocks = [(kind, _indices(nodes, kind)) for kind, nodes in _pairs(given)]
+    blocks = [_face(_known(kind), _indices(nodes, kind)) for kind, nodes in _pairs(given)]
     mesh, back = _mesh(points, blocks), _back(points)
     same = list if isinstance(thing, list) else tuple
     return mesh, lambda new: same((back(new), given))
@@ -144,7 +150,7 @@ def _mesh(
     node_sets: Mapping[str, NDArray[np.int64]] | None = None,
 ) -> Mesh:
     """cell_data: one array over all cells. names: name → (dimension, tag of gmsh:physical). cell_sets: name → cells."""
-    array = _coordinates(points)
+    array = coordinates(points)
     cell_data, node_sets = cell_data or {}, dict(node_sets or {})
     counts = [len(nodes) for _, nodes in blocks]
     dimension = np.repeat([DIMENSION.get(kind, 3) for kind, _ in blocks], counts).astype(np.int64)
@@ -202,33 +208,21 @@ def _pairs(cells: Any) -> list[tuple[str, Any]]:
 
 
 def _indices(nodes: Any, what: str) -> NDArray[np.int64]:
-    array = _array(nodes, what)
+    array = plain_array(nodes, what)
     if array.size and array.dtype.kind not in "iu":
         raise InputError(
             f"{what} must be whole numbers, got {array.dtype}: give node indices, such as cells.astype(int)"
         )
-    if array.size and int(array.max()) > np.iinfo(np.int64).max:
-        raise InputError(f"{what} hold the node index {int(array.max())}, which no mesh can have")
-    return array.astype(np.int64)
+    return whole_numbers(array, what)
 
 
-def _array(thing: Any, what: str) -> NDArray[Any]:
-    try:
-        array = np.asarray(thing)
-    except ValueError as error:
-        raise InputError(f"{what} cannot be made an array: {error}") from error
-    if np.ma.is_masked(thing):
-        raise InputError(f"{what} hold masked values: give a plain array of the unmasked ones")
-    return array
-
-
-def _coordinates(points: Any) -> NDArray[Any]:
-    array = _array(points, "points")
-    if array.dtype.kind not in "iuf" or array.ndim != 2:
-        raise InputError(f"points must be an array of N×2 or N×3 numbers, got {array.dtype} of shape {array.shape}")
-    if array.shape[1] not in (2, 3) and array.shape[0] in (2, 3):
-        raise InputError(f"points must be N×2 or N×3, got shape {array.shape}: give points.T")
-    return array
+def _known(kind: Any) -> str:
+    """The name of a type of cells. Raises InputError where it is none, for any other would count as volumes."""
+    if isinstance(kind, str) and KIND.fullmatch(kind):
+        return kind
+    near = difflib.get_close_matches(str(kind).lower(), NODES, n=2, cutoff=0.5)
+    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known are {', '.join(NODES)}"
+    raise InputError(f"unknown type of cells {kind!r}; {hint}")
 
 
 def _back(points: Any) -> Callable[[NDArray[np.float64]], NDArray[Any]]:
@@ -271,7 +265,7 @@ def _face(kind: str, nodes: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
 
 def _members(ids: Any, count: int, name: str) -> NDArray[np.int64]:
     """The ids of a named set, which may be a mask."""
-    array = np.zeros(0, dtype=np.int64) if ids is None else np.ravel(_array(ids, f"set {name!r}"))
+    array = np.zeros(0, dtype=np.int64) if ids is None else np.ravel(plain_array(ids, f"set {name!r}"))
     if array.dtype.kind == "b" and len(array) == count:
         return np.flatnonzero(array)
     members = _indices(array, f"set {name!r}")
