@@ -42,7 +42,7 @@ def combined(fields: Sequence[NDArray[Any]], count: int) -> NDArray[np.int64]:
     """(count,) one number per cell, equal for two cells where all fields (count, …) are.
 
     0 without a field. One field of whole numbers gives its own numbers. Else the distinct values, of several fields the
-    distinct combinations, are counted from 1.
+    distinct combinations, are counted from 1. Values count, not their spelling in a file: ``1`` and ``1.0`` are equal.
     """
     if not fields or not count:
         return np.zeros(count, dtype=np.int64)
