@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gmsnet.errors import FormatError, InputError
-from gmsnet.io import FORMATS, atomic, read, write
+from gmsnet.io import FORMATS, atomic, read, streams, write
 from gmsnet.io.formats import sniff
 from gmsnet.mesh import CellBlock, Mesh
 
@@ -202,6 +202,74 @@ def test_permissions_of_a_target_are_kept(su2: Path, tmp_path: Path) -> None:
         os.umask(old)
     assert stat.S_IMODE((tmp_path / "new.su2").stat().st_mode) == 0o640
     assert names(tmp_path) == ["grid.su2", "new.su2"]
+
+
+def test_a_private_mesh_is_never_readable_by_others(su2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    su2.chmod(0o600)
+    modes, sync = [], os.fsync
+
+    def look(descriptor: int) -> None:
+        modes.append(
+            stat.S_IMODE(os.fstat(descriptor).st_mode) if stat.S_ISREG(os.fstat(descriptor).st_mode) else 0o600
+        )
+        sync(descriptor)
+
+    made, open_file = [], os.open
+
+    def opened(path: str, flags: int, mode: int = 0o777, **others: int) -> int:
+        descriptor = open_file(path, flags, mode, **others)
+        if flags & os.O_CREAT:
+            made.append(stat.S_IMODE(os.fstat(descriptor).st_mode))
+        return descriptor
+
+    moved = nudged(read(su2))
+    monkeypatch.setattr(atomic.os, "open", opened)
+    monkeypatch.setattr(atomic.os, "fsync", look)
+    write(moved, su2)
+    assert made == [0o600]
+    assert set(modes) == {0o600}
+    su2.chmod(0o644)
+    write(moved, su2)
+    assert made == [0o600, 0o600]
+    assert stat.S_IMODE(su2.stat().st_mode) == 0o644
+
+
+def test_a_pipe_that_nobody_reads_is_a_broken_pipe(su2: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Gone(io.BytesIO):
+        def write(self, data: object) -> int:
+            raise BrokenPipeError(32, os.strerror(32))
+
+    class Output:
+        buffer = Gone()
+
+    monkeypatch.setattr(sys, "stdout", Output())
+    with pytest.raises(BrokenPipeError):
+        write(read(su2), "-")
+
+
+def test_what_is_the_standard_output(su2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert all(streams.is_standard_output(name) for name in streams.STANDARD_OUTPUT)
+    with su2.open("rb") as file:
+        status = os.fstat(file.fileno())
+    monkeypatch.setattr(streams.os, "fstat", lambda descriptor: status)
+    (tmp_path / "link.su2").symlink_to(su2)
+    assert streams.is_standard_output(str(su2))
+    assert streams.is_standard_output(str(tmp_path / "link.su2"))
+    assert not streams.is_standard_output(str(tmp_path))
+    assert not streams.is_standard_output(str(tmp_path / "new.su2"))
+    nowhere = os.stat(os.devnull)
+    monkeypatch.setattr(streams.os, "fstat", lambda descriptor: nowhere)
+    assert not streams.is_standard_output(os.devnull)
+
+
+def test_closed_streams_are_an_error_in_words(su2: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = read(su2)
+    monkeypatch.setattr(sys, "stdin", None)
+    monkeypatch.setattr(sys, "stdout", None)
+    with pytest.raises(InputError, match="standard input: it is closed; give the name of a file"):
+        read("-")
+    with pytest.raises(InputError, match="standard output: it is closed; give the name of a file"):
+        write(mesh, "-")
 
 
 def test_a_link_is_followed(su2: Path, tmp_path: Path) -> None:

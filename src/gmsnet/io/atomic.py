@@ -6,9 +6,11 @@ import contextlib
 import os
 import secrets
 import stat
+import tempfile
 from collections.abc import Mapping
 
 from gmsnet.errors import InputError
+from gmsnet.io.streams import is_special
 
 
 def replace_files(files: Mapping[str, bytes]) -> None:
@@ -16,15 +18,15 @@ def replace_files(files: Mapping[str, bytes]) -> None:
     only when all of them have done so are the targets replaced.
 
     A link is followed, an existing file keeps its permissions. What is no regular file (a pipe, a device) is written
-    straight. Raises InputError where a target cannot be written; then, as after any other interruption, no temporary
-    file is left and no target is half-written.
+    straight. Raises InputError where a target cannot be written, BrokenPipeError where nobody reads a pipe any more;
+    then, as after any other interruption, no temporary file is left and no target is half-written.
     """
     temporary: list[tuple[str, str]] = []
     try:
         for path, data in files.items():
             try:
                 _check(path)
-                if _is_special(path):
+                if is_special(path):
                     with open(path, "wb") as stream:
                         stream.write(data)
                 else:
@@ -32,6 +34,8 @@ def replace_files(files: Mapping[str, bytes]) -> None:
                     name = os.path.join(os.path.dirname(target), f".gmsnet-{secrets.token_hex(6)}.tmp")
                     temporary.append((name, target))
                     _write(name, target, data)
+            except BrokenPipeError:  # no fault of the user's
+                raise
             except OSError as error:
                 raise InputError(f"{path}: cannot be written: {reason(error)}") from None
         for name, target in temporary:
@@ -53,28 +57,47 @@ def reason(error: OSError) -> str:
     return text[:1].lower() + text[1:]
 
 
-def _is_special(path: str) -> bool:
-    """Whether a path leads to something that exists and is no regular file."""
-    return os.path.exists(path) and not os.path.isfile(path)
+def refuse_folder(path: str) -> None:
+    """InputError where a path leads to a folder."""
+    if os.path.isdir(path) or path.endswith(("/", os.sep)):
+        raise InputError(f"{path}: this is a folder; give the name of a file")
+
+
+def check_writable(path: str) -> None:
+    """Raises now what ``replace_files`` would raise after the work, found out by making a file beside the target."""
+    _check(path)
+    if is_special(path):
+        return
+    folder = os.path.dirname(os.path.realpath(path))
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(f"{path}: nothing can be written in {folder}: {reason(error)}") from None
 
 
 def _check(path: str) -> None:
-    folder = os.path.dirname(os.path.realpath(path))
-    if os.path.isdir(path) or path.endswith(("/", os.sep)):
-        raise InputError(f"{path}: this is a folder; give the name of a file")
-    if _is_special(path):
+    refuse_folder(path)
+    if is_special(path):
         return
+    folder = os.path.dirname(os.path.realpath(path))
+    if os.path.exists(folder) and not os.path.isdir(folder):
+        raise InputError(f"{path}: {folder} is not a folder")
     if not os.path.isdir(folder):
         raise InputError(f"{path}: the folder {folder} does not exist; make it first")
     if os.path.exists(path) and not os.access(path, os.W_OK):
-        raise InputError(f"{path}: the file is write-protected")
+        raise InputError(f"{path}: the file is write-protected; name another output")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(f"{path}: the folder {folder} is write-protected")
 
 
 def _write(name: str, target: str, data: bytes) -> None:
-    """A new file with the permissions and owner of the target, if that exists, on the disk when this returns."""
-    descriptor = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    """A new file with the permissions and owner of the target, if that exists, on the disk when this returns.
+
+    Until it has them nobody else may open it: the target may be private.
+    """
+    mode = 0o600 if os.path.exists(target) else 0o666  # less what the umask or the folder takes away
+    descriptor = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), mode)
     with os.fdopen(descriptor, "wb") as stream:
         stream.write(data)
         stream.flush()

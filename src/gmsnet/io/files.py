@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 
 from gmsnet.errors import FormatError, InputError
-from gmsnet.io.atomic import reason, replace_files
+from gmsnet.io.atomic import reason, refuse_folder, replace_files
 from gmsnet.io.document import Parsed
 from gmsnet.io.formats import FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
 from gmsnet.io.splice import FileSource
+from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_input, standard_output
 from gmsnet.mesh import Mesh
-
-STANDARD_INPUT = ("-", "/dev/stdin")
-STANDARD_OUTPUT = ("-", "/dev/stdout")
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
@@ -44,9 +41,8 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
 
 def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, bytes]]:
     """The format and the bytes of each file of the mesh by suffix."""
-    stream = name in STANDARD_INPUT or _is_stream(name)
-    if os.path.isdir(name):
-        raise InputError(f"{name}: this is a folder; give the name of a file")
+    stream = name in STANDARD_INPUT or is_special(name)
+    refuse_folder(name)
     if not stream and not os.path.exists(name):
         raise InputError(f"{name}: there is no such file")
     if format is None and stream:
@@ -64,15 +60,10 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, b
     return entry, {suffix: _bytes(_beside(name, suffix)) for suffix in entry.suffixes}
 
 
-def _is_stream(name: str) -> bool:
-    """Whether a path leads to a pipe or a device."""
-    return os.path.exists(name) and not os.path.isfile(name) and not os.path.isdir(name)
-
-
 def _bytes(name: str) -> bytes:
     try:
         if name in STANDARD_INPUT:
-            return sys.stdin.buffer.read()
+            return standard_input().read()
         with open(name, "rb") as stream:
             return stream.read()
     except FileNotFoundError:
@@ -128,18 +119,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     Raises InputError where the file cannot be written, FormatError where the format cannot hold the mesh.
     """
     name = os.fspath(path)
-    stream = name in STANDARD_OUTPUT or _is_stream(name)
     shown = "standard output" if name in STANDARD_OUTPUT else name
-    if os.path.isdir(name):
-        raise InputError(f"{name}: this is a folder; give the name of a file")
-    if format is not None:
-        entry = entry_of(format)
-    elif stream and mesh.source is not None:
-        entry = entry_of(mesh.source.format)
-    elif stream:
-        raise InputError(f"{shown}: name the format with --format ({', '.join(FORMATS)})")
-    else:
-        entry = FORMATS[format_of_suffix(name, os.path.splitext(name)[1])]
+    entry = output_format(mesh, name, format)
     source = mesh.source
     lost: list[str] = []
     try:
@@ -152,8 +133,6 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
         raise InputError(f"{shown}: there is not enough memory to write this mesh") from None
     except InputError as error:
         raise FormatError(f"{shown}: {error}") from None
-    if len(files) > 1 and stream:
-        raise InputError(f"{shown}: {entry.title} takes several files and cannot be written to a stream")
     if name in STANDARD_OUTPUT:
         _to_standard_output(*files.values())
     elif len(files) > 1:
@@ -163,9 +142,35 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     return lost
 
 
+def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
+    """The format that ``write`` takes. Raises the InputErrors of ``write`` that do not need the conversion."""
+    stream = path in STANDARD_OUTPUT or is_special(path)
+    shown = "standard output" if path in STANDARD_OUTPUT else path
+    refuse_folder(path)
+    if format is not None:
+        entry = entry_of(format)
+    elif stream and mesh.source is not None:
+        entry = entry_of(mesh.source.format)
+    elif stream:
+        raise InputError(f"{shown}: name the format with --format ({', '.join(FORMATS)})")
+    else:
+        entry = FORMATS[format_of_suffix(path, os.path.splitext(path)[1], reading=False)]
+    if stream and len(entry.suffixes) > 1:
+        raise InputError(f"{shown}: {entry.title} takes several files and cannot be written to a stream")
+    return entry
+
+
+def files_of(name: str, entry: Entry) -> list[str]:
+    """The files that a mesh of this name and format stands in: more than one where its format says so."""
+    return [name] if len(entry.suffixes) == 1 else [_beside(name, suffix) for suffix in entry.suffixes]
+
+
 def _to_standard_output(data: bytes) -> None:
+    stream = standard_output()
     try:
-        sys.stdout.buffer.write(data)
-        sys.stdout.buffer.flush()
+        stream.write(data)
+        stream.flush()
+    except BrokenPipeError:  # nobody reads any more: no fault of the user's
+        raise
     except OSError as error:
         raise InputError(f"standard output: cannot be written: {reason(error)}") from None

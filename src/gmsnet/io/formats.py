@@ -92,14 +92,17 @@ def entry_of(key: str) -> Entry:
     return FORMATS[key.lower()]
 
 
-def format_of_suffix(path: str, suffix: str) -> str:
-    """The name of the format that goes by a suffix. Raises InputError naming the file and the known suffixes."""
+def format_of_suffix(path: str, suffix: str, option: str = "--format", reading: bool = True) -> str:
+    """The name of the format that goes by a suffix. Raises InputError naming the file and the known suffixes.
+
+    option: that names the format where the suffix does not. reading: an existing file, not one to be written.
+    """
     if suffix.lower() in BY_SUFFIX:
         return BY_SUFFIX[suffix.lower()]
-    if suffix.lower() in MENDS:
+    if reading and suffix.lower() in MENDS:
         raise InputError(f"{path}: {MENDS[suffix.lower()]}")
     what = f"the suffix {suffix!r} is unknown" if suffix else "the name has no suffix"
-    raise InputError(f"{path}: {what}; known are {known()}; or name the format with --format")
+    raise InputError(f"{path}: {what}; known are {known()}; or name the format with {option}")
 
 
 def sniff(data: bytes) -> str | None:
