@@ -129,6 +129,18 @@ def test_other_cells_are_shown_too(tmp_path):
     assert [len(each.get_paths()) for each in collections] == [1, 2]
 
 
+def test_the_mesh_after_is_wound_as_the_mesh_before(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(plot, "_save", lambda views, path: drawn.extend(views))
+    points = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])
+    before = Mesh(points, (CellBlock("triangle", np.array([[0, 1, 2], [1, 3, 2]]), np.zeros(2)),))
+    plot.plot_smoothing(before, before.with_points(points * [-1, 1]), tmp_path / "p.png")
+    assert [each.report.valid.tolist() for each in drawn] == [[1, 1], [-1, -1]]
+    other = Mesh(points, (CellBlock("triangle", np.array([[0, 1, 2]]), np.zeros(1)),))
+    with pytest.raises(InputError, match="two meshes of the same cells"):
+        plot.plot_smoothing(before, other, tmp_path / "p.png")
+
+
 @pytest.mark.long
 def test_a_hundred_thousand_cells(tmp_path):
     mesh = random_mesh(50_000, seed=1)
@@ -172,6 +184,8 @@ def test_without_matplotlib_the_command_to_install_it_is_named(monkeypatch):
     monkeypatch.setattr(sys, "meta_path", [Missing(), *sys.meta_path])
     with pytest.raises(MissingExtraError, match=r'pip install "gmsnet\[view\]"'):
         plot.check_target("p.png")
+    with pytest.raises(MissingExtraError, match=r'pip install "gmsnet\[view\]"'):
+        plot.new_figure(1.0, 1.0)
 
 
 def test_no_global_state_and_no_display(tmp_path):

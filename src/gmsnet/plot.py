@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from gmsnet.errors import InputError, MissingExtraError
 from gmsnet.io.atomic import replace_files
 from gmsnet.measure import QualityReport, measure
-from gmsnet.mesh import CORNERS, Mesh
+from gmsnet.mesh import CORNERS, CellBlock, Mesh
+from gmsnet.topology import Topology
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,14 +46,19 @@ def plot_smoothing(before: Mesh, after: Mesh, path: str | os.PathLike[str]) -> N
 
     Cells are coloured by 1/q. Where cells are too small to be seen in the whole, a second row shows the surroundings
     of the cell that was worst before. path: ``.png``, ``.svg`` or ``.pdf``.
-    Raises InputError for another suffix, for meshes that are not planar or have no triangles, and where the file
-    cannot be written; MissingExtraError where matplotlib is not installed.
+    Raises InputError for another suffix, for meshes that are not planar or have no triangles, for two meshes of
+    different cells, and where the file cannot be written; MissingExtraError where matplotlib is not installed.
     """
-    _save([_View.of(before, "before", BEFORE), _View.of(after, "after", AFTER)], Path(path))
+    if [block.nodes.tobytes() for block in before.cells] != [block.nodes.tobytes() for block in after.cells]:
+        raise InputError("a picture of before and after needs two meshes of the same cells")
+    check_mesh(before)
+    topology = Topology.of(before)  # wound as before, a cell that has turned over since is drawn as inverted
+    _save([_View.of(before, "before", BEFORE, topology), _View.of(after, "after", AFTER, topology)], Path(path))
 
 
 def plot_quality(mesh: Mesh, path: str | os.PathLike[str]) -> None:
     """Write a picture of one mesh and its quality; see plot_smoothing."""
+    check_mesh(mesh)
     _save([_View.of(mesh, "", AFTER)], Path(path))
 
 
@@ -62,12 +68,36 @@ def check_target(path: str | os.PathLike[str]) -> None:
     if suffix not in SUFFIXES:
         shown = f"the suffix {suffix!r}" if suffix else "no suffix"
         raise InputError(f"{path}: a picture cannot have {shown}: name it .png, .svg or .pdf")
+    _need_matplotlib()
+
+
+def check_mesh(mesh: Mesh) -> None:
+    """Raise what plotting this mesh would raise, before any work: InputError unless it is planar and has triangles."""
+    if mesh.plane is None:
+        raise InputError("a picture shows planar meshes only, and this one varies in x, y and z")
+    if not any(_is_triangular(block) and len(block.nodes) for block in mesh.cells):
+        raise InputError("a picture shows the quality of triangles, and this mesh has none")
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure, in inches, that needs no display. MissingExtraError where matplotlib is not installed."""
+    _need_matplotlib()
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _need_matplotlib() -> None:
     try:
         import matplotlib  # noqa: F401
     except ModuleNotFoundError as error:
         if error.name != "matplotlib":
             raise
         raise MissingExtraError('pictures need matplotlib: pip install "gmsnet[view]"') from error
+
+
+def _is_triangular(block: CellBlock) -> bool:
+    return block.dimension == 2 and CORNERS.get(block.kind) == 3
 
 
 @dataclass(frozen=True)
@@ -83,26 +113,22 @@ class _View:
     lines: NDArray[np.int64]
 
     @classmethod
-    def of(cls, mesh: Mesh, title: str, colour: str) -> _View:
-        if mesh.plane is None:
-            raise InputError("a picture shows planar meshes only, and this one varies in x, y and z")
+    def of(cls, mesh: Mesh, title: str, colour: str, topology: Topology | None = None) -> _View:
+        assert mesh.plane is not None
         triangles, others, lines = [], [], []
         for block in mesh.cells:
-            corners = CORNERS.get(block.kind, block.nodes.shape[1])
-            if block.dimension == 2 and corners == 3:
+            if _is_triangular(block):
                 triangles.append(block.nodes[:, :3])
             elif block.dimension == 2 and len(block.nodes):
-                others.append(block.nodes[:, :corners])
+                others.append(block.nodes[:, : CORNERS.get(block.kind, block.nodes.shape[1])])
             elif block.dimension == 1:
                 lines.append(block.nodes[:, :2])
-        if not sum(map(len, triangles)):
-            raise InputError("a picture shows the quality of triangles, and this mesh has none")
         return cls(
             title,
             colour,
             mesh.points[:, list(mesh.plane)],
             np.concatenate(triangles),
-            measure(mesh),
+            measure(mesh, topology),
             others,
             np.concatenate([np.zeros((0, 2), dtype=np.int64), *lines]),
         )
@@ -131,7 +157,6 @@ def _save(views: list[_View], path: Path) -> None:
 
 
 def _figure(views: list[_View]) -> Figure:
-    from matplotlib.figure import Figure
     from matplotlib.gridspec import GridSpec
 
     box = np.stack([np.min([v.box[0] for v in views], axis=0), np.max([v.box[1] for v in views], axis=0)])
@@ -145,7 +170,7 @@ def _figure(views: list[_View]) -> Figure:
     if window is not None and (alone or len(views) == 2):
         rows.append(PANEL)
     rows.append(2.0)
-    figure = Figure(figsize=(2 * PANEL + 1.4, sum(rows) + 0.45 * len(rows)), layout="constrained")
+    figure = new_figure(2 * PANEL + 1.4, sum(rows) + 0.45 * len(rows))
     grid = GridSpec(len(rows), 2, figure=figure, height_ratios=rows)
     places: list[tuple[int, int | slice]] = (
         [(row, slice(None)) for row in range(len(views))] if alone else [(0, column) for column in range(2)]

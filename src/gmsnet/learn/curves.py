@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 
-from gmsnet.plot import check_target
+from gmsnet.plot import check_target, new_figure
 
 HEADER = "epoch,train_loss,validation_loss,learning_rate\n"
 
@@ -23,9 +23,7 @@ def check_plotting() -> None:
 
 def png_bytes(history: Sequence[tuple[float, float, float]], marks: Mapping[str, float]) -> bytes:
     """Both curves over the epochs, and the marks as horizontal lines."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
+    figure = new_figure(7.0, 4.2)
     axes = figure.add_subplot()
     epochs = range(1, len(history) + 1)
     axes.plot(epochs, [row[0] for row in history], color="#e0a800", linewidth=0.5, label="training (drawn nodes)")
