@@ -36,8 +36,8 @@ class Outcome:
 
     @property
     def target_met(self) -> bool:
-        """Whether the target quality, if any was asked for, is reached."""
-        return self.target is None or self.result.stop_reason == engine.TARGET_REACHED or self.least >= self.target
+        """Whether the cells as they are now reach the target quality, if any was asked for."""
+        return self.target is None or self.least >= self.target
 
     def shortfall(self) -> str:
         """By how much the target is missed, and by which cells."""
@@ -85,7 +85,7 @@ class Outcome:
             return f"nothing to move: all {report.amount(len(self.mesh.points), 'node')} are held ({self._reasons()})"
         run = f"{self.method}, {report.amount(result.sweeps, 'sweep')} in {result.seconds:.3g} s: {result.stop_reason}"
         if not result.moved.any():
-            if result.stop_reason == engine.TARGET_REACHED:
+            if result.stop_reason == engine.TARGET_REACHED and self.target_met:
                 return "nothing was moved: the target is met already"
             return f"no gain: no mesh on the way was better than the input ({run})"
         return f"{int(result.moved.sum()):,} of {report.amount(self.free, 'free node')} moved ({run})"
