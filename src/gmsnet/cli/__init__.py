@@ -5,6 +5,8 @@ Nothing heavy is imported before a subcommand runs, so that help and completion 
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -13,6 +15,7 @@ from typing import Annotated
 import typer
 
 from gmsnet.cli import generate, methods, quality, smooth, train
+from gmsnet.cli.signals import Interrupted
 from gmsnet.errors import GmsnetError
 
 DONE, TARGET_NOT_MET, BAD_INPUT = 0, 1, 2
@@ -58,21 +61,27 @@ def _gmsnet(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0, 1, 2; 130 interrupted, 141 broken pipe, 70 a bug of ours."""
+    _open_what_is_closed()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a name that the terminal cannot show must not end the run
             stream.reconfigure(errors="backslashreplace")
     try:
         code = app(arguments, prog_name="gmsnet", standalone_mode=False)
         sys.stdout.flush()
-    except (SystemExit, GmsnetError, UsageError, OSError) as error:
-        if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
+    except SystemExit as error:
+        if isinstance(error.__context__, BrokenPipeError):  # Typer makes an exit of it
             return _close_pipe()
-        if isinstance(error, SystemExit):
-            raise
+        if isinstance(error.code, int):
+            return error.code
+        raise
+    except BrokenPipeError:
+        return _close_pipe()
+    except (GmsnetError, UsageError, OSError) as error:
         return _fail(error.format_message() if isinstance(error, UsageError) else _describe(error))  # type: ignore[attr-defined]
+    except Interrupted as interruption:
+        return _interrupted(str(interruption))
     except (KeyboardInterrupt, typer.Abort):
-        print("gmsnet: interrupted", file=sys.stderr)
-        return INTERRUPTED
+        return _interrupted("interrupted; nothing was written")
     except Exception as error:
         if os.environ.get("GMSNET_DEBUG"):
             raise
@@ -82,7 +91,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
             file=sys.stderr,
         )
         return BUG
+    if code == INTERRUPTED:  # Typer swallows KeyboardInterrupt
+        return _interrupted("interrupted; nothing was written")
     return code if isinstance(code, int) else DONE
+
+
+def _open_what_is_closed() -> None:
+    """Where the caller closed a standard stream, what is printed goes nowhere, and no file gets the stream's number."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
+    if sys.stdout is None:
+        sys.stdout = io.StringIO()
+    if sys.stderr is None:
+        sys.stderr = io.StringIO()
+
+
+def _interrupted(message: str) -> int:
+    print(f"gmsnet: {message}", file=sys.stderr)
+    return INTERRUPTED
 
 
 def _describe(error: Exception) -> str:
@@ -98,5 +127,6 @@ def _fail(message: str) -> int:
 
 def _close_pipe() -> int:
     """The reader of our output went away: that is no error, and Python shall not complain when it flushes at exit."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    with contextlib.suppress(io.UnsupportedOperation):  # a stream in memory has nothing to flush to
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return BROKEN_PIPE

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -10,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from gmsnet.cli.signals import Deferral, Interrupted
 
 if TYPE_CHECKING:
     from gmsnet.learn.options import TrainOptions
@@ -43,15 +44,18 @@ def train(
     options = _options(context, out, resume=resume)
     check_folder(options, out, resume=resume)
     typer.echo(f"{options.command}: H = {options.hidden}, {options.epochs:,} epochs, into {out}", err=True)
-    with _stop_on_signal() as should_stop, _bar(options.epochs) as on_epoch:
-        result = run(options, out, resume=resume, on_epoch=on_epoch, should_stop=should_stop)
+    try:
+        with _stop_on_signal() as should_stop, _bar(options.epochs) as on_epoch:
+            result = run(options, out, resume=resume, on_epoch=on_epoch, should_stop=should_stop)
+    except KeyboardInterrupt:
+        raise Interrupted(f"interrupted; what {out} holds is that of the last checkpoint, if there was one") from None
     if not result.finished:
         typer.echo(
             f"stopped after {result.epochs:,} of {options.epochs:,} epochs (validation loss so far "
             f"{result.losses['validation_loss']:.4f}); go on with: gmsnet train --resume --out {out}",
             err=True,
         )
-        raise typer.Exit(STOPPED)
+        raise SystemExit(STOPPED)  # Typer itself gives this code to an interruption that nothing was said about
     _report(result)
 
 
@@ -75,19 +79,9 @@ def _is_given(context: typer.Context, name: str) -> bool:
 @contextmanager
 def _stop_on_signal() -> Iterator[Callable[[], bool]]:
     """Ctrl-C and SIGTERM end the training after the current epoch; a second one ends it at once."""
-    caught: list[int] = []
-
-    def handle(number: int, frame: object) -> None:
-        if caught:
-            raise KeyboardInterrupt
-        caught.append(number)
-
-    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield lambda: bool(caught)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with Deferral() as deferral:
+        deferral.begin()
+        yield lambda: deferral.caught
 
 
 @contextmanager

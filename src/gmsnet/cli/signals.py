@@ -1,0 +1,49 @@
+"""Ctrl-C and SIGTERM: until when they end a command at once, and from when on what it has is written first."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from types import FrameType, TracebackType
+from typing import Any
+
+
+class Interrupted(Exception):
+    """A command was interrupted after it had written something; the message says what. Exit code 130."""
+
+
+class Deferral:
+    """A context manager. From ``begin`` to ``end`` (its own end at the latest) Ctrl-C and SIGTERM only set ``caught``.
+
+    A second one raises KeyboardInterrupt at once. Signals that the caller ignores (``nohup``) stay ignored.
+    """
+
+    def __init__(self) -> None:
+        self.caught = False
+        self._before: dict[signal.Signals, Any] = {}
+
+    def __enter__(self) -> Deferral:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, at: TracebackType | None) -> None:
+        self.end()
+
+    def begin(self) -> None:
+        """From now on there is something to lose; it may be said more than once."""
+        if self._before or threading.current_thread() is not threading.main_thread():
+            return  # Python calls handlers in the main thread, and only there they can be set
+        for number in (signal.SIGINT, signal.SIGTERM):
+            handler = signal.getsignal(number)
+            if handler not in (signal.SIG_IGN, None):
+                self._before[number] = handler
+                signal.signal(number, self._handle)
+
+    def end(self) -> None:
+        """Signals mean again what they meant before."""
+        while self._before:
+            signal.signal(*self._before.popitem())
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        if self.caught:
+            raise KeyboardInterrupt
+        self.caught = True
