@@ -110,6 +110,12 @@ BAD_USAGE = [  # arguments after ``smooth``, what the message must hold; {in} is
     (["{in}", "{dir}/out.su2", "--plot", "{dir}/nowhere/p.png"], ["nowhere", "does not exist"]),
     (["{in}", "{dir}/out.png", "--output-format", "su2", "--plot", "{dir}/out.png"], ["overwrite the mesh"]),
     (["{in}", "-", "--json"], ["--json", "standard output"]),
+    (["{in}", "/dev/stdout", "--json"], ["--json", "standard output"]),
+    (["{in}", "/dev/fd/1", "--json"], ["--json", "standard output"]),
+    (["{dir}/pair.node", "-"], ["Triangle takes several files"]),
+    (["{in}", "-", "--output-format", "triangle"], ["standard output", "Triangle takes several files"]),
+    (["{in}", "{dir}/out.gz"], ["'.gz' is unknown", "--output-format"]),
+    (["{in}", "{dir}/symbolic.png", "--output-format", "su2", "--plot", "{dir}/new.png"], ["overwrite the mesh"]),
     (["{in}", "{dir}/out.su2", "--sweeps", "3"], ["No such option", "--sweeps"]),
     ([], ["Missing argument 'IN'"]),
 ]
@@ -120,6 +126,8 @@ def folder(tmp_path, square):
     for name, made in FILES.items():
         (tmp_path / name).write_bytes(made(square.read_bytes()))
     (tmp_path / "symbolic.su2").symlink_to(square)
+    (tmp_path / "symbolic.png").symlink_to(tmp_path / "new.png")
+    (tmp_path / "input.png").symlink_to(square)
     os.link(square, tmp_path / "hard.su2")
     (tmp_path / "pair.node").write_text("3 2 0 0\n1 0 0\n2 1 0\n3 0 1\n")
     (tmp_path / "pair.ele").write_text("1 3 0\n1 1 2 3\n")
@@ -182,6 +190,13 @@ def test_a_format_that_cannot_hold_the_cells_is_found_before_the_smoothing(run, 
     monkeypatch.setattr("gmsnet.engine.smooth", never)
     before = contents(folder)
     check(run("smooth", quads, folder / "out.stl"), folder, before, ["out.stl", "STL"])
+
+
+@pytest.mark.parametrize("command", [["quality", "{in}"], ["smooth", "{in}", "{dir}/out.su2"]])
+def test_a_picture_over_the_input(run, folder, command):
+    before = contents(folder)
+    given = [each.replace("{in}", str(folder / "square.su2")).replace("{dir}", str(folder)) for each in command]
+    check(run(*given, "--plot", folder / "input.png"), folder, before, ["input.png", "overwrite the mesh"])
 
 
 @pytest.mark.parametrize("value", ["2", "-1.5", "nan"])

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 
 import pytest
+
+from gmsnet.io import read
 
 HEAVY = ("numpy", "scipy", "numba", "meshlane", "torch", "matplotlib", "pyvista", "safetensors")
 GMSNET = [sys.executable, "-m", "gmsnet"]
@@ -56,6 +59,99 @@ def test_pipes(square, tmp_path):
     assert b"\x1b" not in done.stderr
     quality = gmsnet("quality", "-", "--json", input=done.stdout)
     assert json.loads(quality.stdout)["inverted"] == 0
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/fd/1"), reason="this system does not name its streams")
+@pytest.mark.parametrize("name", ["/dev/stdout", "/dev/fd/1", "{file}"])
+def test_what_is_said_does_not_mix_with_a_mesh_on_standard_output(run, square, tmp_path, name):
+    assert run("smooth", square, tmp_path / "out.su2", "--quiet").code == 0
+    mixed = tmp_path / "mixed.su2"
+    with mixed.open("wb") as stdout:
+        command = [*GMSNET, "smooth", square, name.replace("{file}", str(mixed))]
+        done = subprocess.run(command, stdout=stdout, stderr=subprocess.PIPE, env=PLAIN, check=False)
+    assert done.returncode == 0
+    assert b"q-hat" in done.stderr
+    assert mixed.read_bytes() == (tmp_path / "out.su2").read_bytes()
+    assert {path.name for path in tmp_path.iterdir()} == {"square.su2", "out.su2", "mixed.su2"}
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/fd/1"), reason="this system does not name its streams")
+def test_a_generated_mesh_on_standard_output_is_alone_there():
+    done = gmsnet("generate", "/dev/fd/1", "--nodes", "9", "--format", "su2")
+    assert done.returncode == 0
+    assert done.stdout.startswith(b"NDIME")
+    assert b"boundary edges" not in done.stdout
+    assert b"boundary edges" in done.stderr
+
+
+def closed(*numbers):
+    """Options of ``subprocess`` that close standard streams in the new process."""
+
+    def close():
+        for number in numbers:
+            os.close(number)
+
+    return {"preexec_fn": close}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="only POSIX systems start a process with closed streams")
+@pytest.mark.parametrize("numbers", [(1,), (0, 1, 2)])
+def test_closed_streams_swallow_what_is_printed(run, square, tmp_path, numbers):
+    assert gmsnet("smooth", square, tmp_path / "out.su2", **closed(*numbers)).returncode == 0
+    assert run("smooth", square, tmp_path / "expected.su2").code == 0
+    assert (tmp_path / "out.su2").read_bytes() == (tmp_path / "expected.su2").read_bytes()
+    done = gmsnet("smooth", tmp_path / "missing.su2", tmp_path / "new.su2", **closed(*numbers))
+    assert done.returncode == 2
+    assert (b"no such file" in done.stderr) is (2 not in numbers)
+    assert gmsnet("--help", **closed(*numbers)).returncode == 0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="only POSIX systems start a process with closed streams")
+def test_a_mesh_to_or_from_a_closed_stream_is_an_error(square, tmp_path):
+    done = gmsnet("smooth", square, "-", **closed(1))
+    assert (done.returncode, done.stderr.count(b"\n")) == (2, 1)
+    assert b"standard output: it is closed" in done.stderr
+    done = gmsnet("smooth", "-", tmp_path / "out.su2", **closed(0))
+    assert (done.returncode, done.stderr.count(b"\n")) == (2, 1)
+    assert b"standard input: it is closed" in done.stderr
+    assert not (tmp_path / "out.su2").exists()
+
+
+@pytest.mark.parametrize("wait_for", [b"reading", b"sweep"])
+def test_a_real_ctrl_c_writes_all_or_nothing_and_says_which(run, tmp_path, wait_for):
+    pty = pytest.importorskip("pty")
+    mesh, out = tmp_path / "in.vtk", tmp_path / "out.vtk"
+    assert run("generate", mesh, "--nodes", "40000", "--jitter", "1").code == 0
+    ours, theirs = pty.openpty()
+    command = [*GMSNET, "smooth", mesh, out, "--threads", "1", "--json"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, env={**PLAIN, "TERM": "xterm"})
+    os.close(theirs)
+    seen, sent = b"", False
+    while True:
+        try:
+            piece = os.read(ours, 65536)
+        except OSError:  # Linux says so when the other end is closed
+            break
+        if not piece:
+            break
+        seen += piece
+        if wait_for in seen and not sent:
+            process.send_signal(signal.SIGINT)
+            sent = True
+    said = process.stdout.read()
+    process.stdout.close()
+    os.close(ours)
+    assert sent
+    if process.wait() == 0:
+        assert len(read(out).points) == len(read(mesh).points)
+        assert json.loads(said)["output"] == str(out)
+        assert json.loads(run("quality", out, "--json").out)["inverted"] == 0
+    else:
+        assert (process.returncode, said) == (130, b"")
+        assert b"interrupted; nothing was written" in seen
+        assert b"Traceback" not in seen
+        assert not out.exists()
+    assert {path.name for path in tmp_path.iterdir()} <= {"in.vtk", "out.vtk"}
 
 
 def test_errors_have_no_traceback(tmp_path):

@@ -38,6 +38,7 @@ def generate(
     from gmsnet.errors import InputError
     from gmsnet.generate import disturb, random_mesh
     from gmsnet.io import write
+    from gmsnet.io.streams import is_standard_output
 
     if tangled and not jitter:
         raise InputError("--tangled needs --jitter: how far may nodes be thrown?")
@@ -50,11 +51,12 @@ def generate(
         inner = np.ones(len(mesh.points), dtype=bool)
         inner[lines.nodes] = False
         mesh = disturb(mesh, inner, jitter, seed=seed, keep_valid=not tangled)
+    aside = is_standard_output(out)  # where the mesh itself goes; a file is another one once it is replaced
     lost = write(mesh, out, format)
-    aside = out == "-"  # then the mesh itself goes to the standard output
     typer.echo(
-        f"{'standard output' if aside else out}: {shape if rings is None else rings} with {len(mesh.points):,} nodes, "
-        f"{len(triangles.nodes):,} triangles and {len(lines.nodes):,} boundary edges (seed {seed})",
+        f"{'standard output' if out == '-' else out}: {shape if rings is None else rings} "
+        f"with {len(mesh.points):,} nodes, {len(triangles.nodes):,} triangles and {len(lines.nodes):,} boundary edges "
+        f"(seed {seed})",
         err=aside,
     )
     for loss in lost:

@@ -20,16 +20,12 @@ def quality(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
     """Measure the triangles of a mesh: angles, 1/q, 1/q_V, inverted cells, and where the worst ones are."""
-    from gmsnet.cli.target import check_writable, files_of, refuse_same, shown
+    from gmsnet.cli.target import check_drawable, check_picture, shown
 
     if threshold is not None and not -1.0 <= threshold <= 1.0:
         raise InputError(f"--threshold is a value of 1/q and must lie between -1 and 1, got {threshold:g}")
     if plot is not None:
-        from gmsnet.plot import check_target
-
-        check_target(plot)
-        refuse_same(files_of(input), [plot])
-        check_writable(plot)
+        check_picture(plot, input)
 
     from gmsnet import io
     from gmsnet.cli import output, report
@@ -41,6 +37,8 @@ def quality(
         raise InputError(
             f"{input}: this is a volume mesh ({', '.join(volumes)}): only triangles can be measured so far"
         )
+    if plot is not None:
+        check_drawable(mesh, input)
     found = measure(mesh)
     worst = report.worst_cells(mesh, found)
     if plot is not None:

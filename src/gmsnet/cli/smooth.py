@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import os
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gmsnet.errors import InputError
+from gmsnet.cli.signals import Deferral, Interrupted
+from gmsnet.errors import GmsnetError, InputError
 
 if TYPE_CHECKING:
     from gmsnet.cli.target import Target
+    from gmsnet.engine import Sweep
     from gmsnet.mesh import Mesh
 
 
@@ -75,15 +77,15 @@ def smooth(
     becomes invalid. The result is never worse than the input. Formats are told by the suffix: .su2 .msh .vtk .vtu .mesh
     .node/.ele .stl .obj .off .ply; OUT of another format than IN is converted.
 
-    Ctrl-C stops the smoothing; the best mesh so far is written.
+    Ctrl-C stops the smoothing; the best mesh so far is written. A second one ends at once and writes nothing.
     """
-    from gmsnet.cli.target import STREAM, shown, target_of
+    from gmsnet.cli.target import check_drawable, check_picture, shown, target_of
 
-    if json and output == STREAM:
-        raise InputError("--json and OUT - both want the standard output: write the mesh to a file")
     target = target_of(input, output, in_place, output_format)
+    if json and target.aside:
+        raise InputError(f"--json and the output {target.path} both want the standard output: write the mesh elsewhere")
     if plot is not None:
-        _check_picture(plot, input, target)
+        check_picture(plot, input, target)
 
     # Heavy imports only now, when the command line is known to be in order.
     from gmsnet import io
@@ -95,64 +97,84 @@ def smooth(
     from gmsnet.methods import method_named
 
     method_named(method)
-    with Progress(max_sweeps, enabled=not quiet) as progress:
-        progress.stage(f"reading {shown(input)}")
-        mesh = io.read(input, format)
-        try:
-            refuse_unless_planar(mesh)
-        except InputError as error:
-            raise InputError(f"{shown(input)}: {error}") from error
-        fixed = fixed_nodes(mesh, fix or [])
-        _check_conversion(mesh, target)
-        progress.stage("preparing (the first run compiles: up to half a minute)")
-        result = run(
-            mesh,
-            method,
-            max_sweeps=max_sweeps,
-            threads=threads,
-            target_quality=target_quality,
-            fixed=fixed,
-            seed=seed,
-            weights=weights,
-            callback=progress.sweep,
-        )
-        lost: list[str] = []
-        unchanged = in_place and not result.moved.any()  # then there is nothing to write
-        if not unchanged:
-            progress.stage(f"writing {target.path}")
-            lost = io.write(result.mesh, target.path, target.format)
-        if plot is not None:
-            from gmsnet.plot import plot_smoothing
+    written: str | None = None
+    lost: list[str] = []
+    try:
+        with Progress(max_sweeps, enabled=not quiet) as progress, Deferral() as interruption:
 
-            progress.stage(f"drawing {plot}")
-            plot_smoothing(mesh, result.mesh, plot)
+            def after_sweep(sweep: Sweep) -> None:
+                interruption.begin()  # from now on there is something to lose
+                progress.sweep(sweep)
+                if interruption.caught:
+                    raise KeyboardInterrupt  # which the engine knows as the end of the sweeps
 
-    outcome = Outcome(input, None if unchanged else target.path, method, mesh, result, target_quality, lost, plot)
-    if json:
-        outcome.print_json()
-    elif not quiet:
-        outcome.print(aside=target.path == STREAM)
+            progress.stage(f"reading {shown(input)}")
+            mesh = io.read(input, format)
+            try:
+                refuse_unless_planar(mesh)
+            except InputError as error:
+                raise InputError(f"{shown(input)}: {error}") from error
+            if plot is not None:
+                check_drawable(mesh, input)
+            if in_place and mesh.source is not None:
+                target = replace(target, format=mesh.source.format)
+            fixed = fixed_nodes(mesh, fix or [])
+            _check_conversion(mesh, target)
+            progress.stage("preparing (the first run compiles: up to half a minute)")
+            result = run(
+                mesh,
+                method,
+                max_sweeps=max_sweeps,
+                threads=threads,
+                target_quality=target_quality,
+                fixed=fixed,
+                seed=seed,
+                weights=weights,
+                callback=after_sweep,
+            )
+            interruption.begin()
+            if not in_place or result.moved.any():  # else there is nothing to write
+                progress.stage(f"writing {target.path}")
+                lost = io.write(result.mesh, target.path, target.format)
+                written = target.path
+            interruption.end()
+            if plot is not None:
+                progress.stage(f"drawing {plot}")
+                _draw(mesh, result.mesh, plot, written)
+
+        outcome = Outcome(input, written, method, mesh, result, target_quality, lost, plot)
+        if json:
+            outcome.print_json()
+        elif not quiet:
+            outcome.print(aside=target.aside)
+    except KeyboardInterrupt:
+        if written is None:
+            raise
+        raise Interrupted(f"interrupted; the mesh is written to {written}") from None
     if not outcome.target_met:
         typer.echo(f"gmsnet: target not met: {outcome.shortfall()}", err=True)
         raise typer.Exit(1)
 
 
-def _check_picture(plot: str, source: str, target: Target) -> None:
-    from gmsnet.cli.target import check_writable
-    from gmsnet.plot import check_target
-
-    check_target(plot)
-    if any(os.path.realpath(plot) == os.path.realpath(path) for path in (source, target.path)):
-        raise InputError(f"{plot}: the picture would overwrite the mesh: give it another name")
-    check_writable(plot)
-
-
 def _check_conversion(mesh: Mesh, target: Target) -> None:
     """Raise now what writing would raise after the work: the format of the output cannot hold the mesh."""
-    from gmsnet.io import FORMATS
+    from gmsnet.io.files import output_format
 
-    if target.format is not None and mesh.source is not None and target.format != mesh.source.format:
+    entry = output_format(mesh, target.path, target.format)
+    if mesh.source is not None and entry.key != mesh.source.format:
         try:
-            FORMATS[target.format].load().write(mesh)
+            entry.load().write(mesh)
         except InputError as error:
             raise InputError(f"{target.path}: {error}") from error
+
+
+def _draw(before: Mesh, after: Mesh, plot: str, written: str | None) -> None:
+    """The picture; where it fails the error says that the mesh is written."""
+    from gmsnet.plot import plot_smoothing
+
+    try:
+        plot_smoothing(before, after, plot)
+    except Exception as error:
+        kind = InputError if isinstance(error, (GmsnetError, OSError, MemoryError)) else RuntimeError
+        done = "the mesh is left as it is" if written is None else f"mesh written to {written}"
+        raise kind(f"{done}; the picture failed: {str(error) or type(error).__name__}") from error

@@ -4,27 +4,34 @@ from __future__ import annotations
 
 import itertools
 import os
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from gmsnet.errors import InputError
+from gmsnet.io.atomic import check_writable, refuse_folder
+from gmsnet.io.files import files_of
+from gmsnet.io.formats import BY_SUFFIX, FORMATS, entry_of, format_of_suffix
+from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, is_standard_output, standard_output
 
-STREAM = "-"
+if TYPE_CHECKING:
+    from gmsnet.mesh import Mesh
 
 
 @dataclass(frozen=True)
 class Target:
-    """path: of the output, ``-`` the standard output. format: its name in the table, None where the input's is kept."""
+    """path: of the output. format: its name in the table, None where the input's is kept.
+
+    aside: the output is the standard output, so what is said goes to standard error.
+    """
 
     path: str
     format: str | None
+    aside: bool = False
 
 
 def target_of(source: str, output: str | None, in_place: bool, format: str | None) -> Target:
     """The output of ``smooth``. Raises InputError where it is missing, is the input, or cannot be written."""
-    from gmsnet.io.formats import BY_SUFFIX, FORMATS, entry_of
-
     if in_place:
         if output is not None:
             raise InputError(f"--in-place writes to the input, so leave out {output}, or leave out --in-place")
@@ -33,71 +40,59 @@ def target_of(source: str, output: str | None, in_place: bool, format: str | Non
         if not os.path.isfile(source):
             raise InputError(f"{source}: only a file can be smoothed in place")
         check_writable(source)
-        return Target(source, None)
+        return Target(source, None, is_standard_output(source))
     if output is None:
         raise InputError("the output is missing: give IN and OUT, or --in-place to overwrite the input")
     if format is not None:
         format = entry_of(format).key
-    if output == STREAM or is_stream(output):
-        return Target(output, format)
+    aside = is_standard_output(output)
+    if output in STANDARD_OUTPUT:
+        standard_output()  # raises where it is closed
+    if output in STANDARD_OUTPUT or is_special(output):
+        return Target(output, format, aside)
     refuse_folder(output)
-    suffix = os.path.splitext(output)[1].lower()
-    if format is None and suffix not in BY_SUFFIX:
-        what = f"the suffix {suffix!r} is unknown" if suffix else "the name has no suffix"
-        known = ", ".join(BY_SUFFIX)
-        raise InputError(f"{output}: {what}; known are {known}; or name the format with --output-format")
-    entry = FORMATS[format or BY_SUFFIX[suffix]]
-    refuse_same(files_of(source), files_of(output, entry.key))
-    check_writable(output)
-    return Target(output, entry.key)
+    key = format or format_of_suffix(output, os.path.splitext(output)[1], "--output-format", reading=False)
+    for read, written in itertools.product(_files(source), _files(output, key)):
+        if os.path.isfile(read) and _is_same(read, written):
+            raise InputError(f"{written} is the input {read} itself: name another output, or use --in-place")
+    for written in files_of(output, FORMATS[key]):
+        check_writable(written)
+    return Target(output, key, aside)
+
+
+def check_picture(plot: str, source: str, target: Target | None = None) -> None:
+    """InputError where a picture cannot be written to this path, or would overwrite a mesh that is read or written."""
+    from gmsnet.plot import check_target
+
+    check_target(plot)
+    meshes = [*_files(source), *(_files(target.path, target.format) if target else ())]
+    if any(_is_same(plot, path) for path in meshes):
+        raise InputError(f"{plot}: the picture would overwrite the mesh: give it another name")
+    check_writable(plot)
+
+
+def check_drawable(mesh: Mesh, source: str) -> None:
+    """InputError, naming the input, where no picture can show the mesh."""
+    from gmsnet.plot import check_mesh
+
+    try:
+        check_mesh(mesh)
+    except InputError as error:
+        raise InputError(f"{shown(source)}: {error}; leave out --plot") from error
 
 
 def shown(path: str) -> str:
     """What messages call an input."""
-    return "standard input" if path == STREAM else path
+    return "standard input" if path in STANDARD_INPUT else path
 
 
-def files_of(path: str, format: str | None = None) -> list[str]:
-    """The files that a mesh of this name stands in: more than one where its format says so."""
-    from gmsnet.io.formats import BY_SUFFIX, FORMATS
-
-    stem, suffix = os.path.splitext(path)
-    key = format or BY_SUFFIX.get(suffix.lower())
-    suffixes = FORMATS[key].suffixes if key in FORMATS else ()
-    return [path, *(stem + each for each in suffixes if len(suffixes) > 1)]
+def _files(path: str, format: str | None = None) -> Sequence[str]:
+    key = format or BY_SUFFIX.get(os.path.splitext(path)[1].lower())
+    return list(dict.fromkeys([path, *(files_of(path, FORMATS[key]) if key in FORMATS else ())]))
 
 
-def is_stream(path: str) -> bool:
-    """Whether a path leads to a pipe or a device."""
-    return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
-
-
-def refuse_same(read: Sequence[str], written: Sequence[str]) -> None:
-    """InputError where one of the files to be written is one that is read, by whatever name."""
-    for source, path in itertools.product(read, written):
-        if os.path.isfile(source) and os.path.exists(path) and os.path.samefile(source, path):
-            raise InputError(f"{path} is the input {source} itself: name another output, or use --in-place")
-
-
-def refuse_folder(path: str) -> None:
-    """InputError where a path leads to a folder."""
-    if os.path.isdir(path) or path.endswith(("/", os.sep)):
-        raise InputError(f"{path}: this is a folder; give the name of a file")
-
-
-def check_writable(path: str) -> None:
-    """InputError where a file cannot be written to this path, found out by making one beside it."""
-    refuse_folder(path)
-    if is_stream(path):
-        return
-    folder = os.path.dirname(os.path.realpath(path))
-    if not os.path.isdir(folder):
-        what = "is not a folder" if os.path.exists(folder) else "is a folder that does not exist: make it first"
-        raise InputError(f"{path}: {folder} {what}")
-    if os.path.exists(path) and not os.access(path, os.W_OK):
-        raise InputError(f"{path}: the file is write-protected: name another output")
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InputError(f"{path}: nothing can be written in {folder}: {error.strerror}") from error
+def _is_same(one: str, other: str) -> bool:
+    """Whether two paths lead to the same file, by whatever name, or to the place of the same file to be made."""
+    if os.path.exists(one) and os.path.exists(other):
+        return os.path.samefile(one, other)
+    return os.path.realpath(one) == os.path.realpath(other)
