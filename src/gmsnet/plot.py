@@ -115,14 +115,10 @@ class _View:
     @classmethod
     def of(cls, mesh: Mesh, title: str, colour: str, topology: Topology | None = None) -> _View:
         assert mesh.plane is not None
-        triangles, others, lines = [], [], []
-        for block in mesh.cells:
-            if _is_triangular(block):
-                triangles.append(block.nodes[:, :3])
-            elif block.dimension == 2 and len(block.nodes):
-                others.append(block.nodes[:, : CORNERS.get(block.kind, block.nodes.shape[1])])
-            elif block.dimension == 1:
-                lines.append(block.nodes[:, :2])
+        triangles = [block.nodes[:, :3] for block in mesh.cells if _is_triangular(block)]
+        faces = [b for b in mesh.cells if b.dimension == 2 and len(b.nodes) and not _is_triangular(b)]
+        others = [block.nodes[:, : CORNERS.get(block.kind, block.nodes.shape[1])] for block in faces]
+        lines = [block.nodes[:, :2] for block in mesh.cells if block.dimension == 1]
         return cls(
             title,
             colour,

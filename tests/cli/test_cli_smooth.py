@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import stat
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +13,6 @@ import pytest
 
 import gmsnet
 from gmsnet import engine
-from gmsnet.cli.progress import Progress
-from gmsnet.cli.signals import Deferral
 from gmsnet.cli.smooth_report import Outcome
 
 
@@ -237,172 +233,6 @@ def test_the_target_is_judged_by_the_cells_and_not_by_the_reason_to_stop(square)
         outcome = Outcome("in", "out", "gmsnet", mesh, replace(result, stop_reason=reason), float(target), [], None)
         assert outcome.target_met is met
     assert "1 cell below it" in Outcome("", "", "", mesh, result, float(np.nextafter(least, 1)), [], None).shortfall()
-
-
-# ------------------------------------------------------------------ --fix
-
-
-def test_fixed_nodes_stay(run, square, tmp_path):
-    names = tmp_path / "ids.txt"
-    mesh = gmsnet.read(square)
-    free = np.flatnonzero(gmsnet.smooth(mesh).moved)
-    names.write_text(f"{free[2]}, {free[3]}\n# a comment\n{free[4]} # another\n")
-    out = tmp_path / "out.su2"
-    done = run("smooth", square, out, "--fix", f"{free[0]},{free[1]}", "--fix", f"@{names}", "--fix", "left")
-    assert done.code == 0
-    assert "fixed by the user: 5" in done.out
-    moved = (gmsnet.read(out).points != mesh.points).any(axis=1)
-    assert not moved[free[:5]].any()
-    assert moved[free[5:]].any()
-
-
-def test_a_marker_that_is_a_number_goes_before_a_node(run, tmp_path):
-    mesh = gmsnet.random_mesh(60, seed=1)
-    path = tmp_path / "numbers.mesh"
-    gmsnet.write(mesh, path)  # Medit keeps the numbers of markers, not their names
-    lines = gmsnet.read(path).markers["1"]
-    assert 1 < len(lines) < len(mesh.points) / 2
-    held = json.loads(run("smooth", path, tmp_path / "out.mesh", "--fix", "1", "--json").out)["held"]
-    assert held["boundary"] == len(mesh.cells[1].nodes), "the lines of marker 1 are held anyway, node 1 is not"
-    assert "fixed by the user" not in held
-    inner = int(np.flatnonzero(gmsnet.smooth(mesh).moved)[0])
-    held = json.loads(run("smooth", path, tmp_path / "out.mesh", "--fix", f"{inner},", "--json").out)["held"]
-    assert held["fixed by the user"] == 1
-
-
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [
-        ("lefft", "did you mean 'left'"),
-        ("999999", "there is no node 999999; the mesh has the nodes 0 to"),
-        ("1,2,x", "no marker '1,2,x'"),
-        ("", "no marker ''"),
-        ("@nowhere.txt", "nowhere.txt: the list of nodes cannot be read: No such file"),
-        ("@{folder}/words.txt", "words.txt, line 2: 'left' is not a node: give whole numbers"),
-        ("@{folder}/far.txt", "far.txt, line 1: there is no node 123456"),
-        ("@{folder}/binary.txt", "this is not a list of nodes"),
-    ],
-)
-def test_wrong_fixed_nodes(run, square, tmp_path, value, message):
-    (tmp_path / "words.txt").write_text("1 2\nleft\n")
-    (tmp_path / "far.txt").write_text("123456")
-    (tmp_path / "binary.txt").write_bytes(b"\xff\xfe\x00")
-    done = run("smooth", square, tmp_path / "out.su2", "--fix", value.format(folder=tmp_path))
-    assert done.code == 2
-    assert message in done.err
-    assert not (tmp_path / "out.su2").exists()
-
-
-@pytest.mark.parametrize("name", ["unnamed.su2", "unnamed.mesh"])
-def test_a_number_is_no_region_of_cells_without_a_name(run, tmp_path, name):
-    triangles = gmsnet.random_mesh(60, seed=1).cells[0]
-    mesh = gmsnet.Mesh(gmsnet.random_mesh(60, seed=1).points, (triangles,))
-    path = tmp_path / name
-    gmsnet.write(mesh, path)
-    inner = int(np.flatnonzero(gmsnet.smooth(mesh).moved)[0])
-    for node in (0, 1, inner):
-        document = json.loads(run("smooth", path, tmp_path / f"out-{name}", "--fix", node, "--json").out)
-        assert document["held"].get("fixed by the user", 0) == (node == inner)
-        assert document["free"] > 30
-    done = run("smooth", path, tmp_path / f"out-{name}", "--fix", "wall")
-    assert "there is no marker 'wall' to hold: the mesh has no markers" in done.err
-
-
-# ------------------------------------------------------------------ interruptions
-
-
-def test_ctrl_c_writes_the_best_mesh_so_far(run, square, tmp_path, monkeypatch):
-    def stop(self, sweep):
-        if sweep.index == 2:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(Progress, "sweep", stop)
-    out = tmp_path / "out.su2"
-    done = run("smooth", square, out)
-    assert done.code == 0
-    assert "2 sweeps" in done.out
-    assert engine.INTERRUPTED in done.out
-    expected = gmsnet.smooth(gmsnet.read(square), max_sweeps=2)
-    assert gmsnet.read(out).points.tolist() == expected.points.tolist()
-
-
-def test_ctrl_c_before_the_smoothing_writes_nothing(run, square, tmp_path, monkeypatch):
-    def stop(*arguments):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("gmsnet.io.read", stop)
-    done = run("smooth", square, tmp_path / "out.su2")
-    assert (done.code, done.out) == (130, "")
-    assert done.err == "gmsnet: interrupted; nothing was written\n"
-    assert listing(tmp_path) == ["square.su2"]
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_between_sweeps_writes_the_best_mesh_so_far(run, square, tmp_path, monkeypatch, number):
-    handler = signal.getsignal(number)
-
-    def interrupted(self, sweep):
-        if sweep.index == 2:
-            signal.raise_signal(number)
-
-    monkeypatch.setattr(Progress, "sweep", interrupted)
-    out = tmp_path / "out.su2"
-    document = json.loads(run("smooth", square, out, "--json").out)
-    assert (document["sweeps"], document["stop_reason"]) == (2, engine.INTERRUPTED)
-    expected = gmsnet.smooth(gmsnet.read(square), max_sweeps=2)
-    assert gmsnet.read(out).points.tolist() == expected.points.tolist()
-    assert signal.getsignal(number) is handler
-
-
-@pytest.mark.parametrize("arguments", [[], ["--max-sweeps", "0"]])
-def test_a_signal_while_writing_waits(run, square, tmp_path, monkeypatch, arguments):
-    def interrupted(*given):
-        signal.raise_signal(signal.SIGINT)
-        return gmsnet.write(*given)
-
-    assert run("smooth", square, tmp_path / "plain.su2", *arguments).code == 0
-    monkeypatch.setattr("gmsnet.io.write", interrupted)
-    done = run("smooth", square, tmp_path / "out.su2", *arguments)
-    assert (done.code, done.err) == (0, "")
-    assert engine.INTERRUPTED not in done.out, "the sweeps were over"
-    assert (tmp_path / "out.su2").read_bytes() == (tmp_path / "plain.su2").read_bytes()
-
-
-def test_a_second_signal_ends_at_once(run, square, tmp_path, monkeypatch):
-    def interrupted(*given):
-        signal.raise_signal(signal.SIGINT)
-        signal.raise_signal(signal.SIGINT)
-
-    monkeypatch.setattr("gmsnet.io.write", interrupted)
-    done = run("smooth", square, tmp_path / "out.su2")
-    assert (done.code, done.err) == (130, "gmsnet: interrupted; nothing was written\n")
-    assert listing(tmp_path) == ["square.su2"]
-
-
-def test_ctrl_c_while_drawing_says_that_the_mesh_is_written(run, square, tmp_path, monkeypatch):
-    monkeypatch.setattr("gmsnet.plot.plot_smoothing", lambda *given: signal.raise_signal(signal.SIGINT))
-    out = tmp_path / "out.su2"
-    done = run("smooth", square, out, "--plot", tmp_path / "p.png")
-    assert (done.code, done.err) == (130, f"gmsnet: interrupted; the mesh is written to {out}\n")
-    assert gmsnet.quality(gmsnet.read(out)).qhat > gmsnet.quality(gmsnet.read(square)).qhat
-
-
-def test_signals_that_the_caller_ignores_stay_ignored():
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        with Deferral() as deferral:
-            deferral.begin()
-            signal.raise_signal(signal.SIGINT)
-            signal.raise_signal(signal.SIGINT)
-            assert not deferral.caught
-        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def test_smoothing_in_a_thread_of_its_own(run, square, tmp_path):
-    with ThreadPoolExecutor(1) as pool:
-        assert pool.submit(run, "smooth", square, tmp_path / "out.su2", "-q").result().code == 0
 
 
 def test_a_bug_is_one_line_and_a_traceback_on_demand(run, square, tmp_path, monkeypatch):
