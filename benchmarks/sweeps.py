@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from statistics import median
 
 import numpy as np
@@ -24,6 +24,7 @@ from gmsnet.kernels import quality as measures
 from gmsnet.kernels.compile import LANES
 from gmsnet.methods import METHODS, Options, Precision, method_named
 from gmsnet.topology import Topology, planar_points
+from gmsnet.workers import workers
 
 
 def averaging_matrix(topology):
@@ -52,34 +53,30 @@ def measure(nodes, threads, repeats):
     matrix = averaging_matrix(topology)
     sums = np.empty((-(-len(topology.near) // LANES), 7))
     precision = Precision()
-    tally = np.zeros(3, dtype=np.int64)
     jobs = {
         "L": lambda: matrix @ points,
         "set-up": lambda: Topology.of(mesh).stars,
         "measures": lambda: measures.summarise(points, topology.near, topology.near_turn, 0, len(sums), sums),
     }
-    pools = {count: ThreadPoolExecutor(count) for count in threads}
+    stack = ExitStack()
     for name in METHODS:
         smoother = method_named(name).create(Options())
-        for count, pool in pools.items():
-            state = points.copy()
+        for count in threads:
+            share, state = stack.enter_context(workers(count, len(stars.count))), points.copy()
 
-            def sweep(smoother=smoother, count=count, pool=pool, state=state):
+            def sweep(smoother=smoother, share=share, state=state):
+                def visit(first, last):
+                    smoother.sweep(state, stars, first, last, precision, np.zeros(3, dtype=np.int64))
+
                 for colour in range(stars.colours):
-                    ends = np.linspace(stars.first[colour], stars.first[colour + 1], count + 1).astype(int).tolist()
-                    if count == 1:
-                        smoother.sweep(state, stars, ends[0], ends[1], precision, tally)
-                    else:
-                        run = lambda first, last: smoother.sweep(  # noqa: E731
-                            state, stars, first, last, precision, np.zeros(3, dtype=np.int64)
-                        )
-                        list(pool.map(run, ends[:-1], ends[1:]))
+                    share(visit, int(stars.first[colour]), int(stars.first[colour + 1]))
 
             jobs[f"{name}, {count} thread{'s' * (count > 1)}"] = sweep
     seconds = {name: [] for name in jobs}
     for _ in range(repeats + 1):
         for name, job in jobs.items():
             seconds[name].append(timed(job))
+    stack.close()
     return {name: median(values[1:]) / nodes * 1e9 for name, values in seconds.items()}
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial import Delaunay
 
 import gmsnet
-from gmsnet import CellBlock, InputError, Mesh, engine, run
+from gmsnet import CellBlock, InputError, Mesh, engine, run, workers
 from gmsnet.generate import disturb
 from gmsnet.topology import Topology
 
@@ -186,7 +186,8 @@ def test_many_runs_at_once_give_what_one_gives(square):
     assert found == [alone] * 4
 
 
-def test_no_threads_are_left_behind():
+def test_no_threads_are_left_behind(monkeypatch):
+    monkeypatch.setattr(workers, "BLOCKS_PER_THREAD", 1)
     mesh = gmsnet.random_mesh(20_000, seed=0)
     gmsnet.smooth(mesh, max_sweeps=1, threads=3)
     for _ in range(100):

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
-BLOCKS_PER_THREAD = 32  # fewer do not pay for handing them to a thread
+BLOCKS_PER_THREAD = 256  # about a millisecond of work: for less, waking a thread can cost more than it brings
 
 Share = Callable[[Callable[[int, int], Any], int, int], list[Any]]
 
@@ -19,12 +19,13 @@ def workers(threads: int, blocks: int) -> Iterator[Share]:
     if threads == 1 or blocks < 2 * BLOCKS_PER_THREAD:
         yield lambda work, first, last: [work(first, last)]
         return
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(threads - 1) as pool:
 
         def share(work: Callable[[int, int], Any], first: int, last: int) -> list[Any]:
             pieces = max(1, min(threads, (last - first) // BLOCKS_PER_THREAD))
             ends = [first + (last - first) * k // pieces for k in range(pieces + 1)]
-            return list(pool.map(work, ends[:-1], ends[1:]))
+            others = [pool.submit(work, *ends[k : k + 2]) for k in range(1, pieces)]
+            return [work(first, ends[1]), *(other.result() for other in others)]  # the caller works too
 
         yield share
 

@@ -155,9 +155,12 @@ def sweep(points, centre, rings, offset, degree, count, first, last, most, unit,
     shift, row = np.empty(2 * LANES, dtype=np.float32), np.empty(4 * LANES, dtype=np.float32)
     m, decoded = np.empty(5 * LANES, dtype=np.float32), np.empty(hidden * LANES, dtype=np.float32)
     features = np.zeros(8 * ((hidden + 3) // 4) * LANES, dtype=np.float32)
+    counts = np.zeros(stars.COUNTERS, dtype=np.int64)
     for block in range(first, last):
         n = degree[block]
         stars.gather(points, centre, rings, block, offset[block], n, x, ring)
         stars.localise(x, ring, n, work, local)
         propose(local, n, weights, hidden, m, row, features, decoded, shift)
-        stars.commit(points, centre, block, count[block], x, ring, n, work, shift, unit, grain, single, tally)
+        stars.commit(points, centre, block, count[block], x, ring, n, work, shift, unit, grain, single, counts)
+    for k in range(len(tally)):
+        tally[k] += counts[k]

@@ -20,6 +20,7 @@ from gmsnet.kernels.predicates import SHEWCHUK, UNDERFLOW, determinant_and_bound
 
 HALVINGS = 20
 MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
+COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
 SIZE, REACH, TARGET, MARGIN = 0, 1, 2, 4  # rows of a block's work array; TARGET has two
 
 
