@@ -12,6 +12,7 @@ import gmsnet
 from gmsnet import engine
 from gmsnet.cli.progress import Progress
 from gmsnet.cli.signals import Deferral
+from gmsnet.io import write
 
 
 def listing(folder):
@@ -65,7 +66,7 @@ def test_a_signal_between_sweeps_writes_the_best_mesh_so_far(run, square, tmp_pa
 def test_a_signal_while_writing_waits(run, square, tmp_path, monkeypatch, arguments):
     def interrupted(*given):
         signal.raise_signal(signal.SIGINT)
-        return gmsnet.write(*given)
+        return write(*given)
 
     assert run("smooth", square, tmp_path / "plain.su2", *arguments).code == 0
     monkeypatch.setattr("gmsnet.io.write", interrupted)
