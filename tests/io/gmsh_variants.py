@@ -79,7 +79,7 @@ def new(
     out.put("i", 5, end=" ")
     out.put("d", *POINTS[5], end=" ")
     out.put("q", 0)
-    for dimension, entities in ((1, {11: [7]}), (2, surfaces)):
+    for _dimension, entities in ((1, {11: [7]}), (2, surfaces)):
         for tag, physical in entities.items():
             out.put("i", tag, end=" ")
             out.put("d", 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, end=" ")
