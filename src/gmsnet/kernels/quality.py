@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, fast_kernel, kernel
+from gmsnet.kernels.compile import LANES, kernel
 
 TWO_SQRT3 = 2.0 * math.sqrt(3.0)
 TAN_PI_8 = math.tan(math.pi / 8.0)
@@ -21,7 +21,7 @@ TINY = 1e-300  # stands in for a length of zero: the quotient is then zero, not 
 SUM_LOW, SUM_HIGH, SUM_SHAPE, MIN_LOW, MAX_HIGH, MIN_SHAPE, INVERTED = range(7)
 
 
-@fast_kernel
+@kernel
 def angle(y, x):
     """atan2(y, x) in radians for y ≥ 0 without a branch; π where both are zero (a corner that has collapsed).
 
@@ -61,7 +61,7 @@ def gather(points, triangles, turn, start, stop, block, sign):
         sign[lane] = turn[t]
 
 
-@fast_kernel
+@kernel
 def measure(block, sign, low, high, shape):
     """Smallest and largest angle (radians) and shape of the triangles in the lanes."""
     for lane in range(LANES):
@@ -97,7 +97,7 @@ def summarise(points, triangles, turn, first, last, sums):
         total(low, high, shape, stop - start, sums[number])
 
 
-@fast_kernel
+@kernel
 def total(low, high, shape, count, row):
     """One row of sums (see the names above) over the first ``count`` lanes."""
     sum_low, sum_high, sum_shape = 0.0, 0.0, 0.0
@@ -140,7 +140,7 @@ def per_cell(points, triangles, turn, low, high, shape, aspect):
         aspect[t] = signed / max(max(k, m, n) * (k + m + n), TINY)
 
 
-@fast_kernel
+@kernel
 def per_surface_cell(points, triangles, low, high, shape, aspect):
     """The same for triangles in space (points N×3), unsigned: a surface has no orientation of its own."""
     for t in range(len(triangles)):

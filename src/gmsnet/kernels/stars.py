@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, fast_kernel, kernel
+from gmsnet.kernels.compile import LANES, kernel
 from gmsnet.kernels.predicates import SHEWCHUK, UNDERFLOW, determinant_and_bound
 
 HALVINGS = 20
@@ -38,7 +38,7 @@ def gather(points, centre, rings, block, offset, n, x, ring):
             ring[(2 * j + 1) * LANES + lane] = points[i, 1]
 
 
-@fast_kernel
+@kernel
 def localise(x, ring, n, work, local):
     """Ring minus centre over the size of the star, in float32.
 
