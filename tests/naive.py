@@ -88,11 +88,3 @@ def gmsnet_shift(centre, ring, tensors):
     inner = t["mlp.0.weight"] @ convolved[0] + t["mlp.0.bias"]
     inner = np.maximum((inner - inner.mean()) / math.sqrt(inner.var() + 1e-5), 0)
     return d * (t["mlp.1.weight"] @ inner + t["mlp.1.bias"])
-
-
-def certified(a, b, c, unit=2.0**-53) -> bool:
-    """Is a triangle positive for certain if each coordinate may be off by ``unit`` of the largest of its own star?
-
-    A necessary condition that does not know the bound: it must at least be positive exactly.
-    """
-    return exact_area_sign(a, b, c) > 0

@@ -79,7 +79,7 @@ class Run:
             return INTERRUPTED
         return MAX_SWEEPS
 
-    def best_points(self) -> tuple[Floats, NDArray[np.bool_]]:
+    def _best_points(self) -> tuple[Floats, NDArray[np.bool_]]:
         """The best coordinates (N, dim) and which nodes they move. All others keep their very bits."""
         elsewhere = (self.best != self.start).any(axis=1)
         ids = self.topology.memory[elsewhere]
@@ -93,7 +93,7 @@ class Run:
 
     def outcome(self, before: QualityReport) -> tuple[Floats, NDArray[np.bool_], QualityReport]:
         """Points, which of them moved, and their measures; those of the input if the quick sums misjudged it."""
-        points, moved = self.best_points()
+        points, moved = self._best_points()
         if moved.any():
             after = measure(self.mesh.with_points(points), self.topology)
             if (after.inverted, -after.qhat) <= (before.inverted, -before.qhat):
@@ -102,13 +102,13 @@ class Run:
 
     def _sweep(self, share: Share) -> Sweep:
         stars, tally = self.topology.stars, np.zeros(3, dtype=np.int64)
+
+        def visit(first: int, last: int) -> NDArray[np.int64]:
+            counts = np.zeros(3, dtype=np.int64)
+            self.smoother.sweep(self.points, stars, first, last, self.precision, counts)
+            return counts
+
         for colour in range(stars.colours):
-
-            def visit(first: int, last: int) -> NDArray[np.int64]:
-                counts = np.zeros(3, dtype=np.int64)
-                self.smoother.sweep(self.points, stars, first, last, self.precision, counts)
-                return counts
-
             tally += sum(share(visit, int(stars.first[colour]), int(stars.first[colour + 1])))
         standing = self._standing(share)
         moved, truncated, dropped = tally.tolist()
