@@ -22,7 +22,8 @@ from machine import describe
 import gmsnet
 from gmsnet.kernels import quality as measures
 from gmsnet.kernels.compile import LANES
-from gmsnet.methods import METHODS, Options, Precision, method_named
+from gmsnet.kernels.stars import Precision
+from gmsnet.methods import METHODS, Field, smoother
 from gmsnet.topology import Topology, planar_points
 from gmsnet.workers import workers
 
@@ -51,27 +52,25 @@ def measure(nodes, threads, repeats):
     stars = topology.stars
     points = planar_points(mesh)[topology.memory]
     matrix = averaging_matrix(topology)
-    sums = np.empty((-(-len(topology.near) // LANES), 7))
-    precision = Precision()
+    sums = np.empty((-(-len(topology.near) // LANES), measures.SUMS))
     jobs = {
         "L": lambda: matrix @ points,
         "set-up": lambda: Topology.of(mesh).stars,
-        "measures": lambda: measures.summarise(points, topology.near, topology.near_turn, 0, len(sums), sums),
+        "measures": lambda: measures.summarise(points, topology.near, topology.near_turn, 0, len(sums), False, sums),
     }
     stack = ExitStack()
-    for name in METHODS:
-        smoother = method_named(name).create(Options())
-        for count in threads:
-            share, state = stack.enter_context(workers(count, len(stars.count))), points.copy()
+    for name, method in METHODS.items():
+        for variant in method.variants or [None]:
+            for count in threads:
+                share = stack.enter_context(workers(count, len(stars.blocks.filled)))
+                chosen = smoother(name, variant=variant)
+                field = Field(points.copy(), topology, Precision())
 
-            def sweep(smoother=smoother, share=share, state=state):
-                def visit(first, last):
-                    smoother.sweep(state, stars, first, last, precision, np.zeros(3, dtype=np.int64))
+                def sweep(chosen=chosen, share=share, field=field):
+                    chosen.sweep(field, share, lambda: True)
 
-                for colour in range(stars.colours):
-                    share(visit, int(stars.first[colour]), int(stars.first[colour + 1]))
-
-            jobs[f"{name}, {count} thread{'s' * (count > 1)}"] = sweep
+                label = f"{name} {variant}" if variant else name
+                jobs[f"{label}, {count} thread{'s' * (count > 1)}"] = sweep
     seconds = {name: [] for name in jobs}
     for _ in range(repeats + 1):
         for name, job in jobs.items():
@@ -94,7 +93,7 @@ def main():
         results[nodes] = figures = measure(nodes, options.threads, options.repeats)
         print(f"\n{nodes:,} nodes")
         for name, value in figures.items():
-            print(f"  {name:24} {value:8.1f} ns   {value / figures['L']:6.2f} L")
+            print(f"  {name:32} {value:8.1f} ns   {value / figures['L']:6.2f} L")
     if options.json:
         with open(options.json, "w", encoding="utf-8") as file:
             json.dump({"machine": describe(), "ns_per_node": results}, file, indent=1)

@@ -10,7 +10,10 @@ import pytest
 from gmsnet.arguments import check_arguments
 from gmsnet.errors import InputError
 
-USABLE = {"max_sweeps": 100, "threads": None, "target_quality": None, "seed": 0, "callback": None, "weights": None}
+USABLE = {
+    "max_sweeps": 100, "threads": None, "target_quality": None, "seed": 0, "callback": None, "weights": None,
+    "best_by": "shape",
+}  # fmt: skip
 NO_WHOLE_NUMBERS = [-1, 1.0, 2.5, "3", True, np.True_, np.array([1, 2]), np.array(3), 1j, float("nan")]
 
 
@@ -30,6 +33,7 @@ NO_WHOLE_NUMBERS = [-1, 1.0, 2.5, "3", True, np.True_, np.array([1, 2]), np.arra
         {"callback": print},
         {"weights": "a.safetensors"},
         {"weights": Path("a.safetensors")},
+        {"best_by": "aspect"},
     ],
 )
 def test_usable_options_pass(given):
@@ -48,6 +52,7 @@ def test_usable_options_pass(given):
         ]),
         ("callback", ["x", 3, [print], np.array([0, 1])]),
         ("weights", [3, b"a.safetensors", ["a.safetensors"], {"linear.bias": np.zeros(3)}, True]),
+        ("best_by", ["qhat", "", None, 1, ["shape"]]),
     ],
 )  # fmt: skip
 def test_each_option_is_refused_by_its_name(name, values):

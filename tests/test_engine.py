@@ -262,3 +262,14 @@ def test_an_interrupt_after_the_sweeps_loses_nothing(square, monkeypatch):
     result = gmsnet.smooth(square, max_sweeps=3)
     assert result.stop_reason == engine.INTERRUPTED
     assert result.after.qhat > result.before.qhat
+
+
+def test_the_best_mesh_is_chosen_by_the_metric_that_is_asked_for():
+    mesh = gmsnet.random_mesh(400, seed=11)
+    results = {by: gmsnet.smooth(mesh, best_by=by) for by in ("shape", "aspect")}
+    assert results["shape"].history[0].qhat != results["aspect"].history[0].qhat
+    assert results["aspect"].after.qhat_aspect >= results["shape"].after.qhat_aspect
+    assert results["shape"].after.qhat >= results["aspect"].after.qhat
+    for by, result in results.items():
+        best = max(sweep.qhat for sweep in result.history)
+        assert best == pytest.approx(result.after.qhat if by == "shape" else result.after.qhat_aspect, abs=1e-12)

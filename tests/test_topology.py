@@ -73,7 +73,7 @@ def test_wheels_of_any_degree(degree):
     assert topology.free.tolist() == [0]
     start, ring = topology.patches
     assert sorted(ring.tolist()) == list(range(1, degree + 1))
-    assert topology.stars.degree.tolist() == [degree]
+    assert topology.stars.blocks.degree.tolist() == [degree]
     assert start.tolist() == [0, degree]
 
 
@@ -169,15 +169,15 @@ def test_blocks_hold_every_star_once():
     rng = np.random.default_rng(9)
     points = rng.random((3000, 2))
     topology = Topology.of(mesh_of(points, Delaunay(points).simplices))
-    stars = topology.stars
+    stars, blocks = topology.stars, topology.stars.blocks
     seen = []
     for c in range(stars.colours):
         for b in range(stars.first[c], stars.first[c + 1]):
-            places = stars.centre[64 * b : 64 * b + stars.count[b]]
+            places = blocks.centre[64 * b : 64 * b + blocks.filled[b]]
             assert (topology.near_colours[places] == c).all()
-            assert (np.diff(topology.near_start)[places] == stars.degree[b]).all()
+            assert (np.diff(topology.near_start)[places] == blocks.degree[b]).all()
             seen += topology.memory[places].tolist()
-            block = stars.rings[stars.offset[b] : stars.offset[b] + 64 * stars.degree[b]].reshape(-1, 64)
+            block = blocks.rings[blocks.offset[b] : blocks.offset[b] + 64 * blocks.degree[b]].reshape(-1, 64)
             for lane, place in enumerate(places):
                 wanted = topology.near_ring[topology.near_start[place] : topology.near_start[place + 1]]
                 assert block[:, lane].tolist() == wanted.tolist()

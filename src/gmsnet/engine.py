@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from gmsnet.errors import InputError
 from gmsnet.fixed import fixed_mask
 from gmsnet.measure import QualityReport, measure
 from gmsnet.mesh import Mesh
-from gmsnet.methods import Options, method_named
+from gmsnet.methods import smoother
 from gmsnet.run import CALLBACK as CALLBACK
 from gmsnet.run import INTERRUPTED as INTERRUPTED
 from gmsnet.run import MAX_SWEEPS as MAX_SWEEPS
@@ -57,13 +57,16 @@ def smooth(
     mesh: Any,
     method: str = "gmsnet",
     *,
+    variant: str | None = None,
+    objective: str | None = None,
     max_sweeps: int = 100,
     threads: int | None = None,
     target_quality: float | None = None,
     fixed: Any = None,
     seed: int = 0,
     callback: Callable[[Sweep], bool | None] | None = None,
-    weights: str | Path | None = None,
+    weights: str | os.PathLike[str] | None = None,
+    best_by: str = "shape",
 ) -> SmoothResult:
     """Moves the free nodes of a planar triangle mesh so that its elements become better; changes nothing else.
 
@@ -71,22 +74,24 @@ def smooth(
     inverted cells, then with the largest q̂, the input among them.
 
     mesh: (points, cells) arrays, a Mesh, or a meshio, meshlane or PyVista object; it is not changed. method: a name in
-    METHODS. max_sweeps: at most so many visits of each node. threads: at most so many (default: the processors at
-    hand); the result is the same bits for any number. target_quality: stop once the least 1/q of a cell is at least
-    this, in (0, 1]. fixed: nodes to hold besides boundary, interfaces and the like: ids, a mask, a marker's name or a
-    list of names. seed: for methods that draw random numbers (GMSNet does not). callback: called after each sweep; a
-    true answer stops the run. weights: a safetensors file for methods with weights.
+    METHODS. variant, objective: names out of the method's own lists (default: their first). max_sweeps: at most so many
+    visits of each node. threads: at most so many (default: the processors at hand); the result is the same bits for any
+    number. target_quality: stop once the least 1/q of a cell is at least this, in (0, 1]. fixed: nodes to hold besides
+    boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. seed: for methods that draw
+    random numbers (none does so far). callback: called after each sweep; a true answer stops the run. weights: a
+    safetensors file for methods with weights. best_by: which 1/q enters the q̂ that says which mesh is the best:
+    "shape" (1/q) or "aspect" (1/q_V, with which the paper's tables are formed).
 
     Raises InputError for what cannot be used, before anything is moved.
     """
     began = time.perf_counter()
-    check_arguments(max_sweeps, threads, target_quality, seed, callback, weights)
-    smoother = method_named(method).create(Options(weights=weights, seed=seed))
+    check_arguments(max_sweeps, threads, target_quality, seed, callback, weights, best_by)
+    chosen = smoother(method, variant=variant, objective=objective, weights=weights, seed=seed)
     held_mesh, restore = to_mesh(mesh)
     refuse_unless_planar(held_mesh)
     topology = Topology.of(held_mesh, fixed_mask(held_mesh, fixed))
     before = measure(held_mesh, topology)
-    run = Run(held_mesh, topology, smoother, threads or available_threads())
+    run = Run(held_mesh, topology, chosen, threads or available_threads(), best_by)
     stop_reason = run.to_the_end(max_sweeps, target_quality, callback)
 
     try:

@@ -9,11 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.arguments import ASPECT
 from gmsnet.kernels import quality as kernels
 from gmsnet.kernels.compile import LANES
+from gmsnet.kernels.stars import Precision
 from gmsnet.measure import QualityReport, measure, weighted_metric
 from gmsnet.mesh import Mesh
-from gmsnet.methods import Precision, Smoother
+from gmsnet.methods import Field, Smoother
 from gmsnet.topology import Topology, planar_points, scale_exponent
 from gmsnet.workers import Share, workers
 
@@ -48,15 +50,14 @@ class Sweep:
 class Run:
     """The state of one run: coordinates in memory order, the best so far, and the record."""
 
-    def __init__(self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int) -> None:
-        self.mesh, self.topology, self.smoother = mesh, topology, smoother
-        self.precision = Precision.of(single=mesh.single, exponent=scale_exponent(mesh))
+    def __init__(self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str) -> None:
+        self.mesh, self.topology, self.smoother, self.best_by = mesh, topology, smoother, best_by
         self.start = planar_points(mesh)[topology.memory]
-        self.points = self.start.copy()
-        self.triangles = topology.near
+        precision = Precision.of(single=mesh.single, exponent=scale_exponent(mesh))
+        self.field = Field(self.start.copy(), topology, precision)
         self.threads = threads
         self.history: list[Sweep] = []
-        self.sums = np.empty((-(-len(self.triangles) // LANES), 7))
+        self.sums = np.empty((-(-len(topology.near) // LANES), kernels.SUMS))
         self.best, self.best_standing = self.start, self._standing()
 
     def to_the_end(self, max_sweeps: int, target: float | None, callback: Callable[[Sweep], bool | None] | None) -> str:
@@ -66,14 +67,14 @@ class Run:
         if target is not None and self.best_standing.min_shape >= target:
             return TARGET_REACHED
         try:
-            with workers(self.threads, len(self.topology.stars.count)) as share:
+            with workers(self.threads, len(self.topology.stars.blocks.filled)) as share:
                 while len(self.history) < max_sweeps:
                     sweep = self._sweep(share)
                     if callback is not None and callback(sweep):
                         return CALLBACK
                     if target is not None and self.best_standing.min_shape >= target:
                         return TARGET_REACHED
-                    if sweep.moved == 0 or self._stalled():
+                    if sweep.moved == 0 or self.smoother.settled or self._stalled():
                         return NO_PROGRESS
         except KeyboardInterrupt:  # the best mesh so far is whole: it is a copy
             return INTERRUPTED
@@ -96,43 +97,43 @@ class Run:
         points, moved = self._best_points()
         if moved.any():
             after = measure(self.mesh.with_points(points), self.topology)
-            if (after.inverted, -after.qhat) <= (before.inverted, -before.qhat):
+            if (after.inverted, -self._qhat(after)) <= (before.inverted, -self._qhat(before)):
                 return points, moved, after
         return self.mesh.points, np.zeros(len(points), dtype=bool), before
 
+    def _qhat(self, report: QualityReport) -> float:
+        return report.qhat_aspect if self.best_by == ASPECT else report.qhat
+
     def _sweep(self, share: Share) -> Sweep:
-        stars, tally = self.topology.stars, np.zeros(3, dtype=np.int64)
-
-        def visit(first: int, last: int) -> NDArray[np.int64]:
-            counts = np.zeros(3, dtype=np.int64)
-            self.smoother.sweep(self.points, stars, first, last, self.precision, counts)
-            return counts
-
-        for colour in range(stars.colours):
-            tally += sum(share(visit, int(stars.first[colour]), int(stars.first[colour + 1])))
+        tally = self.smoother.sweep(self.field, share, lambda: self._keep_if_best(self._standing(share)))
         standing = self._standing(share)
+        self._keep_if_best(standing)
         moved, truncated, dropped = tally.tolist()
         sweep = Sweep(
             len(self.history) + 1, moved, truncated, dropped, standing.inverted, standing.qhat, standing.min_shape,
             standing.mean_shape,
         )  # fmt: skip
         self.history.append(sweep)
-        if standing.beats(self.best_standing):
-            self.best, self.best_standing = self.points.copy(), standing
         return sweep
+
+    def _keep_if_best(self, standing: Standing) -> bool:
+        better = standing.beats(self.best_standing)
+        if better:
+            self.best, self.best_standing = self.field.points.copy(), standing
+        return better
 
     def _standing(self, share: Share | None = None) -> Standing:
         """The sums over all triangles of the coordinates as they are."""
-        turn = self.topology.near_turn
+        triangles, turn = self.topology.near, self.topology.near_turn
 
         def add(first: int, last: int) -> None:
-            kernels.summarise(self.points, self.triangles, turn, first, last, self.sums)
+            kernels.summarise(self.field.points, triangles, turn, first, last, self.best_by == ASPECT, self.sums)
 
         if share is None:
             add(0, len(self.sums))
         else:
             share(add, 0, len(self.sums))
-        return Standing.of(self.sums, len(self.triangles))
+        return Standing.of(self.sums, len(triangles), self.best_by)
 
     def _stalled(self) -> bool:
         """Has nothing been gained for PATIENCE sweeps?"""
@@ -156,7 +157,7 @@ class Standing:
     mean_shape: float
 
     @classmethod
-    def of(cls, sums: Floats, triangles: int) -> Standing:
+    def of(cls, sums: Floats, triangles: int, best_by: str) -> Standing:
         """From the rows of sums that kernels.quality.summarise leaves."""
         if triangles == 0:
             return cls(0, math.nan, math.inf, math.nan)
@@ -164,7 +165,11 @@ class Standing:
         worst_low, worst_high = float(sums[:, kernels.MIN_LOW].min()), float(sums[:, kernels.MAX_HIGH].max())
         worst_shape = float(sums[:, kernels.MIN_SHAPE].min())
         low, worst_low, worst_high, high = map(math.degrees, (low, worst_low, worst_high, high))
-        qhat = weighted_metric(low, worst_low, worst_high, high, shape, worst_shape)
+        mean, worst = shape, worst_shape
+        if best_by == ASPECT:
+            mean = float(sums[:, kernels.SUM_ASPECT].sum()) / triangles
+            worst = float(sums[:, kernels.MIN_ASPECT].min())
+        qhat = weighted_metric(low, worst_low, worst_high, high, mean, worst)
         return cls(int(sums[:, kernels.INVERTED].sum()), qhat, worst_shape, shape)
 
     def beats(self, other: Standing) -> bool:

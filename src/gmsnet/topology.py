@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gmsnet.faces import SMOOTHED, Faces
 from gmsnet.kernels import connectivity, layout
+from gmsnet.kernels.stars import Blocks
 from gmsnet.mesh import CellBlock, Mesh
 
 Ints = NDArray[np.int32]
@@ -26,24 +27,15 @@ MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would 
 
 @dataclass(frozen=True, eq=False)
 class Stars:
-    """The free nodes with their rings in blocks of 64 of one colour and degree (see kernels.layout.blocks)."""
+    """The patches in blocks of 64 stars of one colour and degree; those of colour c are first[c] … first[c + 1] − 1."""
 
-    centre: Ints
-    rings: Ints
-    offset: NDArray[np.int64]
-    degree: Ints
-    count: Ints
+    blocks: Blocks
     first: Ints
 
     @property
     def colours(self) -> int:
-        """How many colours there are; the blocks of colour c are first[c] … first[c + 1] − 1."""
+        """How many colours there are."""
         return len(self.first) - 1
-
-    @cached_property
-    def most(self) -> int:
-        """The largest degree."""
-        return int(self.degree.max(initial=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +143,10 @@ class Topology:
         free = np.flatnonzero(self.near_colours >= 0).astype(np.int32)
         most = int(np.diff(self.near_start)[free].max(initial=0))
         colours = int(self.near_colours.max(initial=-1)) + 1
-        return Stars(*layout.blocks(free, self.near_start, self.near_ring, self.near_colours, most, colours))
+        centre, rings, offset, degree, filled, first = layout.blocks(
+            free, self.near_start, self.near_ring, self.near_colours, most, colours
+        )
+        return Stars(Blocks(centre, rings, offset, degree, filled, most), first)
 
     @cached_property
     def patches(self) -> tuple[Ints, Ints]:

@@ -25,13 +25,14 @@ def commit(stars_, shifts, unit=U64, single=False):
     rings = np.concatenate([count + lanes * degree + j for j in range(degree)]).astype(np.int32)
     x, ring, work = np.empty(2 * LANES), np.empty(2 * degree * LANES), np.empty(8 * LANES)
     local = np.empty(2 * degree * LANES, dtype=np.float32)
-    kernels.gather(points, centre, rings, 0, 0, degree, x, ring)
-    kernels.localise(x, ring, degree, work, local)
+    one = np.zeros(1, dtype=np.int64), np.array([degree], dtype=np.int32), np.array([count], dtype=np.int32)
+    blocks = kernels.Blocks(centre, rings, *one, degree)
+    assert kernels.fetch(points, blocks, 0, x, ring, work, local) == degree
     work[:LANES] = 1.0  # so that shifts are in the coordinates of the mesh
     shift = np.zeros(2 * LANES, dtype=np.float32)
     shift[:LANES], shift[LANES:] = np.asarray(shifts)[lanes].T
     tally = np.zeros(3, dtype=np.int64)
-    kernels.commit(points, centre, 0, count, x, ring, degree, work, shift, unit, 0.0, single, tally)
+    kernels.commit(points, blocks, 0, x, ring, work, shift, kernels.Precision(unit, 0.0, single), tally)
     return points[:count], tally
 
 

@@ -14,7 +14,13 @@ from gmsnet import METHODS, CellBlock, Mesh, workers
 from gmsnet.generate import disturb
 from gmsnet.topology import Topology
 
-every_method = pytest.mark.parametrize("method", sorted(METHODS))
+CHOICES = [
+    {"method": name, **({"variant": variant} if variant else {}), **({"objective": objective} if objective else {})}
+    for name, method in METHODS.items()
+    for variant in method.variants or [""]
+    for objective in method.objectives or [""]
+]
+every_method = pytest.mark.parametrize("method", CHOICES, ids=["-".join(choice.values()) for choice in CHOICES])
 
 
 def mesh_of(points, triangles, regions=None):
@@ -46,7 +52,7 @@ def test_nothing_valid_is_inverted_and_nothing_held_moves(method, seed, nodes, t
     rng = np.random.default_rng(seed)
     mesh = triangulation(rng, nodes, tangle)
     chosen = rng.random(nodes) < 0.1
-    result = gmsnet.smooth(mesh, method, max_sweeps=int(rng.integers(1, 8)), fixed=chosen)
+    result = gmsnet.smooth(mesh, **method, max_sweeps=int(rng.integers(1, 8)), fixed=chosen)
     turn = Topology.of(mesh).turn
     before, after = exact_signs(mesh, turn), exact_signs(result.mesh, turn)
     assert (after[before > 0] > 0).all()
@@ -65,7 +71,7 @@ def test_nothing_valid_is_inverted_and_nothing_held_moves(method, seed, nodes, t
 def test_the_same_bits_for_any_number_of_threads_and_from_run_to_run(method, monkeypatch):
     monkeypatch.setattr(workers, "BLOCKS_PER_THREAD", 1)  # so that a mesh of this size is shared out at all
     mesh = gmsnet.random_mesh(20_000, seed=3)
-    results = [gmsnet.smooth(mesh, method, max_sweeps=4, threads=n).points.tobytes() for n in (1, 2, 4, 1)]
+    results = [gmsnet.smooth(mesh, **method, max_sweeps=4, threads=n).points.tobytes() for n in (1, 2, 4, 1)]
     assert len(set(results)) == 1
 
 
@@ -73,8 +79,8 @@ def test_the_same_bits_for_any_number_of_threads_and_from_run_to_run(method, mon
 @pytest.mark.parametrize("scale", [1e-9, 1e9])
 def test_scaling_commutes(method, scale):
     mesh = gmsnet.random_mesh(300, seed=5)
-    one = gmsnet.smooth(mesh, method, max_sweeps=3).points * scale
-    other = gmsnet.smooth(mesh.with_points(mesh.points * scale), method, max_sweeps=3).points
+    one = gmsnet.smooth(mesh, **method, max_sweeps=3).points * scale
+    other = gmsnet.smooth(mesh.with_points(mesh.points * scale), **method, max_sweeps=3).points
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-5 * scale)
 
 
@@ -82,8 +88,8 @@ def test_scaling_commutes(method, scale):
 def test_translation_commutes(method):
     mesh = gmsnet.random_mesh(300, seed=6)
     away = np.array([1e6, -3e5])
-    one = gmsnet.smooth(mesh, method, max_sweeps=3).points
-    other = gmsnet.smooth(mesh.with_points(mesh.points + away), method, max_sweeps=3).points - away
+    one = gmsnet.smooth(mesh, **method, max_sweeps=3).points
+    other = gmsnet.smooth(mesh.with_points(mesh.points + away), **method, max_sweeps=3).points - away
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-5)
 
 
@@ -93,8 +99,8 @@ def test_cell_order_and_winding_do_not_matter(method):
     triangles = next(b.nodes for b in mesh.cells if b.kind == "triangle")
     rng = np.random.default_rng(0)
     mixed = np.array([np.roll(t[:: rng.choice([1, -1])], rng.integers(3)) for t in rng.permutation(triangles)])
-    one = gmsnet.smooth(mesh_of(mesh.points, triangles), method, max_sweeps=3).points
-    other = gmsnet.smooth(mesh_of(mesh.points, mixed), method, max_sweeps=3).points
+    one = gmsnet.smooth(mesh_of(mesh.points, triangles), **method, max_sweeps=3).points
+    other = gmsnet.smooth(mesh_of(mesh.points, mixed), **method, max_sweeps=3).points
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-5)
 
 
@@ -104,7 +110,7 @@ def test_degrees_from_3_to_100(method, degree):
     angle = 2 * np.pi * np.arange(degree) / degree
     points = np.vstack([[0.3, -0.2], np.column_stack([np.cos(angle), np.sin(angle)])])
     triangles = [(0, 1 + i, 1 + (i + 1) % degree) for i in range(degree)]
-    result = gmsnet.smooth(mesh_of(points, triangles), method, max_sweeps=30)
+    result = gmsnet.smooth(mesh_of(points, triangles), **method, max_sweeps=30)
     assert result.after.inverted == 0
     assert result.after.qhat >= result.before.qhat
     # In a fan of more than twenty flat needles a node finds less to gain than the paper's network can see.
@@ -122,7 +128,7 @@ def test_a_perfect_mesh_stays(method):
     triangles = [[place[c] for c in cell] for cell in corners if all(c in place for c in cell)]
     assert len(triangles) == 6 * 4**2
     mesh = mesh_of(points, triangles)
-    result = gmsnet.smooth(mesh, method)
+    result = gmsnet.smooth(mesh, **method)
     assert result.points.tobytes() == mesh.points.tobytes()
     assert not result.moved.any()
     assert result.after.qhat == pytest.approx(2 / 3, abs=1e-12)
@@ -130,7 +136,7 @@ def test_a_perfect_mesh_stays(method):
 
 @every_method
 def test_it_makes_bad_meshes_better(method):
-    result = gmsnet.smooth(gmsnet.random_mesh(1000, seed=1), method, max_sweeps=20)
+    result = gmsnet.smooth(gmsnet.random_mesh(1000, seed=1), **method, max_sweeps=20)
     assert result.after.qhat > result.before.qhat + 0.1
     assert result.after.shape.mean() > 0.85
     assert result.after.inverted == 0

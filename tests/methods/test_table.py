@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+import gmsnet
 from gmsnet.errors import InputError
-from gmsnet.methods import METHODS, method_named
+from gmsnet.methods import METHODS, method_named, smoother
 
 
 def test_every_method_goes_by_its_name():
@@ -13,9 +14,34 @@ def test_every_method_goes_by_its_name():
     for name, method in METHODS.items():
         assert method.name == name
         assert method_named(name) is method
+        assert method.summary
+        assert method.source
+        assert len(set(method.variants)) == len(method.variants)
 
 
 @pytest.mark.parametrize("name", [None, ["gmsnet"], {"gmsnet"}, 3, b"gmsnet", METHODS["gmsnet"]])
 def test_what_is_no_name_is_refused(name):
-    with pytest.raises(InputError, match="method must be the name of one: gmsnet"):
+    with pytest.raises(InputError, match="method must be the name of one: "):
         method_named(name)
+
+
+def test_unknown_names_are_answered_with_the_nearest_ones():
+    with pytest.raises(InputError, match=r"unknown method 'gmsnett'; did you mean .*gmsnet"):
+        gmsnet.smooth(gmsnet.random_mesh(10), "gmsnett")
+    for method in METHODS.values():
+        for kind, names in (("variant", method.variants), ("objective", method.objectives)):
+            if names:
+                with pytest.raises(InputError, match=f"unknown {kind} of {method.name} '{names[-1]}x'.*{names[-1]}"):
+                    smoother(method.name, **{kind: names[-1] + "x"})
+                with pytest.raises(InputError, match=f"{kind} of {method.name} must be the name of one: {names[0]}"):
+                    smoother(method.name, **{kind: 3})
+            else:
+                with pytest.raises(InputError, match=f"{method.name} has no {kind}s"):
+                    smoother(method.name, **{kind: "plain"})
+
+
+def test_weights_for_a_method_without_any_are_refused():
+    for method in METHODS.values():
+        if not method.weighted:
+            with pytest.raises(InputError, match=f"{method.name} has no weights.*gmsnet"):
+                smoother(method.name, weights="some.safetensors")

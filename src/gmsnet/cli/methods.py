@@ -15,11 +15,14 @@ def methods(
     from gmsnet.methods import METHODS
 
     if json:
-        rows = [{"name": each.name, "summary": each.summary, "source": each.source} for each in METHODS.values()]
-        output.print_json({"methods": rows})
+        keys = ("name", "summary", "source", "variants", "objectives")
+        output.print_json({"methods": [{key: getattr(each, key) for key in keys} for each in METHODS.values()]})
         return
     console = output.console()
     for each in METHODS.values():
         console.print(each.name, style="bold")
         console.print(f"    {each.summary}")
+        for kind, names in (("variants", each.variants), ("objectives", each.objectives)):
+            if names:
+                console.print(f"    {kind}: {', '.join(names)}")
         console.print(f"    {each.source}")

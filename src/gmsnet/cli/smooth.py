@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -36,6 +36,8 @@ def smooth(
     method: Annotated[
         str, typer.Option(help="The smoother; see 'gmsnet methods'.", autocompletion=_method_names)
     ] = "gmsnet",
+    variant: Annotated[str | None, typer.Option(help="A variant of the method; see 'gmsnet methods'.")] = None,
+    objective: Annotated[str | None, typer.Option(help="What 'optimize' minimises; see 'gmsnet methods'.")] = None,
     max_sweeps: Annotated[int, typer.Option(min=0, help="Visit each node at most this often.")] = 100,
     target_quality: Annotated[
         float | None,
@@ -94,9 +96,10 @@ def smooth(
     from gmsnet.cli.smooth_report import Outcome
     from gmsnet.engine import refuse_unless_planar
     from gmsnet.engine import smooth as run
-    from gmsnet.methods import method_named
+    from gmsnet.methods import smoother
 
-    method_named(method)
+    choice: dict[str, Any] = {"variant": variant, "objective": objective, "weights": weights, "seed": seed}
+    smoother(method, **choice)  # so that a wrong name is told before a large file is read
     written: str | None = None
     lost: list[str] = []
     try:
@@ -128,9 +131,8 @@ def smooth(
                 threads=threads,
                 target_quality=target_quality,
                 fixed=fixed,
-                seed=seed,
-                weights=weights,
                 callback=after_sweep,
+                **choice,
             )
             interruption.begin()
             if not in_place or result.moved.any():  # else there is nothing to write

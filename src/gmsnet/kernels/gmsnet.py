@@ -145,22 +145,16 @@ def decode(weights, hidden, features, row, decoded, shift):
 
 
 @kernel
-def sweep(points, centre, rings, offset, degree, count, first, last, most, unit, grain, single, weights, hidden, tally):
-    """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. Arrays: topology.Stars.
-
-    most: the largest degree; unit, grain, single: see kernels.stars.commit; tally: (3,) int64, added to.
-    """
-    x, ring, work = np.empty(2 * LANES), np.empty(2 * most * LANES), np.empty(8 * LANES)
-    local = np.empty(2 * most * LANES, dtype=np.float32)
+def sweep(points, blocks, first, last, precision, weights, hidden, tally):
+    """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
+    x, ring, work, counts = stars.room(blocks.most)
+    local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
     shift, row = np.empty(2 * LANES, dtype=np.float32), np.empty(4 * LANES, dtype=np.float32)
     m, decoded = np.empty(5 * LANES, dtype=np.float32), np.empty(hidden * LANES, dtype=np.float32)
     features = np.zeros(8 * ((hidden + 3) // 4) * LANES, dtype=np.float32)
-    counts = np.zeros(stars.COUNTERS, dtype=np.int64)
     for block in range(first, last):
-        n = degree[block]
-        stars.gather(points, centre, rings, block, offset[block], n, x, ring)
-        stars.localise(x, ring, n, work, local)
+        n = stars.fetch(points, blocks, block, x, ring, work, local)
         propose(local, n, weights, hidden, m, row, features, decoded, shift)
-        stars.commit(points, centre, block, count[block], x, ring, n, work, shift, unit, grain, single, counts)
+        stars.commit(points, blocks, block, x, ring, work, shift, precision, counts)
     for k in range(len(tally)):
         tally[k] += counts[k]

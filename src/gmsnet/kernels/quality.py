@@ -17,8 +17,9 @@ TWO_SQRT3 = 2.0 * math.sqrt(3.0)
 TAN_PI_8 = math.tan(math.pi / 8.0)
 TINY = 1e-300  # stands in for a length of zero: the quotient is then zero, not a division by zero
 
-# Sums of a block of triangles, in this order:
-SUM_LOW, SUM_HIGH, SUM_SHAPE, MIN_LOW, MAX_HIGH, MIN_SHAPE, INVERTED = range(7)
+# Sums of a block of triangles, in this order, those of aspect only where they are asked for:
+SUM_LOW, SUM_HIGH, SUM_SHAPE, MIN_LOW, MAX_HIGH, MIN_SHAPE, INVERTED, SUM_ASPECT, MIN_ASPECT = range(9)
+SUMS = 9
 
 
 @kernel
@@ -82,34 +83,50 @@ def measure(block, sign, low, high, shape):
 
 
 @kernel
-def summarise(points, triangles, turn, first, last, sums):
-    """Sums and extremes over the blocks first…last of LANES triangles, one row of ``sums`` (blocks, 7) each.
+def aspects(block, sign, aspect):
+    """Aspect of the triangles in the lanes."""
+    for lane in range(LANES):
+        px, py = block[lane], block[LANES + lane]
+        qx, qy = block[2 * LANES + lane], block[3 * LANES + lane]
+        rx, ry = qx - px, qy - py
+        k, m, n = math.sqrt(px * px + py * py), math.sqrt(qx * qx + qy * qy), math.sqrt(rx * rx + ry * ry)
+        lengths = max(k, m, n) * (k + m + n)
+        aspect[lane] = TWO_SQRT3 * sign[lane] * (px * qy - py * qx) / max(lengths, TINY)
+
+
+@kernel
+def summarise(points, triangles, turn, first, last, with_aspect, sums):
+    """Sums and extremes over the blocks first…last of LANES triangles, one row of ``sums`` (blocks, SUMS) each.
 
     A row does not depend on who computes it, so that the total is the same for any number of threads.
     """
     block = np.empty(4 * LANES)
-    sign, low, high, shape = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    sign, low, high, shape, aspect = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES), np.zeros(LANES)
     for number in range(first, last):
         start = number * LANES
         stop = min(start + LANES, len(triangles))
         gather(points, triangles, turn, start, stop, block, sign)
         measure(block, sign, low, high, shape)
-        total(low, high, shape, stop - start, sums[number])
+        if with_aspect:
+            aspects(block, sign, aspect)
+        total(low, high, shape, aspect, stop - start, sums[number])
 
 
 @kernel
-def total(low, high, shape, count, row):
+def total(low, high, shape, aspect, count, row):
     """One row of sums (see the names above) over the first ``count`` lanes."""
-    sum_low, sum_high, sum_shape = 0.0, 0.0, 0.0
-    min_low, max_high, min_shape = np.inf, 0.0, np.inf
+    sum_low, sum_high, sum_shape, sum_aspect = 0.0, 0.0, 0.0, 0.0
+    min_low, max_high, min_shape, min_aspect = np.inf, 0.0, np.inf, np.inf
     inverted = 0
     for lane in range(count):
         sum_low += low[lane]
         sum_high += high[lane]
         sum_shape += shape[lane]
+        sum_aspect += aspect[lane]
         min_low = min(min_low, low[lane])
         max_high = max(max_high, high[lane])
         min_shape = min(min_shape, shape[lane])
+        min_aspect = min(min_aspect, aspect[lane])
         inverted += shape[lane] <= 0.0
     row[SUM_LOW] = sum_low
     row[SUM_HIGH] = sum_high
@@ -118,6 +135,8 @@ def total(low, high, shape, count, row):
     row[MAX_HIGH] = max_high
     row[MIN_SHAPE] = min_shape
     row[INVERTED] = inverted
+    row[SUM_ASPECT] = sum_aspect
+    row[MIN_ASPECT] = min_aspect
 
 
 @kernel

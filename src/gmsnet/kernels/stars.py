@@ -13,7 +13,11 @@ Algorithm 1 does, and dropped after HALVINGS.
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet.kernels.compile import LANES, kernel
 from gmsnet.kernels.predicates import SHEWCHUK, UNDERFLOW, determinant_and_bound
@@ -24,11 +28,67 @@ COUNTERS = 32  # room for them on cache lines of their own, so that threads do n
 SIZE, REACH, TARGET, MARGIN = 0, 1, 2, 4  # rows of a block's work array; TARGET has two
 
 
+class Blocks(NamedTuple):
+    """The free nodes with their rings in blocks of LANES of one colour and degree (see kernels.layout.blocks).
+
+    filled: how many of the lanes hold stars of their own. most: the largest degree.
+    """
+
+    centre: NDArray[np.int32]
+    rings: NDArray[np.int32]
+    offset: NDArray[np.int64]
+    degree: NDArray[np.int32]
+    filled: NDArray[np.int32]
+    most: int
+
+
+class Precision(NamedTuple):
+    """How exactly the coordinates of a mesh are known once they are written.
+
+    unit: the largest relative error (2⁻⁵³ for float64 and decimal text, 2⁻²⁴ where a file keeps float32).
+    grain: the largest absolute error next to zero, where floats are evenly spaced. single: round every new coordinate
+    to float32, because the file will.
+    """
+
+    unit: float = 2.0**-53
+    grain: float = 0.0
+    single: bool = False
+
+    @classmethod
+    def of(cls, *, single: bool, exponent: int) -> Precision:
+        """For coordinates that have been divided by 2 to the power of ``exponent``."""
+        if single:
+            return cls(2.0**-24, math.ldexp(1.0, -150 - exponent), single=True)
+        grain = math.ldexp(1.0, -1075 - exponent)
+        return cls(grain=grain if grain > 1e-290 else 0.0)  # a subnormal one would only be slow
+
+
 @kernel
-def gather(points, centre, rings, block, offset, n, x, ring):
+def room(most):
+    """The arrays that a sweep works in: x, ring, work (8 rows) and counts, for stars of up to so many neighbours."""
+    return (
+        np.empty(2 * LANES),
+        np.empty(2 * most * LANES),
+        np.empty(8 * LANES),
+        np.zeros(COUNTERS, dtype=np.int64),
+    )
+
+
+@kernel
+def fetch(points, blocks, block, x, ring, work, local):
+    """Gathers a block and brings it to the size of the star (``localise``); returns the degree."""
+    n = blocks.degree[block]
+    gather(points, blocks, block, n, x, ring)
+    localise(x, ring, n, work, local)
+    return n
+
+
+@kernel
+def gather(points, blocks, block, n, x, ring):
     """Coordinates of the stars of a block, as they stand now."""
+    rings, offset = blocks.rings, blocks.offset[block]
     for lane in range(LANES):
-        i = centre[block * LANES + lane]
+        i = blocks.centre[block * LANES + lane]
         x[lane] = points[i, 0]
         x[LANES + lane] = points[i, 1]
     for j in range(n):
@@ -40,7 +100,7 @@ def gather(points, centre, rings, block, offset, n, x, ring):
 
 @kernel
 def localise(x, ring, n, work, local):
-    """Ring minus centre over the size of the star, in float32.
+    """Ring minus centre over the size of the star, in the type of ``local``.
 
     This is the paper's normalisation: one factor d = max(Δx, Δy), the larger side of the bounding box of the n + 1
     nodes, the free node at the origin. d goes to row SIZE of ``work`` (rows of LANES), the largest absolute coordinate
@@ -117,12 +177,13 @@ def allowed(tx, ty, x, ring, n, lane, delta):
 
 
 @kernel
-def commit(points, centre, block, count, x, ring, n, work, shift, unit, grain, single, tally):
+def commit(points, blocks, block, x, ring, work, shift, precision, tally):
     """Moves the free nodes of a block by size·shift, truncated by the guard; counts what happened in ``tally``.
 
-    work: rows of LANES as ``localise`` leaves them; shift: (2·LANES,) over the star's size. unit, grain: the relative
-    and the absolute error of a coordinate once it is written; single: round new ones to float32.
+    work: rows of LANES as ``localise`` leaves them; shift: (2·LANES,) over the star's size.
     """
+    n, count, centre = blocks.degree[block], blocks.filled[block], blocks.centre
+    unit, grain, single = precision.unit, precision.grain, precision.single
     for lane in range(LANES):
         tx = x[lane] + work[SIZE * LANES + lane] * shift[lane]
         ty = x[LANES + lane] + work[SIZE * LANES + lane] * shift[LANES + lane]

@@ -3,23 +3,69 @@
 from __future__ import annotations
 
 import difflib
+import os
+from collections.abc import Iterable
 
 from gmsnet.errors import InputError
 from gmsnet.methods import gmsnet
-from gmsnet.methods.base import Method, Options, Precision, Smoother
+from gmsnet.methods.base import Field, Method, Options, Smoother, StarSmoother
 
 METHODS: dict[str, Method] = {method.name: method for method in (gmsnet.METHOD,)}
 
 
 def method_named(name: str) -> Method:
     """The row of the table; InputError names the nearest ones for a name that is not in it."""
+    return METHODS[_chosen("method", name, METHODS)]
+
+
+def smoother(
+    name: str,
+    *,
+    variant: str | None = None,
+    objective: str | None = None,
+    weights: str | os.PathLike[str] | None = None,
+    seed: int = 0,
+) -> Smoother:
+    """A method of the table, ready for one run.
+
+    Raises InputError for names that are not in the table, with the nearest ones, and for options that the method does
+    not have.
+    """
+    method = method_named(name)
+    options = Options(
+        _option(method, "variant", variant, method.variants),
+        _option(method, "objective", objective, method.objectives),
+        weights,
+        seed,
+    )
+    if weights is not None and not method.weighted:
+        raise InputError(f"{name} has no weights, so none can be given; {_those('weighted')} have some")
+    return method.create(options)
+
+
+def _option(method: Method, kind: str, given: str | None, names: tuple[str, ...]) -> str:
+    """The variant or objective to use: the given one, or the default, or "" where there are none."""
+    if given is None:
+        return names[0] if names else ""
+    if not names:
+        raise InputError(f"{method.name} has no {kind}s, so none can be chosen; {_those(f'{kind}s')} have some")
+    return _chosen(f"{kind} of {method.name}", given, names)
+
+
+def _those(attribute: str) -> str:
+    return ", ".join(method.name for method in METHODS.values() if getattr(method, attribute)) or "no methods"
+
+
+def _chosen(kind: str, name: str, names: Iterable[str]) -> str:
+    """The name, if it is one of the names; else InputError with the nearest ones."""
+    names = list(names)
     if not isinstance(name, str):
-        raise InputError(f"method must be the name of one: {', '.join(METHODS)}; got {name!r}")
-    if name in METHODS:
-        return METHODS[name]
-    near = difflib.get_close_matches(name, METHODS, n=3, cutoff=0.4)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"choose one of: {', '.join(METHODS)}"
-    raise InputError(f"unknown method {name!r}; {hint}")
+        raise InputError(f"{kind} must be the name of one: {', '.join(names)}; got {name!r}")
+    if name in names:
+        return name
+    near = difflib.get_close_matches(name, names, n=3, cutoff=0.4)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"choose one of: {', '.join(names)}"
+    raise InputError(f"unknown {kind} {name!r}; {hint}")
 
 
-__all__ = ["METHODS", "Method", "Options", "Precision", "Smoother", "method_named"]
+__all__ = ["METHODS", "Field", "Method", "Options", "Smoother", "StarSmoother", "method_named", "smoother"]

@@ -1,74 +1,99 @@
-"""What a smoother is: it proposes shifts for blocks of stars; the guard in its kernel alone moves nodes."""
+"""What a smoother is: it proposes shifts; the guard in the kernels alone moves nodes."""
 
 from __future__ import annotations
 
-import math
+import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.topology import Stars
+from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.topology import Topology
+from gmsnet.workers import Share
+
+Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.stars)
 
 
-@dataclass(frozen=True)
-class Precision:
-    """How exactly the coordinates of a mesh are known once they are written.
+@dataclass(frozen=True, eq=False)
+class Field:
+    """What is smoothed. points: (N, 2) in memory order, changed in place by the guard alone."""
 
-    unit: the largest relative error (2⁻⁵³ for float64 and decimal text, 2⁻²⁴ where a file keeps float32).
-    grain: the largest absolute error next to zero, where floats are evenly spaced. single: round every new coordinate
-    to float32, because the file will.
-    """
-
-    unit: float = 2.0**-53
-    grain: float = 0.0
-    single: bool = False
-
-    @classmethod
-    def of(cls, *, single: bool, exponent: int) -> Precision:
-        """For coordinates that have been divided by 2 to the power of ``exponent``."""
-        if single:
-            return cls(2.0**-24, math.ldexp(1.0, -150 - exponent), single=True)
-        grain = math.ldexp(1.0, -1075 - exponent)
-        return cls(grain=grain if grain > 1e-290 else 0.0)  # a subnormal one would only be slow
+    points: NDArray[np.float64]
+    topology: Topology
+    precision: Precision
 
 
 class Smoother(Protocol):
-    """A method ready to run."""
+    """A method ready for one run.
 
-    def sweep(
-        self,
-        points: NDArray[np.float64],
-        stars: Stars,
-        first: int,
-        last: int,
-        precision: Precision,
-        tally: NDArray[np.int64],
-    ) -> None:
-        """Visits the stars of the blocks first…last, all of one colour, once; without the GIL.
+    settled: it has its own rule when to stop, and that has come true.
+    """
 
-        points: (N, 2) in memory order, changed in place by the guard alone. tally: (3,) counts of moved, truncated and
-        dropped shifts, added to (kernels.stars).
+    settled: bool
+
+    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+        """Visits the mesh once: about as many shifts as there are free nodes. Returns what happened to them.
+
+        share: runs kernels on ranges, on threads where that pays. test: measures the mesh as it stands, keeps it if it
+        is the best so far, and tells whether it is; for methods that look more often than after each sweep.
         """
         ...
 
 
+class StarSmoother(ABC):
+    """A method that looks at one star at a time: a sweep visits colour after colour."""
+
+    settled = False
+
+    @abstractmethod
+    def visit(
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+    ) -> None:
+        """Visits the stars of the blocks first…last, all of one colour, once; without the GIL. Adds to the tally."""
+
+    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+        """See Smoother."""
+        stars, tally = field.topology.stars, np.zeros(3, dtype=np.int64)
+
+        def visit(first: int, last: int) -> Tally:
+            counts = np.zeros(3, dtype=np.int64)
+            self.visit(field.points, stars.blocks, first, last, field.precision, counts)
+            return counts
+
+        for colour in range(stars.colours):
+            tally += sum(share(visit, int(stars.first[colour]), int(stars.first[colour + 1])))
+        return tally
+
+
 @dataclass(frozen=True)
 class Options:
-    """What a user may tell a method. weights: a safetensors file instead of the shipped one."""
+    """What a user may tell a method.
 
-    weights: str | Path | None = None
+    variant, objective: one of those that the method has, or "" where it has none. weights: a safetensors file instead
+    of the shipped one.
+    """
+
+    variant: str = ""
+    objective: str = ""
+    weights: str | os.PathLike[str] | None = None
     seed: int = 0
 
 
 @dataclass(frozen=True)
 class Method:
-    """A row of the table of methods."""
+    """A row of the table of methods.
+
+    variants, objectives: the names that may be chosen from, the default first. weighted: it takes weights.
+    """
 
     name: str
     summary: str
     source: str
     create: Callable[[Options], Smoother]
+    variants: tuple[str, ...] = ()
+    objectives: tuple[str, ...] = ()
+    weighted: bool = False

@@ -8,31 +8,22 @@ from numpy.typing import NDArray
 
 from gmsnet import weights
 from gmsnet.kernels import gmsnet as kernels
-from gmsnet.methods.base import Method, Precision
-from gmsnet.topology import Stars
+from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.methods.base import Method, StarSmoother, Tally
 
 
-class GmsNet:
+class GmsNet(StarSmoother):
     """The network with one set of weights."""
 
     def __init__(self, trained: weights.Weights) -> None:
         self.hidden = trained.hidden
         self.folded = fold(trained)
 
-    def sweep(
-        self,
-        points: NDArray[np.float64],
-        stars: Stars,
-        first: int,
-        last: int,
-        precision: Precision,
-        tally: NDArray[np.int64],
+    def visit(
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
     ) -> None:
-        """See methods.base.Smoother."""
-        kernels.sweep(
-            points, stars.centre, stars.rings, stars.offset, stars.degree, stars.count, first, last,
-            stars.most, precision.unit, precision.grain, precision.single, self.folded, self.hidden, tally,
-        )  # fmt: skip
+        """See StarSmoother."""
+        kernels.sweep(points, blocks, first, last, precision, self.folded, self.hidden, tally)
 
 
 def fold(trained: weights.Weights) -> NDArray[np.float32]:
@@ -60,4 +51,5 @@ METHOD = Method(
     summary="the paper's graph neural network: one look at a node's one-ring, one shift",
     source="Wang, Chen, Yan, Liu: Proposing an intelligent mesh smoothing method with graph neural networks (2023)",
     create=lambda options: GmsNet(weights.load(options.weights)),
+    weighted=True,
 )
