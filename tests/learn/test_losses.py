@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gmsnet.learn.backend import torch
-from gmsnet.learn.losses import MOST_HALVINGS, doubled_areas, metric_loss, truncation
+from gmsnet.learn.losses import LOSSES, MOST_HALVINGS, doubled_areas, metric_loss, truncation
 from gmsnet.learn.optimum import optimal_position
 
 
@@ -14,37 +14,113 @@ def as_tensors(stars):
     return torch.as_tensor(stars.ring), torch.as_tensor(stars.degree)
 
 
-def naive_loss(ring, position):
-    """1 − 1/q from edge lengths and Heron's formula's signed sister, one triangle after another."""
-    total = 0.0
-    for k in range(len(ring)):
-        a, b, c = np.array(position), ring[k], ring[(k + 1) % len(ring)]
-        area = 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-        edges = math.dist(a, b) ** 2 + math.dist(b, c) ** 2 + math.dist(c, a) ** 2
-        total += 1 - 4 * math.sqrt(3) * area / edges
-    return total / len(ring)
+def plain_metric(a, b, c):
+    """1 − 1/q from edge lengths and the signed area."""
+    area = 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    return 1 - 4 * math.sqrt(3) * area / (math.dist(a, b) ** 2 + math.dist(b, c) ** 2 + math.dist(c, a) ** 2)
 
 
-def test_metric_loss_equals_the_formula_in_plain_loops(stars):
+def plain_q(a, b, c):
+    inverse = 1 - plain_metric(a, b, c)
+    return 1 / inverse if inverse > 0 else math.inf
+
+
+def plain_angles(a, b, c):
+    """By the law of cosines."""
+    x, y, z = math.dist(b, c), math.dist(c, a), math.dist(a, b)
+    cosines = [(y * y + z * z - x * x) / (2 * y * z), (z * z + x * x - y * y) / (2 * z * x)]
+    alpha, beta = (math.acos(min(max(value, -1.0), 1.0)) for value in cosines)
+    return alpha, beta, math.pi - alpha - beta
+
+
+PLAIN = {
+    "metric": plain_metric,
+    "q": plain_q,
+    "cosine": lambda *corners: sum((math.cos(angle) - 0.5) ** 2 for angle in plain_angles(*corners)) / 3,
+    "min-max-angle": lambda *corners: max(plain_angles(*corners)),
+}
+every_loss = pytest.mark.parametrize("name", LOSSES)
+
+
+@every_loss
+def test_losses_equal_the_formulas_in_plain_loops(stars, name):
     position = np.random.default_rng(2).normal(scale=0.2, size=(len(stars), 2))
-    expected = [naive_loss(r[:n], x) for r, n, x in zip(stars.ring, stars.degree, position, strict=True)]
-    assert metric_loss(*as_tensors(stars), torch.as_tensor(position)).numpy() == pytest.approx(expected, abs=1e-13)
+    found = LOSSES[name](*as_tensors(stars), torch.as_tensor(position)).numpy()
+    for ring, n, x, loss in zip(stars.ring, stars.degree, position, found, strict=True):
+        triangles = [(x, ring[k], ring[(k + 1) % n]) for k in range(n)]
+        expected = sum(PLAIN[name](*corners) for corners in triangles) / n
+        assert loss == pytest.approx(expected, rel=1e-9, abs=1e-9), n
+    assert np.isinf(found).any() == (name == "q")  # some of these stars are inverted
+
+
+HEXAGON = np.column_stack([np.cos(np.arange(6) * np.pi / 3), np.sin(np.arange(6) * np.pi / 3)])
+RINGS = {  # all triangles of these stars are alike
+    "equilateral": HEXAGON,
+    "inverted": HEXAGON[::-1],
+    "flat": np.array([[1.0, 0], [-2, 0], [1, 0], [-2, 0]]),
+    "needle": np.array([[1.0, 0], [1, 0], [1, 0]]),
+    "point": np.zeros((3, 2)),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("metric", {"equilateral": 0, "inverted": 2, "flat": 1, "needle": 1, "point": 1}),
+        ("q", {"equilateral": 1, "inverted": math.inf, "flat": math.inf, "needle": math.inf, "point": math.inf}),
+        ("cosine", {"equilateral": 0, "inverted": 0, "flat": 11 / 12, "needle": 0.25, "point": 0.25}),
+        ("min-max-angle", {"equilateral": 1, "inverted": 1, "flat": 3, "needle": 0, "point": 0}),  # in π/3
+    ],
+)
+def test_values_of_degenerate_triangles_are_the_documented_ones(name, values):
+    for shape, expected in values.items():
+        ring = torch.as_tensor(RINGS[shape].copy())[None]
+        loss = LOSSES[name](ring, torch.tensor([len(RINGS[shape])]), torch.zeros(1, 2, dtype=torch.float64))
+        unit = math.pi / 3 if name == "min-max-angle" else 1.0
+        assert loss.item() / unit == pytest.approx(expected, abs=1e-12), shape
+
+
+@every_loss
+def test_no_loss_depends_on_the_scale_or_the_padding(stars, name):
+    ring, degree = as_tensors(stars)
+    position = torch.full((len(stars), 2), 0.03, dtype=torch.float64)
+    loss = LOSSES[name](ring, degree, position)
+    scaled = LOSSES[name](torch.nn.functional.pad(1e3 * ring, (0, 0, 0, 5)), degree, 1e3 * position)
+    assert scaled.numpy() == pytest.approx(loss.numpy(), rel=1e-10)
+
+
+@every_loss
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_gradients_are_finite_wherever_the_free_node_lies(stars, name, dtype):
+    """Also on a ring node, between two of them, far outside, and where the star is a single point."""
+    ring, degree = (values[:50] for values in as_tensors(stars))
+    ring = ring.to(dtype)
+    beside = ring[:, 0] + 1e-10
+    places = [ring[:, 0], beside, (ring[:, 0] + ring[:, 1]) / 2, 50 * ring[:, 2], torch.zeros(50, 2, dtype=dtype)]
+    for position in (place.clone().requires_grad_() for place in places):
+        for star in (ring, torch.zeros_like(ring)):
+            loss = LOSSES[name](star, degree, position)
+            assert not loss.isnan().any()
+            (gradient,) = torch.autograd.grad(loss[loss.isfinite()].sum(), position)
+            assert torch.isfinite(gradient).all()
 
 
 def test_regular_hexagon_has_no_loss_and_the_right_areas():
-    angle = np.arange(6) * np.pi / 3
-    ring = torch.as_tensor(np.column_stack([np.cos(angle), np.sin(angle)]))[None]
-    ring = torch.nn.functional.pad(ring, (0, 0, 0, 2))  # two rows of padding
+    ring = torch.nn.functional.pad(torch.as_tensor(HEXAGON)[None], (0, 0, 0, 2))  # two rows of padding
     degree, origin = torch.tensor([6]), torch.zeros(1, 2, dtype=torch.float64)
     assert metric_loss(ring, degree, origin).item() == pytest.approx(0, abs=1e-15)
     areas = doubled_areas(ring, degree, origin)[0].tolist()
     assert areas == pytest.approx([math.sqrt(3) / 2] * 6 + [1, 1])
 
 
-def test_gradient_of_the_loss(stars):
-    ring, degree = (values[:20] for values in as_tensors(stars))
-    position = torch.full((20, 2), 0.03, dtype=torch.float64, requires_grad=True)
-    assert torch.autograd.gradcheck(lambda x: metric_loss(ring, degree, x), position)
+@every_loss
+def test_gradients(stars, name):
+    ring, degree = as_tensors(stars)
+    position = torch.full((len(stars), 2), 0.03, dtype=torch.float64)
+    valid = (doubled_areas(ring, degree, position) > 0.02).all(dim=1)
+    ring, degree, position = ring[valid][:20], degree[valid][:20], position[valid][:20].requires_grad_()
+    assert len(ring) == 20
+    assert torch.autograd.gradcheck(lambda x: LOSSES[name](ring, degree, x), position)
 
 
 def test_truncation_halves_as_often_as_needed_and_no_more(stars):

@@ -1,22 +1,78 @@
 """Losses of a star, and the truncation of shifts.
 
 ring: (B × M × 2) neighbours counter-clockwise, padded; degree: (B,); position: (B × 2) of the free node, all in one
-frame. The results do not depend on the scale.
+frame. Each loss is the mean of one number over the n triangles of the star. None depends on the scale.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from types import MappingProxyType
+
 from gmsnet.learn.backend import torch
 
 MOST_HALVINGS = 40
+Loss = Callable[[torch.Tensor, torch.Tensor, torch.Tensor], torch.Tensor]
 
 
 def metric_loss(ring: torch.Tensor, degree: torch.Tensor, position: torch.Tensor) -> torch.Tensor:
-    """(B,) MetricLoss, equation (10): mean over the n triangles of 1 − 1/q, where 1/q = 4√3·S/(l² + m² + n²)."""
+    """(B,) MetricLoss, equation (10): mean of 1 − 1/q, where 1/q = 4√3·S/(l² + m² + n²).
+
+    From 0 (equilateral) over 1 (flat, or a single point) to 2 (equilateral, inverted).
+    """
     a, b, inside = _spokes(ring, degree, position)
-    lengths = (a.square() + b.square() + (b - a).square()).sum(dim=2)
-    inverse_q = 2.0 * 3.0**0.5 * _cross(a, b) / torch.where(inside, lengths, 1.0)
-    return torch.where(inside, 1.0 - inverse_q, 0.0).sum(dim=1) / degree
+    squares = _squares(a, b)
+    inverse_q = 2.0 * math.sqrt(3.0) * _cross(a, b) / torch.where(squares > 0, squares, 1.0)
+    return _mean(1.0 - inverse_q, inside, degree)
+
+
+def aspect_loss(ring: torch.Tensor, degree: torch.Tensor, position: torch.Tensor) -> torch.Tensor:
+    """(B,) the aspect ratio loss of section 4.3: mean of q = (l² + m² + n²)/(4√3·S), at least 1.
+
+    Infinite, without a gradient, where a triangle is flat or inverted: there the printed fraction would be negative,
+    and an inverted triangle better than a good one.
+    """
+    a, b, inside = _spokes(ring, degree, position)
+    doubled = _cross(a, b)
+    valid = inside & (doubled > 0)
+    q = _squares(a, b) / (2.0 * math.sqrt(3.0) * torch.where(valid, doubled, 1.0))
+    return _mean(torch.where(valid, q, torch.inf), inside, degree)
+
+
+def cosine_loss(ring: torch.Tensor, degree: torch.Tensor, position: torch.Tensor) -> torch.Tensor:
+    """(B,) the cosine loss of section 4.3: mean of (cos θ − ½)² over the 3n angles, from 0 to 11/12.
+
+    Inverted triangles count as their mirror images. An angle at an edge of no length counts as a right one.
+    """
+    a, b, inside = _spokes(ring, degree, position)
+    total = torch.zeros_like(a[..., 0])
+    for u, v in _corners(a, b):
+        first, second = _dot(u, u), _dot(v, v)
+        open_ = (first > 0) & (second > 0)
+        cosine = _dot(u, v) * torch.where(open_, first, 1.0).rsqrt() * torch.where(open_, second, 1.0).rsqrt()
+        total = total + (torch.where(open_, cosine, 0.0) - 0.5).square()
+    return _mean(total / 3.0, inside, degree)
+
+
+def largest_angle_loss(ring: torch.Tensor, degree: torch.Tensor, position: torch.Tensor) -> torch.Tensor:
+    """(B,) the min-max angle loss of section 4.3: mean of the largest angle, in radians, from π/3 to π.
+
+    (The printed formula also has the minimum, which is what training does.) Inverted triangles count as their mirror
+    images. An angle at an edge of no length counts as 0; angles that are equally large share the gradient.
+    """
+    a, b, inside = _spokes(ring, degree, position)
+    angles = []
+    for u, v in _corners(a, b):
+        sine, cosine = _cross(u, v).abs(), _dot(u, v)
+        open_ = sine.square() + cosine.square() > 0  # else the gradient of atan2 would be 0/0
+        angles.append(torch.atan2(torch.where(open_, sine, 0.0), torch.where(open_, cosine, 1.0)))
+    return _mean(torch.stack(angles).amax(dim=0), inside, degree)
+
+
+LOSSES = MappingProxyType(
+    {"metric": metric_loss, "q": aspect_loss, "cosine": cosine_loss, "min-max-angle": largest_angle_loss}
+)
 
 
 def doubled_areas(ring: torch.Tensor, degree: torch.Tensor, position: torch.Tensor) -> torch.Tensor:
@@ -53,5 +109,24 @@ def _spokes(
     return ring - position[:, None], following - position[:, None], place < degree[:, None]
 
 
+def _corners(a: torch.Tensor, b: torch.Tensor) -> tuple[tuple[torch.Tensor, torch.Tensor], ...]:
+    """The edges that leave each corner of the triangles (0, a, b), in pairs."""
+    return (a, b), (b - a, -a), (-b, a - b)
+
+
+def _squares(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+    """l² + m² + n² of the triangles (0, a, b)."""
+    return (a.square() + b.square() + (b - a).square()).sum(dim=2)
+
+
+def _mean(values: torch.Tensor, inside: torch.Tensor, degree: torch.Tensor) -> torch.Tensor:
+    """The mean over the triangles of each star, (B × M) → (B,)."""
+    return torch.where(inside, values, 0.0).sum(dim=1) / degree
+
+
 def _cross(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _dot(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+    return (a * b).sum(dim=2)
