@@ -18,13 +18,15 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 
 from gmsnet import plot
+from gmsnet.plot import smoothing
+from gmsnet.plot.view import BAD_TO_GOOD, INVERTED, View
 
 SMALL = random_mesh(60, seed=2)
 LARGE = random_mesh(4000, seed=2)
 
 
 def view(mesh, title=""):
-    return plot._View.of(mesh, title, plot.AFTER)
+    return View.of(mesh, title, plot.AFTER)
 
 
 def cells_of(axes):
@@ -53,23 +55,23 @@ def test_good_cells_are_blue_bad_ones_yellow_inverted_ones_red():
     mesh = Mesh(np.array(points), (CellBlock("triangle", np.array(cells), np.zeros(5)),))
     drawn = view(mesh)
     assert drawn.report.valid.tolist() == [1, 1, 1, -1, -1]
-    cells_drawn = cells_of(plot._figure([drawn]).axes[0])
+    cells_drawn = cells_of(smoothing._figure([drawn]).axes[0])
     order = np.argsort(-drawn.report.shape, kind="stable").tolist()
     colours = dict(zip(order, cells_drawn.get_facecolor().tolist(), strict=True))
     assert blueness(colours[0]) > 0.2
     assert blueness(colours[1]) < -0.4
-    assert tuple(colours[3][:3]) == pytest.approx(to_rgb(plot.INVERTED))
-    assert tuple(colours[4][:3]) == pytest.approx(to_rgb(plot.INVERTED))
+    assert tuple(colours[3][:3]) == pytest.approx(to_rgb(INVERTED))
+    assert tuple(colours[4][:3]) == pytest.approx(to_rgb(INVERTED))
 
 
 def test_the_scale_runs_from_yellow_to_blue():
-    shades = [blueness(to_rgb(colour)) for colour in plot.BAD_TO_GOOD]
+    shades = [blueness(to_rgb(colour)) for colour in BAD_TO_GOOD]
     assert shades == sorted(shades)
     assert shades[0] < -0.5 < 0.2 < shades[-1]
 
 
 def test_every_cell_is_drawn_once_and_the_worst_on_top():
-    axes = plot._figure([view(SMALL)]).axes[0]
+    axes = smoothing._figure([view(SMALL)]).axes[0]
     drawn = np.array([path.vertices[:3].mean(axis=0) for path in cells_of(axes).get_paths()])
     report = view(SMALL).report
     centres = report.centre[np.argsort(-report.shape, kind="stable")][:, :2]
@@ -77,9 +79,9 @@ def test_every_cell_is_drawn_once_and_the_worst_on_top():
 
 
 def test_a_zoom_on_the_worst_cell_where_cells_are_small():
-    assert plot._surroundings(view(SMALL), 1.0) is None
+    assert smoothing._surroundings(view(SMALL), 1.0) is None
     large = view(LARGE)
-    window = plot._surroundings(large, 1.0)
+    window = smoothing._surroundings(large, 1.0)
     worst = large.report.centre[large.report.worst(1)[0], :2]
     assert (window[0] <= worst).all()
     assert (worst <= window[1]).all()
@@ -87,20 +89,20 @@ def test_a_zoom_on_the_worst_cell_where_cells_are_small():
     assert (window[1] <= 1 + 1e-12).all()
     inside = ((large.report.centre[:, :2] >= window[0]) & (large.report.centre[:, :2] <= window[1])).all(axis=1)
     assert 50 < inside.sum() < 300
-    titles = [axes.get_title() for axes in plot._figure([large]).axes]
+    titles = [axes.get_title() for axes in smoothing._figure([large]).axes]
     assert "around its worst cell" in titles
 
 
 def test_the_titles_name_the_figures():
     after = SMALL.with_points(SMALL.points)
-    figure = plot._figure([view(SMALL, "before"), view(after, "after")])
+    figure = smoothing._figure([view(SMALL, "before"), view(after, "after")])
     report = view(SMALL).report
     text = f"1/q  min {report.shape.min():.3f}, mean {report.shape.mean():.3f}"
     assert [axes.get_title() for axes in figure.axes[:2]] == [f"before:  {text}", f"after:  {text}"]
 
 
 def test_histograms_count_every_cell():
-    figure = plot._figure([view(SMALL, "before"), view(SMALL, "after")])
+    figure = smoothing._figure([view(SMALL, "before"), view(SMALL, "after")])
     for axes in figure.axes[-2:]:
         bars = sum(patch.get_height() for patch in axes.patches if hasattr(patch, "get_height"))
         assert bars == pytest.approx(200)
@@ -125,13 +127,15 @@ def test_other_cells_are_shown_too(tmp_path):
     points = [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]]
     quads = CellBlock("quad", np.array([[0, 1, 4, 3]]), np.zeros(1))
     mesh = Mesh(np.array(points), (quads, CellBlock("triangle", np.array([[1, 2, 5], [1, 5, 4]]), np.zeros(2))))
-    collections = [each for each in plot._figure([view(mesh)]).axes[0].collections if isinstance(each, PolyCollection)]
+    collections = [
+        each for each in smoothing._figure([view(mesh)]).axes[0].collections if isinstance(each, PolyCollection)
+    ]
     assert [len(each.get_paths()) for each in collections] == [1, 2]
 
 
 def test_the_mesh_after_is_wound_as_the_mesh_before(tmp_path, monkeypatch):
     drawn = []
-    monkeypatch.setattr(plot, "_save", lambda views, path: drawn.extend(views))
+    monkeypatch.setattr(smoothing, "_save", lambda views, path: drawn.extend(views))
     points = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])
     before = Mesh(points, (CellBlock("triangle", np.array([[0, 1, 2], [1, 3, 2]]), np.zeros(2)),))
     plot.plot_smoothing(before, before.with_points(points * [-1, 1]), tmp_path / "p.png")

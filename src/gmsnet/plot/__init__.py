@@ -1,0 +1,24 @@
+"""Pictures of meshes and their quality: cells from blue (good) to yellow (bad), inverted ones red, and histograms.
+
+The only place that imports matplotlib, on use and without its global state, so no display is needed.
+"""
+
+from gmsnet.plot.figure import AFTER, BEFORE, check_target, new_figure, png_bytes
+from gmsnet.plot.histogram import histogram
+from gmsnet.plot.smoothing import plot_quality, plot_smoothing
+from gmsnet.plot.view import View, add_colour_bar, check_mesh, draw
+
+__all__ = [
+    "AFTER",
+    "BEFORE",
+    "View",
+    "add_colour_bar",
+    "check_mesh",
+    "check_target",
+    "draw",
+    "histogram",
+    "new_figure",
+    "plot_quality",
+    "plot_smoothing",
+    "png_bytes",
+]

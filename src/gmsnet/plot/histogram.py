@@ -1,0 +1,34 @@
+"""Distributions of a measure over the cells of one or two meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gmsnet.plot.view import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def histogram(axes: Axes, views: Sequence[View], name: str, label: str) -> None:
+    """The share of cells by a measure (an array of QualityReport, by name), and a mark at the least value.
+
+    The axis goes to 60 degrees for ``min_angle`` and to 1 else, and below 0 if cells are inverted.
+    """
+    values = [getattr(view.report, name) for view in views]
+    low = min([0.0, *(float(v.min()) for v in values)])
+    bins = np.linspace(low, 60.0 if name == "min_angle" else 1.0, 61).tolist()
+    for view, each in zip(views, values, strict=True):
+        share = np.full(len(each), 100.0 / len(each))
+        axes.hist(each, bins, weights=share, color=view.colour, alpha=0.35, edgecolor="none")
+        axes.hist(each, bins, weights=share, color=view.colour, histtype="step", linewidth=1.4, label=view.title)
+        axes.plot(each.min(), 0.0, marker="v", color=view.colour, markersize=7, clip_on=False, zorder=3)
+    axes.set_xlabel(f"{label}; ▾ the least")
+    axes.set_ylabel("share of cells (%)")
+    axes.set_xlim(bins[0], bins[-1])
+    axes.spines[["top", "right"]].set_visible(False)
+    if len(views) > 1:
+        axes.legend(loc="upper left", frameon=False)

@@ -1,0 +1,128 @@
+"""A mesh before and after smoothing, or one mesh: the whole, the surroundings of its worst cell, and histograms."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import InputError
+from gmsnet.io.atomic import replace_files
+from gmsnet.mesh import Mesh
+from gmsnet.plot.figure import AFTER, BEFORE, check_target, file_bytes, new_figure
+from gmsnet.plot.histogram import histogram
+from gmsnet.plot.view import View, add_colour_bar, check_mesh, draw
+from gmsnet.topology import Topology
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PANEL = 4.8  # inches
+ZOOM_CELLS = 150  # about as many cells are seen around the worst one
+ZOOM_FROM = 0.2  # if they take less of the picture than this
+RING_BELOW = 0.03
+WIDE = 2.6  # meshes wider than this (width over height) go one above the other
+
+
+def plot_smoothing(before: Mesh, after: Mesh, path: str | os.PathLike[str]) -> None:
+    """Write a picture of a mesh before and after smoothing, side by side, with histograms of 1/q and smallest angle.
+
+    Cells are coloured by 1/q. Where cells are too small to be seen in the whole, a second row shows the surroundings
+    of the cell that was worst before. path: ``.png``, ``.svg`` or ``.pdf``.
+    Raises InputError for another suffix, for meshes that are not planar or have no triangles, for two meshes of
+    different cells, and where the file cannot be written; MissingExtraError where matplotlib is not installed.
+    """
+    if [block.nodes.tobytes() for block in before.cells] != [block.nodes.tobytes() for block in after.cells]:
+        raise InputError("a picture of before and after needs two meshes of the same cells")
+    check_mesh(before)
+    topology = Topology.of(before)  # wound as before, a cell that has turned over since is drawn as inverted
+    _save([View.of(before, "before", BEFORE, topology), View.of(after, "after", AFTER, topology)], Path(path))
+
+
+def plot_quality(mesh: Mesh, path: str | os.PathLike[str]) -> None:
+    """Write a picture of one mesh and its quality; see plot_smoothing."""
+    check_mesh(mesh)
+    _save([View.of(mesh, "", AFTER)], Path(path))
+
+
+def _save(views: Sequence[View], path: Path) -> None:
+    check_target(path)
+    figure = _figure(views)
+    replace_files({os.fspath(path): file_bytes(figure, path.suffix)})
+
+
+def _figure(views: Sequence[View]) -> Figure:
+    from matplotlib.gridspec import GridSpec
+
+    box = np.stack([np.min([v.box[0] for v in views], axis=0), np.max([v.box[1] for v in views], axis=0)])
+    width, height = np.maximum(box[1] - box[0], np.finfo(float).tiny).tolist()
+    window = _surroundings(views[0], max(width, height))
+    wide = width > WIDE * height
+    alone = wide or (len(views) == 1 and window is None)  # each overall view has a row of its own
+    panel = (2.0 if alone else 1.0) * PANEL
+    overview = float(np.clip(panel * height / width, 1.2, 6.5))
+    rows = [overview] * (len(views) if alone else 1)
+    if window is not None and (alone or len(views) == 2):
+        rows.append(PANEL)
+    rows.append(2.0)
+    figure = new_figure(2 * PANEL + 1.4, sum(rows) + 0.45 * len(rows))
+    grid = GridSpec(len(rows), 2, figure=figure, height_ratios=rows)
+    places: list[tuple[int, int | slice]] = (
+        [(row, slice(None)) for row in range(len(views))] if alone else [(0, column) for column in range(2)]
+    )
+    maps = [figure.add_subplot(grid[place]) for place in places[: len(views)]]
+    for axes, view in zip(maps, views, strict=True):
+        axes.set_title(view.summary, fontsize=10)
+        mappable = draw(axes, view, box)
+        if window is not None:
+            _frame(axes, window)
+    if window is not None:
+        free = places[1:] if not alone and len(views) == 1 else [(len(rows) - 2, column) for column in range(2)]
+        worst = views[0].corners[views[0].report.worst(1)[0]]
+        for view, place, where in zip(views, free, ("around its worst cell", "the same place"), strict=False):
+            zoom = figure.add_subplot(grid[place])
+            zoom.set_title(f"{view.title}:  {where}" if view.title else where, fontsize=10)
+            draw(zoom, view, window)
+            zoom.spines[:].set_visible(True)
+            cell = view.points[worst]
+            if np.ptp(cell, axis=0).max() < 4 * RING_BELOW * np.ptp(window, axis=0).max():
+                zoom.plot(*cell.mean(axis=0), "o", ms=32, mfc="none", mec="black", mew=1.2, clip_on=False)
+            else:
+                zoom.fill(*cell.T, fill=False, edgecolor="black", linewidth=1.2)
+            maps.append(zoom)
+    add_colour_bar(figure, mappable, maps)
+    histogram(figure.add_subplot(grid[-1, 0]), views, "shape", "1/q")
+    histogram(figure.add_subplot(grid[-1, 1]), views, "min_angle", "smallest angle of a cell (degrees)")
+    return figure
+
+
+def _surroundings(view: View, extent: float) -> NDArray[np.float64] | None:
+    """(2 × 2) a square around the worst cell, or None where its cells can be seen in the whole picture."""
+    corners = view.points[view.corners]
+    centres = corners.mean(axis=1)
+    worst = int(view.report.worst(1)[0])
+    distance = np.abs(centres - centres[worst]).max(axis=1)
+    near = np.partition(distance, min(ZOOM_CELLS, len(distance) - 1))[: ZOOM_CELLS + 1].max()
+    half = max(float(near), 1.2 * float(np.abs(corners[worst] - centres[worst]).max()))
+    if half > ZOOM_FROM * extent:
+        return None
+    low, high = view.box  # at the rim of the mesh the square moves inwards, so that it shows cells
+    centre = np.where(high - low > 2 * half, np.clip(centres[worst], low + half, high - half), (low + high) / 2)
+    reach = np.minimum(half, (high - low) / 2)
+    return np.stack([centre - reach, centre + reach])
+
+
+def _frame(axes: Axes, window: NDArray[np.float64]) -> None:
+    """Marks on the whole picture where the zoom is; a frame too small to be seen gets a ring around it."""
+    from matplotlib.patches import Rectangle
+
+    width, height = window[1] - window[0]
+    for colour, thick in (("white", 3.0), ("black", 1.3)):
+        axes.add_patch(Rectangle(tuple(window[0]), width, height, fill=False, edgecolor=colour, linewidth=thick))
+        if max(width, height) < RING_BELOW * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())):
+            axes.plot(*window.mean(axis=0), "o", ms=18, mfc="none", mec=colour, mew=thick, clip_on=False)

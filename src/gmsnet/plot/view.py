@@ -1,0 +1,155 @@
+"""One mesh as it is drawn: its cells in colours of their quality, faces that are no triangles, and lines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import InputError
+from gmsnet.measure import QualityReport, measure
+from gmsnet.mesh import CORNERS, CellBlock, Mesh
+from gmsnet.plot.figure import AFTER
+from gmsnet.topology import Topology
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.figure import Figure
+
+BAD_TO_GOOD = ["#ffd60a", "#e9c46a", "#8fb8a0", "#3f7fb5", "#103a80"]  # yellow … blue; also apart in grey print
+INVERTED = "#d1001f"
+OTHER_CELLS = "#e6e6e6"
+EDGE = "#ffffff"
+MANY = 20_000  # more cells than this are an image in SVG and PDF, so that the file stays small, and share one style
+POINTS = 345.6  # across a picture, in printer's points: 4.8 inches
+
+
+def check_mesh(mesh: Mesh) -> None:
+    """Raise what plotting this mesh would raise, before any work: InputError unless it is planar and has triangles."""
+    if mesh.plane is None:
+        raise InputError("a picture shows planar meshes only, and this one varies in x, y and z")
+    if not any(_is_triangular(block) and len(block.nodes) for block in mesh.cells):
+        raise InputError("a picture shows the quality of triangles, and this mesh has none")
+
+
+def _is_triangular(block: CellBlock) -> bool:
+    return block.dimension == 2 and CORNERS.get(block.kind) == 3
+
+
+@dataclass(frozen=True)
+class View:
+    """One mesh in its plane, measured.
+
+    title, colour: of its histogram. points: (N × 2). corners: (T × 3) of the triangles of ``report``, in its order.
+    others: the corners of faces that are no triangles. lines: (L × 2) the ends of line cells.
+    """
+
+    title: str
+    colour: str
+    points: NDArray[np.float64]
+    corners: NDArray[np.int64]
+    report: QualityReport
+    others: Sequence[NDArray[np.int64]]
+    lines: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, mesh: Mesh, title: str = "", colour: str = AFTER, topology: Topology | None = None) -> View:
+        """A planar mesh; with the topology of another state of it, cells that have turned over since are inverted."""
+        assert mesh.plane is not None
+        triangles = [block.nodes[:, :3] for block in mesh.cells if _is_triangular(block)]
+        faces = [b for b in mesh.cells if b.dimension == 2 and len(b.nodes) and not _is_triangular(b)]
+        others = [block.nodes[:, : CORNERS.get(block.kind, block.nodes.shape[1])] for block in faces]
+        lines = [block.nodes[:, :2] for block in mesh.cells if block.dimension == 1]
+        return cls(
+            title,
+            colour,
+            mesh.points[:, list(mesh.plane)],
+            np.concatenate(triangles),
+            measure(mesh, topology),
+            others,
+            np.concatenate([np.zeros((0, 2), dtype=np.int64), *lines]),
+        )
+
+    @property
+    def box(self) -> NDArray[np.float64]:
+        """(2 × 2) least and greatest coordinates of the nodes that are drawn."""
+        used = self.points[np.unique(np.concatenate([self.corners.ravel(), *(o.ravel() for o in self.others)]))]
+        return np.stack([used.min(axis=0), used.max(axis=0)])
+
+    @property
+    def summary(self) -> str:
+        """The figures above the picture."""
+        least, mean = self.report.shape.min(), self.report.shape.mean()
+        inverted = f", {self.report.inverted:,} inverted" if self.report.inverted else ""
+        text = f"1/q  min {least:.3f}, mean {mean:.3f}{inverted}"
+        return f"{self.title}:  {text}" if self.title else text
+
+
+def draw(axes: Axes, view: View, box: NDArray[np.float64] | None = None) -> ScalarMappable:
+    """The cells that lie in the box (default: all), and the lines; good cells first, so that the worst lie on top.
+
+    Returns what a colour bar needs.
+    """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgba
+
+    box = view.box if box is None else box
+    span = box[1] - box[0]
+    low, high = box[0] - 0.01 * span, box[1] + 0.01 * span
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.spines[:].set_visible(False)
+    mappable = ScalarMappable(Normalize(0.0, 1.0), LinearSegmentedColormap.from_list("bad to good", BAD_TO_GOOD))
+
+    def seen(nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
+        corners = view.points[nodes]
+        inside: NDArray[np.bool_] = ((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)
+        return inside
+
+    rows = np.flatnonzero(seen(view.corners))
+    rows = rows[np.argsort(-view.report.shape[rows], kind="stable")]
+    polygons = view.points[view.corners[rows]]
+    colours = mappable.to_rgba(view.report.shape[rows])
+    colours[view.report.valid[rows] <= 0] = to_rgba(INVERTED)
+    # White edges fade out where cells are specks; slivers are outlined in their own colour, or they would drown in it.
+    thickness = _thickness(polygons) / max(span.max(), np.finfo(float).tiny) * POINTS
+    white = np.clip((thickness - 2.0) / 4.0, 0.0, 0.9)[:, None]
+    edges = white * np.array(to_rgba(EDGE)) + (1.0 - white) * colours
+    many = len(rows) > MANY
+    widths: Any = 0.25 if many else np.clip(0.03 * thickness, 0.25, 0.6)
+    for nodes in view.others:
+        faces = view.points[nodes[seen(nodes)]]
+        other = PolyCollection(list(faces), facecolors=OTHER_CELLS, edgecolors=EDGE, linewidths=0.3, rasterized=many)
+        axes.add_collection(other, autolim=False)
+    cells = PolyCollection(
+        cast(Any, polygons), facecolors=colours, edgecolors=edges, linewidths=widths, rasterized=many
+    )
+    axes.add_collection(cells, autolim=False)
+    lines = LineCollection(
+        list(view.points[view.lines[seen(view.lines)]]), colors="black", linewidths=0.9, rasterized=many
+    )
+    axes.add_collection(lines, autolim=False)
+    return mappable
+
+
+def add_colour_bar(figure: Figure, mappable: ScalarMappable, maps: Sequence[Axes]) -> None:
+    """The legend of the cells' colours, beside the pictures that it belongs to."""
+    label = "1/q (1 equilateral, 0 flat; red: inverted)"
+    figure.colorbar(mappable, ax=list(maps), label=label, aspect=40, pad=0.01)
+
+
+def _thickness(polygons: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T,) the least height of each triangle."""
+    edges = polygons - np.roll(polygons, 1, axis=1)
+    (ax, ay), (bx, by) = edges[:, 0].T, edges[:, 1].T
+    longest = np.sqrt((edges**2).sum(axis=2).max(axis=1))
+    thickness: NDArray[np.float64] = np.abs(ax * by - ay * bx) / np.maximum(longest, np.finfo(float).tiny)
+    return thickness
