@@ -30,20 +30,37 @@ def random_weights(rng, hidden=8, scale=0.3):
     return Weights(model="gmsnet", hidden=hidden, tensors=tensors, metadata={})
 
 
-def compiled_shifts(stars, weights):
-    """The shifts that the compiled network proposes for (centre, ring) pairs, in the coordinates of each star."""
+def proposed(stars, propose, dtype=np.float64):
+    """What a kernel proposes for (centre, ring) pairs, as shifts in the coordinates of each star.
+
+    propose(local, n, shift) writes the shifts of a block, both arrays of the dtype that the kernel computes in.
+    """
     out = np.empty((len(stars), 2))
-    folded, hidden = fold(weights), weights.hidden
-    x, work = np.empty(2 * LANES), np.empty(8 * LANES)
-    shift, row = np.empty(2 * LANES, dtype=np.float32), np.empty(4 * LANES, dtype=np.float32)
-    m, decoded = np.empty(5 * LANES, dtype=np.float32), np.empty(hidden * LANES, dtype=np.float32)
-    features = np.zeros(8 * ((hidden + 3) // 4) * LANES, dtype=np.float32)
+    x, work, shift = np.empty(2 * LANES), np.empty(8 * LANES), np.empty(2 * LANES, dtype=dtype)
     for k, (centre, ring) in enumerate(stars):
         n, lane = len(ring), k % LANES  # every lane takes its turn; all hold the same star
-        flat = np.repeat(np.asarray(ring).ravel(), LANES)
-        local = np.empty(2 * n * LANES, dtype=np.float32)
+        flat = np.repeat(np.asarray(ring, dtype=float).ravel(), LANES)
+        local = np.empty(2 * n * LANES, dtype=dtype)
         x[:LANES], x[LANES:] = centre
         kernels_stars.localise(x, flat, n, work, local)
-        kernels_gmsnet.propose(local, n, folded, hidden, m, row, features, decoded, shift)
+        propose(local, n, shift)
         out[k] = work[lane] * shift[[lane, LANES + lane]].astype(np.float64)
     return out
+
+
+def compiled_shifts(stars, weights):
+    """The shifts that the compiled GMSNet proposes for (centre, ring) pairs, in the coordinates of each star."""
+    folded, hidden = fold(weights), weights.hidden
+    row, m = np.empty(4 * LANES, dtype=np.float32), np.empty(5 * LANES, dtype=np.float32)
+    decoded = np.empty(hidden * LANES, dtype=np.float32)
+    features = np.zeros(8 * ((hidden + 3) // 4) * LANES, dtype=np.float32)
+
+    def propose(local, n, shift):
+        kernels_gmsnet.propose(local, n, folded, hidden, m, row, features, decoded, shift)
+
+    return proposed(stars, propose, np.float32)
+
+
+def size(centre, ring):
+    """The larger side of the bounding box of a star."""
+    return float(np.ptp(np.vstack([centre, ring]), axis=0).max())

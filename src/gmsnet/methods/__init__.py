@@ -7,10 +7,19 @@ import os
 from collections.abc import Iterable
 
 from gmsnet.errors import InputError
-from gmsnet.methods import gmsnet
+from gmsnet.methods import angle, cpt, cvt, gmsnet, laplacian
 from gmsnet.methods.base import Field, Method, Options, Smoother, StarSmoother
 
-METHODS: dict[str, Method] = {method.name: method for method in (gmsnet.METHOD,)}
+METHODS: dict[str, Method] = {
+    method.name: method
+    for method in (
+        gmsnet.METHOD,
+        laplacian.METHOD,
+        angle.METHOD,
+        cvt.METHOD,
+        cpt.METHOD,
+    )
+}
 
 
 def method_named(name: str) -> Method:

@@ -129,9 +129,10 @@ def laplacian(x: Point, ring: list[Point]) -> Point:
 
 
 def smart_laplacian(x: Point, ring: list[Point]) -> Point:
-    """The mean of the ring if the star is the better for it (Field 1988); else x."""
+    """The mean of the ring if the star is the better for it and no triangle is inverted (Field 1988); else x."""
     target = laplacian(x, ring)
-    return target if star_shape(target, ring) > star_shape(x, ring) else x
+    better = star_shape(target, ring) > star_shape(x, ring) and not inverts(x, target, ring)
+    return target if better else x
 
 
 def inverse_length_laplacian(x: Point, ring: list[Point]) -> Point:
@@ -147,24 +148,29 @@ def area_laplacian(x: Point, ring: list[Point]) -> Point:
 
 
 def angle(x: Point, ring: list[Point]) -> Point:
-    """Zhou & Shimada (2000): x turned about each ring node onto the bisector of the angle there; the mean of these.
+    """Zhou & Shimada (2000): x turned about each ring node onto the bisector of the angle there; the mean of these."""
+    neighbours = zip(ring[-1:] + ring[:-1], ring, ring[1:] + ring[:1], strict=True)
+    turned = [onto_bisector(x, before, node, after) for before, node, after in neighbours]
+    return weighted_mean(turned, [1.0] * len(turned))
+
+
+def onto_bisector(x: Point, before: Point, node: Point, after: Point) -> Point:
+    """x turned about a ring node x_j until it is between the edges to the nodes before and after it.
 
     With v = x − x_j, and α₁ and α₂ the angles from v to the edges x_j → x_j+1 and x_j → x_j−1: v is turned by
     β = (α₂ − α₁)/2, counter-clockwise.
     """
-    turned = []
-    for before, node, after in zip(ring[-1:] + ring[:-1], ring, ring[1:] + ring[:1], strict=True):
-        v = (x[0] - node[0], x[1] - node[1])
-        beta = 0.5 * (angle_between(v, node, before) - angle_between(v, node, after))
-        sine, cosine = math.sin(beta), math.cos(beta)
-        turned.append((node[0] + cosine * v[0] - sine * v[1], node[1] + sine * v[0] + cosine * v[1]))
-    return weighted_mean(turned, [1.0] * len(turned))
+    v = (x[0] - node[0], x[1] - node[1])
+    beta = 0.5 * (angle_between(v, node, before) - angle_between(v, node, after))
+    sine, cosine = math.sin(beta), math.cos(beta)
+    return node[0] + cosine * v[0] - sine * v[1], node[1] + sine * v[0] + cosine * v[1]
 
 
 def angle_between(v: Point, tail: Point, head: Point) -> float:
     """The angle in [0, π] between v and the edge tail → head; 0 if one of them has no length."""
     u = (head[0] - tail[0], head[1] - tail[1])
-    return math.atan2(abs(v[0] * u[1] - v[1] * u[0]), v[0] * u[0] + v[1] * u[1])
+    sine, cosine = abs(v[0] * u[1] - v[1] * u[0]), v[0] * u[0] + v[1] * u[1]
+    return math.atan2(sine, cosine) if sine != 0.0 or cosine != 0.0 else 0.0  # atan2(0, −0) is π
 
 
 def cvt(x: Point, ring: list[Point]) -> Point:

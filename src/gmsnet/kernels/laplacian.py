@@ -1,0 +1,133 @@
+"""Laplacian smoothing for a block of stars, in float64: the weighted mean of the ring, p_j its nodes minus the centre.
+
+    shift = Σ w_j p_j / Σ w_j,    w_j = 1,  1/|p_j|,  or the areas of the two triangles at the edge p_j.
+
+The smart form takes the mean only where the sum of 1/q over the star grows by it and no triangle is inverted by it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmsnet.kernels import stars
+from gmsnet.kernels.compile import LANES, kernel
+
+SMART, PLAIN, INVERSE_LENGTH, AREA = range(4)
+TINY = 1e-300  # stands in for a product of squared lengths that is zero: 1/q is then 0
+
+
+@kernel
+def mean(local, n, shift):
+    """w_j = 1."""
+    for k in range(2 * LANES):
+        shift[k] = 0.0
+    for j in range(n):
+        p = local[2 * j * LANES : 2 * (j + 1) * LANES]
+        for k in range(2 * LANES):
+            shift[k] += p[k]
+    for k in range(2 * LANES):
+        shift[k] /= n
+
+
+@kernel
+def inverse_length_mean(local, n, row, shift):
+    """w_j = 1/|p_j|; not a number, so no move, where a neighbour lies on the centre. row: the sum of weights."""
+    for lane in range(LANES):
+        row[lane] = shift[lane] = shift[LANES + lane] = 0.0
+    for j in range(n):
+        p = local[2 * j * LANES : 2 * (j + 1) * LANES]
+        for lane in range(LANES):
+            u, v = p[lane], p[LANES + lane]
+            weight = 1.0 / np.sqrt(u * u + v * v)
+            row[lane] += weight
+            shift[lane] += weight * u
+            shift[LANES + lane] += weight * v
+    for lane in range(LANES):
+        shift[lane] /= row[lane]
+        shift[LANES + lane] /= row[lane]
+
+
+@kernel
+def area_mean(local, n, row, shift):
+    """w_j = |T_j−1| + |T_j|, so Σ w_j p_j = Σ |T_j|(p_j + p_j+1) and Σ w_j = 2 Σ |T_j|; row: the latter.
+
+    Not a number, so no move, where no triangle has an area.
+    """
+    for lane in range(LANES):
+        row[lane] = shift[lane] = shift[LANES + lane] = 0.0
+    for j in range(n):
+        i = n - 1 if j == 0 else j - 1
+        p = local[2 * i * LANES : 2 * (i + 1) * LANES]
+        q = local[2 * j * LANES : 2 * (j + 1) * LANES]
+        for lane in range(LANES):
+            px, py, qx, qy = p[lane], p[LANES + lane], q[lane], q[LANES + lane]
+            twice = abs(px * qy - py * qx)
+            row[lane] += twice
+            shift[lane] += twice * (px + qx)
+            shift[LANES + lane] += twice * (py + qy)
+    for lane in range(LANES):
+        shift[lane] /= 2.0 * row[lane]
+        shift[LANES + lane] /= 2.0 * row[lane]
+
+
+@kernel
+def add_gain(local, n, shift, row):
+    """Adds to row 0 what the sum of 1/q over the star gains by the shift (over 2√3).
+
+    Brings row 1 below or to 0 where a triangle is not positive after the shift and was no less so before.
+    """
+    for j in range(n):
+        i = n - 1 if j == 0 else j - 1
+        p = local[2 * i * LANES : 2 * (i + 1) * LANES]
+        q = local[2 * j * LANES : 2 * (j + 1) * LANES]
+        for lane in range(LANES):
+            px, py, qx, qy = p[lane], p[LANES + lane], q[lane], q[LANES + lane]
+            rim = (px - qx) * (px - qx) + (py - qy) * (py - qy)
+            before = px * qy - py * qx
+            lengths_before = px * px + py * py + qx * qx + qy * qy + rim
+            px, py = px - shift[lane], py - shift[LANES + lane]
+            qx, qy = qx - shift[lane], qy - shift[LANES + lane]
+            after = px * qy - py * qx
+            lengths = px * px + py * py + qx * qx + qy * qy + rim
+            row[lane] += (after * lengths_before - before * lengths) / max(lengths * lengths_before, TINY)
+            row[LANES + lane] = min(row[LANES + lane], max(after, after - before))
+
+
+@kernel
+def smart_mean(local, n, row, shift):
+    """The mean where the star gains by it and no triangle is inverted, else 0. row: two rows of LANES."""
+    mean(local, n, shift)
+    for lane in range(LANES):
+        row[lane] = 0.0
+        row[LANES + lane] = np.inf
+    add_gain(local, n, shift, row)
+    for lane in range(LANES):
+        taken = min(row[lane], row[LANES + lane]) > 0.0
+        shift[lane] = shift[lane] if taken else 0.0
+        shift[LANES + lane] = shift[LANES + lane] if taken else 0.0
+
+
+@kernel
+def propose(local, n, variant, row, shift):
+    """Shifts (2·LANES, over the star's size) of a variant for a block of stars. row: (2·LANES,) to work in."""
+    if variant == SMART:
+        smart_mean(local, n, row, shift)
+    elif variant == PLAIN:
+        mean(local, n, shift)
+    elif variant == INVERSE_LENGTH:
+        inverse_length_mean(local, n, row, shift)
+    else:
+        area_mean(local, n, row, shift)
+
+
+@kernel
+def sweep(points, blocks, first, last, precision, variant, tally):
+    """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
+    x, ring, work, counts = stars.room(blocks.most)
+    local, row, shift = np.empty(2 * blocks.most * LANES), np.empty(2 * LANES), np.empty(2 * LANES)
+    for block in range(first, last):
+        n = stars.fetch(points, blocks, block, x, ring, work, local)
+        propose(local, n, variant, row, shift)
+        stars.commit(points, blocks, block, x, ring, work, shift, precision, counts)
+    for k in range(len(tally)):
+        tally[k] += counts[k]

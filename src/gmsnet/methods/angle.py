@@ -1,0 +1,28 @@
+"""Angle-based smoothing, averaged. The formula stands in kernels/angle.py."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels import angle as kernels
+from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.methods.base import Method, StarSmoother, Tally
+
+
+class AngleBased(StarSmoother):
+    """Each node turned onto the bisectors of the angles at its neighbours, on average."""
+
+    def visit(
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        kernels.sweep(points, blocks, first, last, precision, tally)
+
+
+METHOD = Method(
+    name="angle",
+    summary="to the mean of the places where the node would halve the angles at its neighbours",
+    source="Zhou, Shimada: An angle-based approach to two-dimensional mesh smoothing (2000)",
+    create=lambda options: AngleBased(),
+)

@@ -1,0 +1,32 @@
+"""The paper's CVT smoothing: its equation 1, circumcentres weighted by areas (kernels/cvt.py).
+
+Elsewhere the formula goes by the name of optimal Delaunay triangulation (ODT) smoothing; the centroid of a Voronoi
+region, from which CVT has its name, weights otherwise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels import cvt as kernels
+from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.methods.base import Method, StarSmoother, Tally
+
+
+class Circumcentres(StarSmoother):
+    """Each node to the mean of its triangles' circumcentres by area."""
+
+    def visit(
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        kernels.sweep(points, blocks, first, last, precision, True, tally)
+
+
+METHOD = Method(
+    name="cvt",
+    summary="to the mean of the circumcentres of the triangles, weighted by their areas (also called ODT)",
+    source="Chen: Mesh smoothing schemes based on optimal Delaunay triangulations (2004)",
+    create=lambda options: Circumcentres(),
+)

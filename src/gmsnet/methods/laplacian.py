@@ -1,0 +1,48 @@
+"""Laplacian smoothing, in four variants. The formulas stand in kernels/laplacian.py.
+
+- smart: to the mean of the ring, if the star's mean 1/q is larger there (its MetricLoss smaller) and no triangle is
+  inverted; else no move. So a move that would invert is left out, not truncated, and each move that is made raises the
+  mean 1/q of its star. (Asking for a larger least 1/q instead ends at a mean of 0.876 on random squares, not 0.892.)
+- plain: to the mean of the ring, whatever comes of it.
+- inverse-length: to the ring's mean weighted by 1/length of the edges, so that near neighbours pull most. It tends to
+  the geometric median, which may be a neighbour: on random meshes the first sweeps help, and later ones harm.
+- area: to the ring's mean weighted by the areas of the two triangles at each edge, so that large triangles pull most.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels import laplacian as kernels
+from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.methods.base import Method, StarSmoother, Tally
+
+VARIANTS = {
+    "smart": kernels.SMART,
+    "plain": kernels.PLAIN,
+    "inverse-length": kernels.INVERSE_LENGTH,
+    "area": kernels.AREA,
+}
+
+
+class Laplacian(StarSmoother):
+    """One variant."""
+
+    def __init__(self, variant: str) -> None:
+        self.variant = VARIANTS[variant]
+
+    def visit(
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        kernels.sweep(points, blocks, first, last, precision, self.variant, tally)
+
+
+METHOD = Method(
+    name="laplacian",
+    summary="to the mean of the neighbours, if the star gains by it; or whatever it gains, or with weights",
+    source="Field: Laplacian smoothing and Delaunay triangulations (1988)",
+    create=lambda options: Laplacian(options.variant),
+    variants=tuple(VARIANTS),
+)
