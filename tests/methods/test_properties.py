@@ -36,6 +36,8 @@ TURN_MATTERS = {"gmsnet"}
 # What is less than a gain of 0.1 in q-hat and a mean 1/q of 0.85 on a random square in twenty sweeps.
 LESSER_GAINS = {
     "laplacian-inverse-length": (0.05, 0.75),  # draws nodes to near neighbours
+    "getme-sequential": (0.1, 0.75),  # works at the worst cells and leaves the others alone
+    "getme-sequential-book": (0.1, 0.72),
     "cvt": (0.05, 0.84),  # makes some cells flat: its point may lie outside of a star, and a shift is only halved
 }
 

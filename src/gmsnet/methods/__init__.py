@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable
 
 from gmsnet.errors import InputError
-from gmsnet.methods import angle, cpt, cvt, gmsnet, laplacian
+from gmsnet.methods import angle, cpt, cvt, getme, gmsnet, laplacian
 from gmsnet.methods.base import Field, Method, Options, Smoother, StarSmoother
 
 METHODS: dict[str, Method] = {
@@ -18,6 +18,7 @@ METHODS: dict[str, Method] = {
         angle.METHOD,
         cvt.METHOD,
         cpt.METHOD,
+        getme.METHOD,
     )
 }
 
