@@ -145,7 +145,7 @@ def steps(points, elements, queue, transformation, precision, count, tally):
     transformed anew each time.
     """
     memory, penalty = queue.memory, queue.penalty
-    old, target = np.empty(6), np.empty(6)
+    old, target, room = np.empty(6), np.empty(6), np.empty(12)
     for _ in range(count):
         e = queue.heap[0]
         repeated = e == memory[LAST]
@@ -156,7 +156,7 @@ def steps(points, elements, queue, transformation, precision, count, tally):
             movable += elements.free[elements.corners[e, k]]
         if not (repeated and memory[STUCK]):
             propose(points, elements, e, transformation, precision.single, old, target)
-            memory[STUCK] = not moved(points, elements, e, old, target, precision)
+            memory[STUCK] = not moved(points, elements, e, old, target, precision, room)
         if memory[STUCK]:
             penalty[e] += INVALID
             tally[DROPPED] += movable
@@ -197,7 +197,7 @@ def propose(points, elements, e, transformation, single, old, target):
 
 
 @kernel
-def moved(points, elements, e, old, target, precision):
+def moved(points, elements, e, old, target, precision, room):
     """Moves the corners of an element to their targets if that breaks no triangle; tells whether it has."""
     for k in range(3):
         i = elements.corners[e, k]
@@ -206,7 +206,10 @@ def moved(points, elements, e, old, target, precision):
         i = elements.corners[e, k]
         if elements.free[i]:
             for at in range(elements.start[i], elements.start[i + 1]):
-                if not allowed(points, elements.corners, elements.around[at], e, old, precision):
+                f = elements.around[at]
+                if seen(elements, e, k, f):
+                    continue
+                if not allowed(points, elements.corners, f, e, old, precision, room):
                     for m in range(3):
                         j = elements.corners[e, m]
                         points[j, 0], points[j, 1] = old[2 * m], old[2 * m + 1]
@@ -215,12 +218,24 @@ def moved(points, elements, e, old, target, precision):
 
 
 @kernel
-def allowed(points, corners, f, e, old, precision):
+def seen(elements, e, k, f):
+    """Has element f been met already at one of the free corners of e before the k-th?"""
+    for m in range(k):
+        i = elements.corners[e, m]
+        if elements.free[i]:
+            for n in range(3):
+                if elements.corners[f, n] == i:
+                    return True
+    return False
+
+
+@kernel
+def allowed(points, corners, f, e, old, precision, room):
     """May element f be as it is now that the corners of e have left their old places? The rule of the guard.
 
     It must be certified (kernels.stars), or have been certainly inverted and certainly be less so now.
     """
-    x, was = np.empty(6), np.empty(6)
+    x, was = room[:6], room[6:]
     reach = 0.0
     for k in range(3):
         i = corners[f, k]
@@ -247,6 +262,8 @@ def arrange(points, elements, e, queue):
         if elements.free[i]:
             for at in range(elements.start[i], elements.start[i + 1]):
                 f = elements.around[at]
+                if seen(elements, e, k, f):
+                    continue
                 queue.shape[f] = shape_of(points, elements.corners, f)
                 queue.key[f] = rank(queue.shape[f]) + queue.penalty[f]
                 update(queue.heap, queue.place, queue.key, f)
