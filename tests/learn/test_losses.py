@@ -90,6 +90,14 @@ def test_no_loss_depends_on_the_scale_or_the_padding(stars, name):
 
 
 @every_loss
+def test_no_number_in_no_number_out(stars, name):
+    ring, degree = as_tensors(stars)
+    position = torch.zeros(len(stars), 2, dtype=torch.float64)
+    position[5, 1] = torch.nan
+    assert torch.argwhere(LOSSES[name](ring, degree, position).isnan()).tolist() == [[5]]
+
+
+@every_loss
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_gradients_are_finite_wherever_the_free_node_lies(stars, name, dtype):
     """Also on a ring node, between two of them, far outside, and where the star is a single point."""

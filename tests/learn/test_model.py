@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gmsnet.errors import InputError
+from gmsnet.learn import dense
 from gmsnet.learn.backend import torch
 from gmsnet.learn.data import Stars
 from gmsnet.learn.model import GMSNet, wheels
@@ -140,3 +141,28 @@ def test_wheel_of_four():
 def test_two_neighbours_are_no_star():
     with pytest.raises(InputError, match="at least 3 neighbours, got 2"):
         wheels(torch.zeros(2, 3, 2), torch.tensor([3, 2]))
+
+
+@pytest.mark.parametrize("hidden", [4, 8, 64])
+def test_the_dense_form_is_the_same_network(stars, hidden):
+    """Shifts and gradients, as exactly as float64 lets two orders of summation agree."""
+    net = random_net(hidden).double()
+    ring, degree = torch.as_tensor(stars.ring), torch.as_tensor(stars.degree)
+    seen = []
+    for shift in (net(wheels(ring, degree)), dense.shifts(net, ring, degree)):
+        weight = torch.linspace(-1.0, 1.0, shift.numel(), dtype=torch.float64).reshape(shift.shape)
+        seen.append([shift, *torch.autograd.grad((weight * shift).sum(), list(net.parameters()))])
+    for graph, padded in zip(*seen, strict=True):
+        assert (graph - padded).abs().max() < 1e-10 * (1.0 + graph.abs().max())
+    narrow = random_net(hidden)
+    with torch.no_grad():
+        padded = dense.shifts(narrow, ring.float(), degree)
+        assert (narrow(wheels(ring.float(), degree)) - padded).abs().max() < 2e-4
+
+
+def test_the_dense_form_does_not_see_the_padding(stars):
+    net = random_net(8).double()
+    ring, degree = torch.as_tensor(stars.ring), torch.as_tensor(stars.degree)
+    wider = torch.nn.functional.pad(ring, (0, 0, 0, 3))
+    wider[torch.arange(wider.shape[1]) >= degree[:, None]] = 7.0
+    assert (dense.shifts(net, wider, degree) - dense.shifts(net, ring, degree)).abs().max() < 1e-12

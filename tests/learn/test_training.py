@@ -2,8 +2,11 @@ from __future__ import annotations
 
 import csv
 import json
+import math
+import re
 import signal
 from contextlib import contextmanager
+from dataclasses import replace
 
 import pytest
 import typer
@@ -12,12 +15,15 @@ from typer.testing import CliRunner
 from gmsnet import weights
 from gmsnet.cli import train as command
 from gmsnet.errors import InputError
-from gmsnet.learn import data
+from gmsnet.learn import data, train_gmsnet
 from gmsnet.learn import train as training
 from gmsnet.learn.backend import torch
 from gmsnet.learn.checkpoint import NAME, saved_options
-from gmsnet.learn.model import GMSNet
-from gmsnet.learn.options import TrainOptions
+from gmsnet.learn.losses import LOSSES, truncation
+from gmsnet.learn.model import GMSNet, wheels
+from gmsnet.learn.options import LOSS_TITLES, TrainOptions, options_for
+from gmsnet.learn.train import Ending
+from gmsnet.learn.train_gmsnet import Batch
 
 FILES = {"gmsnet-h4.safetensors", "history.csv", "curves.png", NAME}
 SHORT = TrainOptions(hidden=4, epochs=12, nodes_per_mesh=8, patience=2, seed=3, mesh_seed=1)
@@ -49,10 +55,13 @@ def test_the_same_options_make_the_same_bytes(tmp_path, whole):
     assert contents(tmp_path / "a") == whole
     assert whole.keys() == FILES
     assert [p.epoch for p in seen] == list(range(1, 13))
-    assert first.finished
+    assert first.ending is Ending.FINISHED
+    assert first.files[0].name == "gmsnet-h4.safetensors"
     assert {path.name for path in first.files} == FILES
-    assert first.losses["validation_loss"] == min(p.validation_loss for p in seen)
-    assert seen[-1].learning_rate < SHORT.learning_rate  # the plateau schedule has worked
+    rows = [p.rows["gmsnet"] for p in seen]
+    assert first.history == {"gmsnet": rows}
+    assert first.losses["validation_loss"] == min(row.validation_loss for row in rows)
+    assert rows[-1].learning_rate < SHORT.learning_rate  # the plateau schedule has worked
 
 
 def test_another_seed_makes_other_weights_on_the_same_meshes(tmp_path):
@@ -65,7 +74,7 @@ def test_another_seed_makes_other_weights_on_the_same_meshes(tmp_path):
 def test_stopped_and_resumed_is_as_if_never_stopped(tmp_path, whole):
     epochs = []
     stopped = training.train(SHORT, tmp_path / "parts", on_epoch=epochs.append, should_stop=lambda: len(epochs) == 5)
-    assert not stopped.finished
+    assert stopped.ending is Ending.STOPPED
     assert stopped.epochs == 5
     assert contents(tmp_path / "parts").keys() == {NAME}
     training.train(SHORT, tmp_path / "parts", resume=True)
@@ -86,43 +95,58 @@ def test_killed_and_resumed_is_as_if_never_killed(tmp_path, whole):
 
 
 def test_a_finished_training_can_be_prolonged(tmp_path, whole):
-    short = TrainOptions(**{**SHORT.as_dict(), "epochs": 4})
+    short = replace(SHORT, epochs=4)
     training.train(short, tmp_path / "parts")
     training.train(SHORT, tmp_path / "parts", resume=True)
     assert contents(tmp_path / "parts") == whole
 
 
-def test_it_learns_and_keeps_the_best(tmp_path):
-    options = TrainOptions(hidden=8, epochs=60)
+@pytest.mark.parametrize("loss", ["metric", "cosine", "min-max-angle"])
+def test_it_learns_and_keeps_the_best(tmp_path, loss):
+    options = TrainOptions(epochs=60, loss=loss)
     result = training.train(options, tmp_path)
     losses = result.losses
     assert losses["validation_loss_optimum"] < losses["validation_loss"] < losses["validation_loss_before"]
-    assert losses["test_loss"] < losses["test_loss_before"]
+    for kind in ("validation_loss", "validation_metric_loss", "test_loss", "test_metric_loss"):
+        assert losses[kind] < losses[f"{kind}_before"]
     rows = list(csv.DictReader((tmp_path / "history.csv").read_text().splitlines()))
     assert [int(row["epoch"]) for row in rows] == list(range(1, 61))
-    assert min(float(row["validation_loss"]) for row in rows) == pytest.approx(losses["validation_loss"], abs=1e-8)
+    best = min(rows, key=lambda row: float(row["validation_loss"]))
+    for kind in ("validation_loss", "validation_metric_loss"):
+        assert float(best[kind]) == pytest.approx(losses[kind], rel=1e-7)
+    assert (best["validation_loss"] == best["validation_metric_loss"]) == (loss == "metric")
 
-    loaded = weights.load(tmp_path / "gmsnet-h8.safetensors")
-    parts = [data.Stars.of_mesh(mesh) for mesh in data.meshes(0)]
-    validation = training.Batch.of_stars(data.joined(parts[12:16]))
+    loaded = weights.load(tmp_path / f"gmsnet-h8{'' if loss == 'metric' else '-' + loss}.safetensors")
+    net = GMSNet.from_tensors(loaded.tensors)
+    stars = data.joined([data.Stars.of_mesh(mesh) for mesh in data.meshes(0)[12:16]])
+    ring, degree = torch.as_tensor(stars.ring, dtype=torch.float32), torch.as_tensor(stars.degree)
     with torch.no_grad():
-        assert float(validation.loss(GMSNet.from_tensors(loaded.tensors))) == losses["validation_loss"]
+        shift = net(wheels(ring, degree))
+        moved = truncation(ring, degree, shift)[:, None] * shift
+        assert float(LOSSES[loss](ring, degree, moved).mean()) == pytest.approx(losses["validation_loss"], abs=1e-4)
+        assert float(LOSSES["metric"](ring, degree, moved).mean()) == pytest.approx(
+            losses["validation_metric_loss"], abs=1e-5
+        )
 
 
 def test_metadata_tells_how_the_weights_were_made(tmp_path, whole):
     (tmp_path / "w.safetensors").write_bytes(whole["gmsnet-h4.safetensors"])
     metadata = weights.load(tmp_path / "w.safetensors").metadata
-    assert TrainOptions(**json.loads(metadata["recipe"])) == SHORT
+    recipe = json.loads(metadata["recipe"])
+    assert options_for(recipe.pop("model"), recipe) == SHORT
+    assert recipe["loss"] == "metric"
     assert metadata["command"] == SHORT.command
     assert metadata["command"] == (
-        "gmsnet train --hidden 4 --epochs 12 --nodes-per-mesh 8 --patience 2 --seed 3 --mesh-seed 1"
+        "gmsnet train --epochs 12 --nodes-per-mesh 8 --patience 2 --seed 3 --mesh-seed 1 --hidden 4"
     )
     assert metadata["parameters"] == "74"
     assert metadata["seed"] == "3"
     assert json.loads(metadata["versions"])["torch"] == torch.__version__
-    curve = json.loads(metadata["validation_curve"])
+    curve = json.loads(metadata["validation_curve"])["gmsnet"]
     assert [epoch for epoch, _ in curve] == list(range(1, 13))
-    assert min(loss for _, loss in curve) == pytest.approx(float(metadata["validation_loss"]), abs=1e-5)
+    assert min(loss for _, loss in curve) == pytest.approx(float(metadata["validation_loss"]), rel=1e-4)
+    best = json.loads(metadata["validation_best_epoch"])["gmsnet"]
+    assert curve[best - 1][1] == min(loss for _, loss in curve)
     assert "20 random Delaunay squares" in metadata["data"]
 
 
@@ -140,9 +164,10 @@ def test_meshes_with_fewer_nodes_than_asked_for_give_all(tmp_path):
     losses = []
     options = TrainOptions(hidden=4, epochs=2, nodes_per_mesh=1000)
     training.train(options, tmp_path, on_epoch=losses.append, should_stop=lambda: True)
-    stars = training.Batch.of_stars(data.joined([data.Stars.of_mesh(mesh) for mesh in data.meshes(0)[:12]]))
+    stars = Batch.of_stars(data.joined([data.Stars.of_mesh(mesh) for mesh in data.meshes(0)[:12]]))
     torch.manual_seed(0)
-    assert losses[0].train_loss == pytest.approx(stars.loss(GMSNet(4)).item(), abs=1e-6)
+    expected = stars.mean(LOSSES["metric"], stars.moved(GMSNet(4))).item()
+    assert losses[0].rows["gmsnet"].train_loss == pytest.approx(expected, abs=1e-6)
 
 
 def test_folder_rules(tmp_path):
@@ -151,7 +176,7 @@ def test_folder_rules(tmp_path):
     assert saved_options(tmp_path / "a") == SHORT
     with pytest.raises(InputError, match="holds a training already"):
         training.train(SHORT, tmp_path / "a", **stop)
-    with pytest.raises(InputError, match=r"other options: gmsnet train --hidden 4 .* --seed 3"):
+    with pytest.raises(InputError, match=r"other options: gmsnet train .* --seed 3 .* --hidden 4"):
         training.train(TrainOptions(), tmp_path / "a", resume=True, **stop)
     with pytest.raises(InputError, match="nothing to resume"):
         training.train(SHORT, tmp_path / "b", resume=True, **stop)
@@ -175,9 +200,38 @@ def test_another_file_of_the_name_is_refused(tmp_path, whole):
         training.train(SHORT, tmp_path, resume=True)
 
 
-def test_divergence_is_told(tmp_path):
-    with pytest.raises(InputError, match=r"diverged in epoch .* lower --learning-rate"):
-        training.train(TrainOptions(hidden=4, learning_rate=1e20), tmp_path)
+WILD = TrainOptions(hidden=4, learning_rate=1e20)
+
+
+def test_a_training_that_diverges_keeps_its_curves(tmp_path):
+    seen = []
+    result = training.train(WILD, tmp_path, on_epoch=seen.append)
+    assert result.ending is Ending.DIVERGED
+    assert result.losses == {}
+    assert result.epochs == len(seen) < WILD.epochs
+    assert {path.name for path in result.files} == {"history.csv", "curves.png"} <= contents(tmp_path).keys()
+    rows = list(csv.DictReader((tmp_path / "history.csv").read_text().splitlines()))
+    assert [int(row["epoch"]) for row in rows] == list(range(1, len(seen) + 1))
+    assert rows[-1]["validation_loss"] == "nan"
+    assert all(row["validation_loss"] != "nan" for row in rows[:-1])
+    assert not any(name.startswith("gmsnet") for name in contents(tmp_path))
+
+
+def test_an_infinite_loss_is_no_divergence(tmp_path, monkeypatch):
+    """A star that cannot be truncated has an infinite aspect ratio loss; it may come right again."""
+    true = LOSSES["q"]
+    calls = []
+
+    def loss(*star):
+        calls.append(1)
+        return true(*star) * (math.inf if len(calls) in (2, 4) else 1.0)  # the validation of two epochs
+
+    monkeypatch.setattr(train_gmsnet, "LOSSES", {"q": loss})
+    result = training.train(TrainOptions(hidden=4, epochs=3, loss="q"), tmp_path)
+    assert result.ending is Ending.FINISHED
+    assert [row.validation_loss < math.inf for row in result.history["gmsnet"]] == [False, False, True]
+    assert result.losses["validation_loss"] == pytest.approx(result.history["gmsnet"][2].validation_loss)
+    assert (tmp_path / "gmsnet-h4-q.safetensors").exists()
 
 
 @pytest.mark.parametrize(
@@ -193,11 +247,23 @@ def test_divergence_is_told(tmp_path):
         ({"learning_rate": 0.0}, "--learning-rate must be a positive number"),
         ({"learning_rate": float("nan")}, "--learning-rate must be a positive number"),
         ({"decay": 1.0}, "--decay must lie between 0 and 1"),
+        ({"loss": "angle"}, "--loss must be one of metric, q, cosine, min-max-angle; got 'angle'"),
     ],
 )
 def test_bad_options_are_named(options, message):
     with pytest.raises(InputError, match=message):
         TrainOptions(**options)
+
+
+def test_every_loss_can_be_chosen():
+    assert tuple(LOSS_TITLES) == tuple(LOSSES)
+
+
+def test_options_of_other_models_are_refused():
+    with pytest.raises(InputError, match=r"--model must be one of gmsnet.*; got 'resnet'"):
+        options_for("resnet", {})
+    with pytest.raises(InputError, match="--depth does not apply to --model gmsnet; leave it out"):
+        options_for("gmsnet", {"depth": 3})
 
 
 app = typer.Typer()
@@ -208,7 +274,7 @@ ARGUMENTS = SHORT.command.split()[2:]
 def test_command_trains_and_reports(tmp_path, whole):
     result = CliRunner().invoke(app, [*ARGUMENTS, "--out", str(tmp_path / "run")])
     assert result.exit_code == 0, result.output
-    assert result.stdout.startswith("validation loss 0.")
+    assert result.stdout.startswith("MetricLoss: validation 0.")
     assert all(f"wrote {tmp_path / 'run' / name}" in result.stdout for name in FILES)
     assert "\x1b" not in result.output  # no progress bar where there is no terminal
     assert contents(tmp_path / "run") == whole
@@ -231,6 +297,12 @@ def test_command_stops_with_a_checkpoint_and_resumes_with_its_options(tmp_path, 
     assert contents(tmp_path / "run") == whole
     result = CliRunner().invoke(app, ["--resume", "--hidden", "8", *folder])
     assert isinstance(result.exception, InputError)
+
+
+def test_command_tells_where_the_curves_of_a_divergence_are(tmp_path):
+    result = CliRunner().invoke(app, [*WILD.command.split()[2:], "--out", str(tmp_path)])
+    assert isinstance(result.exception, InputError)
+    assert re.search(rf"diverged in epoch \d+; its curves so far are {tmp_path}/curves.png", str(result.exception))
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -1,28 +1,33 @@
-"""gmsnet train: trains GMSNet on random squares, without labels, and writes its weights."""
+"""gmsnet train: trains a network on random squares and writes its weights."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gmsnet.cli.signals import Deferral, Interrupted
+from gmsnet.errors import InputError
 
 if TYPE_CHECKING:
-    from gmsnet.learn.options import TrainOptions
+    from gmsnet.learn.options import Options
     from gmsnet.learn.train import Progress, TrainResult
 
+_NO_OPTIONS = ("out", "model", "resume")  # of a training itself
 STOPPED = 130  # exit code after Ctrl-C, as shells count it
 
 
 def train(
     context: typer.Context,
     out: Annotated[Path, typer.Option(help="Folder for weights, curves and checkpoint.")] = Path("gmsnet-training"),
-    hidden: Annotated[int, typer.Option(help="Hidden features H; 2H² + 10H + 2 parameters.")] = 8,
+    model: Annotated[str, typer.Option(help="What is trained: gmsnet.")] = "gmsnet",
+    loss: Annotated[
+        str, typer.Option(help="What GMSNet minimises: metric (MetricLoss), q (aspect ratio), cosine, min-max-angle.")
+    ] = "metric",
+    hidden: Annotated[int, typer.Option(help="Hidden features H of GMSNet; 2H² + 10H + 2 parameters.")] = 8,
     epochs: Annotated[int, typer.Option(help="Adam steps, one an epoch.")] = 4000,
     nodes_per_mesh: Annotated[int, typer.Option(help="Nodes that an epoch draws from each training mesh.")] = 32,
     learning_rate: Annotated[float, typer.Option(help="Learning rate at the start.")] = 1e-2,
@@ -34,41 +39,50 @@ def train(
         bool, typer.Option("--resume", help="Go on from the checkpoint in --out, with its options.")
     ] = False,
 ) -> None:
-    """Train GMSNet on 20 random Delaunay squares (12 to train, 4 to validate, 4 to test), without labels.
+    """Train a model on 20 random Delaunay squares (12 to train, 4 to validate, 4 to test).
 
-    Writes gmsnet-hH.safetensors (for gmsnet smooth --weights), history.csv, curves.png and checkpoint.safetensors.
+    GMSNet learns without labels. Writes MODEL.safetensors (for gmsnet smooth --weights), history.csv, curves.png and
+    checkpoint.safetensors.
     """
-    from gmsnet.learn.train import check_folder
+    from gmsnet.learn.train import Ending, check_folder
     from gmsnet.learn.train import train as run
 
-    options = _options(context, out, resume=resume)
+    options = _options(context, out, model, resume=resume)
     check_folder(options, out, resume=resume)
-    typer.echo(f"{options.command}: H = {options.hidden}, {options.epochs:,} epochs, into {out}", err=True)
+    typer.echo(f"{options.command}: {options.epochs:,} epochs, into {out}", err=True)
     try:
         with _stop_on_signal() as should_stop, _bar(options.epochs) as on_epoch:
             result = run(options, out, resume=resume, on_epoch=on_epoch, should_stop=should_stop)
     except KeyboardInterrupt:
         raise Interrupted(f"interrupted; what {out} holds is that of the last checkpoint, if there was one") from None
-    if not result.finished:
+    if result.ending is Ending.DIVERGED:
+        raise InputError(
+            f"the training diverged in epoch {result.epochs:,}; its curves so far are {result.files[-1]}; "
+            f"take a lower --learning-rate, another --loss or another --seed"
+        )
+    if result.ending is Ending.STOPPED:
         typer.echo(
-            f"stopped after {result.epochs:,} of {options.epochs:,} epochs (validation loss so far "
-            f"{result.losses['validation_loss']:.4f}); go on with: gmsnet train --resume --out {out}",
+            f"stopped after {result.epochs:,} of {options.epochs:,} epochs; "
+            f"go on with: gmsnet train --resume --out {out}",
             err=True,
         )
         raise SystemExit(STOPPED)  # Typer itself gives this code to an interruption that nothing was said about
     _report(result)
 
 
-def _options(context: typer.Context, out: Path, *, resume: bool) -> TrainOptions:
+def _options(context: typer.Context, out: Path, model: str, *, resume: bool) -> Options:
     """The options as given; when resuming, those of the checkpoint with what was given on top."""
     from gmsnet.learn.checkpoint import saved_options
-    from gmsnet.learn.options import TrainOptions
+    from gmsnet.learn.options import changed, options_for
 
+    values = {name: value for name, value in context.params.items() if name not in _NO_OPTIONS}
+    given = {name: value for name, value in values.items() if _is_given(context, name)}
     saved = saved_options(out) if resume else None
-    values: dict[str, Any] = {name: context.params[name] for name in TrainOptions().as_dict()}
     if saved is None:
-        return TrainOptions(**values)
-    return replace(saved, **{name: value for name, value in values.items() if _is_given(context, name)})
+        return options_for(model, given)
+    if _is_given(context, "model") and model != saved.model:
+        raise InputError(f"{out}: the training there is of --model {saved.model}, not {model}")
+    return changed(saved, given)
 
 
 def _is_given(context: typer.Context, name: str) -> bool:
@@ -102,7 +116,8 @@ def _bar(epochs: int) -> Iterator[Callable[[Progress], None]]:
         task = bar.add_task("training", total=epochs, losses="")
 
         def on_epoch(at: Progress) -> None:
-            losses = f"loss {at.train_loss:.4f}, validation {at.validation_loss:.4f}, rate {at.learning_rate:.1g}"
+            row = next(iter(at.rows.values()))
+            losses = f"loss {row.train_loss:.4f}, validation {row.validation_loss:.4f}, rate {row.learning_rate:.1g}"
             bar.update(task, completed=at.epoch, losses=losses)
 
         yield on_epoch
@@ -113,9 +128,9 @@ def _report(result: TrainResult) -> None:
     best, before, optimum = (losses[f"validation_loss{name}"] for name in ("", "_before", "_optimum"))
     share = (before - best) / (before - optimum)
     typer.echo(
-        f"validation loss {best:.4f}, {share:.0%} of the way from {before:.4f} before "
+        f"{result.options.loss_title}: validation {best:.4f}, {share:.0%} of the way from {before:.4f} before "
         f"to {optimum:.4f}, the optimum of each star by itself"
     )
-    typer.echo(f"test loss {losses['test_loss']:.4f}, before {losses['test_loss_before']:.4f}")
+    typer.echo(f"test {losses['test_loss']:.4f}, before {losses['test_loss_before']:.4f}")
     for path in result.files:
         typer.echo(f"wrote {path}")

@@ -6,7 +6,8 @@ The draws of an epoch depend on the seed and the epoch's number alone, so there 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,43 +19,65 @@ from gmsnet.errors import InputError
 from gmsnet.io.atomic import replace_files
 from gmsnet.learn.backend import torch
 from gmsnet.learn.encoding import safetensors_bytes
-from gmsnet.learn.options import TrainOptions
+from gmsnet.learn.options import Options, options_for
+from gmsnet.learn.trainee import Row
 
 NAME = "checkpoint.safetensors"
-Schedule = torch.optim.lr_scheduler.ReduceLROnPlateau
 
 
 @dataclass
-class State:
-    """What changes from epoch to epoch.
+class Member:
+    """One network in training, and what changes from epoch to epoch.
 
-    best: the parameters with the least validation loss so far, by name. history: for each epoch the training loss, the
-    validation loss and the learning rate of its step.
+    best: the parameters with the least validation loss so far, by name. least: that loss. history: a row an epoch.
     """
 
     net: torch.nn.Module
     optimizer: torch.optim.Adam
-    schedule: Schedule
-    best: dict[str, torch.Tensor]
-    history: list[tuple[float, float, float]]
+    schedule: torch.optim.lr_scheduler.ReduceLROnPlateau
+    best: dict[str, torch.Tensor] = field(default_factory=dict)
+    least: float = np.inf
+    history: list[Row] = field(default_factory=list)
 
-    def save(self, folder: Path, options: TrainOptions) -> None:
-        """Write the checkpoint into a folder. Raises InputError where it cannot be written."""
-        tensors: dict[str, NDArray[Any]] = {"history": np.array(self.history, dtype=np.float64).reshape(-1, 3)}
+    @classmethod
+    def of(cls, net: torch.nn.Module, options: Options) -> Member:
+        """The network at the start."""
+        optimizer = torch.optim.Adam(net.parameters(), lr=options.learning_rate)
+        schedule = torch.optim.lr_scheduler.ReduceLROnPlateau(
+            optimizer, factor=options.decay, patience=options.patience
+        )
+        return cls(net, optimizer, schedule)
+
+    def judge(self, row: Row) -> None:
+        """Take down an epoch; keep the parameters if they are the best so far."""
+        self.schedule.step(row.validation_loss)
+        if row.validation_loss < self.least or not self.best:
+            self.least = row.validation_loss
+            self.best = {name: value.clone() for name, value in self.net.state_dict().items()}
+        self.history.append(row)
+
+    @property
+    def diverged(self) -> bool:
+        """A loss may be infinite for a while, as long as it and the parameters are numbers."""
+        finite = all(bool(torch.isfinite(value).all()) for value in self.net.state_dict().values())
+        return not finite or bool(np.isnan(self.history[-1].validation_loss))
+
+    def tensors(self) -> dict[str, NDArray[Any]]:
+        """The state but for that of the schedule."""
+        tensors: dict[str, NDArray[Any]] = {"history": np.array(self.history, dtype=np.float64)}
         tensors |= {f"net/{name}": value.numpy() for name, value in self.net.state_dict().items()}
         tensors |= {f"best/{name}": value.numpy() for name, value in self.best.items()}
         for index, moments in self.optimizer.state_dict()["state"].items():
             tensors |= {f"adam/{index}/{name}": value.numpy() for name, value in moments.items()}
-        metadata = {"options": json.dumps(options.as_dict()), "schedule": json.dumps(self.schedule.state_dict())}
-        replace_files({str(folder / NAME): safetensors_bytes(tensors, metadata)})
+        return tensors
 
-    def restore(self, folder: Path) -> None:
-        """Take over the state in a folder. Raises InputError where it cannot be read."""
-        tensors, metadata = _read(folder)
+    def restore(self, tensors: Mapping[str, torch.Tensor], schedule: dict[str, Any]) -> None:
+        """Take over the state that ``tensors`` gave, and the schedule's."""
         self.net.load_state_dict(_below(tensors, "net/"))
         self.best = _below(tensors, "best/")
-        self.history = [(train, val, rate) for train, val, rate in tensors["history"].tolist()]
-        self.schedule.load_state_dict(json.loads(metadata["schedule"]))
+        self.history = [Row(*row) for row in tensors["history"].tolist()]
+        self.least = min(row.validation_loss for row in self.history)
+        self.schedule.load_state_dict(schedule)
         state: dict[int, dict[str, torch.Tensor]] = {}
         for name, value in _below(tensors, "adam/").items():
             index, moment = name.split("/")
@@ -65,17 +88,35 @@ class State:
         self.optimizer.load_state_dict({"state": state, "param_groups": groups})
 
 
-def saved_options(folder: Path) -> TrainOptions | None:
+def save(folder: Path, options: Options, members: Mapping[str, Member]) -> None:
+    """Write the checkpoint into a folder. Raises InputError where it cannot be written."""
+    tensors = {f"{name}/{key}": value for name, member in members.items() for key, value in member.tensors().items()}
+    schedules = {name: member.schedule.state_dict() for name, member in members.items()}
+    metadata = {"options": json.dumps(options.as_dict()), "schedules": json.dumps(schedules)}
+    replace_files({str(folder / NAME): safetensors_bytes(tensors, metadata)})
+
+
+def restore(folder: Path, members: Mapping[str, Member]) -> None:
+    """Take over the state in a folder. Raises InputError where it cannot be read."""
+    tensors, metadata = _read(folder)
+    schedules = json.loads(metadata["schedules"])
+    for name, member in members.items():
+        member.restore(_below(tensors, f"{name}/"), schedules[name])
+
+
+def saved_options(folder: Path) -> Options | None:
     """The options of the training whose checkpoint lies in a folder; None if there is none. Raises InputError."""
     if not (folder / NAME).exists():
         return None
+    metadata = _read(folder)[1]
     try:
-        return TrainOptions(**json.loads(_read(folder)[1]["options"]))
-    except (KeyError, TypeError, json.JSONDecodeError) as error:
+        values = json.loads(metadata["options"])
+        return options_for(values.pop("model"), values)
+    except (InputError, KeyError, TypeError, AttributeError, json.JSONDecodeError) as error:
         raise InputError(f"{folder / NAME}: no checkpoint of this version of gmsnet; take another --out") from error
 
 
-def _below(tensors: dict[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:
+def _below(tensors: Mapping[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:
     return {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
 
 

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.learn.trainee import Row
 from gmsnet.plot import check_target, new_figure
 
-HEADER = "epoch,train_loss,validation_loss,learning_rate\n"
+HEADER = ",".join(("epoch", "network", *Row._fields)) + "\n"
+MOST_LINEAR = 10.0  # largest ratio of what is shown to its smallest that is not shown on a logarithmic axis
 
 
-def csv_bytes(history: Sequence[tuple[float, float, float]]) -> bytes:
-    """One row for each epoch: its number, training loss, validation loss, learning rate."""
-    rows = (f"{k},{train:.8f},{val:.8f},{rate:.6g}\n" for k, (train, val, rate) in enumerate(history, start=1))
+def csv_bytes(history: Mapping[str, Sequence[Row]]) -> bytes:
+    """For each epoch a row for each network."""
+    rows = [
+        f"{epoch},{name},{row.train_loss:.8g},{row.validation_loss:.8g},{row.validation_metric_loss:.8g},"
+        f"{row.learning_rate:.6g}\n"
+        for epoch, each in enumerate(zip(*history.values(), strict=True), start=1)
+        for name, row in zip(history, each, strict=True)
+    ]
     return (HEADER + "".join(rows)).encode()
 
 
@@ -21,21 +32,51 @@ def check_plotting() -> None:
     check_target("curves.png")
 
 
-def png_bytes(history: Sequence[tuple[float, float, float]], marks: Mapping[str, float]) -> bytes:
-    """Both curves over the epochs, and the marks as horizontal lines."""
+def png_bytes(history: Mapping[str, Sequence[Row]], loss: str, marks: Mapping[str, float]) -> bytes:
+    """The curves over the epochs; of a single network also that of the drawn nodes, and the marks as horizontal lines.
+
+    loss: its name, for the axis.
+    """
     figure = new_figure(7.0, 4.2)
     axes = figure.add_subplot()
-    epochs = range(1, len(history) + 1)
-    axes.plot(epochs, [row[0] for row in history], color="#e0a800", linewidth=0.5, label="training (drawn nodes)")
-    axes.plot(epochs, [row[1] for row in history], color="#173f7a", linewidth=1.2, label="validation")
+    shown = list(marks.values())
+    for (name, rows), colour in zip(history.items(), _colours(len(history)), strict=True):
+        epochs = range(1, len(rows) + 1)
+        curve = [row.validation_loss for row in rows]
+        shown += curve[len(rows) // 10 :]
+        if len(history) == 1:
+            drawn = [row.train_loss for row in rows]
+            axes.plot(epochs, drawn, color="#e0a800", linewidth=0.5, label="training (drawn nodes)")
+        label = "validation" if len(history) == 1 else f"validation, {name}"
+        axes.plot(epochs, curve, color=colour, linewidth=1.2, label=label)
     for (name, value), style in zip(marks.items(), (":", "--", "-."), strict=False):
-        axes.axhline(value, color="black", linewidth=0.8, linestyle=style, label=f"{name} ({value:.4f})")
-    low = min(*(row[1] for row in history), *marks.values())
-    high = max(*(row[1] for row in history[-len(history) * 9 // 10 :]), *marks.values())
-    axes.set_ylim(low - 0.1 * (high - low), high + 0.15 * (high - low))
+        axes.axhline(value, color="black", linewidth=0.8, linestyle=style, label=f"{name} ({value:.4g})")
+    _scale(axes, np.array(shown))
     axes.set_xlabel("epoch")
-    axes.set_ylabel("MetricLoss")
+    axes.set_ylabel(loss)
     axes.legend(frameon=False)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=150)
     return buffer.getvalue()
+
+
+def _scale(axes: Any, shown: NDArray[np.float64]) -> None:
+    """The range of the values that are shown, without those that are not finite."""
+    shown = shown[np.isfinite(shown)]
+    if not shown.size:
+        return
+    low, high = shown.min(), shown.max()
+    if low > 0 and high / low > MOST_LINEAR:
+        axes.set_yscale("log")
+        axes.set_ylim(low / 1.2, high * 1.2)
+    elif high > low:
+        axes.set_ylim(low - 0.1 * (high - low), high + 0.15 * (high - low))
+
+
+def _colours(count: int) -> list[str]:
+    """From dark blue to yellow."""
+    if count == 1:
+        return ["#173f7a"]
+    ends = np.array([[0x17, 0x3F, 0x7A], [0xE0, 0xA8, 0x00]])
+    mixed = [ends[0] + (ends[1] - ends[0]) * k / (count - 1) for k in range(count)]
+    return ["#" + "".join(f"{round(part):02x}" for part in colour) for colour in mixed]

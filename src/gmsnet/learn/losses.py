@@ -1,7 +1,8 @@
 """Losses of a star, and the truncation of shifts.
 
 ring: (B × M × 2) neighbours counter-clockwise, padded; degree: (B,); position: (B × 2) of the free node, all in one
-frame. Each loss is the mean of one number over the n triangles of the star. None depends on the scale.
+frame. Each loss is the mean of one number over the n triangles of the star. None depends on the scale, and a position
+that is not a number has a loss that is none either.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ def metric_loss(ring: torch.Tensor, degree: torch.Tensor, position: torch.Tensor
     """
     a, b, inside = _spokes(ring, degree, position)
     squares = _squares(a, b)
-    inverse_q = 2.0 * math.sqrt(3.0) * _cross(a, b) / torch.where(squares > 0, squares, 1.0)
+    inverse_q = 2.0 * math.sqrt(3.0) * _cross(a, b) / torch.where(squares == 0, 1.0, squares)
     return _mean(1.0 - inverse_q, inside, degree)
 
 
@@ -35,9 +36,9 @@ def aspect_loss(ring: torch.Tensor, degree: torch.Tensor, position: torch.Tensor
     """
     a, b, inside = _spokes(ring, degree, position)
     doubled = _cross(a, b)
-    valid = inside & (doubled > 0)
-    q = _squares(a, b) / (2.0 * math.sqrt(3.0) * torch.where(valid, doubled, 1.0))
-    return _mean(torch.where(valid, q, torch.inf), inside, degree)
+    inverted = doubled <= 0
+    q = _squares(a, b) / (2.0 * math.sqrt(3.0) * torch.where(inverted, 1.0, doubled))
+    return _mean(torch.where(inverted, torch.inf, q), inside, degree)
 
 
 def cosine_loss(ring: torch.Tensor, degree: torch.Tensor, position: torch.Tensor) -> torch.Tensor:
@@ -48,10 +49,8 @@ def cosine_loss(ring: torch.Tensor, degree: torch.Tensor, position: torch.Tensor
     a, b, inside = _spokes(ring, degree, position)
     total = torch.zeros_like(a[..., 0])
     for u, v in _corners(a, b):
-        first, second = _dot(u, u), _dot(v, v)
-        open_ = (first > 0) & (second > 0)
-        cosine = _dot(u, v) * torch.where(open_, first, 1.0).rsqrt() * torch.where(open_, second, 1.0).rsqrt()
-        total = total + (torch.where(open_, cosine, 0.0) - 0.5).square()
+        cosine = _dot(u, v) * _inverse_length(u) * _inverse_length(v)
+        total = total + (cosine - 0.5).square()
     return _mean(total / 3.0, inside, degree)
 
 
@@ -65,8 +64,8 @@ def largest_angle_loss(ring: torch.Tensor, degree: torch.Tensor, position: torch
     angles = []
     for u, v in _corners(a, b):
         sine, cosine = _cross(u, v).abs(), _dot(u, v)
-        open_ = sine.square() + cosine.square() > 0  # else the gradient of atan2 would be 0/0
-        angles.append(torch.atan2(torch.where(open_, sine, 0.0), torch.where(open_, cosine, 1.0)))
+        closed = sine.square() + cosine.square() == 0  # there the gradient of atan2 would be 0/0
+        angles.append(torch.atan2(torch.where(closed, 0.0, sine), torch.where(closed, 1.0, cosine)))
     return _mean(torch.stack(angles).amax(dim=0), inside, degree)
 
 
@@ -130,3 +129,9 @@ def _cross(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
 
 def _dot(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
     return (a * b).sum(dim=2)
+
+
+def _inverse_length(a: torch.Tensor) -> torch.Tensor:
+    """1/|a|; 1 where |a| is 0."""
+    square = _dot(a, a)
+    return torch.where(square == 0, 1.0, square).rsqrt()

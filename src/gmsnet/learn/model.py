@@ -44,8 +44,12 @@ class GMSNet(torch.nn.Module):
         #      Ã = D̂^(−½) (A + I) D̂^(−½): 1/(n + 1) on the free node, 1/(2 √(n + 1)) on a spoke
         hidden = self.gcn(torch.relu(normed), stars.edge_index) + normed  # (N × H)
 
+        return self.decode(hidden[stars.centre])  # (8)
+
+    def decode(self, hidden: torch.Tensor) -> torch.Tensor:
+        """(B × 2) the shift from the free node's features X_g[i_c, :] (B × H)."""
         # (8)  x* = MLP(X_g[i_c, :]),   MLP = Linear, InstanceNorm over the H features of each star, ReLU, Linear
-        inner = self.mlp[0](hidden[stars.centre])  # (B × H)
+        inner = self.mlp[0](hidden)  # (B × H)
         inner = torch.nn.functional.instance_norm(inner[:, None, :], eps=1e-5)[:, 0, :]
         shift: torch.Tensor = self.mlp[1](torch.relu(inner))  # (B × 2)
         return shift
