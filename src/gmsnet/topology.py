@@ -48,8 +48,8 @@ class Topology:
     parts: how many pieces the faces form over shared edges. held: reason → node ids, the first reason that applies.
     free: (F,) ids of the nodes that may move, ascending.
     memory: (N,) node ids in memory order. In that order, by places in memory: near (T, 3) and near_turn (T,), the
-    triangles; rings, their CSR start (N + 1) and the colours (N,), of which no two free nodes of one cell share one
-    (−1 where held).
+    triangles; rings, each from its smallest id on, their CSR start (N + 1) and the colours (N,), of which no two free
+    nodes of one cell share one (−1 where held).
     """
 
     plane: tuple[int, int] | None
@@ -111,6 +111,7 @@ class Topology:
         state, start, ring = connectivity.walk_fans(
             first, corner, head, twin, face, turn, faces.smoothable, candidate[memory], nodes
         )
+        connectivity.turn_rings(start, ring, memory)
         hub = (np.diff(start) > MOST_NEIGHBOURS)[position]
         fan = candidate & (state != connectivity.FREE)[position]
         reasons |= {"star is not one closed fan": fan, f"more than {MOST_NEIGHBOURS} neighbours": hub}
@@ -150,7 +151,10 @@ class Topology:
 
     @cached_property
     def patches(self) -> tuple[Ints, Ints]:
-        """The rings of the free nodes by node ids, counter-clockwise: start (F + 1) and ring, row i of node free[i]."""
+        """The rings of the free nodes by node ids: start (F + 1) and ring, row i of node free[i].
+
+        Counter-clockwise, each from its smallest id on.
+        """
         place = _inverse(self.memory)[self.free]
         degree = np.diff(self.near_start)[place]
         start = np.zeros(len(place) + 1, dtype=np.int32)

@@ -199,6 +199,31 @@ def next_half_edge(h, first, face):
 
 
 @kernel
+def turn_rings(start, ring, identity):
+    """Turns each ring (CSR, in place) until it begins at its node of smallest identity."""
+    most = 0
+    for v in range(len(start) - 1):
+        most = max(most, start[v + 1] - start[v])
+    front = np.empty(most, dtype=ring.dtype)
+    for v in range(len(start) - 1):
+        first, end = start[v], start[v + 1]
+        if first == end:
+            continue
+        at, least = first, identity[ring[first]]
+        for k in range(first + 1, end):
+            other = identity[ring[k]]
+            if other < least:
+                at, least = k, other
+        turned = at - first
+        for k in range(turned):
+            front[k] = ring[first + k]
+        for k in range(end - at):
+            ring[first + k] = ring[at + k]
+        for k in range(turned):
+            ring[end - turned + k] = front[k]
+
+
+@kernel
 def colour(free, start, ring, is_free):
     """Greedy first-fit colours (int32 per node, −1 where held): no two free nodes of one ring share a colour.
 

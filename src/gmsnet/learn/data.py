@@ -52,9 +52,8 @@ class Stars:
         degree = np.diff(start).astype(np.int64)
         column = np.arange(degree.max(initial=3))
         ids = ring[start[:-1, None] + np.minimum(column, degree[:, None] - 1)]  # (F × M), padded with the last one
-        turned = (ids.argmin(axis=1)[:, None] + column) % degree[:, None]
         points = mesh.points[:, list(mesh.plane or (0, 1))]
-        return cls.of(points[topology.free], points[np.take_along_axis(ids, turned, axis=1)], degree)
+        return cls.of(points[topology.free], points[ids], degree)
 
     def __len__(self) -> int:
         return len(self.degree)
