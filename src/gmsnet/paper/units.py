@@ -1,0 +1,143 @@
+"""Units of work: done in processes of their own, side by side or alone, and skipped where their results are there."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import dataclass, field
+from multiprocessing.synchronize import Event
+from pathlib import Path
+from typing import Any
+
+from gmsnet.paper.plan import Plan
+from gmsnet.paper.store import Result, Store
+from gmsnet.workers import available_threads
+
+MOST_PROCESSES = 8
+LOOK = 0.2  # seconds between two looks at whether to stop
+
+_stop: Event | None = None  # of the process that does the work
+
+
+class Stopped(Exception):
+    """The reproduction is to stop: the unit in work is given up."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a unit may use besides its arguments: the plan, and the results of earlier units."""
+
+    plan: Plan
+    store: Store
+
+    @property
+    def stopping(self) -> bool:
+        """Whether to stop; units that take more than a second or two ask now and then."""
+        return _stop is not None and _stop.is_set()
+
+    def go_on(self) -> None:
+        """Raises Stopped if the reproduction is to stop."""
+        if self.stopping:
+            raise Stopped
+
+
+@dataclass(frozen=True)
+class Unit:
+    """name: of its result in the store. work(context, **arguments): a function of a module."""
+
+    name: str
+    work: Callable[..., Result]
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Units that may be done side by side, or, if ``alone``, one after another: because they are timed."""
+
+    title: str
+    units: Sequence[Unit]
+    alone: bool = False
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How far a reproduction is: so many of all units are there; a unit of this stage was the last."""
+
+    done: int
+    total: int
+    stage: str
+
+
+def missing(stages: Sequence[Stage], store: Store) -> list[Stage]:
+    """The stages with those units whose results are not in the store."""
+    left = [Stage(s.title, [unit for unit in s.units if not store.holds(unit.name)], s.alone) for s in stages]
+    return [stage for stage in left if stage.units]
+
+
+def carry_out(
+    stages: Sequence[Stage],
+    plan: Plan,
+    store: Store,
+    on_unit: Callable[[Standing], None],
+    should_stop: Callable[[], bool],
+) -> bool:
+    """Does what is missing, a stage after the other; tells whether all is there now.
+
+    on_unit: called at the start of each stage and after each unit. should_stop: asked all the time; once it is true,
+    units in work are given up (a training leaves its checkpoint), and all finished ones stay.
+    """
+    total = sum(len(stage.units) for stage in stages)
+    left = missing(stages, store)
+    done = total - sum(len(stage.units) for stage in left)
+    if not left:
+        return True
+    method = multiprocessing.get_context("spawn")  # a fork of a process with threads may hang
+    stop = method.Event()
+    processes = min(available_threads(), MOST_PROCESSES)
+    with ProcessPoolExecutor(processes, mp_context=method, initializer=_prepare, initargs=(stop,)) as pool:
+        try:
+            for stage in left:
+                on_unit(Standing(done, total, stage.title))
+                abreast = 1 if stage.alone else processes
+                waiting, running = list(stage.units), set[Future[bool]]()
+                while waiting or running:
+                    if should_stop():
+                        stop.set()
+                        waiting = []
+                    while waiting and len(running) < abreast:
+                        running.add(pool.submit(_do, waiting.pop(0), plan, store.folder))
+                    finished, running = wait(running, timeout=LOOK, return_when=FIRST_COMPLETED)
+                    for each in finished:
+                        done += each.result()
+                        on_unit(Standing(done, total, stage.title))
+                if stop.is_set():
+                    return False
+        except BaseException:
+            stop.set()
+            raise
+    return True
+
+
+def _prepare(stop: Event) -> None:
+    """In a new process: one thread, and signals are the parent's affair (a terminal sends them to all)."""
+    global _stop
+    _stop = stop
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ[name] = "1"  # read when the libraries are loaded, which is later
+
+
+def _do(unit: Unit, plan: Plan, folder: Path) -> bool:
+    """Does a unit and keeps its result, unless it was given up; tells whether it is there."""
+    store = Store(folder)
+    began = time.perf_counter()
+    try:
+        result = unit.work(Context(plan, store), **unit.arguments)
+    except Stopped:
+        return False
+    store.save(unit.name, result, time.perf_counter() - began)
+    return True

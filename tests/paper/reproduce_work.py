@@ -1,0 +1,37 @@
+"""Units of work for the tests: processes of their own find them by the name of this module."""
+
+from __future__ import annotations
+
+import os
+import time
+
+from gmsnet.errors import InputError
+from gmsnet.paper.store import Result
+from gmsnet.paper.units import Context
+
+
+def note(context: Context, text: str) -> Result:
+    """Says which process did it."""
+    return Result({"text": text, "process": os.getpid()}, {f"notes/{text}.txt": text.encode()})
+
+
+def add(context: Context, names: list[str]) -> Result:
+    """Reads the results of others."""
+    return Result({"text": "".join(context.store.load(name)["text"] for name in names)})
+
+
+def fail(context: Context) -> Result:
+    """As work on what a user gave may."""
+    raise InputError("this mesh has no triangles")
+
+
+def endless(context: Context) -> Result:
+    """Until it is stopped."""
+    while True:
+        time.sleep(0.01)
+        context.go_on()
+
+
+def threads(context: Context) -> Result:
+    """What libraries will read when they are loaded."""
+    return Result({name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")})

@@ -1,0 +1,134 @@
+"""Units of work: done once, whatever happens, in processes of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import pytest
+import reproduce_work as work
+
+from gmsnet.errors import InputError
+from gmsnet.paper.plan import Plan
+from gmsnet.paper.store import Store
+from gmsnet.paper.units import Stage, Standing, Unit, carry_out, missing
+
+PLAN = Plan(runs=1, sweeps=1, seed=0, quick=True)
+
+
+@pytest.fixture
+def store(tmp_path) -> Store:
+    made = Store(tmp_path / "out")
+    made.open(PLAN.fingerprint())
+    return made
+
+
+def notes(*texts: str) -> list[Unit]:
+    return [Unit(f"note/{text}", work.note, {"text": text}) for text in texts]
+
+
+def do(stages, store, should_stop=lambda: False) -> tuple[bool, list[Standing]]:
+    standings: list[Standing] = []
+    return carry_out(stages, PLAN, store, standings.append, should_stop), standings
+
+
+def test_stages_follow_one_another_and_results_are_kept(store):
+    stages = [
+        Stage("alone", notes("a", "b"), alone=True),
+        Stage("together", notes("c", "d")),
+        Stage("after", [Unit("sum", work.add, {"names": ["note/d", "note/a"]})]),
+    ]
+    finished, standings = do(stages, store)
+    assert finished
+    assert store.load("sum") == {"text": "da"}
+    assert store.load("note/a")["process"] != os.getpid()
+    assert (store.folder / "notes/c.txt").read_text() == "c"
+    assert store.seconds("sum") >= 0
+    assert standings[0] == Standing(0, 5, "alone")
+    assert standings[-1] == Standing(5, 5, "after")
+    assert [each.done for each in standings] == sorted(each.done for each in standings)
+
+
+def test_what_is_there_is_not_done_again(store):
+    assert do([Stage("first", notes("a"))], store)[0]
+    kept = (store.folder / "units/note/a.json").read_bytes()
+    both = [Stage("first", notes("a", "b"))]
+    assert [unit.name for stage in missing(both, store) for unit in stage.units] == ["note/b"]
+    finished, standings = do(both, store)
+    assert finished
+    assert standings[0] == Standing(1, 2, "first")
+    assert (store.folder / "units/note/a.json").read_bytes() == kept
+    assert do(both, store) == (True, [])
+
+
+def test_a_stop_gives_up_what_is_in_work_and_keeps_the_rest(store):
+    stages = [Stage("first", notes("a")), Stage("second", [Unit("endless", work.endless), *notes("b")], alone=True)]
+    finished, standings = do(stages, store, lambda: store.holds("note/a"))
+    assert not finished
+    assert standings[-1].done <= 1
+    assert store.holds("note/a")
+    assert not store.holds("endless")
+    assert not store.holds("note/b")
+    stages = [stages[0], Stage("second", notes("b"))]
+    assert do(stages, store)[0]
+
+
+def test_an_error_comes_through_and_what_was_done_stays(store):
+    with pytest.raises(InputError, match="no triangles"):
+        do([Stage("first", notes("a")), Stage("second", [Unit("fails", work.fail), *notes("b")], alone=True)], store)
+    assert store.holds("note/a")
+    assert not store.holds("fails")
+    assert not store.holds("note/b")
+
+
+def test_processes_use_one_thread(store):
+    assert do([Stage("first", [Unit("threads", work.threads)])], store)[0]
+    assert store.load("threads") == {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+
+
+def test_a_folder_is_claimed_by_one_set_of_options(store):
+    store.open(PLAN.fingerprint())
+    other = Plan(runs=2, sweeps=1, seed=0, quick=True).fingerprint()
+    with pytest.raises(InputError, match=r"other options \(runs 1 there, 2 here\); take another --out"):
+        store.open(other)
+    weights = PLAN.fingerprint() | {"weights": {"gmsnet-h8.safetensors": "0"}}
+    with pytest.raises(InputError, match="made with other weights"):
+        store.open(weights)
+
+
+def test_folders_that_cannot_be_used(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be made"):
+        Store(tmp_path / "file" / "out").open(PLAN.fingerprint())
+    with pytest.raises(InputError, match="cannot be made"):
+        Store(tmp_path / "file").open(PLAN.fingerprint())
+
+
+def test_damaged_results_are_named(store):
+    assert do([Stage("first", notes("a"))], store)[0]
+    path = store.folder / "units/note/a.json"
+    path.write_text(path.read_text()[:20])
+    with pytest.raises(InputError, match=r"a\.json: cannot be read .* delete it, and it is made anew"):
+        store.load("note/a")
+    with pytest.raises(KeyError):
+        store.load("note/b")
+
+
+def test_numbers_that_are_not_finite_become_null(store):
+    store.write({"x.json": b""})
+    from gmsnet.paper.store import Result
+
+    store.save("odd", Result({"values": [1.0, float("inf"), float("nan")]}), 0.0)
+    assert store.load("odd") == {"values": [1.0, None, None]}
+    assert json.loads((store.folder / "units/odd.json").read_text())["unit"] == "odd"
+
+
+@pytest.mark.parametrize(("name", "value"), [("runs", 0), ("sweeps", 0), ("seed", -1)])
+def test_plans_out_of_range(name, value):
+    with pytest.raises(InputError, match=f"--{name} must be at least"):
+        Plan(**({"runs": 1, "sweeps": 1, "seed": 0, "quick": False} | {name: value}))
+
+
+def test_the_ordinary_plan_is_the_papers():
+    assert Plan.of(None, None, 0, quick=False) == Plan(10, 100, 0, False)
+    assert Plan.of(3, None, 0, quick=True) == Plan(3, 20, 0, True)
