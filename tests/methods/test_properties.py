@@ -30,16 +30,25 @@ CHOICES = [
 every_method = pytest.mark.parametrize("method", CHOICES, ids=list(map(name_of, CHOICES)))
 
 # How the names of the methods begin whose result depends on how the mesh lies to the axes: the paper's networks scale a
-# star by the sides of its bounding box and read plain coordinates.
-TURN_MATTERS = ("gmsnet",)
+# star by the sides of its bounding box and read plain coordinates; Adam scales each component of a gradient by itself.
+TURN_MATTERS = ("gmsnet", "optimize-adam")
 
 # What is less than a gain of 0.1 in q-hat and a mean 1/q of 0.85 on a random square in twenty sweeps.
 LESSER_GAINS = {
     "laplacian-inverse-length": (0.05, 0.75),  # draws nodes to near neighbours
     "getme-sequential": (0.1, 0.75),  # works at the worst cells and leaves the others alone
     "getme-sequential-book": (0.1, 0.72),
+    # Bounded, and unsigned: cells are given up for the mean of the angles of the others.
+    "optimize-adam-cosine": (0.09, 0.85),
+    "optimize-newton-cosine": (0.09, 0.85),
+    "optimize-adam-min-max-angle": (0.07, 0.79),
+    "optimize-newton-min-max-angle": (0.07, 0.79),
     "cvt": (0.05, 0.84),  # makes some cells flat: its point may lie outside of a star, and a shift is only halved
 }
+
+# Degrees of a regular fan where an objective has nothing to gain in the middle: the largest angles are those at the
+# node, and their sum is fixed; three angles of 120° cost more than a flat triangle at the rim.
+NOTHING_TO_GAIN = {"cosine": (3,), "min-max-angle": (3, 4)}
 
 
 def mesh_of(points, triangles, regions=None):
@@ -179,7 +188,8 @@ def test_degrees_from_3_to_100(method, degree):
     assert result.after.inverted == 0
     assert result.after.qhat >= result.before.qhat
     # In a fan of more than twenty flat needles a node finds less to gain than the paper's network can see.
-    assert degree > 20 or result.after.qhat > result.before.qhat
+    if degree not in NOTHING_TO_GAIN.get(method.get("objective"), ()):
+        assert degree > 20 or result.after.qhat > result.before.qhat
 
 
 @every_method

@@ -24,7 +24,15 @@ LANES = 64  # stars or triangles that go through the processor abreast
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile, releasing the GIL."""
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    return _compiled(function, {"nogil": True, "error_model": "numpy"})
+
+
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile into its callers, however long it is: a loop over lanes that calls something is not vectorised."""
+    return _compiled(function, {"nogil": True, "error_model": "numpy", "forceinline": True})
+
+
+def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Callable[..., Any]:
     try:
         compiled: Callable[..., Any] = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no folder for the cache can be written

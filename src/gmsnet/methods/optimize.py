@@ -1,0 +1,60 @@
+"""Optimisation-based smoothing: each node goes to where an objective of its star is least, found by descent.
+
+- adam: at most 20 Adam steps from where the node is, of MetricLoss by default: the paper's OptimSmoothing, with a step
+  size tuned in its favour. kernels/adam.py
+- newton: safeguarded Newton steps, to the end. kernels/newton.py
+
+The objectives stand in kernels/objectives.py. ``q`` and ``q2`` are barriers, and good for the worst cell; the other
+three are bounded, so that their minimisers give up single cells for the mean of the rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels import adam, newton, objectives
+from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.methods.base import Method, Options, StarSmoother, Tally
+
+
+class Adam(StarSmoother):
+    """Adam steps on one objective. sizes: of each step, relative to the star."""
+
+    def __init__(self, objective: str, sizes: NDArray[np.float64] | None = None) -> None:
+        self.objective = objectives.NAMES.index(objective)
+        self.sizes = np.full(adam.STEPS, adam.STEP_SIZE) if sizes is None else sizes
+
+    def visit(
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        adam.sweep(points, blocks, first, last, precision, self.objective, self.sizes, tally)
+
+
+class Newton(StarSmoother):
+    """Newton steps on one objective."""
+
+    def __init__(self, objective: str) -> None:
+        self.objective = objectives.NAMES.index(objective)
+
+    def visit(
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        newton.sweep(points, blocks, first, last, precision, self.objective, tally)
+
+
+def create(options: Options) -> StarSmoother:
+    """The variant with the objective."""
+    return Newton(options.objective) if options.variant == "newton" else Adam(options.objective)
+
+
+METHOD = Method(
+    name="optimize",
+    summary="to where an objective of the star is least, by Adam steps (as the paper does) or Newton's",
+    source="Kingma, Ba: Adam (2014), as in the paper of GMSNet; Nocedal, Wright: Numerical Optimization, chapter 3",
+    create=create,
+    variants=("adam", "newton"),
+    objectives=objectives.NAMES,
+)
