@@ -19,11 +19,11 @@ from gmsnet.methods.base import Method, Options, StarSmoother, Tally
 
 
 class Adam(StarSmoother):
-    """Adam steps on one objective. sizes: of each step, relative to the star."""
+    """Adam steps on one objective. sizes: of each step, relative to the star's size."""
 
     def __init__(self, objective: str, sizes: NDArray[np.float64] | None = None) -> None:
         self.objective = objectives.NAMES.index(objective)
-        self.sizes = np.full(adam.STEPS, adam.STEP_SIZE) if sizes is None else sizes
+        self.sizes = step_sizes() if sizes is None else sizes
 
     def visit(
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
@@ -43,6 +43,11 @@ class Newton(StarSmoother):
     ) -> None:
         """See StarSmoother."""
         newton.sweep(points, blocks, first, last, precision, self.objective, tally)
+
+
+def step_sizes() -> NDArray[np.float64]:
+    """(20,) the tuned step sizes of Adam, relative to the star's size."""
+    return adam.STEP_SIZE / np.sqrt(np.arange(1, adam.STEPS + 1))
 
 
 def create(options: Options) -> StarSmoother:
