@@ -40,9 +40,9 @@ def stars(seed, count=50, degrees=range(3, 13)):
     return [points_of(*star(rng, int(rng.choice(degrees)))) for _ in range(count)]
 
 
-def valid_stars(seed):
+def valid_stars(seed, count=50):
     """Those of which all triangles are positive."""
-    return [(x, ring) for x, ring in stars(seed) if min(plain.area(x, a, b) for a, b in plain.edges(ring)) > 0]
+    return [(x, ring) for x, ring in stars(seed, count) if min(plain.area(x, a, b) for a, b in plain.edges(ring)) > 0]
 
 
 def valid_places(x, ring, rng, count=5):
@@ -83,19 +83,36 @@ def test_means_by_hand():
     assert plain.area_laplacian(x, ring) == pytest.approx(tuple(np.average(ring, axis=0, weights=by_areas)))
 
 
-def test_smart_takes_the_mean_where_the_star_gains_and_nothing_is_inverted():
+def test_smart_takes_the_mean_where_the_mean_q_falls_and_nothing_is_inverted():
     taken = 0
-    for x, ring in stars(1, 300):
+    for x, ring in valid_stars(1, 300):
         full, smart = plain.laplacian(x, ring), plain.smart_laplacian(x, ring)
-        if smart == full:
-            taken += 1
-            assert plain.star_shape(full, ring) > plain.star_shape(x, ring)
-            assert min(plain.area(full, a, b) for a, b in plain.edges(ring)) > 0
-        else:
-            assert smart == x
-            inverted = any(plain.area(full, a, b) <= 0 for a, b in plain.edges(ring))
-            assert inverted or plain.star_shape(full, ring) <= plain.star_shape(x, ring)
-    assert 100 < taken < 300
+        before, after = ([naive.quality(at, a, b)[2] for a, b in plain.edges(ring)] for at in (x, full))
+        better = min(after) > 0 and sum(1 / s for s in after) < sum(1 / s for s in before)
+        assert smart == (full if better else x)
+        taken += better
+    assert 50 < taken < 250
+
+
+def test_smart_takes_a_tangled_star_to_the_mean_unless_something_becomes_worse():
+    assert plain.smart_laplacian((3.0, 0.5), SQUARE) == (0.0, 0.0)
+    bent = [(3.0, 0.0), (-1.0, 4.0), (-0.9, 0.1), (-1.0, -4.0)]  # the mean is within; x is beyond the dent
+    x = (-2.0, 0.0)
+    assert plain.star_aspect_ratio(x, bent) == math.inf
+    assert plain.smart_laplacian(x, bent) == plain.laplacian(x, bent)
+    crossed = [SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3]]
+    x = (0.5, 0.9)
+    assert plain.inverts(x, plain.laplacian(x, crossed), crossed)
+    assert plain.smart_laplacian(x, crossed) == x
+
+
+def test_aspect_ratios_are_those_of_the_definition():
+    for x, ring in valid_stars(8):
+        shapes = [naive.quality(x, a, b)[2] for a, b in plain.edges(ring)]
+        assert plain.star_shape(x, ring) == pytest.approx(np.mean(shapes))
+        assert plain.star_aspect_ratio(x, ring) == pytest.approx(np.mean([1 / s for s in shapes]))
+    assert plain.star_aspect_ratio((2.0, 0.0), SQUARE) == math.inf
+    assert plain.star_shape((0.0, 0.0), [(0.0, 0.0)] * 3) == 0.0
 
 
 def test_turning_halves_the_angle_and_keeps_the_distance():

@@ -2,7 +2,7 @@
 
     shift = Σ w_j p_j / Σ w_j,    w_j = 1,  1/|p_j|,  or the areas of the two triangles at the edge p_j.
 
-The smart form takes the mean only where the sum of 1/q over the star grows by it and no triangle is inverted by it.
+The smart form takes the mean only where the sum of q over the star falls by it and no triangle is inverted by it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from gmsnet.kernels import stars
 from gmsnet.kernels.compile import LANES, kernel
 
 SMART, PLAIN, INVERSE_LENGTH, AREA = range(4)
-TINY = 1e-300  # stands in for a product of squared lengths that is zero: 1/q is then 0
+TINY = 1e-300  # stands in for a product of areas that is not positive: the star is judged by its signs then
 
 
 @kernel
@@ -71,11 +71,15 @@ def area_mean(local, n, row, shift):
 
 
 @kernel
-def add_gain(local, n, shift, row):
-    """Adds to row 0 what the sum of 1/q over the star gains by the shift (over 2√3).
+def judge(local, n, shift, row):
+    """What the shift does to the star, into three rows of LANES.
 
-    Brings row 1 below or to 0 where a triangle is not positive after the shift and was no less so before.
+    0: by how much Σ q falls, if all triangles are positive before and after (times 2√3). 1: positive if each triangle
+    is positive after it, or less inverted than before. 2: positive if all triangles are positive before it.
     """
+    for lane in range(LANES):
+        row[lane] = 0.0
+        row[LANES + lane] = row[2 * LANES + lane] = np.inf
     for j in range(n):
         i = n - 1 if j == 0 else j - 1
         p = local[2 * i * LANES : 2 * (i + 1) * LANES]
@@ -89,27 +93,25 @@ def add_gain(local, n, shift, row):
             qx, qy = qx - shift[lane], qy - shift[LANES + lane]
             after = px * qy - py * qx
             lengths = px * px + py * py + qx * qx + qy * qy + rim
-            row[lane] += (after * lengths_before - before * lengths) / max(lengths * lengths_before, TINY)
+            row[lane] += (lengths_before * after - lengths * before) / max(before * after, TINY)
             row[LANES + lane] = min(row[LANES + lane], max(after, after - before))
+            row[2 * LANES + lane] = min(row[2 * LANES + lane], before)
 
 
 @kernel
 def smart_mean(local, n, row, shift):
-    """The mean where the star gains by it and no triangle is inverted, else 0. row: two rows of LANES."""
+    """The mean where nothing is inverted by it and Σ q falls, or is infinite before (a tangled star); else 0."""
     mean(local, n, shift)
+    judge(local, n, shift, row)
     for lane in range(LANES):
-        row[lane] = 0.0
-        row[LANES + lane] = np.inf
-    add_gain(local, n, shift, row)
-    for lane in range(LANES):
-        taken = min(row[lane], row[LANES + lane]) > 0.0
+        taken = row[LANES + lane] > 0.0 and (row[lane] > 0.0 or row[2 * LANES + lane] <= 0.0)
         shift[lane] = shift[lane] if taken else 0.0
         shift[LANES + lane] = shift[LANES + lane] if taken else 0.0
 
 
 @kernel
 def propose(local, n, variant, row, shift):
-    """Shifts (2·LANES, over the star's size) of a variant for a block of stars. row: (2·LANES,) to work in."""
+    """Shifts (2·LANES, over the star's size) of a variant for a block of stars. row: (3·LANES,) to work in."""
     if variant == SMART:
         smart_mean(local, n, row, shift)
     elif variant == PLAIN:
@@ -124,7 +126,7 @@ def propose(local, n, variant, row, shift):
 def sweep(points, blocks, first, last, precision, variant, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
     x, ring, work, counts = stars.room(blocks.most)
-    local, row, shift = np.empty(2 * blocks.most * LANES), np.empty(2 * LANES), np.empty(2 * LANES)
+    local, row, shift = np.empty(2 * blocks.most * LANES), np.empty(3 * LANES), np.empty(2 * LANES)
     for block in range(first, last):
         n = stars.fetch(points, blocks, block, x, ring, work, local)
         propose(local, n, variant, row, shift)

@@ -103,10 +103,27 @@ def area(a: Point, b: Point, c: Point) -> float:
     return 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
+def aspect_ratio(a: Point, b: Point, c: Point) -> float:
+    """q = (l² + m² + n²)/(4√3·S) of a triangle of positive area."""
+    return squares(a, b, c) / (4.0 * math.sqrt(3.0) * area(a, b, c))
+
+
 def shape(a: Point, b: Point, c: Point) -> float:
-    """1/q = 4√3·S/(l² + m² + n²), with the sign of the area; 0 for a triangle without extent."""
-    lengths = sum((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 for p, q in ((a, b), (b, c), (c, a)))
+    """1/q, with the sign of the area; 0 for a triangle without extent."""
+    lengths = squares(a, b, c)
     return 4.0 * math.sqrt(3.0) * area(a, b, c) / lengths if lengths > 0.0 else 0.0
+
+
+def squares(a: Point, b: Point, c: Point) -> float:
+    """l² + m² + n² of a triangle's sides."""
+    return sum((p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 for p, q in ((a, b), (b, c), (c, a)))
+
+
+def star_aspect_ratio(x: Point, ring: list[Point]) -> float:
+    """The mean of q over the triangles of a star; infinite where one is not positive."""
+    if min(area(x, a, b) for a, b in edges(ring)) <= 0.0:
+        return math.inf
+    return sum(aspect_ratio(x, a, b) for a, b in edges(ring)) / len(ring)
 
 
 def star_shape(x: Point, ring: list[Point]) -> float:
@@ -129,10 +146,15 @@ def laplacian(x: Point, ring: list[Point]) -> Point:
 
 
 def smart_laplacian(x: Point, ring: list[Point]) -> Point:
-    """The mean of the ring if the star is the better for it and no triangle is inverted (Field 1988); else x."""
+    """The mean of the ring if the star is the better for it (Field 1988); else x.
+
+    Better is a smaller mean of q; in a star that is tangled, that no triangle that is not positive has become worse.
+    """
     target = laplacian(x, ring)
-    better = star_shape(target, ring) > star_shape(x, ring) and not inverts(x, target, ring)
-    return target if better else x
+    if inverts(x, target, ring):
+        return x
+    before = star_aspect_ratio(x, ring)
+    return target if before == math.inf or star_aspect_ratio(target, ring) < before else x
 
 
 def inverse_length_laplacian(x: Point, ring: list[Point]) -> Point:
