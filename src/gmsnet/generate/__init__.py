@@ -1,7 +1,10 @@
-"""Random test meshes, bad on purpose: Delaunay triangulations of uniform points, and nodes thrown out of place."""
+"""Test meshes: Delaunay triangulations of random points, good meshes, and nodes thrown out of place."""
 
+from gmsnet.generate.curves import Curve
 from gmsnet.generate.disturb import disturb
+from gmsnet.generate.good import good_mesh
 from gmsnet.generate.outline import SHAPES
 from gmsnet.generate.random import random_mesh
+from gmsnet.generate.split import split_edges
 
-__all__ = ["SHAPES", "disturb", "random_mesh"]
+__all__ = ["SHAPES", "Curve", "disturb", "good_mesh", "random_mesh", "split_edges"]

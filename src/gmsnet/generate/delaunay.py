@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.spatial import Delaunay, QhullError
 
 from gmsnet.errors import InputError
 from gmsnet.generate.outline import inside
+from gmsnet.mesh import CellBlock, Mesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -54,6 +56,26 @@ def triangulate(outline: Floats, segments: Ints, side: Ints, inner: Floats) -> T
         segments = np.concatenate([segments, second])
         side = np.concatenate([side, side[missing]])
     raise InputError("no division of the boundary fits these nodes; take more nodes or another seed")
+
+
+def labelled(mesh: Triangulation, markers: Sequence[str], *, scale: float = 1.0) -> Mesh:
+    """The mesh of a triangulation: triangles of the region "domain", and lines by the marker of their side.
+
+    markers: of each side. scale: factor for the coordinates.
+    """
+    names = list(dict.fromkeys(markers))
+    number = np.array([names.index(name) + 1 for name in markers], dtype=np.int64)
+    region_names = {(1, k): name for k, name in enumerate(names, start=1)} | {(2, 1): "domain"}
+    cells = (
+        CellBlock("triangle", mesh.triangles, np.ones(len(mesh.triangles), dtype=np.int64)),
+        CellBlock("line", mesh.segments, number[mesh.side]),
+    )
+    return Mesh(mesh.points * scale, cells, region_names)
+
+
+def unique_edges(triangles: Ints) -> Ints:
+    """(E × 2) each edge once, the smaller number first, in the order of the numbers."""
+    return np.unique(np.sort(_edges(triangles), axis=1), axis=0)
 
 
 def _edges(triangles: Ints) -> Ints:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gmsnet.errors import InputError
-from gmsnet.generate.delaunay import triangulate
+from gmsnet.generate.delaunay import labelled, triangulate
 from gmsnet.generate.outline import SHAPES, area, divide, polygon, uniform_inside
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh import Mesh
 
 
 def random_mesh(
@@ -19,6 +19,7 @@ def random_mesh(
     *,
     size: float = 1.0,
     boundary: str = "even",
+    boundary_spacing: float = 1.0,
     seed: int = 0,
 ) -> Mesh:
     """The Delaunay triangulation of uniform random points in a shape (mean 1/q about 0.69 in a square).
@@ -27,8 +28,8 @@ def random_mesh(
     makes round(√nodes) on each side of a square, and more where an edge of the boundary would not be an edge of the
     triangulation. shape: "square", "circle", "plate" (a square with a round hole), "lshape", or the rings of a polygon,
     the outer one first and then its holes, each (k × 2). size: side of the square around a named shape; the coordinates
-    of rings are multiplied by it. boundary: "even" or "random" spacing of the nodes on the boundary. seed: the same
-    arguments give the same mesh.
+    of rings are multiplied by it. boundary: "even" or "random" spacing of the nodes on the boundary. boundary_spacing:
+    how far apart those are, in mean spacings inside. seed: the same arguments give the same mesh.
 
     Returns counter-clockwise triangles of the region "domain", and the boundary as line cells by marker: the sides of
     the named shapes ("bottom", "circle", "hole", …); for rings "outer", "hole_1", "hole_2", …
@@ -41,6 +42,8 @@ def random_mesh(
         raise InputError(f"the size of a random mesh must be a positive number, got {size!r}")
     if boundary not in ("even", "random"):
         raise InputError(f"boundary must be 'even' or 'random', got {boundary!r}")
+    if not (np.isfinite(boundary_spacing) and boundary_spacing > 0):
+        raise InputError(f"the spacing on the boundary must be a positive number, got {boundary_spacing!r}")
     rng = generator(seed)
     spread = rng if boundary == "random" else None
     if isinstance(shape, str):
@@ -48,22 +51,13 @@ def random_mesh(
             raise InputError(f"unknown shape {shape!r}; there are {', '.join(SHAPES)}")
         whole, outline = SHAPES[shape]
         spacing = float(np.sqrt(whole / nodes))
-        rings = outline(spacing, spread)
+        rings = outline(spacing * boundary_spacing, spread)
     else:
         rings = polygon(shape)
         spacing = float(np.sqrt(sum(area(ring.corners) for ring in rings) / nodes))
     inner = uniform_inside(int(nodes), rings, rng)
-    mesh = triangulate(*divide(rings, spacing, spread), inner)
-
-    markers = [name for ring in rings for name in ring.markers]  # of each side
-    names = list(dict.fromkeys(markers))
-    number = np.array([names.index(name) + 1 for name in markers], dtype=np.int64)
-    region_names = {(1, k): name for k, name in enumerate(names, start=1)} | {(2, 1): "domain"}
-    cells = (
-        CellBlock("triangle", mesh.triangles, np.ones(len(mesh.triangles), dtype=np.int64)),
-        CellBlock("line", mesh.segments, number[mesh.side]),
-    )
-    return Mesh(mesh.points * size, cells, region_names)
+    mesh = triangulate(*divide(rings, spacing * boundary_spacing, spread), inner)
+    return labelled(mesh, [name for ring in rings for name in ring.markers], scale=size)
 
 
 def generator(seed: int) -> np.random.Generator:
