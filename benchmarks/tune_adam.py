@@ -1,4 +1,4 @@
-"""Step sizes of the Adam variant of ``optimize``: how near they come to the optimum of a star, and the meshes they make.
+"""Step sizes of the Adam variant of ``optimize``: how near they come to the optimum of a star, and what they make.
 
     python benchmarks/tune_adam.py [--objective metric] [--squares 20] [--runs 3] [--sweeps 100]
 
