@@ -14,8 +14,9 @@ import gmsnet
 
 PROGRAM = """
 import hashlib, gmsnet
-result = gmsnet.smooth(gmsnet.random_mesh(500, seed=1), max_sweeps=5)
-print(hashlib.sha256(result.points.tobytes()).hexdigest())
+mesh = gmsnet.random_mesh(500, seed=1)
+for name in gmsnet.METHODS:
+    print(name, hashlib.sha256(gmsnet.smooth(mesh, name, max_sweeps=5).points.tobytes()).hexdigest())
 """
 
 
@@ -27,5 +28,7 @@ def test_code_for_the_plainest_processor_gives_the_same_bits(tmp_path):
     plain = {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": "+sse2", "GMSNET_CACHE": str(tmp_path)}
     environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | plain
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, env=environment, check=True)
-    here = gmsnet.smooth(gmsnet.random_mesh(500, seed=1), max_sweeps=5)
-    assert done.stdout.strip() == hashlib.sha256(here.points.tobytes()).hexdigest()
+    mesh = gmsnet.random_mesh(500, seed=1)
+    for line, name in zip(done.stdout.splitlines(), gmsnet.METHODS, strict=True):
+        here = gmsnet.smooth(mesh, name, max_sweeps=5)
+        assert line == f"{name} {hashlib.sha256(here.points.tobytes()).hexdigest()}"
