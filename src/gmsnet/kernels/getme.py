@@ -132,7 +132,7 @@ def transformed(px, py, qx, qy, straight, across):
 
 @kernel
 def length(x, y):
-    """Of a vector; coordinates are near 1, so that squares neither under- nor overflow."""
+    """Of a vector; coordinates are near 1 or in single precision, so that squares neither under- nor overflow."""
     return math.sqrt(x * x + y * y)
 
 

@@ -50,12 +50,21 @@ def perimeter(z: Iterable[Point]) -> float:
 class PlainGetme:
     """Sequential GETMe: at each step the element with the least 1/q + penalty is transformed.
 
-    Elements without a free node never take part. shapes, penalties: by element. The heap keeps outdated entries; one
-    counts if its key is what the element's key is now.
+    Elements without a free node never take part. success: what a transformation takes off its element's penalty.
+    shapes, penalties: by element. The heap keeps outdated entries; one counts if its key is what the element's key is
+    now.
     """
 
-    def __init__(self, mesh: PlainMesh, theta: float = math.pi / 3.0, lambda_: float = 0.0, rho: float = 1.0) -> None:
-        self.mesh, self.parameters = mesh, (theta, lambda_, rho)
+    def __init__(
+        self,
+        mesh: PlainMesh,
+        theta: float = math.pi / 3.0,
+        lambda_: float = 0.0,
+        rho: float = 1.0,
+        *,
+        success: float = SUCCESS,
+    ) -> None:
+        self.mesh, self.parameters, self.success = mesh, (theta, lambda_, rho), success
         self.elements = elements_of(mesh)
         self.around: dict[int, list[int]] = {node: [] for node in mesh.free}
         for e, element in enumerate(self.elements):
@@ -104,7 +113,7 @@ class PlainGetme:
             self.penalties[e] += INVALID
             affected = [e]
         else:
-            self.penalties[e] = max(0.0, self.penalties[e] - SUCCESS)
+            self.penalties[e] = max(0.0, self.penalties[e] - self.success)
         for f in affected:
             self.shapes[f] = shape(*self.corners(f))
             heapq.heappush(self.heap, (self.key(f), f))
