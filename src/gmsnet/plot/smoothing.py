@@ -16,16 +16,15 @@ from gmsnet.mesh import Mesh
 from gmsnet.plot.figure import AFTER, BEFORE, check_target, file_bytes, new_figure
 from gmsnet.plot.histogram import histogram
 from gmsnet.plot.view import View, add_colour_bar, check_mesh, draw
+from gmsnet.plot.zoom import RING_BELOW, frame, surroundings
 from gmsnet.topology import Topology
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PANEL = 4.8  # inches
 ZOOM_CELLS = 150  # about as many cells are seen around the worst one
 ZOOM_FROM = 0.2  # if they take less of the picture than this
-RING_BELOW = 0.03
 WIDE = 2.6  # meshes wider than this (width over height) go one above the other
 
 
@@ -80,7 +79,7 @@ def _figure(views: Sequence[View]) -> Figure:
         axes.set_title(view.summary, fontsize=10)
         mappable = draw(axes, view, box)
         if window is not None:
-            _frame(axes, window)
+            frame(axes, window)
     if window is not None:
         free = places[1:] if not alone and len(views) == 1 else [(len(rows) - 2, column) for column in range(2)]
         worst = views[0].corners[views[0].report.worst(1)[0]]
@@ -103,26 +102,5 @@ def _figure(views: Sequence[View]) -> Figure:
 
 def _surroundings(view: View, extent: float) -> NDArray[np.float64] | None:
     """(2 × 2) a square around the worst cell, or None where its cells can be seen in the whole picture."""
-    corners = view.points[view.corners]
-    centres = corners.mean(axis=1)
-    worst = int(view.report.worst(1)[0])
-    distance = np.abs(centres - centres[worst]).max(axis=1)
-    near = np.partition(distance, min(ZOOM_CELLS, len(distance) - 1))[: ZOOM_CELLS + 1].max()
-    half = max(float(near), 1.2 * float(np.abs(corners[worst] - centres[worst]).max()))
-    if half > ZOOM_FROM * extent:
-        return None
-    low, high = view.box  # at the rim of the mesh the square moves inwards, so that it shows cells
-    centre = np.where(high - low > 2 * half, np.clip(centres[worst], low + half, high - half), (low + high) / 2)
-    reach = np.minimum(half, (high - low) / 2)
-    return np.stack([centre - reach, centre + reach])
-
-
-def _frame(axes: Axes, window: NDArray[np.float64]) -> None:
-    """Marks on the whole picture where the zoom is; a frame too small to be seen gets a ring around it."""
-    from matplotlib.patches import Rectangle
-
-    width, height = window[1] - window[0]
-    for colour, thick in (("white", 3.0), ("black", 1.3)):
-        axes.add_patch(Rectangle(tuple(window[0]), width, height, fill=False, edgecolor=colour, linewidth=thick))
-        if max(width, height) < RING_BELOW * max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())):
-            axes.plot(*window.mean(axis=0), "o", ms=18, mfc="none", mec=colour, mew=thick, clip_on=False)
+    window = surroundings(view, ZOOM_CELLS)
+    return None if float(np.ptp(window, axis=0).max()) > 2 * ZOOM_FROM * extent else window
