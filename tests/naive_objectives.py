@@ -51,8 +51,8 @@ TRIANGLES = {
 }
 
 
-def derivatives(name, ring, places):
-    """The objective with the free node at each of P places, its gradients (P, 2) and Hessians (P, 2, 2).
+def derivatives(name, ring, places, bends=True):
+    """The objective with the free node at each of P places, its gradients (P, 2) and, if it bends, Hessians (P, 2, 2).
 
     By automatic differentiation; where the objective is infinite they are 0, or no number.
     """
@@ -60,14 +60,23 @@ def derivatives(name, ring, places):
     at = torch.tensor(np.asarray(places, dtype=float), requires_grad=True)
     value = TRIANGLES[name](at[:, None], rim.roll(1, dims=0), rim).mean(dim=1)
     finite = torch.where(torch.isfinite(value), value, 0.0)
-    (gradient,) = torch.autograd.grad(finite.sum(), at, create_graph=True)
+    (gradient,) = torch.autograd.grad(finite.sum(), at, create_graph=bends)
+    if not bends:
+        return value.detach().numpy(), gradient.numpy(), None
     hessian = torch.stack([torch.autograd.grad(gradient[:, k].sum(), at, retain_graph=True)[0] for k in (0, 1)], dim=1)
     return value.detach().numpy(), gradient.detach().numpy(), hessian.numpy()
 
 
 def derivatives_at(name, ring, p):
+    """Value, gradient and Hessian at one place."""
     value, gradient, hessian = derivatives(name, ring, p[None])
     return float(value[0]), gradient[0], hessian[0]
+
+
+def slope_at(name, ring, p):
+    """Value and gradient at one place."""
+    value, gradient, _ = derivatives(name, ring, p[None], bends=False)
+    return float(value[0]), gradient[0]
 
 
 def least_area(ring, p):
@@ -89,7 +98,7 @@ def adam(name, centre, ring, sizes):
     p, m, v = np.zeros(2), np.zeros(2), np.zeros(2)
     best, least, factor, outside = p, math.inf, 1.0, 0
     for t in range(1, len(sizes) + 2):
-        f, g, _ = derivatives_at(name, ring, p)
+        f, g = slope_at(name, ring, p)
         if (tangled or least_area(ring, p) > 0) and f < least * (1 - 1e-12):
             best, least = p, f
         if t > len(sizes):
@@ -127,9 +136,10 @@ def newton(name, centre, ring):
             if share < 2**-10 or share * np.linalg.norm(step) <= 1e-9 * radius or evaluations == 100:
                 return size * p
             evaluations += 1
-            there, *others = derivatives_at(name, ring, p + share * step)
+            there = slope_at(name, ring, p + share * step)[0]
             if least_area(ring, p + share * step) > lowest and there <= f + 1e-4 * share * (g @ step):
-                p, f, (g, curvature) = p + share * step, there, others
+                p = p + share * step
+                f, g, curvature = derivatives_at(name, ring, p)
                 break
             share /= 2
     return size * p
