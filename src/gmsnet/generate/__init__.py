@@ -5,6 +5,7 @@ from gmsnet.generate.disturb import disturb
 from gmsnet.generate.good import good_mesh
 from gmsnet.generate.outline import SHAPES
 from gmsnet.generate.random import random_mesh
+from gmsnet.generate.settle import settle
 from gmsnet.generate.split import split_edges
 
-__all__ = ["SHAPES", "Curve", "disturb", "good_mesh", "random_mesh", "split_edges"]
+__all__ = ["SHAPES", "Curve", "disturb", "good_mesh", "random_mesh", "settle", "split_edges"]

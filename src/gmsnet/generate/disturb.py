@@ -39,7 +39,7 @@ def disturb(mesh: Mesh, free: ArrayLike, amount: float, *, seed: int = 0, keep_v
     throw = radius * _mean_edge(old, rings) * amount * _mask(free, len(old))
     shift = throw[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     if keep_valid:
-        _keep_orientation(old, shift, _corners(rings), single=mesh.single)
+        keep_orientation(old, shift, _corners(rings), single=mesh.single)
     points = mesh.points.copy()
     points[:, axes] = _landed(old, shift, single=mesh.single)
     return mesh.with_points(points)
@@ -66,7 +66,7 @@ def _landed(old: Floats, shift: Floats, *, single: bool) -> Floats:
     return np.where(shift != 0, new.astype(np.float32).astype(np.float64) if single else new, old)
 
 
-def _keep_orientation(old: Floats, shift: Floats, corners: Ints, *, single: bool) -> None:
+def keep_orientation(old: Floats, shift: Floats, corners: Ints, *, single: bool) -> None:
     """Halves shifts (N × 2, in place) until every corner (T × 3) has its old orientation."""
     sign = _orientation(old, corners)
     shift[np.unique(corners[sign == 0])] = 0.0

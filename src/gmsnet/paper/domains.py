@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gmsnet.engine import smooth
-from gmsnet.generate import Curve, good_mesh, split_edges
+from gmsnet.generate import Curve, good_mesh, settle, split_edges
 from gmsnet.mesh import Mesh
 
 Floats = NDArray[np.float64]
 
 ARC = 200  # points of a curved boundary
+SWEEPS = 20  # of Laplacian smoothing at the end
 
 FOIL_EDGE, FOIL_GROWTH = 0.025, 0.13  # chords: length of edges on the airfoil, and what it grows by with the distance
 FARFIELD = 3.0  # chords
@@ -80,5 +80,4 @@ def naca0012() -> Floats:
 
 def _as_software_leaves_it(mesh: Mesh, degree_four: int) -> Mesh:
     """With a few nodes of degree four, and smoothed."""
-    result: Mesh = smooth(split_edges(mesh, degree_four), "laplacian").mesh
-    return result
+    return settle(split_edges(mesh, degree_four), SWEEPS)
