@@ -1,9 +1,9 @@
 """Good meshes of the airfoil and the pipe, before they are disturbed.
 
 The paper had them from meshing software. What it prints of them after smoothing says what they were like: means of .94
-and .96 in 1/q_V, so nearly all of their nodes have six triangles; and greatest angles of 111° and 112° that Laplacian
-smoothing leaves, and 96° and 94° that GETMe does, where a mesh without nodes of degree four goes down to 82° with any
-method. So a few of their nodes have four triangles, as meshing software leaves them, and here as many edges are split.
+and .96 in 1/q_V, so nearly all of their nodes have six triangles; and greatest angles of 111° and 112° after Laplacian
+smoothing and of 96° and 94° after GETMe. The meshes below, were they without nodes of degree four, would come down to
+82° with Laplacian smoothing. So the paper's have a few, as meshing software leaves them; here as many edges are split.
 """
 
 from __future__ import annotations
