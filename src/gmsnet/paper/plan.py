@@ -50,7 +50,7 @@ class Plan:
     @property
     def timed_nodes(self) -> int:
         """How many nodes of a case each method in plain Python is timed on."""
-        return 60 if self.quick else 300
+        return 60 if self.quick else 600
 
     @property
     def timed_sweeps(self) -> int:

@@ -25,15 +25,18 @@ def draw(context: Context) -> Drawn:
         own, metric = axes[:, column]
         for k, result in enumerate(trainings.loaded(context.store, loss, context.plan)):
             history = result["history"]
-            own.plot(_curve(history, "train_loss"), color=TRAINING, lw=0.4, alpha=0.5, label=None if k else "training")
-            own.plot(_curve(history, "validation_loss"), color=VALIDATION, lw=0.9, label=None if k else "validation")
-            metric.plot(_curve(history, "validation_metric_loss"), color=VALIDATION, lw=0.9)
+            epochs = range(1, len(history["train_loss"]) + 1)
+            names = ("training", "validation") if k == 0 else (None, None)
+            own.plot(epochs, _curve(history, "train_loss"), color=TRAINING, lw=0.4, alpha=0.5, label=names[0])
+            own.plot(epochs, _curve(history, "validation_loss"), color=VALIDATION, lw=0.9, label=names[1])
+            metric.plot(epochs, _curve(history, "validation_metric_loss"), color=VALIDATION, lw=0.9)
         own.set_title(f"{trainings.TITLES[loss]}: {found.converged(loss)} of {context.plan.training_seeds} converge")
         if loss == "q":
             own.set_yscale("log")
         for value, style, text in ((found.before, ":", "no move"), (found.optimum, "--", "optimum of each star")):
             metric.axhline(value, color="black", lw=0.8, ls=style, label=text)
-        metric.set_ylim(found.optimum - 0.01, found.before + 0.06)
+        metric.set_ylim(found.optimum - 0.01, found.before + 0.12)
+        metric.set_xscale("log")
         metric.set_xlabel("epoch")
         for each in (own, metric):
             each.spines[["top", "right"]].set_visible(False)
