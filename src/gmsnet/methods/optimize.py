@@ -2,10 +2,13 @@
 
 - adam: at most 20 Adam steps from where the node is, of MetricLoss by default: the paper's OptimSmoothing, with a step
   size tuned in its favour. kernels/adam.py
-- newton: safeguarded Newton steps, to the end. kernels/newton.py
+- newton: safeguarded Newton steps, to the end; bounded objectives may not make a triangle smaller than a tenth of its
+  star's mean. kernels/newton.py
 
 The objectives stand in kernels/objectives.py. ``q`` and ``q2`` are barriers, and good for the worst cell; the other
-three are bounded, so that their minimisers give up single cells for the mean of the rest.
+three are bounded, so that their minimisers give up single cells for the mean of the rest: on random squares of 1,000
+nodes the least angle ends at 20° and 21° with the barriers and at about 1° with the others, the mean of 1/q at 0.896,
+0.895 and, with MetricLoss, 0.897.
 """
 
 from __future__ import annotations
