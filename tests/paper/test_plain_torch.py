@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from random_stars import proposed, size, star
@@ -70,6 +72,33 @@ def test_optim_smoothing_makes_twenty_steps(monkeypatch):
     rng = np.random.default_rng(3)
     plain_shifts(plain_torch.optim_smoothing(), [star(rng, 6)])
     assert len(evaluated) == 20
+
+
+def test_nn_smoothing_is_its_formula_and_the_mean_of_the_ring_in_other_degrees(monkeypatch):
+    rng = np.random.default_rng(4)
+    widths = {n: (2 * n, 5 + n, 7, 2) for n in (3, 6, 9)}
+    tensors = {}
+    for n, w in widths.items():
+        for k in range(3):
+            tensors[f"degree{n}.{k}.weight"] = rng.normal(size=(w[k + 1], w[k])).astype(np.float32)
+            tensors[f"degree{n}.{k}.bias"] = rng.normal(size=w[k + 1]).astype(np.float32)
+    loaded = {"nn": SimpleNamespace(tensors=tensors)}
+    monkeypatch.setattr(plain_torch.weights, "load", lambda path, model: loaded[model])
+    stars = [s for s in stars_of(rng) if len(s[1]) < 11]
+    wanted = []
+    for centre, ring in stars:
+        n, low = len(ring), ring.min(axis=0)
+        d = (ring.max(axis=0) - low).max()
+        place = ring.mean(axis=0)
+        if n in widths:
+            value = ((ring - low) / d).ravel()
+            for k in range(3):
+                value = tensors[f"degree{n}.{k}.weight"] @ value + tensors[f"degree{n}.{k}.bias"]
+                value = 1 / (1 + np.exp(-value)) if k < 2 else value
+            place = low + d * value
+        wanted.append((place - centre) / size(centre, ring))
+    assert {len(ring) for _, ring in stars} == set(range(3, 11))
+    np.testing.assert_allclose(plain_shifts(plain_torch.nn_smoothing(), stars), wanted, rtol=0, atol=1e-5)
 
 
 @pytest.mark.parametrize("make", [plain_torch.gmsnet, plain_torch.optim_smoothing])
