@@ -64,15 +64,15 @@ def papers_own(printed: str) -> Contender:
 
 
 def beyond() -> list[Contender]:
-    """All other methods, variants and objectives; of the optimisers of the paper's kind only the paper's objective."""
-    taken = {(each.method, each.variant): each for each in papers()}
-    others = []
-    for name, method in METHODS.items():
-        for variant in method.variants or ("",):
-            for objective in method.objectives or ("",):
-                if (name, variant) not in taken:
-                    others.append(Contender("", name, variant, objective))
-    return others
+    """All other methods, variants and objectives."""
+    taken = {each.key for each in papers()}
+    others = [
+        Contender("", name, variant, objective)
+        for name, method in METHODS.items()
+        for variant in method.variants or ("",)
+        for objective in method.objectives or ("",)
+    ]
+    return [each for each in others if each.key not in taken]
 
 
 def named(key: str) -> Contender:
