@@ -88,3 +88,19 @@ def gmsnet_shift(centre, ring, tensors):
     inner = t["mlp.0.weight"] @ convolved[0] + t["mlp.0.bias"]
     inner = np.maximum((inner - inner.mean()) / math.sqrt(inner.var() + 1e-5), 0)
     return d * (t["mlp.1.weight"] @ inner + t["mlp.1.bias"])
+
+
+def nn_shift(centre, ring, tensors):
+    """NN-Smoothing for one star, float64, loop by loop: the shift in the coordinates of the star."""
+    n = len(ring)
+    if f"degree{n}.0.weight" not in tensors:
+        return [sum(p[axis] for p in ring) / n - centre[axis] for axis in range(2)]
+    low = [min(p[axis] for p in ring) for axis in range(2)]
+    side = max(max(p[axis] for p in ring) - low[axis] for axis in range(2))
+    values = [(p[axis] - low[axis]) / side for p in ring for axis in range(2)]
+    for layer in range(3):
+        matrix, bias = (tensors[f"degree{n}.{layer}.{kind}"].astype(float).tolist() for kind in ("weight", "bias"))
+        values = [sum(w * v for w, v in zip(row, values, strict=True)) + b for row, b in zip(matrix, bias, strict=True)]
+        if layer < 2:
+            values = [1 / (1 + math.exp(-v)) for v in values]
+    return [low[axis] + side * values[axis] - centre[axis] for axis in range(2)]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels import gmsnet as kernels_gmsnet
+from gmsnet.kernels import nn as kernels_nn
 from gmsnet.kernels import stars as kernels_stars
 from gmsnet.kernels.compile import LANES
 from gmsnet.methods.gmsnet import fold
+from gmsnet.methods.nn import fold as fold_nn
 from gmsnet.weights import Weights, shapes
 
 
@@ -24,10 +26,18 @@ def star(rng, degree, size=1.0, offset=0.0):
 
 def random_weights(rng, hidden=8, scale=0.3):
     """Weights of an untrained network, with every parameter away from its neutral value."""
-    tensors = {name: (scale * rng.normal(size=shape)).astype(np.float32) for name, shape in shapes(hidden).items()}
+    tensors = {
+        name: (scale * rng.normal(size=shape)).astype(np.float32) for name, shape in shapes.gmsnet(hidden).items()
+    }
     tensors["norm.weight"] += np.float32(1)
     tensors["norm.mean_scale"] += np.float32(0.8)
-    return Weights(model="gmsnet", hidden=hidden, tensors=tensors, metadata={})
+    return Weights(model="gmsnet", tensors=tensors, metadata={})
+
+
+def random_nn_weights(rng, scale=0.5):
+    """Weights of untrained networks of NN-Smoothing that answer with places all over the ring."""
+    tensors = {name: (scale * rng.normal(size=shape)).astype(np.float32) for name, shape in shapes.nn().items()}
+    return Weights(model="nn", tensors=tensors, metadata={})
 
 
 def proposed(stars, propose, dtype=np.float64):
@@ -57,6 +67,17 @@ def compiled_shifts(stars, weights):
 
     def propose(local, n, shift):
         kernels_gmsnet.propose(local, n, folded, hidden, m, row, features, decoded, shift)
+
+    return proposed(stars, propose, np.float32)
+
+
+def compiled_nn_shifts(stars, weights):
+    """As ``compiled_shifts``, by NN-Smoothing."""
+    table, flat = fold_nn(weights)
+    box, inputs, first, second, _ = kernels_nn.room(table)
+
+    def propose(local, n, shift):
+        kernels_nn.propose(local, n, table, flat, box, inputs, first, second, shift)
 
     return proposed(stars, propose, np.float32)
 

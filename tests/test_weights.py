@@ -14,7 +14,7 @@ from gmsnet.errors import InputError
 
 def random_tensors(hidden=8):
     rng = np.random.default_rng(0)
-    return {name: rng.normal(size=shape).astype(np.float32) for name, shape in weights.shapes(hidden).items()}
+    return {name: rng.normal(size=shape).astype(np.float32) for name, shape in weights.shapes.gmsnet(hidden).items()}
 
 
 METADATA = {"model": "gmsnet", "format_version": "1"}
@@ -40,19 +40,44 @@ def test_reads_what_was_written(tmp_path, hidden):
             tensor[0] = 0
 
 
-def test_shipped_weights_tell_their_recipe():
-    shipped = weights.load()
+SHIPPED = [(model, variant) for model, variants in weights.SHIPPED.items() for variant in variants]
+
+
+@pytest.mark.parametrize(("model", "variant"), SHIPPED)
+def test_shipped_weights_tell_their_recipe(model, variant):
+    shipped = weights.load(model=model, variant=variant)
     metadata = shipped.metadata
-    assert shipped.hidden == 8
-    assert shipped.parameters == 210 == int(metadata["parameters"])
-    assert metadata["command"] == "gmsnet train"
+    first = variant == next(iter(weights.SHIPPED[model]))
+    assert shipped.parameters == {"gmsnet": 210, "nn": 4864}[model] == int(metadata["parameters"])
+    recipe = json.loads(metadata["recipe"])
+    kind = {"gmsnet": "loss", "nn": "labels"}[model]
+    assert (recipe["model"], recipe[kind]) == (model, variant)
+    assert metadata["command"] == (
+        "gmsnet train" + (" --model nn" if model == "nn" else "") + ("" if first else f" --{kind} {variant}")
+    )
+    assert recipe["epochs"] == 4000
+    assert recipe["seed"] == int(metadata["seed"])
+    networks = ["gmsnet"] if model == "gmsnet" else [f"degree{n}" for n in range(3, 10)]
+    curves, best = (json.loads(metadata[f"validation_{name}"]) for name in ("curve", "best_loss"))
+    for name in networks:
+        assert curves[name][-1][0] == 4000
+        assert best[name] <= 1.001 * min(loss for _, loss in curves[name])
+        half = min(loss for epoch, loss in curves[name] if epoch <= 2000)
+        assert curves[name][0][1] - half > 0.95 * (curves[name][0][1] - best[name])  # the curve has settled
+    assert {"gmsnet", "torch", "torch_geometric", "numpy"} <= json.loads(metadata["versions"]).keys()
+    assert float(metadata["validation_metric_loss"]) < float(metadata["validation_metric_loss_before"])
+
+
+def test_shipped_gmsnet_comes_near_the_optimum_of_its_loss():
+    metadata = weights.load().metadata
+    assert weights.load().hidden == 8
     assert 0.30 < float(metadata["validation_loss_before"]) < 0.33
     assert float(metadata["validation_loss_optimum"]) < float(metadata["validation_loss"]) <= 0.245
-    curve = json.loads(metadata["validation_curve"])
-    recipe = json.loads(metadata["recipe"])
-    assert curve[-1][0] == recipe["epochs"] == 4000
-    assert recipe["seed"] == int(metadata["seed"])
-    assert {"gmsnet", "torch", "torch_geometric", "numpy"} <= json.loads(metadata["versions"]).keys()
+
+
+def test_variants_that_do_not_exist():
+    with pytest.raises(InputError, match="no weights of gmsnet for 'q'; there are some for metric, cosine"):
+        weights.load(variant="q")
 
 
 def changed(**other):
@@ -85,6 +110,21 @@ def test_weights_that_do_not_fit_are_named(tmp_path, tensors, metadata, message)
         weights.load(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
+
+
+def test_weights_of_nn_smoothing(tmp_path):
+    rng = np.random.default_rng(0)
+    tensors = {name: rng.normal(size=shape).astype(np.float32) for name, shape in weights.shapes.nn().items()}
+    metadata = {**METADATA, "model": "nn"}
+    loaded = weights.load(written(tmp_path / "w.safetensors", tensors, metadata), model="nn")
+    assert loaded.parameters == 4864
+    assert all(np.array_equal(loaded.tensors[name], tensors[name]) for name in tensors)
+    wrong = {**tensors, "degree5.1.weight": np.zeros((20, 10), np.float32)}
+    with pytest.raises(InputError, match=r"degree5.1.weight must have the shape \(10, 20\), here it is \(20, 10\)"):
+        weights.load(written(tmp_path / "w.safetensors", wrong, metadata), model="nn")
+    del wrong["degree5.1.weight"]
+    with pytest.raises(InputError, match=r"not the tensors of 'nn'; missing or unknown: degree5.1.weight"):
+        weights.load(written(tmp_path / "w.safetensors", wrong, metadata), model="nn")
 
 
 def test_files_that_are_none(tmp_path):

@@ -16,7 +16,9 @@ from gmsnet.weights import shapes
 def random_net(hidden: int, seed: int = 0) -> GMSNet:
     """All parameters random, the norm's among them (they start as ones and zeros)."""
     rng = np.random.default_rng(seed)
-    return GMSNet.from_tensors({name: rng.normal(size=s).astype(np.float32) for name, s in shapes(hidden).items()})
+    return GMSNet.from_tensors(
+        {name: rng.normal(size=s).astype(np.float32) for name, s in shapes.gmsnet(hidden).items()}
+    )
 
 
 def naive_shift(tensors, ring):
@@ -78,7 +80,7 @@ def test_equals_the_formulas_in_plain_loops(stars, hidden):
 @pytest.mark.parametrize(("hidden", "parameters"), [(4, 74), (8, 210), (16, 674), (64, 8834)])
 def test_parameters(hidden, parameters):
     assert sum(p.numel() for p in GMSNet(hidden).parameters()) == parameters == 2 * hidden**2 + 10 * hidden + 2
-    assert {name: value.shape for name, value in GMSNet(hidden).tensors().items()} == shapes(hidden)
+    assert {name: value.shape for name, value in GMSNet(hidden).tensors().items()} == shapes.gmsnet(hidden)
 
 
 def test_a_star_alone_and_among_others_moves_alike(stars):

@@ -30,8 +30,8 @@ CHOICES = [
 every_method = pytest.mark.parametrize("method", CHOICES, ids=list(map(name_of, CHOICES)))
 
 # How the names of the methods begin whose result depends on how the mesh lies to the axes: the paper's networks scale a
-# star by the sides of its bounding box and read plain coordinates; Adam scales each component of a gradient by itself.
-TURN_MATTERS = ("gmsnet", "optimize-adam")
+# star by the sides of a bounding box and read plain coordinates; Adam scales each component of a gradient by itself.
+TURN_MATTERS = ("gmsnet", "nn", "optimize-adam")
 
 # What is less than a gain of 0.1 in q-hat and a mean 1/q of 0.85 on a random square in twenty sweeps.
 LESSER_GAINS = {

@@ -23,13 +23,22 @@ STOPPED = 130  # exit code after Ctrl-C, as shells count it
 def train(
     context: typer.Context,
     out: Annotated[Path, typer.Option(help="Folder for weights, curves and checkpoint.")] = Path("gmsnet-training"),
-    model: Annotated[str, typer.Option(help="What is trained: gmsnet.")] = "gmsnet",
+    model: Annotated[str, typer.Option(help="What is trained: gmsnet, or nn (NN-Smoothing).")] = "gmsnet",
     loss: Annotated[
         str, typer.Option(help="What GMSNet minimises: metric (MetricLoss), q (aspect ratio), cosine, min-max-angle.")
     ] = "metric",
     hidden: Annotated[int, typer.Option(help="Hidden features H of GMSNet; 2H² + 10H + 2 parameters.")] = 8,
+    labels: Annotated[
+        str,
+        typer.Option(
+            help="What NN-Smoothing is taught: star (where optimisation puts the node of each star as it stands), or "
+            "mesh (where nodes lie when whole meshes were optimised)."
+        ),
+    ] = "star",
     epochs: Annotated[int, typer.Option(help="Adam steps, one an epoch.")] = 4000,
-    nodes_per_mesh: Annotated[int, typer.Option(help="Nodes that an epoch draws from each training mesh.")] = 32,
+    nodes_per_mesh: Annotated[
+        int, typer.Option(help="Nodes that an epoch draws from each training mesh, for each network.")
+    ] = 32,
     learning_rate: Annotated[float, typer.Option(help="Learning rate at the start.")] = 1e-2,
     decay: Annotated[float, typer.Option(help="Factor of the learning rate when validation stalls.")] = 0.5,
     patience: Annotated[int, typer.Option(help="Epochs without a better validation loss until then.")] = 150,
@@ -41,8 +50,8 @@ def train(
 ) -> None:
     """Train a model on 20 random Delaunay squares (12 to train, 4 to validate, 4 to test).
 
-    GMSNet learns without labels. Writes MODEL.safetensors (for gmsnet smooth --weights), history.csv, curves.png and
-    checkpoint.safetensors.
+    GMSNet learns without labels, NN-Smoothing from labels that optimisation makes. Writes MODEL.safetensors (for gmsnet
+    smooth --weights), history.csv, curves.png and checkpoint.safetensors.
     """
     from gmsnet.learn.train import Ending, check_folder
     from gmsnet.learn.train import train as run
@@ -116,21 +125,27 @@ def _bar(epochs: int) -> Iterator[Callable[[Progress], None]]:
         task = bar.add_task("training", total=epochs, losses="")
 
         def on_epoch(at: Progress) -> None:
-            row = next(iter(at.rows.values()))
-            losses = f"loss {row.train_loss:.4f}, validation {row.validation_loss:.4f}, rate {row.learning_rate:.1g}"
+            train, validation, _, rate = (sum(values) / len(at.rows) for values in zip(*at.rows.values(), strict=True))
+            losses = f"loss {train:.4g}, validation {validation:.4g}, rate {rate:.1g}"
             bar.update(task, completed=at.epoch, losses=losses)
 
         yield on_epoch
 
 
 def _report(result: TrainResult) -> None:
-    losses = result.losses
-    best, before, optimum = (losses[f"validation_loss{name}"] for name in ("", "_before", "_optimum"))
-    share = (before - best) / (before - optimum)
-    typer.echo(
-        f"{result.options.loss_title}: validation {best:.4f}, {share:.0%} of the way from {before:.4f} before "
-        f"to {optimum:.4f}, the optimum of each star by itself"
-    )
-    typer.echo(f"test {losses['test_loss']:.4f}, before {losses['test_loss_before']:.4f}")
+    losses, title = result.losses, result.options.loss_title
+    best = losses["validation_loss"]
+    if "validation_loss_optimum" in losses:
+        before, optimum = losses["validation_loss_before"], losses["validation_loss_optimum"]
+        share = (before - best) / (before - optimum)
+        typer.echo(
+            f"{title}: validation {best:.4f}, {share:.0%} of the way from {before:.4f} before "
+            f"to {optimum:.4f}, the optimum of each star by itself; test {losses['test_loss']:.4f}"
+        )
+    else:
+        typer.echo(f"{title}: validation {best:.4g}, test {losses['test_loss']:.4g}")
+    for name in ("validation", "test"):
+        before, after = losses[f"{name}_metric_loss_before"], losses[f"{name}_metric_loss"]
+        typer.echo(f"MetricLoss of the {name} meshes: {before:.4f} before, {after:.4f} after")
     for path in result.files:
         typer.echo(f"wrote {path}")

@@ -20,6 +20,7 @@ LOSS_TITLES = MappingProxyType(
         "min-max-angle": "min-max angle loss (radians)",
     }
 )
+LABELS = ("star", "mesh")  # where NN-Smoothing's labels come from, see ``labels``
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,9 +60,9 @@ class Options(ABC):
         return f"gmsnet train{model}" + "".join(given)
 
     @property
+    @abstractmethod
     def file_name(self) -> str:
         """Of the weights."""
-        return f"{self.model}.safetensors"
 
     @property
     @abstractmethod
@@ -101,7 +102,31 @@ class TrainOptions(Options):
         return LOSS_TITLES[self.loss]
 
 
-MODELS: Mapping[str, type[Options]] = MappingProxyType({kind.model: kind for kind in (TrainOptions,)})
+@dataclass(frozen=True, kw_only=True)
+class NNOptions(Options):
+    """For NN-Smoothing. labels: what it is taught, one of ``LABELS``."""
+
+    model = "nn"
+
+    labels: str = "star"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.labels not in LABELS:
+            raise InputError(f"--labels must be one of {', '.join(LABELS)}; got {self.labels!r}")
+
+    @property
+    def file_name(self) -> str:
+        """Of the weights."""
+        return "nn.safetensors" if self.labels == "star" else f"nn-{self.labels}.safetensors"
+
+    @property
+    def loss_title(self) -> str:
+        """See Options."""
+        return "mean squared distance to the label, over the ring's size"
+
+
+MODELS: Mapping[str, type[Options]] = MappingProxyType({kind.model: kind for kind in (TrainOptions, NNOptions)})
 
 
 def options_for(model: str, values: Mapping[str, Any]) -> Options:

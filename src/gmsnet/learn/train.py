@@ -20,9 +20,11 @@ from gmsnet.learn.backend import torch
 from gmsnet.learn.checkpoint import NAME, Member, saved_options
 from gmsnet.learn.curves import check_plotting, csv_bytes, png_bytes
 from gmsnet.learn.export import weights_bytes
-from gmsnet.learn.options import Options, TrainOptions
+from gmsnet.learn.options import NNOptions, Options, TrainOptions
 from gmsnet.learn.train_gmsnet import GMSNetTrainee
+from gmsnet.learn.train_nn import NNTrainee
 from gmsnet.learn.trainee import Row, Trainee
+from gmsnet.mesh import Mesh
 
 CHECKPOINT_EVERY = 200  # epochs
 
@@ -87,7 +89,7 @@ def train(
     check_folder(options, folder, resume=resume)
     with _reproducible():
         torch.manual_seed(options.seed)
-        trainee = _trainee(options, [data.Stars.of_mesh(mesh) for mesh in data.meshes(options.mesh_seed)])
+        trainee = _trainee(options, data.meshes(options.mesh_seed))
         members = {name: Member.of(net, options) for name, net in trainee.nets.items()}
         if resume:
             checkpoint.restore(folder, members)
@@ -113,9 +115,11 @@ def train(
         return TrainResult(options, Ending.FINISHED, history, marks, [*written, folder / NAME])
 
 
-def _trainee(options: Options, parts: list[data.Stars]) -> Trainee:
+def _trainee(options: Options, meshes: Sequence[Mesh]) -> Trainee:
+    if isinstance(options, NNOptions):
+        return NNTrainee(options, meshes)
     assert isinstance(options, TrainOptions)
-    return GMSNetTrainee(options, parts)
+    return GMSNetTrainee(options, meshes)
 
 
 def _epoch(trainee: Trainee, members: Mapping[str, Member], epoch: int) -> None:

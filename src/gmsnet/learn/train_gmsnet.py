@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from gmsnet.learn.losses import LOSSES, Loss, metric_loss, truncation
 from gmsnet.learn.model import GMSNet
 from gmsnet.learn.optimum import optimal_position
 from gmsnet.learn.options import TrainOptions
+from gmsnet.mesh import Mesh
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,8 @@ class Batch:
 class GMSNetTrainee:
     """See trainee.Trainee; one network, "gmsnet"."""
 
-    def __init__(self, options: TrainOptions, parts: list[data.Stars]) -> None:
+    def __init__(self, options: TrainOptions, meshes: Sequence[Mesh]) -> None:
+        parts = [data.Stars.of_mesh(mesh) for mesh in meshes]
         self.options = options
         self.net = GMSNet(options.hidden)
         self.nets: Mapping[str, torch.nn.Module] = {"gmsnet": self.net}

@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable
 
 from gmsnet.errors import InputError
-from gmsnet.methods import angle, cpt, cvt, getme, gmsnet, laplacian, optimize
+from gmsnet.methods import angle, cpt, cvt, getme, gmsnet, laplacian, nn, optimize
 from gmsnet.methods.base import Field, Method, Options, Smoother, StarSmoother
 
 METHODS: dict[str, Method] = {
@@ -20,6 +20,7 @@ METHODS: dict[str, Method] = {
         cpt.METHOD,
         getme.METHOD,
         optimize.METHOD,
+        nn.METHOD,
     )
 }
 

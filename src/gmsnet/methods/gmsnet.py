@@ -1,5 +1,5 @@
 """GMSNet, the paper's graph neural network, compiled. The formulas stand in kernels/gmsnet.py, the model as the paper
-prints it in learn/model.py."""
+prints it in learn/model.py. The variants are weights that were trained with different losses (learn/losses.py)."""
 
 from __future__ import annotations
 
@@ -50,6 +50,7 @@ METHOD = Method(
     name="gmsnet",
     summary="the paper's graph neural network: one look at a node's one-ring, one shift",
     source="Wang, Chen, Yan, Liu: Proposing an intelligent mesh smoothing method with graph neural networks (2023)",
-    create=lambda options: GmsNet(weights.load(options.weights)),
+    create=lambda options: GmsNet(weights.load(options.weights, variant=options.variant)),
+    variants=tuple(weights.SHIPPED["gmsnet"]),
     weighted=True,
 )

@@ -14,43 +14,33 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 
 from gmsnet.errors import InputError
+from gmsnet.weights import shapes
+from gmsnet.weights.shapes import LEAST_HIDDEN, MOST_HIDDEN
 
 FORMAT_VERSION = "1"
-LEAST_HIDDEN, MOST_HIDDEN = 4, 64
-SHIPPED = {"gmsnet": "gmsnet-h8.safetensors"}  # model → file beside this module
-
-
-def shapes(hidden: int) -> dict[str, tuple[int, ...]]:
-    """Name → shape of each tensor of GMSNet with H hidden features (float32; matrices as output × input).
-
-    linear: W_l, b_l of equation (4). norm: γ, β, α of GraphNorm, (5). gcn: W_g, b_g, (7). mlp: (8).
-    """
-    h = hidden
-    return {
-        "linear.weight": (h, 2),
-        "linear.bias": (h,),
-        "norm.weight": (h,),
-        "norm.bias": (h,),
-        "norm.mean_scale": (h,),
-        "gcn.weight": (h, h),
-        "gcn.bias": (h,),
-        "mlp.0.weight": (h, h),
-        "mlp.0.bias": (h,),
-        "mlp.1.weight": (2, h),
-        "mlp.1.bias": (2,),
+SHIPPED: Mapping[str, Mapping[str, str]] = MappingProxyType(
+    {
+        "gmsnet": MappingProxyType(
+            {
+                "metric": "gmsnet-h8.safetensors",
+                "cosine": "gmsnet-h8-cosine.safetensors",
+                "min-max-angle": "gmsnet-h8-min-max-angle.safetensors",
+            }
+        ),
+        "nn": MappingProxyType({"star": "nn.safetensors", "mesh": "nn-mesh.safetensors"}),
     }
+)  # model → variant, the default first → file beside this module
 
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """The parameters of a network.
+    """The parameters of a model.
 
-    model: "gmsnet". hidden: H. tensors: name → float32 array, read-only, see ``shapes``. metadata: the recipe, the
+    model: "gmsnet" or "nn". tensors: name → float32 array, read-only, see ``shapes``. metadata: the recipe, the
     versions of the packages, the validation curve, …, all as text.
     """
 
     model: str
-    hidden: int
     tensors: Mapping[str, NDArray[np.float32]]
     metadata: Mapping[str, str]
 
@@ -59,9 +49,14 @@ class Weights:
         """How many numbers they are."""
         return sum(tensor.size for tensor in self.tensors.values())
 
+    @property
+    def hidden(self) -> int:
+        """GMSNet's H."""
+        return len(self.tensors["linear.bias"])
 
-def load(path: str | os.PathLike[str] | None = None, *, model: str = "gmsnet") -> Weights:
-    """The weights in a file, by default those that come with the package.
+
+def load(path: str | os.PathLike[str] | None = None, *, model: str = "gmsnet", variant: str = "") -> Weights:
+    """The weights in a file, by default those of a variant that come with the package ("": its first one).
 
     Raises InputError, with the file first, where it is missing or cut off, is no safetensors file, belongs to another
     model or format version, has a hidden width outside 4 to 64, or its tensors have the wrong names, shapes, type or
@@ -69,10 +64,14 @@ def load(path: str | os.PathLike[str] | None = None, *, model: str = "gmsnet") -
     """
     if model not in SHIPPED:
         raise InputError(f"there are no weights for a model {model!r}; there are some for {', '.join(SHIPPED)}")
-    if path is None:
-        with as_file(files(__name__) / SHIPPED[model]) as shipped:
-            return _load(shipped, model)
-    return _load(Path(path), model)
+    if path is not None:
+        return _load(Path(path), model)
+    variants = SHIPPED[model]
+    variant = variant or next(iter(variants))
+    if variant not in variants:
+        raise InputError(f"there are no weights of {model} for {variant!r}; there are some for {', '.join(variants)}")
+    with as_file(files(__name__) / variants[variant]) as shipped:
+        return _load(shipped, model)
 
 
 def _load(path: Path, model: str) -> Weights:
@@ -93,11 +92,11 @@ def _load(path: Path, model: str) -> Weights:
             f"but this gmsnet reads version {FORMAT_VERSION!r}"
         )
     hidden = tensors["linear.bias"].size if "linear.bias" in tensors else 0
-    if not LEAST_HIDDEN <= hidden <= MOST_HIDDEN:
+    if model == "gmsnet" and not LEAST_HIDDEN <= hidden <= MOST_HIDDEN:
         raise InputError(
             f"{path}: the hidden width must lie between {LEAST_HIDDEN} and {MOST_HIDDEN}, here it is {hidden}"
         )
-    expected = shapes(hidden)
+    expected = shapes.nn() if model == "nn" else shapes.gmsnet(hidden)
     if tensors.keys() != expected.keys():
         names = ", ".join(sorted(tensors.keys() ^ expected.keys()))
         raise InputError(f"{path}: not the tensors of {model!r}; missing or unknown: {names}")
@@ -109,4 +108,7 @@ def _load(path: Path, model: str) -> Weights:
         if not np.isfinite(tensor).all():
             raise InputError(f"{path}: {name} holds values that are not finite")
         tensor.flags.writeable = False
-    return Weights(model, hidden, MappingProxyType(tensors), MappingProxyType(metadata))
+    return Weights(model, MappingProxyType(tensors), MappingProxyType(metadata))
+
+
+__all__ = ["FORMAT_VERSION", "LEAST_HIDDEN", "MOST_HIDDEN", "SHIPPED", "Weights", "load", "shapes"]

@@ -1,0 +1,59 @@
+"""NN-Smoothing, compiled: for each degree from 3 to 9 a small network that has learnt where optimisation puts a node.
+
+The formulas stand in kernels/nn.py, the model in learn/model_nn.py. Other degrees go to the mean of the ring, as in the
+paper of GMSNet. A ring begins at its smallest node id: the networks see their input in order.
+
+The variants are weights that were taught differently (learn/labels.py): "star" by where optimisation puts the node of a
+star as it stands, "mesh" by where nodes lie when whole meshes were optimised.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet import weights
+from gmsnet.kernels import nn as kernels
+from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.methods.base import Method, StarSmoother, Tally
+from gmsnet.weights.shapes import NN_HIDDEN
+
+
+class NNSmoothing(StarSmoother):
+    """The networks with one set of weights."""
+
+    def __init__(self, trained: weights.Weights) -> None:
+        self.table, self.flat = fold(trained)
+
+    def visit(
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        kernels.sweep(points, blocks, first, last, precision, self.table, self.flat, tally)
+
+
+def fold(trained: weights.Weights) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """The weights as the kernel reads them: the table by degree (10 × 3) and all numbers, flat float32.
+
+    Of each layer row by row: the bias, then the weights of the row, padded with zeros (kernels.nn.padded).
+    """
+    table = np.full((max(NN_HIDDEN) + 1, 3), -1, dtype=np.int64)
+    parts: list[NDArray[np.float32]] = []
+    for degree, hidden in NN_HIDDEN.items():
+        table[degree] = (sum(part.size for part in parts), *hidden)
+        for layer in range(3):
+            matrix = trained.tensors[f"degree{degree}.{layer}.weight"]
+            bias = trained.tensors[f"degree{degree}.{layer}.bias"]
+            wide = np.pad(matrix, ((0, 0), (0, kernels.padded(matrix.shape[1]) - matrix.shape[1])))
+            parts.append(np.column_stack([bias, wide]).ravel())
+    return table, np.concatenate(parts)
+
+
+METHOD = Method(
+    name="nn",
+    summary="for each degree a small network that was taught by optimisation",
+    source="Guo, Wang, Ma et al.: A new mesh smoothing method based on a neural network (2021)",
+    create=lambda options: NNSmoothing(weights.load(options.weights, model="nn", variant=options.variant)),
+    variants=tuple(weights.SHIPPED["nn"]),
+    weighted=True,
+)
