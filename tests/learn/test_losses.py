@@ -179,3 +179,17 @@ def test_optimum_is_stationary_in_the_middle_of_a_star():
     angle = np.arange(7) * 2 * np.pi / 7
     ring = torch.as_tensor(np.column_stack([np.cos(angle), np.sin(angle)]) + 0.3)[None]
     assert optimal_position(ring, torch.tensor([7]))[0].tolist() == pytest.approx([0.3, 0.3], abs=1e-5)
+
+
+def test_the_largest_angle_by_its_cosine_would_not_be_a_number():
+    """Nodes that truncation leaves close to an edge: rounding takes the cosine of a flat angle beyond −1."""
+    rng = np.random.default_rng(5)
+    share = torch.as_tensor(rng.uniform(0.05, 0.95, (1000, 1)), dtype=torch.float32)
+    ring = torch.as_tensor(rng.normal(size=(1000, 3, 2)), dtype=torch.float32)
+    a, b = ring[:, 0], ring[:, 1]
+    place = (a + share * (b - a)) * (1 - 1e-6)
+    degree = torch.full((1000,), 3)
+    u, v = a - place, b - place
+    cosine = (u * v).sum(dim=1) / (u.norm(dim=1) * v.norm(dim=1))
+    assert torch.acos(cosine).isnan().sum() > 50
+    assert torch.isfinite(LOSSES["min-max-angle"](ring, degree, place)).all()
