@@ -21,7 +21,7 @@ from gmsnet.learn.backend import torch
 from gmsnet.learn.checkpoint import NAME, saved_options
 from gmsnet.learn.losses import LOSSES, truncation
 from gmsnet.learn.model import GMSNet, wheels
-from gmsnet.learn.options import LOSS_TITLES, TrainOptions, options_for
+from gmsnet.learn.options import TrainOptions, options_for
 from gmsnet.learn.train import Ending
 from gmsnet.learn.train_gmsnet import Batch
 
@@ -232,38 +232,6 @@ def test_an_infinite_loss_is_no_divergence(tmp_path, monkeypatch):
     assert [row.validation_loss < math.inf for row in result.history["gmsnet"]] == [False, False, True]
     assert result.losses["validation_loss"] == pytest.approx(result.history["gmsnet"][2].validation_loss)
     assert (tmp_path / "gmsnet-h4-q.safetensors").exists()
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"hidden": 3}, "--hidden must lie between 4 and 64, got 3"),
-        ({"hidden": 65}, "--hidden must lie between 4 and 64, got 65"),
-        ({"epochs": 0}, "--epochs must be at least 1"),
-        ({"nodes_per_mesh": 0}, "--nodes-per-mesh must be at least 1"),
-        ({"seed": -1}, "--seed must be at least 0"),
-        ({"mesh_seed": -1}, "--mesh-seed must be at least 0"),
-        ({"patience": 0}, "--patience must be at least 1"),
-        ({"learning_rate": 0.0}, "--learning-rate must be a positive number"),
-        ({"learning_rate": float("nan")}, "--learning-rate must be a positive number"),
-        ({"decay": 1.0}, "--decay must lie between 0 and 1"),
-        ({"loss": "angle"}, "--loss must be one of metric, q, cosine, min-max-angle; got 'angle'"),
-    ],
-)
-def test_bad_options_are_named(options, message):
-    with pytest.raises(InputError, match=message):
-        TrainOptions(**options)
-
-
-def test_every_loss_can_be_chosen():
-    assert tuple(LOSS_TITLES) == tuple(LOSSES)
-
-
-def test_options_of_other_models_are_refused():
-    with pytest.raises(InputError, match=r"--model must be one of gmsnet.*; got 'resnet'"):
-        options_for("resnet", {})
-    with pytest.raises(InputError, match="--depth does not apply to --model gmsnet; leave it out"):
-        options_for("gmsnet", {"depth": 3})
 
 
 app = typer.Typer()

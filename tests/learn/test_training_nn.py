@@ -158,13 +158,6 @@ def test_meshes_without_a_degree_are_refused(tmp_path, monkeypatch):
         training.train(SHORT, tmp_path)
 
 
-def test_options():
-    with pytest.raises(InputError, match="--labels must be one of star, mesh; got 'node'"):
-        NNOptions(labels="node")
-    with pytest.raises(InputError, match="--hidden does not apply to --model nn; leave it out"):
-        options_for("nn", {"hidden": 8})
-
-
 app = typer.Typer()
 app.command()(command.train)
 

@@ -13,7 +13,7 @@ from gmsnet.learn.trainee import Row
 from gmsnet.plot import check_target, new_figure
 
 HEADER = ",".join(("epoch", "network", *Row._fields)) + "\n"
-MOST_LINEAR = 10.0  # largest ratio of what is shown to its smallest that is not shown on a logarithmic axis
+MOST_LINEAR = 4.0  # largest ratio of what is shown to its smallest that is not shown on a logarithmic axis
 
 
 def csv_bytes(history: Mapping[str, Sequence[Row]]) -> bytes:
@@ -40,21 +40,22 @@ def png_bytes(history: Mapping[str, Sequence[Row]], loss: str, marks: Mapping[st
     figure = new_figure(7.0, 4.2)
     axes = figure.add_subplot()
     shown = list(marks.values())
-    for (name, rows), colour in zip(history.items(), _colours(len(history)), strict=True):
+    single = len(history) == 1
+    for k, (name, rows) in enumerate(history.items()):
         epochs = range(1, len(rows) + 1)
         curve = [row.validation_loss for row in rows]
         shown += curve[len(rows) // 10 :]
-        if len(history) == 1:
+        if single:
             drawn = [row.train_loss for row in rows]
             axes.plot(epochs, drawn, color="#e0a800", linewidth=0.5, label="training (drawn nodes)")
-        label = "validation" if len(history) == 1 else f"validation, {name}"
+        colour, label = ("#173f7a", "validation") if single else (f"C{k}", name)
         axes.plot(epochs, curve, color=colour, linewidth=1.2, label=label)
     for (name, value), style in zip(marks.items(), (":", "--", "-."), strict=False):
         axes.axhline(value, color="black", linewidth=0.8, linestyle=style, label=f"{name} ({value:.4g})")
     _scale(axes, np.array(shown))
     axes.set_xlabel("epoch")
-    axes.set_ylabel(loss)
-    axes.legend(frameon=False)
+    axes.set_ylabel(loss if single else f"{loss}, validation")
+    figure.legend(frameon=False, loc="outside upper center", ncols=2 if single else 4, fontsize="small")
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=150)
     return buffer.getvalue()
@@ -71,12 +72,3 @@ def _scale(axes: Any, shown: NDArray[np.float64]) -> None:
         axes.set_ylim(low / 1.2, high * 1.2)
     elif high > low:
         axes.set_ylim(low - 0.1 * (high - low), high + 0.15 * (high - low))
-
-
-def _colours(count: int) -> list[str]:
-    """From dark blue to yellow."""
-    if count == 1:
-        return ["#173f7a"]
-    ends = np.array([[0x17, 0x3F, 0x7A], [0xE0, 0xA8, 0x00]])
-    mixed = [ends[0] + (ends[1] - ends[0]) * k / (count - 1) for k in range(count)]
-    return ["#" + "".join(f"{round(part):02x}" for part in colour) for colour in mixed]

@@ -123,7 +123,7 @@ class NNOptions(Options):
     @property
     def loss_title(self) -> str:
         """See Options."""
-        return "mean squared distance to the label, over the ring's size"
+        return "mean squared distance to the label"
 
 
 MODELS: Mapping[str, type[Options]] = MappingProxyType({kind.model: kind for kind in (TrainOptions, NNOptions)})
