@@ -42,14 +42,14 @@ def test_options_of_other_models_are_refused():
 
 
 def test_options_of_nn_smoothing():
-    with pytest.raises(InputError, match="--labels must be one of star, mesh; got 'node'"):
+    with pytest.raises(InputError, match="--labels must be one of mesh, star; got 'node'"):
         NNOptions(labels="node")
     with pytest.raises(InputError, match="--hidden does not apply to --model nn; leave it out"):
         options_for("nn", {"hidden": 8})
 
 
 @pytest.mark.parametrize(
-    "options", [TrainOptions(loss="q", hidden=9), NNOptions(labels="mesh", decay=0.4), NNOptions()]
+    "options", [TrainOptions(loss="q", hidden=9), NNOptions(labels="star", decay=0.4), NNOptions()]
 )
 def test_options_survive_as_values(options):
     values = options.as_dict()
@@ -62,7 +62,7 @@ def test_each_kind_of_weights_has_a_name_of_its_own():
         *(TrainOptions(loss=loss) for loss in LOSSES),
         TrainOptions(hidden=16),
         NNOptions(),
-        NNOptions(labels="mesh"),
+        NNOptions(labels="star"),
     ]
     assert len({options.file_name for options in kinds}) == len(kinds)
     assert TrainOptions().file_name == "gmsnet-h8.safetensors"

@@ -24,9 +24,9 @@ from gmsnet.learn.options import NNOptions, options_for
 from gmsnet.learn.train import Ending
 from gmsnet.learn.train_nn import NNTrainee, Rings
 
-FILES = {"nn-mesh.safetensors", "history.csv", "curves.png", NAME}
+FILES = {"nn.safetensors", "history.csv", "curves.png", NAME}
 NETWORKS = [f"degree{n}" for n in range(3, 10)]
-SHORT = NNOptions(epochs=12, nodes_per_mesh=8, patience=2, seed=3, labels="mesh")
+SHORT = NNOptions(epochs=12, nodes_per_mesh=8, patience=2, seed=3)
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -47,7 +47,7 @@ def whole(tmp_path_factory, _small_meshes):
     folder = tmp_path_factory.mktemp("whole")
     result = training.train(SHORT, folder)
     assert result.ending is Ending.FINISHED
-    assert result.files[0].name == "nn-mesh.safetensors"
+    assert result.files[0].name == "nn.safetensors"
     return contents(folder)
 
 
@@ -74,13 +74,13 @@ def test_stopped_and_resumed_is_as_if_never_stopped(tmp_path, whole):
 
 
 def test_the_best_of_each_network_is_kept(tmp_path, whole):
-    (tmp_path / "nn.safetensors").write_bytes(whole["nn-mesh.safetensors"])
+    (tmp_path / "nn.safetensors").write_bytes(whole["nn.safetensors"])
     loaded = weights.load(tmp_path / "nn.safetensors", model="nn")
     assert loaded.parameters == 4864 == int(loaded.metadata["parameters"])
     recipe = json.loads(loaded.metadata["recipe"])
     assert options_for(recipe.pop("model"), recipe) == SHORT
     assert loaded.metadata["command"] == (
-        "gmsnet train --model nn --epochs 12 --nodes-per-mesh 8 --patience 2 --seed 3 --labels mesh"
+        "gmsnet train --model nn --epochs 12 --nodes-per-mesh 8 --patience 2 --seed 3"
     )
     best = json.loads(loaded.metadata["validation_best_loss"])
     curves = json.loads(loaded.metadata["validation_curve"])
@@ -98,7 +98,7 @@ def test_the_best_of_each_network_is_kept(tmp_path, whole):
 
 
 def test_it_learns(tmp_path):
-    result = training.train(NNOptions(epochs=150), tmp_path)
+    result = training.train(NNOptions(labels="star", epochs=150), tmp_path)
     for rows in result.history.values():
         assert min(row.validation_loss for row in rows) < 0.3 * rows[0].validation_loss
     losses = result.losses

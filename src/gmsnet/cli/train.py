@@ -31,10 +31,10 @@ def train(
     labels: Annotated[
         str,
         typer.Option(
-            help="What NN-Smoothing is taught: star (where optimisation puts the node of each star as it stands), or "
-            "mesh (where nodes lie when whole meshes were optimised)."
+            help="What NN-Smoothing is taught: mesh (where nodes lie when whole meshes were optimised, as in the "
+            "paper), or star (where optimisation puts the node of each star as it stands)."
         ),
-    ] = "star",
+    ] = "mesh",
     epochs: Annotated[int, typer.Option(help="Adam steps, one an epoch.")] = 4000,
     nodes_per_mesh: Annotated[
         int, typer.Option(help="Nodes that an epoch draws from each training mesh, for each network.")

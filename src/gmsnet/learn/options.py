@@ -20,7 +20,7 @@ LOSS_TITLES = MappingProxyType(
         "min-max-angle": "min-max angle loss (radians)",
     }
 )
-LABELS = ("star", "mesh")  # where NN-Smoothing's labels come from, see ``labels``
+LABELS = ("mesh", "star")  # where NN-Smoothing's labels come from, see ``labels``
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +108,7 @@ class NNOptions(Options):
 
     model = "nn"
 
-    labels: str = "star"
+    labels: str = "mesh"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -118,7 +118,7 @@ class NNOptions(Options):
     @property
     def file_name(self) -> str:
         """Of the weights."""
-        return "nn.safetensors" if self.labels == "star" else f"nn-{self.labels}.safetensors"
+        return "nn.safetensors" if self.labels == "mesh" else f"nn-{self.labels}.safetensors"
 
     @property
     def loss_title(self) -> str:

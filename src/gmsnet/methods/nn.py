@@ -3,8 +3,9 @@
 The formulas stand in kernels/nn.py, the model in learn/model_nn.py. Other degrees go to the mean of the ring, as in the
 paper of GMSNet. A ring begins at its smallest node id: the networks see their input in order.
 
-The variants are weights that were taught differently (learn/labels.py): "star" by where optimisation puts the node of a
-star as it stands, "mesh" by where nodes lie when whole meshes were optimised.
+The variants are weights that were taught differently (learn/labels.py): "mesh" by where nodes lie when whole meshes
+were optimised, as the paper has it; "star" by where optimisation puts the node of a star as it stands, which follows
+from the ring and can be learnt better.
 """
 
 from __future__ import annotations

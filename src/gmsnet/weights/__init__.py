@@ -27,7 +27,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = MappingProxyType(
                 "min-max-angle": "gmsnet-h8-min-max-angle.safetensors",
             }
         ),
-        "nn": MappingProxyType({"star": "nn.safetensors", "mesh": "nn-mesh.safetensors"}),
+        "nn": MappingProxyType({"mesh": "nn.safetensors", "star": "nn-star.safetensors"}),
     }
 )  # model → variant, the default first → file beside this module
 
