@@ -14,7 +14,7 @@ from typing import Annotated
 
 import typer
 
-from gmsnet.cli import generate, methods, quality, smooth, train
+from gmsnet.cli import generate, methods, quality, reproduce, smooth, train
 from gmsnet.cli.signals import Interrupted
 from gmsnet.errors import GmsnetError
 
@@ -37,6 +37,7 @@ app.command()(quality.quality)
 app.command()(methods.methods)
 app.command()(generate.generate)
 app.command()(train.train)
+app.command()(reproduce.reproduce)
 
 
 def _print_version(wanted: bool) -> None:

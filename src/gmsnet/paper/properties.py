@@ -55,12 +55,17 @@ def measure(context: Context) -> Result:
 
 
 def _star(degree: int, seed: int) -> tuple[Point, list[Point]]:
-    """A free node and its ring, counter-clockwise, star-shaped as seen from the node."""
+    """A ring, counter-clockwise, and a free node well off its middle, from which the whole rim is seen."""
     rng = np.random.default_rng([seed, degree])
-    around = (np.arange(degree) + rng.uniform(-0.35, 0.35, degree)) * 2.0 * math.pi / degree
+    around = (np.arange(degree) + rng.uniform(-0.2, 0.2, degree)) * 2.0 * math.pi / degree
     radius = rng.uniform(0.5, 1.5, degree)
     ring = [(float(r * math.cos(a)), float(r * math.sin(a))) for r, a in zip(radius, around, strict=True)]
-    return (0.0, 0.0), ring
+    direction, reach = rng.uniform(0.0, 2.0 * math.pi), 1.0
+    while True:  # no gap reaches half a turn, so from the middle all of the rim is seen, and this ends
+        x = (reach * math.cos(direction), reach * math.sin(direction))
+        if all(plain.area(x, a, b) > 0.0 for a, b in plain.edges(ring)):
+            return x, ring
+        reach *= 0.8
 
 
 def _rotations(ring: list[Point]) -> Iterable[list[Point]]:
