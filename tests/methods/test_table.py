@@ -45,3 +45,10 @@ def test_weights_for_a_method_without_any_are_refused():
         if not method.weighted:
             with pytest.raises(InputError, match=f"{method.name} has no weights.*gmsnet"):
                 smoother(method.name, weights="some.safetensors")
+
+
+def test_weights_and_a_variant_exclude_each_other():
+    for method in METHODS.values():
+        if method.weighted:
+            with pytest.raises(InputError, match="either a variant or weights"):
+                smoother(method.name, variant=method.variants[-1], weights="some.safetensors")

@@ -52,6 +52,8 @@ def smoother(
     )
     if weights is not None and not method.weighted:
         raise InputError(f"{name} has no weights, so none can be given; {_those('weighted')} have some")
+    if weights is not None and variant is not None:
+        raise InputError(f"variants of {name} are its own weights: give either a variant or weights, not both")
     return method.create(options)
 
 
