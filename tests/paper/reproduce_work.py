@@ -35,3 +35,8 @@ def endless(context: Context) -> Result:
 def threads(context: Context) -> Result:
     """What libraries will read when they are loaded."""
     return Result({name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")})
+
+
+def die(context: Context) -> Result:
+    """As a process does that the system kills."""
+    os._exit(9)

@@ -10,7 +10,7 @@ import reproduce_work as work
 
 from gmsnet.errors import InputError
 from gmsnet.paper.plan import Plan
-from gmsnet.paper.store import Store
+from gmsnet.paper.store import Result, Store
 from gmsnet.paper.units import Stage, Standing, Unit, carry_out, missing
 
 PLAN = Plan(runs=1, sweeps=1, seed=0, quick=True)
@@ -81,6 +81,13 @@ def test_an_error_comes_through_and_what_was_done_stays(store):
     assert not store.holds("note/b")
 
 
+def test_a_process_that_is_killed_is_told_plainly(store):
+    with pytest.raises(InputError, match=r"of the stage 'second' ended abruptly .* keeps what is done"):
+        do([Stage("first", notes("a")), Stage("second", [Unit("dies", work.die)])], store)
+    assert store.holds("note/a")
+    assert not store.holds("dies")
+
+
 def test_processes_use_one_thread(store):
     assert do([Stage("first", [Unit("threads", work.threads)])], store)[0]
     assert store.load("threads") == {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -115,9 +122,6 @@ def test_damaged_results_are_named(store):
 
 
 def test_numbers_that_are_not_finite_become_null(store):
-    store.write({"x.json": b""})
-    from gmsnet.paper.store import Result
-
     store.save("odd", Result({"values": [1.0, float("inf"), float("nan")]}), 0.0)
     assert store.load("odd") == {"values": [1.0, None, None]}
     assert json.loads((store.folder / "units/odd.json").read_text())["unit"] == "odd"

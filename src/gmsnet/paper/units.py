@@ -8,11 +8,13 @@ import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import Any
 
+from gmsnet.errors import InputError
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.store import Result, Store
 from gmsnet.workers import available_threads
@@ -89,6 +91,7 @@ def carry_out(
 
     on_unit: called at the start of each stage and after each unit. should_stop: asked all the time; once it is true,
     units in work are given up (a training leaves its checkpoint), and all finished ones stay.
+    Raises what a unit raises, and InputError where a process is killed; finished units stay then, too.
     """
     total = sum(len(stage.units) for stage in stages)
     left = missing(stages, store)
@@ -116,6 +119,11 @@ def carry_out(
                         on_unit(Standing(done, total, stage.title))
                 if stop.is_set():
                     return False
+        except BrokenProcessPool as error:
+            raise InputError(
+                f"a process of the stage '{stage.title}' ended abruptly (is there too little memory?); "
+                f"{store.folder} keeps what is done: the same command goes on with it"
+            ) from error
         except BaseException:
             stop.set()
             raise
