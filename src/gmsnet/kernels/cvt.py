@@ -14,6 +14,7 @@ import numpy as np
 
 from gmsnet.kernels import stars
 from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.laplacian import area_mean
 
 
 @kernel
@@ -40,22 +41,13 @@ def circumcentres(local, n, row, shift):
 
 @kernel
 def centroids(local, n, row, shift):
-    """Shifts (2·LANES, over the star's size) with centroids; row: (LANES,) Σ 2|T|. 0/0 where no area is."""
-    for lane in range(LANES):
-        row[lane] = shift[lane] = shift[LANES + lane] = 0.0
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
-        p = local[2 * i * LANES : 2 * (i + 1) * LANES]
-        q = local[2 * j * LANES : 2 * (j + 1) * LANES]
-        for lane in range(LANES):
-            ax, ay, bx, by = p[lane], p[LANES + lane], q[lane], q[LANES + lane]
-            twice = abs(ax * by - ay * bx)
-            row[lane] += twice
-            shift[lane] += twice * (ax + bx)
-            shift[LANES + lane] += twice * (ay + by)
-    for lane in range(LANES):
-        shift[lane] /= 3.0 * row[lane]
-        shift[LANES + lane] /= 3.0 * row[lane]
+    """Shifts (2·LANES, over the star's size) with centroids; row: (LANES,) as there. Not a number where no area is.
+
+    Σ|T|(a + b)/3 / Σ|T| is two thirds of the mean weighted by areas.
+    """
+    area_mean(local, n, row, shift)
+    for k in range(2 * LANES):
+        shift[k] *= 2.0 / 3.0
 
 
 @kernel
