@@ -6,7 +6,7 @@ import numpy as np
 
 from gmsnet import plot
 from gmsnet.learn import data
-from gmsnet.paper.contenders import OPTIM, papers_own
+from gmsnet.learn.labels import END, optimised
 from gmsnet.paper.figures.picture import Drawn
 from gmsnet.paper.units import Context
 
@@ -21,9 +21,9 @@ def draw(context: Context) -> Drawn:
     axes = figure.subplots(2, SHOWN)
     for column, mesh in enumerate(chosen):
         context.go_on()
-        label = papers_own(OPTIM).smooth(mesh, context.plan.sweeps)
+        (label,) = optimised(mesh, (END,))
         side = float(np.ptp(mesh.points[:, 0]))
-        before, after = plot.View.of(mesh), plot.View.of(label.mesh)
+        before, after = plot.View.of(mesh), plot.View.of(label)
         top, bottom = axes[:, column]
         mappable = plot.draw(top, before)
         plot.draw(bottom, after)
@@ -32,8 +32,8 @@ def draw(context: Context) -> Drawn:
     plot.add_colour_bar(figure, mappable, axes.ravel())
     caption = (
         f"Above: {SHOWN} of the {data.SPLIT[0]} meshes that the networks are trained on, random Delaunay squares that "
-        "differ in size and density. Below: the same meshes smoothed by OptimSmoothing, whose final positions are the "
-        "labels of NN-Smoothing; GMSNet needs none. The paper's figure shows four such pairs, input to the left and "
-        "label to the right."
+        f"differ in size and density. Below: the same meshes after {END} sweeps of OptimSmoothing; these positions are "
+        "the labels of NN-Smoothing, and GMSNet needs none. The paper's figure shows four such pairs, input to the "
+        "left and label to the right."
     )
     return Drawn(figure, caption)
