@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -116,15 +117,21 @@ def test_all_of_it_quickly(tmp_path, run):
 
 
 @pytest.mark.long
-def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path, run):
+@pytest.mark.parametrize("group", [False, True], ids=["SIGINT", "SIGTERM to all its processes"])
+def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path, run, group):
     out = tmp_path / "out"
     arguments = ["reproduce", "table3", "--quick", "--runs", "1", "--sweeps", "2", "--out", str(out)]
-    process = subprocess.Popen([sys.executable, "-m", "gmsnet", *arguments], stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "gmsnet", *arguments], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
     try:
         deadline = time.monotonic() + 300
         while not list(out.glob("units/training/*/*.json")) and process.poll() is None and time.monotonic() < deadline:
             time.sleep(0.05)
-        process.send_signal(signal.SIGINT)
+        if group:
+            os.killpg(process.pid, signal.SIGTERM)
+        else:
+            process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=120)
     finally:
         process.kill()

@@ -52,3 +52,9 @@ def test_weights_and_a_variant_exclude_each_other():
         if method.weighted:
             with pytest.raises(InputError, match="either a variant or weights"):
                 smoother(method.name, variant=method.variants[-1], weights="some.safetensors")
+
+
+def test_names_in_other_letters_are_known():
+    for name in METHODS:
+        with pytest.raises(InputError, match=f"did you mean .*{name}"):
+            method_named(name.upper())

@@ -136,3 +136,25 @@ def test_plans_out_of_range(name, value):
 def test_the_ordinary_plan_is_the_papers():
     assert Plan.of(None, None, 0, quick=False) == Plan(10, 100, 0, False)
     assert Plan.of(3, None, 0, quick=True) == Plan(3, 20, 0, True)
+
+
+def test_a_result_whose_file_is_gone_is_made_anew(store):
+    store.save("drawn", Result({}, {"figures/one.png": b"picture"}), 1.0)
+    assert store.holds("drawn")
+    (store.folder / "figures" / "one.png").unlink()
+    assert not store.holds("drawn")
+
+
+def test_results_without_their_options_are_not_adopted(store):
+    store.save("one", Result({}), 1.0)
+    (store.folder / "options.json").unlink()
+    with pytest.raises(InputError, match="not with which options"):
+        store.open(PLAN.fingerprint())
+
+
+@pytest.mark.parametrize("content", ['{"a": 1}', "[1]", "{"])
+def test_a_file_that_is_no_result_is_told_with_its_mend(store, content):
+    store.path("one").parent.mkdir(parents=True, exist_ok=True)
+    store.path("one").write_text(content)
+    with pytest.raises(InputError, match=r"one\.json: .*delete it, and it is made anew"):
+        store.load("one")

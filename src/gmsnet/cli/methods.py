@@ -15,7 +15,7 @@ def methods(
     from gmsnet.methods import METHODS
 
     if json:
-        keys = ("name", "summary", "source", "variants", "objectives")
+        keys = ("name", "summary", "source", "variants", "objectives", "weighted")
         output.print_json({"methods": [{key: getattr(each, key) for key in keys} for each in METHODS.values()]})
         return
     console = output.console()
@@ -24,5 +24,5 @@ def methods(
         console.print(f"    {each.summary}")
         for kind, names in (("variants", each.variants), ("objectives", each.objectives)):
             if names:
-                console.print(f"    {kind}: {', '.join(names)}")
+                console.print(f"    {kind} (the first is the default): {', '.join(names)}")
         console.print(f"    {each.source}")

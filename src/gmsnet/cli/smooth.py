@@ -144,7 +144,7 @@ def smooth(
                 progress.stage(f"drawing {plot}")
                 _draw(mesh, result.mesh, plot, written)
 
-        outcome = Outcome(input, written, method, mesh, result, target_quality, lost, plot)
+        outcome = Outcome(input, written, method, mesh, result, target_quality, lost, plot, choice)
         if json:
             outcome.print_json()
         elif not quiet:

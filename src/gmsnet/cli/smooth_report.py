@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +19,11 @@ from gmsnet.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """A finished run. written: the file that was written, None where there was no need to. lost: by conversion."""
+    """A finished run.
+
+    written: the file that was written, None where there was no need to. lost: by conversion. choice: variant, objective
+    and weights as they were given, or None.
+    """
 
     input: str
     written: str | None
@@ -28,6 +33,7 @@ class Outcome:
     target: float | None
     lost: list[str]
     plot: str | None
+    choice: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def least(self) -> float:
@@ -83,7 +89,9 @@ class Outcome:
         result = self.result
         if result.stop_reason == engine.NOTHING_TO_MOVE:
             return f"nothing to move: all {report.amount(len(self.mesh.points), 'node')} are held ({self._reasons()})"
-        run = f"{self.method}, {report.amount(result.sweeps, 'sweep')} in {result.seconds:.3g} s: {result.stop_reason}"
+        given = [self.choice.get(key) for key in ("variant", "objective", "weights")]
+        method = " ".join([self.method, *(each for each in given if each is not None)])
+        run = f"{method}, {report.amount(result.sweeps, 'sweep')} in {result.seconds:.3g} s: {result.stop_reason}"
         if not result.moved.any():
             if result.stop_reason == engine.TARGET_REACHED and self.target_met:
                 return "nothing was moved: the target is met already"
@@ -108,6 +116,7 @@ class Outcome:
                 "output": self.written,
                 "plot": self.plot,
                 "method": self.method,
+                **{key: self.choice.get(key) for key in ("variant", "objective", "weights")},
                 "nodes": len(self.mesh.points),
                 "cells": sum(len(block.nodes) for block in self.mesh.cells),
                 "before": result.before.summary(),

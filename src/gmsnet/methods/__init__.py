@@ -51,7 +51,7 @@ def smoother(
         seed,
     )
     if weights is not None and not method.weighted:
-        raise InputError(f"{name} has no weights, so none can be given; {_those('weighted')} have some")
+        raise InputError(f"{name} has no weights, so none can be given; those with weights: {_those('weighted')}")
     if weights is not None and variant is not None:
         raise InputError(f"variants of {name} are its own weights: give either a variant or weights, not both")
     return method.create(options)
@@ -62,12 +62,14 @@ def _option(method: Method, kind: str, given: str | None, names: tuple[str, ...]
     if given is None:
         return names[0] if names else ""
     if not names:
-        raise InputError(f"{method.name} has no {kind}s, so none can be chosen; {_those(f'{kind}s')} have some")
+        raise InputError(
+            f"{method.name} has no {kind}s, so none can be chosen; those with {kind}s: {_those(f'{kind}s')}"
+        )
     return _chosen(f"{kind} of {method.name}", given, names)
 
 
 def _those(attribute: str) -> str:
-    return ", ".join(method.name for method in METHODS.values() if getattr(method, attribute)) or "no methods"
+    return ", ".join(method.name for method in METHODS.values() if getattr(method, attribute)) or "none"
 
 
 def _chosen(kind: str, name: str, names: Iterable[str]) -> str:
@@ -77,9 +79,10 @@ def _chosen(kind: str, name: str, names: Iterable[str]) -> str:
         raise InputError(f"{kind} must be the name of one: {', '.join(names)}; got {name!r}")
     if name in names:
         return name
-    near = difflib.get_close_matches(name, names, n=3, cutoff=0.4)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"choose one of: {', '.join(names)}"
-    raise InputError(f"unknown {kind} {name!r}; {hint}")
+    known = {each.casefold(): each for each in names}
+    near = difflib.get_close_matches(name.casefold(), known, n=3, cutoff=0.5)
+    hint = f"did you mean {' or '.join(known[each] for each in near)}? " if near else ""
+    raise InputError(f"unknown {kind} {name!r}; {hint}choose one of: {', '.join(names)}")
 
 
 __all__ = ["METHODS", "Field", "Method", "Options", "Smoother", "StarSmoother", "method_named", "smoother"]

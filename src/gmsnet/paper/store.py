@@ -14,6 +14,7 @@ from gmsnet.io.atomic import check_writable, reason, replace_files
 
 OPTIONS = "options.json"
 UNITS = "units"
+ANEW = "delete it, and it is made anew"
 
 
 @dataclass(frozen=True)
@@ -41,8 +42,12 @@ class Store:
             raise InputError(f"{self.folder}: this folder cannot be made: {reason(error)}") from error
         options = self.folder / OPTIONS
         check_writable(str(options))
+        if (self.folder / UNITS).exists() and not options.exists():
+            raise InputError(
+                f"{self.folder}: holds results, but not with which options ({OPTIONS}); take another --out"
+            )
         if options.exists():
-            held = _read(options)
+            held = _read(options, "take another --out")
             if held != fingerprint:
                 raise InputError(
                     f"{self.folder}: holds a reproduction with other options ({_difference(held, fingerprint)}); "
@@ -52,31 +57,36 @@ class Store:
         self._write({options: dumps(fingerprint)})
 
     def holds(self, name: str) -> bool:
-        """Is the result of this unit there?"""
-        return self._path(name).exists()
+        """Is the result of this unit there, with its files?"""
+        path = self.path(name)
+        return path.exists() and all((self.folder / each).exists() for each in _read(path).get("files", []))
 
     def save(self, name: str, result: Result, seconds: float) -> None:
         """Keeps the result of a unit, its files first. seconds: that it took."""
         contents = {self.folder / path: content for path, content in result.files.items()}
-        contents[self._path(name)] = dumps({"unit": name, "seconds": seconds, "result": result.values})
+        head = {"unit": name, "seconds": seconds, "files": list(result.files)}
+        contents[self.path(name)] = dumps({**head, "result": result.values})
         self._write(contents)
 
     def load(self, name: str) -> dict[str, Any]:
         """The values of a unit. Raises InputError if its file is damaged; KeyError if it is not there."""
         if not self.holds(name):
             raise KeyError(name)
-        values: dict[str, Any] = _read(self._path(name))["result"]
+        values = _read(self.path(name)).get("result")
+        if not isinstance(values, dict):
+            raise InputError(f"{self.path(name)}: is no result of gmsnet reproduce; {ANEW}")
         return values
 
     def seconds(self, name: str) -> float:
         """How long a unit took."""
-        return float(_read(self._path(name))["seconds"])
+        return float(_read(self.path(name)).get("seconds", math.nan))
 
     def write(self, files: Mapping[str, bytes]) -> None:
         """Writes files by their path in the folder."""
         self._write({self.folder / path: content for path, content in files.items()})
 
-    def _path(self, name: str) -> Path:
+    def path(self, name: str) -> Path:
+        """Of the file with the result of a unit."""
         return self.folder / UNITS / f"{name}.json"
 
     def _write(self, contents: Mapping[Path, bytes]) -> None:
@@ -102,13 +112,13 @@ def dumps(document: Mapping[str, Any]) -> bytes:
     return (json.dumps(strict(document), indent=1, allow_nan=False) + "\n").encode()
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(path: Path, mend: str = ANEW) -> dict[str, Any]:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({error}); delete it, and it is made anew") from error
+        raise InputError(f"{path}: cannot be read ({error}); {mend}") from error
     if not isinstance(document, dict):
-        raise InputError(f"{path}: is no result of gmsnet reproduce; delete it, and it is made anew")
+        raise InputError(f"{path}: is no result of gmsnet reproduce; {mend}")
     return document
 
 

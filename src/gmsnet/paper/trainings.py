@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from gmsnet.errors import InputError
 from gmsnet.learn.checkpoint import saved_options
 from gmsnet.learn.losses import LOSSES
 from gmsnet.learn.options import TrainOptions
@@ -45,7 +46,12 @@ def folder(store: Store, loss: str, seed: int) -> Path:
 def weights(store: Store, loss: str, seed: int) -> Path | None:
     """The weights of a finished training; None for one that diverged."""
     file = store.load(name(loss, seed))["weights"]
-    return None if file is None else folder(store, loss, seed) / file
+    if file is None:
+        return None
+    path = folder(store, loss, seed) / str(file)
+    if not path.exists():
+        raise InputError(f"{path}: is gone; delete {store.path(name(loss, seed))} too, and it is trained anew")
+    return path
 
 
 def train_once(context: Context, loss: str, seed: int) -> Result:

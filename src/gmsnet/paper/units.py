@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -22,7 +23,10 @@ from gmsnet.workers import available_threads
 MOST_PROCESSES = 8
 LOOK = 0.2  # seconds between two looks at whether to stop
 
+GRACE = 20.0  # seconds that a process has to give up its unit once it is told to end
+
 _stop: Event | None = None  # of the process that does the work
+_ending = False  # it was told to end by a signal
 
 
 class Stopped(Exception):
@@ -39,7 +43,7 @@ class Context:
     @property
     def stopping(self) -> bool:
         """Whether to stop; units that take more than a second or two ask now and then."""
-        return _stop is not None and _stop.is_set()
+        return _ending or (_stop is not None and _stop.is_set())
 
     def go_on(self) -> None:
         """Raises Stopped if the reproduction is to stop."""
@@ -131,12 +135,32 @@ def carry_out(
 
 
 def _prepare(stop: Event) -> None:
-    """In a new process: one thread, and signals are the parent's affair (a terminal sends them to all)."""
+    """In a new process: one thread, and signals are the parent's affair (a terminal sends them to all).
+
+    A unit in work is given up at the signal to end, and the process does not outlive its parent.
+    """
     global _stop
     _stop = stop
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _give_up)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ[name] = "1"  # read when the libraries are loaded, which is later
+
+
+def _give_up(*_: Any) -> None:
+    global _ending
+    _ending = True
+    timer = threading.Timer(GRACE, os._exit, [1])
+    timer.daemon = True
+    timer.start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _do(unit: Unit, plan: Plan, folder: Path) -> bool:
