@@ -63,7 +63,7 @@ def draw(context: Context) -> Drawn:
         "three are bounded. The min-max angle has creases and comes to a point, cosine loss and MetricLoss are round "
         f"at their minima. Rise at a tenth of the way to the rim, of that at half the way: {rises} (a cone has 20%, a "
         "parabola 4%). The paper shows the same four surfaces; it finds the aspect ratio unbounded and its own loss "
-        "the smoothest, as here, but calls the min-max angle flat near its minimum."
+        "the smoothest, but calls the min-max angle flat near its minimum."
     )
     return Drawn(figure, caption, facts)
 
