@@ -123,7 +123,15 @@ def test_a_real_ctrl_c_writes_all_or_nothing_and_says_which(run, tmp_path, wait_
     mesh, out = tmp_path / "in.vtk", tmp_path / "out.vtk"
     assert run("generate", mesh, "--nodes", "40000", "--jitter", "1").code == 0
     ours, theirs = pty.openpty()
-    command = [*GMSNET, "smooth", mesh, out, "--threads", "1", "--json"]
+    slow = [
+        "--method",
+        "optimize",
+        "--variant",
+        "newton",
+        "--objective",
+        "cosine",
+    ]  # long enough for its bar to be seen
+    command = [*GMSNET, "smooth", mesh, out, "--threads", "1", "--json", *slow]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=theirs, env={**PLAIN, "TERM": "xterm"})
     os.close(theirs)
     seen, sent = b"", False
