@@ -259,3 +259,17 @@ def test_a_full_disk_is_one_line(run, square, tmp_path, monkeypatch):
     assert done.code == 2
     assert "out.su2: cannot be written: no space left on device" in done.err
     assert listing(tmp_path) == ["square.su2"]
+
+
+def test_the_metric_by_which_the_best_mesh_is_chosen(run, square, tmp_path):
+    results = {
+        by: json.loads(run("smooth", square, tmp_path / f"{by}.su2", "--best-by", by, "--json").out)
+        for by in ("shape", "aspect")
+    }
+    assert results["aspect"]["after"]["qhat_aspect"] >= results["shape"]["after"]["qhat_aspect"]
+    assert results["shape"]["after"]["qhat"] >= results["aspect"]["after"]["qhat"]
+    assert results["shape"]["history"][0]["qhat"] != results["aspect"]["history"][0]["qhat"]
+    refused = run("smooth", square, tmp_path / "out.su2", "--best-by", "qhat")
+    assert refused.code == 2
+    assert "best_by must be 'shape' or 'aspect'" in refused.err
+    assert not (tmp_path / "out.su2").exists()

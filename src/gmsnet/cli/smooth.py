@@ -45,6 +45,9 @@ def smooth(
             help="Stop once the least 1/q of a cell is at least this, in (0, 1]; exit code 1 if it is not met."
         ),
     ] = None,
+    best_by: Annotated[
+        str, typer.Option(help="Which 1/q says which mesh is the best: shape, or aspect (Verdict's, as in the paper).")
+    ] = "shape",
     fix: Annotated[
         list[str] | None,
         typer.Option(
@@ -132,6 +135,7 @@ def smooth(
                 target_quality=target_quality,
                 fixed=fixed,
                 callback=after_sweep,
+                best_by=best_by,
                 **choice,
             )
             interruption.begin()
