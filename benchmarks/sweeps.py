@@ -22,7 +22,7 @@ from machine import describe
 import gmsnet
 from gmsnet.kernels import quality as measures
 from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.stars import Precision
+from gmsnet.kernels.guard import Precision
 from gmsnet.methods import METHODS, Field, smoother
 from gmsnet.topology import Topology, planar_points
 from gmsnet.workers import workers

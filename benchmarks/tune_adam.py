@@ -65,7 +65,7 @@ class Subject:
 
     def points(self, objective, sweeps):
         """In memory order, after so many sweeps with the tuned step sizes."""
-        run = Run(self.mesh, self.topology, Adam(objective), 1, "aspect")
+        run = Run(self.mesh, self.topology, Adam(objective), 1, "aspect", "valid")
         with workers(1, 0) as share:
             for _ in range(sweeps):
                 run.smoother.sweep(run.field, share, lambda: False)
@@ -77,7 +77,7 @@ class Subject:
         return out[self.own]
 
     def smoothed(self, objective, sizes, sweeps):
-        run = Run(self.mesh, self.topology, Adam(objective, sizes), 1, "aspect")
+        run = Run(self.mesh, self.topology, Adam(objective, sizes), 1, "aspect", "valid")
         run.to_the_end(sweeps, None, None)
         return run.outcome(self.before)[2]
 

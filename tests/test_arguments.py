@@ -12,7 +12,7 @@ from gmsnet.errors import InputError
 
 USABLE = {
     "max_sweeps": 100, "threads": None, "target_quality": None, "seed": 0, "callback": None, "weights": None,
-    "best_by": "shape",
+    "best_by": "shape", "guard": "worst",
 }  # fmt: skip
 NO_WHOLE_NUMBERS = [-1, 1.0, 2.5, "3", True, np.True_, np.array([1, 2]), np.array(3), 1j, float("nan")]
 
@@ -34,6 +34,7 @@ NO_WHOLE_NUMBERS = [-1, 1.0, 2.5, "3", True, np.True_, np.array([1, 2]), np.arra
         {"weights": "a.safetensors"},
         {"weights": Path("a.safetensors")},
         {"best_by": "aspect"},
+        {"guard": "star"},
     ],
 )
 def test_usable_options_pass(given):
@@ -52,6 +53,7 @@ def test_usable_options_pass(given):
         ]),
         ("callback", ["x", 3, [print], np.array([0, 1])]),
         ("weights", [3, b"a.safetensors", ["a.safetensors"], {"linear.bias": np.zeros(3)}, True]),
+        ("guard", ["none", "", None, 1, ["worst"]]),
         ("best_by", ["qhat", "", None, 1, ["shape"]]),
     ],
 )  # fmt: skip

@@ -8,18 +8,26 @@ from typing import Any
 import numpy as np
 
 from gmsnet.errors import InputError
+from gmsnet.kernels.guard import LEVELS
 
 SHAPE, ASPECT = "shape", "aspect"  # with which 1/q meshes on the way are compared: the loss's or Verdict's
 
 
 def check_arguments(
-    max_sweeps: Any, threads: Any, target_quality: Any, seed: Any, callback: Any, weights: Any, best_by: Any
+    max_sweeps: Any,
+    threads: Any,
+    target_quality: Any,
+    seed: Any,
+    callback: Any,
+    weights: Any,
+    best_by: Any,
+    guard: Any,
 ) -> None:
     """Raises InputError, naming the option and what it must be, for the first one that cannot be used.
 
     max_sweeps: a whole number of 0 or more. threads: None, or one of 1 or more. target_quality: None, or a number in
     (0, 1]. seed: a whole number of 0 or more. callback: None or a function. weights: None or the path of a file.
-    best_by: SHAPE or ASPECT. Whole numbers may be NumPy's; True and False are no numbers here.
+    best_by: SHAPE or ASPECT. guard: one of LEVELS. Whole numbers may be NumPy's; True and False are no numbers here.
     """
     if not _is_whole(max_sweeps, 0):
         raise InputError(f"max_sweeps must be a whole number of 0 or more, got {max_sweeps!r}")
@@ -35,6 +43,8 @@ def check_arguments(
         raise InputError(f"weights must be the path of a safetensors file, got {weights!r}")
     if best_by not in (SHAPE, ASPECT):
         raise InputError(f"best_by must be {SHAPE!r} or {ASPECT!r}, got {best_by!r}")
+    if guard not in LEVELS:
+        raise InputError(f"guard must be one of {', '.join(LEVELS)}; got {guard!r}")
 
 
 def _is_whole(value: Any, least: int) -> bool:

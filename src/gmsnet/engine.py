@@ -67,11 +67,12 @@ def smooth(
     callback: Callable[[Sweep], bool | None] | None = None,
     weights: str | os.PathLike[str] | None = None,
     best_by: str = "shape",
+    guard: str = "worst",
 ) -> SmoothResult:
     """Moves the free nodes of a planar triangle mesh so that its elements become better; changes nothing else.
 
-    No cell that is valid becomes invalid, and of all meshes on the way the best is returned: the one with the fewest
-    inverted cells, then with the largest q̂, the input among them.
+    No cell that is valid becomes invalid, the worst cell does not get worse (``guard``), and of all meshes on the way
+    the best is returned: the one with the fewest inverted cells, then with the largest q̂, the input among them.
 
     mesh: (points, cells) arrays, a Mesh, or a meshio, meshlane or PyVista object; it is not changed. method: a name in
     METHODS. variant, objective: names out of the method's own lists (default: their first). max_sweeps: at most so many
@@ -80,18 +81,20 @@ def smooth(
     boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. seed: for methods that draw
     random numbers (none does so far). callback: called after each sweep; a true answer stops the run. weights: a
     safetensors file for methods with weights. best_by: which 1/q enters the q̂ that says which mesh is the best:
-    "shape" (1/q) or "aspect" (1/q_V, with which the paper's tables are formed).
+    "shape" (1/q) or "aspect" (1/q_V, with which the paper's tables are formed). guard: what each sweep keeps besides
+    validity: "valid" nothing (as the paper), "worst" that the worst 1/q of the cells with a free node never falls,
+    "star" that the worst 1/q around any free node never falls.
 
     Raises InputError for what cannot be used, before anything is moved.
     """
     began = time.perf_counter()
-    check_arguments(max_sweeps, threads, target_quality, seed, callback, weights, best_by)
+    check_arguments(max_sweeps, threads, target_quality, seed, callback, weights, best_by, guard)
     chosen = smoother(method, variant=variant, objective=objective, weights=weights, seed=seed)
     held_mesh, restore = to_mesh(mesh)
     refuse_unless_planar(held_mesh)
     topology = Topology.of(held_mesh, fixed_mask(held_mesh, fixed))
     before = measure(held_mesh, topology)
-    run = Run(held_mesh, topology, chosen, threads or available_threads(), best_by)
+    run = Run(held_mesh, topology, chosen, threads or available_threads(), best_by, guard)
     stop_reason = run.to_the_end(max_sweeps, target_quality, callback)
 
     try:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gmsnet.arguments import ASPECT
 from gmsnet.kernels import quality as kernels
 from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.stars import Precision
+from gmsnet.kernels.guard import LEVELS, Precision
 from gmsnet.measure import QualityReport, measure, weighted_metric
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Field, Smoother
@@ -50,11 +50,13 @@ class Sweep:
 class Run:
     """The state of one run: coordinates in memory order, the best so far, and the record."""
 
-    def __init__(self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str) -> None:
+    def __init__(
+        self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str, guard: str
+    ) -> None:
         self.mesh, self.topology, self.smoother, self.best_by = mesh, topology, smoother, best_by
         self.start = planar_points(mesh)[topology.memory]
         precision = Precision.of(single=mesh.single, exponent=scale_exponent(mesh))
-        self.field = Field(self.start.copy(), topology, precision)
+        self.field = Field(self.start.copy(), topology, precision, LEVELS.index(guard))
         self.threads = threads
         self.history: list[Sweep] = []
         self.sums = np.empty((-(-len(topology.near) // LANES), kernels.SUMS))

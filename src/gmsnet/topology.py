@@ -163,6 +163,17 @@ class Topology:
         return start, self.memory[self.near_ring[np.repeat(self.near_start[place], degree) + within]]
 
     @cached_property
+    def near_free(self) -> Flags:
+        """(N,) by places in memory: which nodes may move."""
+        return self.near_colours >= 0
+
+    @cached_property
+    def changeable(self) -> tuple[Ints, NDArray[np.int8]]:
+        """The rows of near and near_turn that have a free node."""
+        chosen = self.near_free[self.near].any(axis=1)
+        return (self.near, self.near_turn) if chosen.all() else (self.near[chosen], self.near_turn[chosen])
+
+    @cached_property
     def colours(self) -> Ints:
         """(N,) colour of each node by id, −1 where held."""
         return self.near_colours[_inverse(self.memory)]

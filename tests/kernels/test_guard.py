@@ -11,6 +11,7 @@ from random_stars import star
 
 from gmsnet.kernels import stars as kernels
 from gmsnet.kernels.compile import LANES
+from gmsnet.kernels.guard import Precision, plain_guard
 
 U64, U32 = 2.0**-53, 2.0**-24
 
@@ -23,7 +24,7 @@ def commit(stars_, shifts, unit=U64, single=False):
     lanes = np.minimum(np.arange(LANES), count - 1)
     centre = lanes.astype(np.int32)
     rings = np.concatenate([count + lanes * degree + j for j in range(degree)]).astype(np.int32)
-    x, ring, work = np.empty(2 * LANES), np.empty(2 * degree * LANES), np.empty(8 * LANES)
+    x, ring, work = np.empty(2 * LANES), np.empty(2 * degree * LANES), np.empty((kernels.FLOORS + degree) * LANES)
     local = np.empty(2 * degree * LANES, dtype=np.float32)
     one = np.zeros(1, dtype=np.int64), np.array([degree], dtype=np.int32), np.array([count], dtype=np.int32)
     blocks = kernels.Blocks(centre, rings, *one, degree)
@@ -32,7 +33,7 @@ def commit(stars_, shifts, unit=U64, single=False):
     shift = np.zeros(2 * LANES, dtype=np.float32)
     shift[:LANES], shift[LANES:] = np.asarray(shifts)[lanes].T
     tally = np.zeros(3, dtype=np.int64)
-    kernels.commit(points, blocks, 0, x, ring, work, shift, kernels.Precision(unit, 0.0, single), tally)
+    kernels.commit(points, blocks, 0, x, ring, work, shift, plain_guard(Precision(unit, 0.0, single)), tally)
     return points[:count], tally
 
 

@@ -11,7 +11,7 @@ import gmsnet
 from gmsnet.generate import disturb
 from gmsnet.kernels import angle, cvt, laplacian
 from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.stars import Precision
+from gmsnet.kernels.guard import Precision
 from gmsnet.methods import Field, smoother
 from gmsnet.paper import plain
 from gmsnet.topology import Topology, planar_points, scale_exponent

@@ -11,7 +11,8 @@ import gmsnet
 from gmsnet import CellBlock, Mesh
 from gmsnet.generate import disturb
 from gmsnet.kernels import getme as kernels
-from gmsnet.kernels.stars import DROPPED, MOVED, Precision
+from gmsnet.kernels.guard import Precision, plain_guard
+from gmsnet.kernels.stars import DROPPED, MOVED
 from gmsnet.methods import getme
 from gmsnet.methods.base import Field
 from gmsnet.paper import plain_getme
@@ -41,6 +42,10 @@ def field_of(mesh):
     topology = Topology.of(mesh)
     precision = Precision.of(single=mesh.single, exponent=scale_exponent(mesh))
     return Field(planar_points(mesh)[topology.memory], topology, precision)
+
+
+def guard_of(field):
+    return plain_guard(field.precision)
 
 
 def in_file_order(field, mesh):
@@ -85,7 +90,7 @@ def test_step_by_step_it_is_the_plain_one(name, make):
         assert len(elements.corners) == len(twin.elements)
         tally, nodes = np.zeros(3, dtype=np.int64), 0
         for count in (1, 2, 2997):
-            kernels.steps(field.points, elements, queue, getme.TRANSFORMATIONS[name], field.precision, count, tally)
+            kernels.steps(field.points, elements, queue, getme.TRANSFORMATIONS[name], guard_of(field), count, tally)
             nodes += sum(twin.step() for _ in range(count))
             off = (in_file_order(field, mesh) - twin.mesh.array())[field.topology.free]
             assert (abs(off) <= 1e-9 * star_sizes(mesh, field.topology)).all()
@@ -113,7 +118,7 @@ def test_penalties_of_an_element_that_is_put_back():
     tally = np.zeros(3, dtype=np.int64)
     before = field.points.copy()
     for count in range(1, 6):
-        kernels.steps(field.points, elements, queue, getme.TRANSFORMATIONS["sequential"], field.precision, 1, tally)
+        kernels.steps(field.points, elements, queue, getme.TRANSFORMATIONS["sequential"], guard_of(field), 1, tally)
         # Its twin on the other side of the node is as bad, so they take turns: never twice running.
         assert queue.penalty.sum() == pytest.approx(count * 1e-4)
         assert tally.tolist() == [0, 0, count]
@@ -122,7 +127,7 @@ def test_penalties_of_an_element_that_is_put_back():
     queue.key[:] = queue.shape + queue.penalty  # all are valid
     kernels.build(queue.heap, queue.place, queue.key)
     queue.memory[kernels.LAST] = -1
-    kernels.steps(field.points, elements, queue, getme.TRANSFORMATIONS["sequential"], field.precision, 10, tally)
+    kernels.steps(field.points, elements, queue, getme.TRANSFORMATIONS["sequential"], guard_of(field), 10, tally)
     assert queue.penalty[first] == pytest.approx(10 * 1e-4 + 9 * 1e-5)
     np.testing.assert_array_equal(field.points, before)
 
@@ -138,7 +143,7 @@ def test_success_takes_from_the_penalty_but_never_below_nothing():
         queue.penalty[:] = start
         queue.key[:] = queue.shape + queue.penalty
         book = getme.TRANSFORMATIONS["sequential-book"]
-        kernels.steps(points, elements, queue, book, field.precision, 1, tally)
+        kernels.steps(points, elements, queue, book, guard_of(field), 1, tally)
         assert tally[DROPPED] == 0
         assert tally[MOVED] >= 1
         assert queue.penalty[first] == pytest.approx(after, abs=1e-15)

@@ -51,7 +51,7 @@ def centroids(local, n, row, shift):
 
 
 @kernel
-def sweep(points, blocks, first, last, precision, circum, tally):
+def sweep(points, blocks, first, last, guard, circum, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to.
 
     circum: with circumcentres, else with centroids.
@@ -64,6 +64,6 @@ def sweep(points, blocks, first, last, precision, circum, tally):
             circumcentres(local, n, row, shift)
         else:
             centroids(local, n, row, shift)
-        stars.commit(points, blocks, block, x, ring, work, shift, precision, counts)
+        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
     for k in range(len(tally)):
         tally[k] += counts[k]

@@ -29,8 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.guard import STAR, permitted
 from gmsnet.kernels.heap import build, update
-from gmsnet.kernels.predicates import determinant_and_bound
 from gmsnet.kernels.quality import TINY, TWO_SQRT3
 from gmsnet.kernels.stars import DROPPED, MOVED
 
@@ -137,7 +137,7 @@ def length(x, y):
 
 
 @kernel
-def steps(points, elements, queue, transformation, precision, count, tally):
+def steps(points, elements, queue, transformation, guard, count, tally):
     """So many times the element with the least key is transformed. tally: counts of moved and dropped nodes, added to.
 
     An element that is put back gets a penalty; one that is transformed loses some of its own; one that is chosen twice
@@ -155,8 +155,8 @@ def steps(points, elements, queue, transformation, precision, count, tally):
         for k in range(3):
             movable += elements.free[elements.corners[e, k]]
         if not (repeated and memory[STUCK]):
-            propose(points, elements, e, transformation, precision.single, old, target)
-            memory[STUCK] = not moved(points, elements, e, old, target, precision, room)
+            propose(points, elements, e, transformation, guard.single, old, target)
+            memory[STUCK] = not moved(points, elements, e, old, target, guard, room)
         if memory[STUCK]:
             penalty[e] += INVALID
             tally[DROPPED] += movable
@@ -197,7 +197,7 @@ def propose(points, elements, e, transformation, single, old, target):
 
 
 @kernel
-def moved(points, elements, e, old, target, precision, room):
+def moved(points, elements, e, old, target, guard, room):
     """Moves the corners of an element to their targets if that breaks no triangle; tells whether it has."""
     for k in range(3):
         i = elements.corners[e, k]
@@ -209,7 +209,7 @@ def moved(points, elements, e, old, target, precision, room):
                 f = elements.around[at]
                 if seen(elements, e, k, f):
                     continue
-                if not allowed(points, elements.corners, f, e, old, precision, room):
+                if not allowed(points, elements.corners, f, e, old, guard, room):
                     for m in range(3):
                         j = elements.corners[e, m]
                         points[j, 0], points[j, 1] = old[2 * m], old[2 * m + 1]
@@ -230,15 +230,14 @@ def seen(elements, e, k, f):
 
 
 @kernel
-def allowed(points, corners, f, e, old, precision, room):
-    """May element f be as it is now that the corners of e have left their old places? The rule of the guard.
-
-    It must be certified (kernels.stars), or have been certainly inverted and certainly be less so now.
-    """
+def allowed(points, corners, f, e, old, guard, room):
+    """May element f be as it is now that the corners of e have left their old places? The rule of kernels.guard."""
     x, was = room[:6], room[6:]
-    reach = 0.0
+    reach, floor = 0.0, guard.floor
     for k in range(3):
         i = corners[f, k]
+        if guard.level == STAR:
+            floor = max(floor, guard.floors[i])
         x[2 * k], x[2 * k + 1] = points[i, 0], points[i, 1]
         was[2 * k], was[2 * k + 1] = points[i, 0], points[i, 1]
         for m in range(3):
@@ -246,12 +245,7 @@ def allowed(points, corners, f, e, old, precision, room):
                 was[2 * k], was[2 * k + 1] = old[2 * m], old[2 * m + 1]
         for m in range(2 * k, 2 * k + 2):
             reach = max(reach, max(abs(x[m]), abs(was[m])))
-    delta = precision.unit * reach + precision.grain
-    after, doubt = determinant_and_bound(x[0], x[1], x[2], x[3], x[4], x[5], delta)
-    if after > doubt:
-        return True
-    before, doubt_before = determinant_and_bound(was[0], was[1], was[2], was[3], was[4], was[5], delta)
-    return before < -doubt_before and after - doubt > before + doubt_before
+    return permitted(was, x, guard.unit * reach + guard.grain, floor)
 
 
 @kernel

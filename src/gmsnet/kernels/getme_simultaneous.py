@@ -57,13 +57,13 @@ def plan(points, blocks, first, last, transformation, shifts):
 
 
 @kernel
-def carry_out(points, blocks, first, last, precision, shifts, tally):
+def carry_out(points, blocks, first, last, guard, shifts, tally):
     """The guard moves the stars in the blocks first…last, of one colour, by their planned shifts."""
     x, ring, work, counts = stars.room(blocks.most)
     local = np.empty(2 * blocks.most * LANES)
     for block in range(first, last):
         stars.fetch(points, blocks, block, x, ring, work, local)
         work[SIZE * LANES : (SIZE + 1) * LANES] = 1.0  # the shifts are absolute: the ring has moved since
-        stars.commit(points, blocks, block, x, ring, work, shifts[block], precision, counts)
+        stars.commit(points, blocks, block, x, ring, work, shifts[block], guard, counts)
     for k in range(len(tally)):
         tally[k] += counts[k]

@@ -145,7 +145,7 @@ def decode(weights, hidden, features, row, decoded, shift):
 
 
 @kernel
-def sweep(points, blocks, first, last, precision, weights, hidden, tally):
+def sweep(points, blocks, first, last, guard, weights, hidden, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
     x, ring, work, counts = stars.room(blocks.most)
     local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
@@ -155,6 +155,6 @@ def sweep(points, blocks, first, last, precision, weights, hidden, tally):
     for block in range(first, last):
         n = stars.fetch(points, blocks, block, x, ring, work, local)
         propose(local, n, weights, hidden, m, row, features, decoded, shift)
-        stars.commit(points, blocks, block, x, ring, work, shift, precision, counts)
+        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
     for k in range(len(tally)):
         tally[k] += counts[k]

@@ -123,13 +123,13 @@ def propose(local, n, variant, row, shift):
 
 
 @kernel
-def sweep(points, blocks, first, last, precision, variant, tally):
+def sweep(points, blocks, first, last, guard, variant, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
     x, ring, work, counts = stars.room(blocks.most)
     local, row, shift = np.empty(2 * blocks.most * LANES), np.empty(3 * LANES), np.empty(2 * LANES)
     for block in range(first, last):
         n = stars.fetch(points, blocks, block, x, ring, work, local)
         propose(local, n, variant, row, shift)
-        stars.commit(points, blocks, block, x, ring, work, shift, precision, counts)
+        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
     for k in range(len(tally)):
         tally[k] += counts[k]

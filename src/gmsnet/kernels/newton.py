@@ -137,7 +137,7 @@ def propose(objective, local, n, state, out, hessian, shift, other):
 
 
 @kernel
-def sweep(points, blocks, first, last, precision, objective, tally):
+def sweep(points, blocks, first, last, guard, objective, tally):
     """Smooths the blocks first…last (of one colour) once. tally: (3,), added to."""
     x, ring, work, counts = stars.room(blocks.most)
     local = np.empty(2 * blocks.most * LANES)
@@ -146,6 +146,6 @@ def sweep(points, blocks, first, last, precision, objective, tally):
     for block in range(first, last):
         n = stars.fetch(points, blocks, block, x, ring, work, local)
         propose(objective, local, n, state, out, hessian, shift, other)
-        stars.commit(points, blocks, block, x, ring, work, shift, precision, counts)
+        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
     for k in range(len(tally)):
         tally[k] += counts[k]

@@ -128,7 +128,7 @@ def room(table):
 
 
 @kernel
-def sweep(points, blocks, begin, end, precision, table, weights, tally):
+def sweep(points, blocks, begin, end, guard, table, weights, tally):
     """Smooths the blocks begin…end (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
     x, ring, work, counts = stars.room(blocks.most)
     local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
@@ -136,6 +136,6 @@ def sweep(points, blocks, begin, end, precision, table, weights, tally):
     for block in range(begin, end):
         n = stars.fetch(points, blocks, block, x, ring, work, local)
         propose(local, n, table, weights, box, inputs, first, second, shift)
-        stars.commit(points, blocks, block, x, ring, work, shift, precision, counts)
+        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
     for k in range(len(tally)):
         tally[k] += counts[k]

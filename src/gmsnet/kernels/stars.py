@@ -3,29 +3,24 @@
 A block is LANES stars of one colour and degree n. Its free nodes stand in ``x`` as [axis][lane], its rings in ``ring``
 as [ring node][axis][lane], flat. Stars of one colour share no cell, so a block may be committed at once.
 
-The guard. A triangle is *certified* if its determinant exceeds the error bound of kernels.predicates with the
-coordinates known up to ±δ, δ the file's unit of rounding times the star's largest coordinate plus the grain of the
-numbers next to zero: it is then positive in exact arithmetic, in float64, and as written. A move is allowed if each
-triangle of the star is certified after it, or was certainly inverted before and is certainly less so after it. So no
-valid cell becomes invalid, and invalid ones only get better. A shift that is not allowed is halved, as the paper's
-Algorithm 1 does, and dropped after HALVINGS.
+The rule of the guard stands in kernels.guard. A shift that it does not allow is halved, as the paper's Algorithm 1
+does, and dropped after HALVINGS.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.compile import LANES, kernel
-from gmsnet.kernels.predicates import SHEWCHUK, UNDERFLOW, determinant_and_bound
+from gmsnet.kernels.guard import STAR, permitted, surplus_above, surplus_above_zero
 
 HALVINGS = 20
 MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
 COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
-SIZE, REACH, TARGET, MARGIN = 0, 1, 2, 4  # rows of a block's work array; TARGET has two
+SIZE, REACH, TARGET, MARGIN, FLOORS = 0, 1, 2, 4, 8  # rows of a block's work array; TARGET has two, FLOORS n
 
 
 class Blocks(NamedTuple):
@@ -42,34 +37,13 @@ class Blocks(NamedTuple):
     most: int
 
 
-class Precision(NamedTuple):
-    """How exactly the coordinates of a mesh are known once they are written.
-
-    unit: the largest relative error (2⁻⁵³ for float64 and decimal text, 2⁻²⁴ where a file keeps float32).
-    grain: the largest absolute error next to zero, where floats are evenly spaced. single: round every new coordinate
-    to float32, because the file will.
-    """
-
-    unit: float = 2.0**-53
-    grain: float = 0.0
-    single: bool = False
-
-    @classmethod
-    def of(cls, *, single: bool, exponent: int) -> Precision:
-        """For coordinates that have been divided by 2 to the power of ``exponent``."""
-        if single:
-            return cls(2.0**-24, math.ldexp(1.0, -150 - exponent), single=True)
-        grain = math.ldexp(1.0, -1075 - exponent)
-        return cls(grain=grain if grain > 1e-290 else 0.0)  # a subnormal one would only be slow
-
-
 @kernel
 def room(most):
-    """The arrays that a sweep works in: x, ring, work (8 rows) and counts, for stars of up to so many neighbours."""
+    """The arrays that a sweep works in: x, ring, work (8 + most rows) and counts, for stars of up to so many nodes."""
     return (
         np.empty(2 * LANES),
         np.empty(2 * most * LANES),
-        np.empty(8 * LANES),
+        np.empty((FLOORS + most) * LANES),
         np.zeros(COUNTERS, dtype=np.int64),
     )
 
@@ -135,7 +109,7 @@ def localise(x, ring, n, work, local):
 def margins(ring, n, work):
     """For each lane the least certified surplus of a triangle with the free node at its target; positive: allowed.
 
-    Rows of work: reads TARGET and the one after it, and REACH, which becomes the uncertainty δ; writes MARGIN.
+    Rows of work: reads TARGET and the one after it, and REACH, which holds the uncertainty δ; writes MARGIN.
     """
     for lane in range(LANES):
         work[MARGIN * LANES + lane] = np.inf
@@ -144,46 +118,91 @@ def margins(ring, n, work):
         p = ring[2 * i * LANES : 2 * (i + 1) * LANES]
         q = ring[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
-            delta = work[REACH * LANES + lane]
-            px = p[lane] - work[TARGET * LANES + lane]
-            py = p[LANES + lane] - work[(TARGET + 1) * LANES + lane]
-            qx = q[lane] - work[TARGET * LANES + lane]
-            qy = q[LANES + lane] - work[(TARGET + 1) * LANES + lane]
-            left = px * qy
-            right = py * qx
-            around = abs(px) + abs(py) + abs(qx) + abs(qy) + 4.0 * delta
-            bound = SHEWCHUK * (abs(left) + abs(right)) + UNDERFLOW + 4.0 * delta * around
-            surplus = (left - right) - bound
-            least = work[MARGIN * LANES + lane]
+            tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
+            delta, least = work[REACH * LANES + lane], work[MARGIN * LANES + lane]
+            surplus = surplus_above_zero(p[lane] - tx, p[LANES + lane] - ty, q[lane] - tx, q[LANES + lane] - ty, delta)
             # A target that is not finite makes every surplus NaN or −∞, and no comparison with it holds.
             work[MARGIN * LANES + lane] = surplus if not surplus >= least else least
 
 
 @kernel
-def allowed(tx, ty, x, ring, n, lane, delta):
-    """May the free node of one lane move to (tx, ty)? The scalar form of the rule, which also knows inverted cells."""
+def margins_above(ring, n, work, floor):
+    """As ``margins``, above one floor of D/L that is not negative."""
+    for lane in range(LANES):
+        work[MARGIN * LANES + lane] = np.inf
+    for j in range(n):
+        i = n - 1 if j == 0 else j - 1
+        p = ring[2 * i * LANES : 2 * (i + 1) * LANES]
+        q = ring[2 * j * LANES : 2 * (j + 1) * LANES]
+        for lane in range(LANES):
+            tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
+            delta, least = work[REACH * LANES + lane], work[MARGIN * LANES + lane]
+            px, py, qx, qy = p[lane] - tx, p[LANES + lane] - ty, q[lane] - tx, q[LANES + lane] - ty
+            surplus = surplus_above(px, py, qx, qy, delta, floor)
+            work[MARGIN * LANES + lane] = surplus if not surplus >= least else least
+
+
+@kernel
+def margins_above_each(ring, n, work):
+    """As ``margins``, each triangle above the floor in its row from FLOORS on."""
+    for lane in range(LANES):
+        work[MARGIN * LANES + lane] = np.inf
+    for j in range(n):
+        i = n - 1 if j == 0 else j - 1
+        p = ring[2 * i * LANES : 2 * (i + 1) * LANES]
+        q = ring[2 * j * LANES : 2 * (j + 1) * LANES]
+        for lane in range(LANES):
+            tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
+            delta, least = work[REACH * LANES + lane], work[MARGIN * LANES + lane]
+            px, py, qx, qy = p[lane] - tx, p[LANES + lane] - ty, q[lane] - tx, q[LANES + lane] - ty
+            surplus = surplus_above(px, py, qx, qy, delta, max(work[(FLOORS + j) * LANES + lane], 0.0))
+            work[MARGIN * LANES + lane] = surplus if not surplus >= least else least
+
+
+@kernel
+def gather_floors(blocks, block, guard, work):
+    """The floor of each triangle of a block's stars, into the rows from FLOORS on: triangle j lies before ring node j.
+
+    At the level STAR that is the largest of its nodes' floors, else the mesh's.
+    """
+    n, rings, offset, floors = blocks.degree[block], blocks.rings, blocks.offset[block], guard.floors
+    if guard.level != STAR:
+        work[FLOORS * LANES : (FLOORS + n) * LANES] = guard.floor
+        return
+    for j in range(n):
+        i = n - 1 if j == 0 else j - 1
+        for lane in range(LANES):
+            floor = floors[blocks.centre[block * LANES + lane]]
+            around = max(floors[rings[offset + i * LANES + lane]], floors[rings[offset + j * LANES + lane]])
+            work[(FLOORS + j) * LANES + lane] = max(floor, around)
+
+
+@kernel
+def allowed(tx, ty, x, ring, n, lane, delta, work):
+    """May the free node of one lane move to (tx, ty)? The scalar form of the rule, which also knows inverted cells.
+
+    Rows of work: reads those from FLOORS on; 5 and 6 are overwritten.
+    """
+    was, now = work[5 * LANES : 5 * LANES + 6], work[6 * LANES : 6 * LANES + 6]
+    was[4], was[5], now[4], now[5] = x[lane], x[LANES + lane], tx, ty
     for j in range(n):
         a = 2 * (n - 1 if j == 0 else j - 1) * LANES + lane
         b = 2 * j * LANES + lane
-        after, doubt = determinant_and_bound(ring[a], ring[a + LANES], ring[b], ring[b + LANES], tx, ty, delta)
-        if after > doubt:
-            continue
-        before, doubt_before = determinant_and_bound(
-            ring[a], ring[a + LANES], ring[b], ring[b + LANES], x[lane], x[LANES + lane], delta
-        )
-        if not (before < -doubt_before and after - doubt > before + doubt_before):
+        was[0], was[1], was[2], was[3] = ring[a], ring[a + LANES], ring[b], ring[b + LANES]
+        now[:4] = was[:4]
+        if not permitted(was, now, delta, work[(FLOORS + j) * LANES + lane]):
             return False
     return True
 
 
 @kernel
-def commit(points, blocks, block, x, ring, work, shift, precision, tally):
+def commit(points, blocks, block, x, ring, work, shift, guard, tally):
     """Moves the free nodes of a block by size·shift, truncated by the guard; counts what happened in ``tally``.
 
     work: rows of LANES as ``localise`` leaves them; shift: (2·LANES,) over the star's size.
     """
     n, count, centre = blocks.degree[block], blocks.filled[block], blocks.centre
-    unit, grain, single = precision.unit, precision.grain, precision.single
+    single = guard.single
     for lane in range(LANES):
         tx = x[lane] + work[SIZE * LANES + lane] * shift[lane]
         ty = x[LANES + lane] + work[SIZE * LANES + lane] * shift[LANES + lane]
@@ -192,10 +211,18 @@ def commit(points, blocks, block, x, ring, work, shift, precision, tally):
     if single:
         for lane in range(TARGET * LANES, (TARGET + 2) * LANES):
             work[lane] = np.float64(np.float32(work[lane]))
+    unit, grain = guard.unit, guard.grain
     for lane in range(LANES):
         target = max(abs(work[TARGET * LANES + lane]), abs(work[(TARGET + 1) * LANES + lane]))
         work[REACH * LANES + lane] = unit * max(work[REACH * LANES + lane], target) + grain
-    margins(ring, n, work)
+    if guard.level == STAR:
+        gather_floors(blocks, block, guard, work)
+        margins_above_each(ring, n, work)
+    elif guard.floor > 0.0:
+        margins_above(ring, n, work, guard.floor)
+    else:
+        margins(ring, n, work)
+    known = guard.level == STAR
     for lane in range(count):
         i = centre[block * LANES + lane]
         if work[MARGIN * LANES + lane] > 0.0:
@@ -204,13 +231,16 @@ def commit(points, blocks, block, x, ring, work, shift, precision, tally):
             points[i, 0] = tx
             points[i, 1] = ty
         else:
-            size, delta = work[SIZE * LANES + lane], work[REACH * LANES + lane]
-            truncate(points, i, x, ring, n, lane, size, shift, delta, single, tally)
+            if not known:
+                gather_floors(blocks, block, guard, work)
+                known = True
+            truncate(points, i, x, ring, n, lane, work, shift, single, tally)
 
 
 @kernel
-def truncate(points, i, x, ring, n, lane, size, shift, delta, single, tally):
+def truncate(points, i, x, ring, n, lane, work, shift, single, tally):
     """Halves the shift of one lane until it is allowed (Algorithm 1), or drops it."""
+    size, delta = work[SIZE * LANES + lane], work[REACH * LANES + lane]
     dx = size * shift[lane]
     dy = size * shift[LANES + lane]
     if not (np.isfinite(dx) and np.isfinite(dy)):
@@ -223,7 +253,7 @@ def truncate(points, i, x, ring, n, lane, size, shift, delta, single, tally):
             tx, ty = np.float64(np.float32(tx)), np.float64(np.float32(ty))
         if tx == x[lane] and ty == x[LANES + lane]:
             break
-        if allowed(tx, ty, x, ring, n, lane, delta):
+        if allowed(tx, ty, x, ring, n, lane, delta, work):
             points[i, 0] = tx
             points[i, 1] = ty
             tally[MOVED] += 1

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.stars import Precision
+from gmsnet.kernels.guard import Precision
 from gmsnet.learn.data import Stars, joined
 from gmsnet.mesh import CellBlock, Mesh
 from gmsnet.methods import Field, Smoother, smoother

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import angle as kernels
-from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 
@@ -14,10 +15,10 @@ class AngleBased(StarSmoother):
     """Each node turned onto the bisectors of the angles at its neighbours, on average."""
 
     def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, precision, tally)
+        kernels.sweep(points, blocks, first, last, guard, tally)
 
 
 METHOD = Method(

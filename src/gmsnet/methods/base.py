@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -11,7 +12,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.kernels.compile import LANES
+from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, Precision, most_ratios, star_floors
+from gmsnet.kernels.stars import Blocks
 from gmsnet.topology import Topology
 from gmsnet.workers import Share
 
@@ -20,11 +23,30 @@ Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """What is smoothed. points: (N, 2) in memory order, changed in place by the guard alone."""
+    """What is smoothed. points: (N, 2) in memory order, changed in place by the guard alone. level: of the guard."""
 
     points: NDArray[np.float64]
     topology: Topology
     precision: Precision
+    level: int = VALID
+
+    def guard(self, share: Share) -> Guard:
+        """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
+        triangles, turn = self.topology.changeable
+        unit, grain, _ = self.precision
+        floor, floors = -math.inf, np.empty(0)
+        if self.level == WORST:
+            least = np.empty(-(-len(triangles) // LANES))
+
+            def look(first: int, last: int) -> None:
+                most_ratios(self.points, triangles, turn, unit, grain, first, last, least)
+
+            share(look, 0, len(least))
+            floor = float(least.min(initial=math.inf))
+        elif self.level == STAR:
+            floors = np.empty(len(self.points))
+            star_floors(self.points, triangles, turn, self.topology.near_free, unit, grain, floors)
+        return Guard(*self.precision, self.level, floor, floors)
 
 
 class Smoother(Protocol):
@@ -51,17 +73,17 @@ class StarSmoother(ABC):
 
     @abstractmethod
     def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """Visits the stars of the blocks first…last, all of one colour, once; without the GIL. Adds to the tally."""
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
-        stars, tally = field.topology.stars, np.zeros(3, dtype=np.int64)
+        stars, guard, tally = field.topology.stars, field.guard(share), np.zeros(3, dtype=np.int64)
 
         def visit(first: int, last: int) -> Tally:
             counts = np.zeros(3, dtype=np.int64)
-            self.visit(field.points, stars.blocks, first, last, field.precision, counts)
+            self.visit(field.points, stars.blocks, first, last, guard, counts)
             return counts
 
         for colour in range(stars.colours):

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import cvt as kernels
-from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 
@@ -18,10 +19,10 @@ class Centroids(StarSmoother):
     """Each node to the centroid of its star."""
 
     def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, precision, False, tally)
+        kernels.sweep(points, blocks, first, last, guard, False, tally)
 
 
 METHOD = Method(

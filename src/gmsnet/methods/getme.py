@@ -64,7 +64,7 @@ class SequentialGetme:
         period = max(PERIOD, nodes // PERIODS)
         left = max(1, round(nodes / period))
         while not self.settled and (left > 0 or tally[MOVED] == 0):
-            kernels.steps(field.points, elements, queue, self.transformation, field.precision, period, tally)
+            kernels.steps(field.points, elements, queue, self.transformation, field.guard(share), period, tally)
             self.without_gain = 0 if test() else self.without_gain + 1
             self.settled = self.without_gain == PATIENCE
             left -= 1
@@ -81,7 +81,7 @@ class SimultaneousGetme:
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
-        stars, tally = field.topology.stars, np.zeros(3, dtype=np.int64)
+        stars, guard, tally = field.topology.stars, field.guard(share), np.zeros(3, dtype=np.int64)
         points, blocks = field.points, stars.blocks
         shifts = np.empty((len(blocks.filled), 2 * LANES))
 
@@ -90,7 +90,7 @@ class SimultaneousGetme:
 
         def carry_out(first: int, last: int) -> Tally:
             counts = np.zeros(3, dtype=np.int64)
-            getme_simultaneous.carry_out(points, blocks, first, last, field.precision, shifts, counts)
+            getme_simultaneous.carry_out(points, blocks, first, last, guard, shifts, counts)
             return counts
 
         share(plan, 0, len(shifts))
@@ -104,7 +104,7 @@ def elements_of(topology: Topology) -> Elements:
 
     Each starts with its lowest place in memory and goes counter-clockwise; they are sorted by their places.
     """
-    free = topology.near_colours >= 0
+    free = topology.near_free
     chosen = free[topology.near].any(axis=1)
     corners = topology.near[chosen]
     backwards = topology.near_turn[chosen] < 0

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from gmsnet import weights
 from gmsnet.kernels import gmsnet as kernels
-from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 
@@ -20,10 +21,10 @@ class GmsNet(StarSmoother):
         self.folded = fold(trained)
 
     def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, precision, self.folded, self.hidden, tally)
+        kernels.sweep(points, blocks, first, last, guard, self.folded, self.hidden, tally)
 
 
 def fold(trained: weights.Weights) -> NDArray[np.float32]:

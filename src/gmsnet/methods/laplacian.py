@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import laplacian as kernels
-from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 VARIANTS = {
@@ -37,10 +38,10 @@ class Laplacian(StarSmoother):
         self.variant = VARIANTS[variant]
 
     def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, precision, self.variant, tally)
+        kernels.sweep(points, blocks, first, last, guard, self.variant, tally)
 
 
 METHOD = Method(

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from gmsnet import weights
 from gmsnet.kernels import nn as kernels
-from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Method, StarSmoother, Tally
 from gmsnet.weights.shapes import NN_HIDDEN
 
@@ -27,10 +28,10 @@ class NNSmoothing(StarSmoother):
         self.table, self.flat = fold(trained)
 
     def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, precision, self.table, self.flat, tally)
+        kernels.sweep(points, blocks, first, last, guard, self.table, self.flat, tally)
 
 
 def fold(trained: weights.Weights) -> tuple[NDArray[np.int64], NDArray[np.float32]]:

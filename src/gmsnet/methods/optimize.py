@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import adam, newton, objectives
-from gmsnet.kernels.stars import Blocks, Precision
+from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Method, Options, StarSmoother, Tally
 
 
@@ -29,10 +30,10 @@ class Adam(StarSmoother):
         self.sizes = step_sizes() if sizes is None else sizes
 
     def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        adam.sweep(points, blocks, first, last, precision, self.objective, self.sizes, tally)
+        adam.sweep(points, blocks, first, last, guard, self.objective, self.sizes, tally)
 
 
 class Newton(StarSmoother):
@@ -42,10 +43,10 @@ class Newton(StarSmoother):
         self.objective = objectives.NAMES.index(objective)
 
     def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, precision: Precision, tally: Tally
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        newton.sweep(points, blocks, first, last, precision, self.objective, tally)
+        newton.sweep(points, blocks, first, last, guard, self.objective, tally)
 
 
 def step_sizes() -> NDArray[np.float64]:

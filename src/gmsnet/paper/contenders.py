@@ -33,7 +33,7 @@ class Contender:
         """The mesh smoothed as the paper's tables want it: one thread, and the best mesh is the best in 1/q_V."""
         return smooth(
             mesh, self.method, variant=self.variant or None, objective=self.objective or None, max_sweeps=sweeps,
-            threads=1, best_by=ASPECT,
+            threads=1, best_by=ASPECT, guard="valid",
         )  # fmt: skip
 
     def smoother(self) -> Smoother:
