@@ -7,8 +7,8 @@ import os
 from collections.abc import Iterable
 
 from gmsnet.errors import InputError
-from gmsnet.methods import angle, cpt, cvt, getme, gmsnet, laplacian, nn, optimize
-from gmsnet.methods.base import Field, Method, Options, Smoother, StarSmoother
+from gmsnet.methods import angle, barrier, cpt, cvt, getme, gmsnet, laplacian, nn, optimize
+from gmsnet.methods.base import Field, Method, Options, Smoother, StarSmoother, Tally
 
 METHODS: dict[str, Method] = {
     method.name: method
@@ -20,6 +20,7 @@ METHODS: dict[str, Method] = {
         cpt.METHOD,
         getme.METHOD,
         optimize.METHOD,
+        barrier.METHOD,
         nn.METHOD,
     )
 }
@@ -85,4 +86,4 @@ def _chosen(kind: str, name: str, names: Iterable[str]) -> str:
     raise InputError(f"unknown {kind} {name!r}; {hint}choose one of: {', '.join(names)}")
 
 
-__all__ = ["METHODS", "Field", "Method", "Options", "Smoother", "StarSmoother", "method_named", "smoother"]
+__all__ = ["METHODS", "Field", "Method", "Options", "Smoother", "StarSmoother", "Tally", "method_named", "smoother"]

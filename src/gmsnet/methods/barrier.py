@@ -1,0 +1,59 @@
+"""Newton's method on a barrier, one step a visit. The formulas stand in kernels/barrier.py.
+
+The objective is the sum of q^p over the star, p = 1, 2 or 4, q the inverse of the shape metric: infinite where a
+triangle of the star degenerates, so that no cell is given up for the mean of the others. ``q`` gives the best mean of
+1/q and ``q4`` the best least one; ``q2`` stands between them.
+
+On random squares (10,000 nodes, from the input, means over four meshes) q̂ after 2, 4, 8 and 12 sweeps is
+
+    q   0.027  0.110  0.119  0.120        q2  0.048  0.117  0.139  0.139        q4  0.035  0.101  0.137  0.152
+
+with ω = 1.5, and 0.025, 0.100, 0.117, 0.118 for q without over-relaxation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels import barrier as kernels
+from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.stars import Blocks
+from gmsnet.methods.base import Field, Method, StarSmoother, Tally
+from gmsnet.workers import Share
+
+POWERS = {"q2": 2, "q": 1, "q4": 4}
+RELAXATION, RELAXED = 1.5, 8  # ω, and for how many sweeps
+
+
+class Barrier(StarSmoother):
+    """One objective. relaxation: ω, by which a Newton step is lengthened in the first ``relaxed`` sweeps."""
+
+    def __init__(self, objective: str, relaxation: float = RELAXATION, relaxed: int = RELAXED) -> None:
+        self.power = kernels.Power.of(POWERS[objective])
+        self.relaxation, self.relaxed = relaxation, relaxed
+        self.sweeps = 0
+
+    def visit(
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        relaxation = self.relaxation if self.sweeps < self.relaxed else 1.0
+        kernels.sweep(points, blocks, first, last, guard, self.power, relaxation, tally)
+
+    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+        """See Smoother."""
+        tally = super().sweep(field, share, test)
+        self.sweeps += 1
+        return tally
+
+
+METHOD = Method(
+    name="barrier",
+    summary="one Newton step a sweep on the sum of q^p over the star, which is infinite where a cell degenerates",
+    source="Knupp: Algebraic mesh quality metrics (2001), for q; Nocedal, Wright: Numerical Optimization, chapter 3",
+    create=lambda options: Barrier(options.objective),
+    objectives=tuple(POWERS),
+)
