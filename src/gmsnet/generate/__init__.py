@@ -1,4 +1,4 @@
-"""Test meshes: Delaunay triangulations of random points, good meshes, boundary layers, and nodes thrown out of place."""
+"""Test meshes: Delaunay triangulations of random points, good meshes, boundary layers, nodes thrown out of place."""
 
 from gmsnet.generate.curves import Curve
 from gmsnet.generate.disturb import disturb
