@@ -1,0 +1,38 @@
+"""Mending tangled meshes by moving free nodes: fewer inverted cells, and none that was positive is lost for it."""
+
+from __future__ import annotations
+
+from gmsnet.measure import exact_signs
+from gmsnet.topology import Topology
+from gmsnet.untangle.patch import Floats
+from gmsnet.untangle.reasons import reasons
+from gmsnet.untangle.result import ALL, NOTHING, PART, Stage, Unmended, Untangled
+from gmsnet.untangle.road import follow
+from gmsnet.untangle.tangle import Precision, Tangle
+from gmsnet.untangle.transaction import guarded, moved, take
+
+__all__ = ["ALL", "NOTHING", "PART", "Stage", "Unmended", "Untangled", "untangle"]
+
+
+def untangle(points: Floats, topology: Topology, precision: Precision) -> Untangled:
+    """Moves free nodes until no cell is inverted, or as few as can be; held nodes and what is far off keep their bits.
+
+    points: (N, 2) float64 by places in memory (``planar_points(mesh)[topology.memory]``); not changed. topology: of the
+    mesh. precision: how exactly coordinates are known once they are written (kernels.guard.Precision, or a Guard).
+
+    A cell counts as mended once it is certified: positive as it will be written. No cell that was positive is not so
+    afterwards, and none that stays inverted is worse (in 1/q) than the worst was. The result follows from the arguments
+    alone.
+    """
+    tangle = Tangle(points, topology, precision)
+    before = int(tangle.was_bad.sum())
+    if not before:
+        return Untangled(tangle.points, 0, 0, ALL, "", (), ())
+    stages = list(follow(tangle))
+    taken, why = take(tangle)
+    if tangle.left and tangle.bad_nodes().any():
+        stages.append(guarded(tangle))
+        taken = PART if taken == NOTHING and moved(tangle).any() else taken
+    after = int((exact_signs(tangle.points, topology.near, topology.near_turn) <= 0).sum())
+    sweeps = sum(stage.sweeps for stage in stages)
+    return Untangled(tangle.points, before, after, taken, why, tuple(stages), reasons(tangle, sweeps))

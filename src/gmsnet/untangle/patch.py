@@ -1,0 +1,75 @@
+"""A patch: free nodes that are moved together, with their rings and cells in numbers of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+
+from gmsnet.kernels import untangle as kernels
+from gmsnet.topology import Topology
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """count: how many nodes are moved. every: (m,) places in memory of all its nodes, the moved ones first.
+
+    start, ring: the rings of the moved nodes, CSR in numbers of the patch. cells: (c, 3), counter-clockwise, all that
+    have a moved node, each with one in front. part: (count,) which piece of the patch a moved node belongs to; no cell
+    has moved nodes of two. parts: how many pieces there are.
+    """
+
+    count: int
+    every: Ints
+    start: Ints
+    ring: Ints
+    cells: Ints
+    part: Ints
+    parts: int
+
+    @classmethod
+    def of(cls, topology: Topology, nodes: Ints) -> Patch:
+        """The patch of free nodes (places in memory), in their order."""
+        number = np.full(len(topology.memory), -1, dtype=np.int32)
+        every, start, ring, cells = kernels.cut(nodes, topology.near_start, topology.near_ring, number)
+        count = len(nodes)
+        row = np.repeat(np.arange(count), np.diff(start))
+        joined = ring < count
+        graph = scipy.sparse.csr_matrix(
+            (np.ones(int(joined.sum()), dtype=np.int8), (row[joined], ring[joined])), shape=(count, count)
+        )
+        parts, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
+        return cls(count, every, start, ring, cells, part.astype(np.int32), int(parts))
+
+    @property
+    def nodes(self) -> Ints:
+        """(count,) places in memory of the moved nodes."""
+        return self.every[: self.count]
+
+    def pieces(self, topology: Topology, wanted: Flags) -> Iterator[Patch]:
+        """The wanted ones (parts,) of its pieces, as patches."""
+        for piece in np.flatnonzero(wanted):
+            yield self if self.parts == 1 else Patch.of(topology, self.nodes[self.part == piece])
+
+
+def in_order(topology: Topology, chosen: Flags) -> Ints:
+    """The places in memory of the chosen free nodes (N, bool) in the order in which they are visited: colour, then id.
+
+    Neither depends on coordinates.
+    """
+    nodes = np.flatnonzero(chosen).astype(np.int32)
+    return nodes[np.lexsort((topology.memory[nodes], topology.near_colours[nodes]))]
+
+
+def free_nodes_of(topology: Topology, cells: NDArray[np.intp] | Flags) -> Flags:
+    """(N,) which free nodes the cells (rows of ``near``) have."""
+    chosen = np.zeros(len(topology.memory), dtype=bool)
+    chosen[topology.near[cells].ravel()] = True
+    return chosen & (topology.near_colours >= 0)

@@ -1,0 +1,78 @@
+"""Why a cell could not be mended: what is proven to stand against it, and where."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.optimize
+
+from gmsnet.measure import exact_signs
+from gmsnet.topology import Topology
+from gmsnet.untangle.crossings import held_edges, near_crossings
+from gmsnet.untangle.patch import Floats
+from gmsnet.untangle.result import Unmended
+from gmsnet.untangle.tangle import Tangle
+
+HELD = "all its nodes are held"
+CROSSING = "the boundary crosses itself here"
+HELD_CROSSING = "edges whose nodes are held cross each other here"
+EMPTY = "no position of its free node makes all triangles of its star positive"
+ROUNDING = "it is positive, but by no more than its coordinates may be off by"
+
+
+def reasons(tangle: Tangle, sweeps: int) -> tuple[Unmended, ...]:
+    """One row for each bad cell, ascending."""
+    topology, points = tangle.topology, tangle.points
+    rows = np.flatnonzero(tangle.bad)
+    if not len(rows):
+        return ()
+    cells = topology.near[rows]
+    held = topology.near_colours[cells] < 0
+    places = points[cells].mean(axis=1)
+    signs = exact_signs(points, topology.near[rows], topology.near_turn[rows])
+    boundary, fixed = (near_crossings(points, edges, cells) for edges in held_edges(topology))
+    empty: dict[int, bool] = {}
+    out = []
+    for k, (row, cell) in enumerate(zip(rows.tolist(), cells, strict=True)):
+        reason, place = f"not mended within {sweeps} sweeps", places[k]
+        if signs[k] > 0:
+            reason = ROUNDING
+        elif np.isfinite(boundary[k, 0]):
+            reason, place = CROSSING, boundary[k]
+        elif held[k].all():
+            reason = HELD
+        elif any(has_no_place(points, topology, v, empty) for v in cell[~held[k]].tolist()):
+            reason = EMPTY
+        elif np.isfinite(fixed[k, 0]):
+            reason, place = HELD_CROSSING, fixed[k]
+        out.append(Unmended(row, reason, (float(place[0]), float(place[1]))))
+    return tuple(out)
+
+
+def has_no_place(points: Floats, topology: Topology, v: int, known: dict[int, bool]) -> bool:
+    """Is the ring of v all held, and is there no place for v at which all triangles of its star are positive?"""
+    if v not in known:
+        ring = topology.near_ring[topology.near_start[v] : topology.near_start[v + 1]]
+        known[v] = bool((topology.near_colours[ring] < 0).all()) and kernel_depth(points[ring]) <= 0.0
+    return known[v]
+
+
+def kernel_depth(ring: Floats) -> float:
+    """How far the deepest place in a ring (n, 2), counter-clockwise, is from the lines of its edges, over its size.
+
+    The linear programme max t, n_j·(x − r_j) ≥ t for the inner normals n_j of the edges; 0 or less: no place sees all
+    edges from the left. An edge of no length has a triangle of no area wherever x is.
+    """
+    size = float(np.ptp(ring, axis=0).max())
+    if size == 0.0:
+        return 0.0
+    local = (ring - ring.mean(axis=0)) / size
+    along = np.roll(local, -1, axis=0) - local
+    length = np.linalg.norm(along, axis=1)
+    if (length == 0.0).any():
+        return 0.0
+    normal = np.column_stack([-along[:, 1], along[:, 0]]) / length[:, None]
+    rows = np.column_stack([-normal, np.ones(len(ring))])
+    result = scipy.optimize.linprog(
+        [0.0, 0.0, -1.0], A_ub=rows, b_ub=-(normal * local).sum(axis=1), bounds=[(-2, 2), (-2, 2), (-2, 1)]
+    )
+    return float(-result.fun)

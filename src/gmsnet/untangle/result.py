@@ -1,0 +1,50 @@
+"""What untangling says about itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+ALL, PART, NOTHING = "all", "part", "nothing"
+
+
+class Stage(NamedTuple):
+    """What was done: its name, how many nodes it moved about, sweeps (or iterations), cells then left to mend."""
+
+    name: str
+    nodes: int
+    sweeps: int
+    left: int
+
+
+class Unmended(NamedTuple):
+    """A cell that is not mended: its row in ``Topology.near``, why, and where (x, y, in coordinates of the run)."""
+
+    triangle: int
+    reason: str
+    place: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Untangled:
+    """points: (N, 2) in memory order. before, after: how many cells have an area of zero or less (exact signs).
+
+    taken: ALL, PART or NOTHING of what was tried; why: if not all, what stood against it, else "". stages: what was
+    done. unmended: the cells that are still inverted, or positive within rounding only, ascending.
+    """
+
+    points: NDArray[np.float64]
+    before: int
+    after: int
+    taken: str
+    why: str
+    stages: tuple[Stage, ...]
+    unmended: tuple[Unmended, ...]
+
+    @property
+    def sweeps(self) -> int:
+        """Sweeps and iterations of all stages."""
+        return sum(stage.sweeps for stage in self.stages)

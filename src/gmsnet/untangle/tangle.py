@@ -1,0 +1,84 @@
+"""The state of one untangling: the points as they are now, and which cells are still to be mended."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from gmsnet.kernels import untangle as kernels
+from gmsnet.measure import exact_signs
+from gmsnet.topology import Topology
+from gmsnet.untangle.patch import Flags, Floats, Ints, Patch, free_nodes_of, in_order
+
+
+class Precision(Protocol):
+    """How exactly coordinates are known (kernels.stars): relative and absolute error, kept as float32 or not."""
+
+    @property
+    def unit(self) -> float: ...  # noqa: D102
+    @property
+    def grain(self) -> float: ...  # noqa: D102
+    @property
+    def single(self) -> bool: ...  # noqa: D102
+
+
+class Tangle:
+    """points: (N, 2) in memory order, of which free nodes are moved. before: the same at first, not changed.
+
+    signs: (T,) exact signs at first. bad: (T,) which cells are to be mended: not certified (kernels.untangle), and
+    inverted at first or with a node that has moved. left: how many.
+    """
+
+    def __init__(self, points: Floats, topology: Topology, precision: Precision) -> None:
+        self.before, self.topology, self.precision = points, topology, precision
+        self.points = points.copy()
+        self.signs = exact_signs(points, topology.near, topology.near_turn)
+        self.was_bad = self.signs <= 0
+        self.bad = np.empty(len(topology.near), dtype=bool)
+        self.left = 0
+        self.look()
+
+    def look(self) -> int:
+        """Finds the bad cells of the points as they are now; returns how many there are."""
+        precision, topology = self.precision, self.topology
+        self.left = int(
+            kernels.find_bad(
+                self.points, self.before, topology.near, topology.near_turn, self.was_bad, precision.unit,
+                precision.grain, self.bad,
+            )
+        )  # fmt: skip
+        return self.left
+
+    def bad_nodes(self) -> Flags:
+        """(N,) the free nodes of bad cells."""
+        return free_nodes_of(self.topology, self.bad)
+
+    def average(self, nodes: Ints) -> None:
+        """One Laplacian sweep over some free nodes, which no guard holds back."""
+        topology = self.topology
+        kernels.average(self.points, nodes, topology.near_start, topology.near_ring)
+        self.points[nodes] = self.rounded(self.points[nodes])
+
+    def around(self, rings: int) -> Patch:
+        """The patch of the free nodes of bad cells and those within so many rings of them."""
+        chosen = self.bad_nodes()
+        kernels.grow(chosen, self.topology.near_start, self.topology.near_ring, rings)
+        return Patch.of(self.topology, in_order(self.topology, chosen))
+
+    def rounded(self, points: Floats) -> Floats:
+        """As they will be kept."""
+        return points.astype(np.float32).astype(np.float64) if self.precision.single else points
+
+    def certified(self, points: Floats, patch: Patch) -> bool:
+        """Are all cells of a patch certified, its points (m, 2) rounded?"""
+        precision = self.precision
+        kept = points
+        if precision.single:
+            kept = points.copy()
+            kept[: patch.count] = self.rounded(points[: patch.count])
+        return not kernels.uncertified(kept, patch.cells, precision.unit, precision.grain)
+
+    def put(self, points: Floats, patch: Patch) -> None:
+        """Takes over the moved points of a patch (m, 2)."""
+        self.points[patch.nodes] = self.rounded(points[: patch.count])

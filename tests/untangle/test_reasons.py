@@ -1,0 +1,58 @@
+"""Why cells stay inverted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tangles import grid, mesh_of, moved, untangled
+
+from gmsnet.topology import Topology
+from gmsnet.untangle.reasons import CROSSING, EMPTY, HELD, kernel_depth
+
+
+def test_a_cell_whose_nodes_are_all_held():
+    """A corner pulled in over the diagonal of its cell."""
+    result, _, topology, _ = untangled(moved(grid(4), [4], [[0.3, 0.7]]))
+    assert [row.reason for row in result.unmended] == [HELD]
+    assert result.after == 1
+    assert (topology.near_colours[topology.near[result.unmended[0].triangle]] < 0).all()
+    assert result.unmended[0].place == pytest.approx(((0.3 + 0.0 + 0.25) / 6, (0.7 + 0.75 + 1.0) / 6))  # over 2
+
+
+def test_a_boundary_that_crosses_itself():
+    """A bottom node pulled up above the top: two edges of the bottom cross two of the top."""
+    mesh = grid(4)
+    result, _, _, _ = untangled(moved(mesh, [10], [[0.5, 1.2]]))
+    assert result.after > 0
+    assert CROSSING in {row.reason for row in result.unmended}
+    # In the coordinates of the run, which are divided by 2.
+    places = [row.place for row in result.unmended if row.reason == CROSSING]
+    assert all(y == pytest.approx(0.5) for _, y in places)
+
+
+def test_a_ring_that_no_place_sees_all_of():
+    angle = np.pi / 3 * np.arange(6)
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    assert kernel_depth(ring) == pytest.approx(np.sqrt(0.75) / 2)
+    # A Z: each of its arms looks past the other.
+    ring = np.array([[0, 0], [4, 0], [4, 3], [3, 3], [3, 1], [0, 1]], float)
+    assert kernel_depth(ring) > 0
+    ring = np.array([[0, 0], [4, 0], [4, 1], [1, 1], [1, 2], [4, 2], [4, 3], [0, 3]], float)  # a C
+    assert kernel_depth(ring) < 0
+    points = np.vstack([[2.0, 0.5], ring])
+    result, before, _, _ = untangled(mesh_of(points, [(0, 1 + i, 1 + (i + 1) % 8) for i in range(8)]))
+    assert (result.points == before).all()
+    assert {row.reason for row in result.unmended} == {EMPTY}
+    assert result.before == result.after == len(result.unmended)
+
+
+def test_depth_is_zero_for_an_edge_of_no_length_and_for_a_point():
+    assert kernel_depth(np.array([[0, 0], [1, 0], [1, 0], [0, 1]], float)) == 0
+    assert kernel_depth(np.zeros((4, 2))) == 0
+
+
+def test_all_held():
+    mesh = moved(grid(4), [12], [[0.9, 0.6]])
+    result, _, _, _ = untangled(mesh, Topology.of(mesh, np.ones(25, dtype=bool)))
+    assert result.after == result.before == len(result.unmended) > 0
+    assert {row.reason for row in result.unmended} == {HELD}
