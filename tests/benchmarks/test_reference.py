@@ -161,3 +161,15 @@ def test_what_is_stored_is_not_computed_again(tmp_path, monkeypatch):
     second = reference.stored(file, [40], [0, 1])
     assert second["40/0"] == first["40/0"]
     assert second["40/1"] == {"computed": [40, 1]}
+
+
+def test_polishing_spares_the_worst_cells(plane):
+    points = reference.best(plane, reference.road(plane, plane.start, 0)).points
+    before = plane.figures(points)
+    met = list(reference.polish(plane, points))
+    assert len(met) == 1 + len(reference.ABOVE_WORST) * reference.POLISH_SWEEPS
+    for each in met:
+        after = plane.figures(each)
+        assert after["min_shape"] >= before["min_shape"]
+        assert after["inverted"] == 0
+    assert reference.best(plane, met).figures["mean_shape"] > before["mean_shape"]
