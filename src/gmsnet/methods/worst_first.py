@@ -1,0 +1,109 @@
+"""The worst cells first: Newton's method on high powers of q, at the free nodes of the worst cells alone.
+
+A cycle ranks the cells, takes a share of them, and visits their free nodes a number of times (kernels/worst_first.py),
+colour by colour, in one order whatever the number of threads. Cells are ranked among the candidates, which are the
+worst of all when the list of cycles begins: a cell next to a mended one can become the worst, and is one of them.
+
+A sweep is one cycle of CYCLES; after the last of them LAST goes on, with new candidates each time, until the worst cell
+gains no more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels import ranking
+from gmsnet.kernels import worst_first as kernels
+from gmsnet.kernels.compile import LANES
+from gmsnet.methods.base import Field, Method, Options, Smoother, Tally
+from gmsnet.workers import Share
+
+
+class Cycle(NamedTuple):
+    """share: of all cells. power: p = 2^power. sweeps: over their free nodes."""
+
+    share: float
+    power: int
+    sweeps: int
+
+
+CANDIDATES = 0.02  # the share of all cells that is ranked within a list of cycles
+FEWEST, FEWEST_CANDIDATES = 6, 50  # cells
+CYCLES = (
+    Cycle(0.002, 3, 3),
+    Cycle(0.002, 3, 3),
+    Cycle(0.0006, 4, 4),
+    Cycle(0.0006, 5, 4),
+    Cycle(0.0003, 5, 8),
+    Cycle(0.0003, 6, 8),
+    Cycle(0.0003, 6, 16),
+)
+LAST = (Cycle(0.0003, 7, 16), Cycle(0.0003, 8, 16))
+GAIN = 1e-5  # in the least 1/q: less is none
+
+
+class WorstFirst(Smoother):
+    """See the module. at_once: how many cycles a sweep makes; a ranking of all cells costs more than a late cycle."""
+
+    def __init__(self, cycles: tuple[Cycle, ...] = CYCLES, at_once: int = 1) -> None:
+        self.cycles, self.at_once = cycles, at_once
+        self.settled = False
+        self.cells: NDArray[np.int32] | None = None
+        self.next = 0
+
+    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+        """See Smoother. The visits depend on each other, so that they are made on one thread."""
+        tally = np.zeros(3, dtype=np.int64)
+        guard, topology = field.guard(share), field.topology
+        triangles, turn = topology.changeable
+        if self.cells is None or self.next >= len(self.cycles):
+            self.cells = candidates(field, share)
+        shape = np.empty(len(self.cells))
+        ranking.shapes_of(field.points, triangles, turn, self.cells, shape)
+        before = float(shape.min())
+        late = self.next >= len(self.cycles)
+        chosen = LAST if late else self.cycles[self.next : self.next + self.at_once]
+        seen = np.zeros(len(field.points), dtype=np.bool_)
+        for cycle in chosen:
+            wanted = min(len(shape), max(FEWEST, math.ceil(cycle.share * len(triangles))))
+            limit = np.partition(shape, wanted - 1)[wanted - 1]
+            colours = topology.near_colours
+            nodes = ranking.free_nodes(triangles, self.cells, shape, limit, colours, topology.stars.colours, seen)
+            start, ring = topology.near_start, topology.near_ring
+            kernels.visit(field.points, nodes, start, ring, guard, cycle.power, cycle.sweeps, tally)
+            ranking.shapes_of(field.points, triangles, turn, self.cells, shape)
+        self.next += len(chosen)
+        self.settled = late and float(shape.min()) < before + GAIN
+        return tally
+
+
+def candidates(field: Field, share: Share) -> NDArray[np.int32]:
+    """The worst cells, by their place among those that can change: at least the share CANDIDATES of them."""
+    triangles, turn = field.topology.changeable
+    shape = np.empty(len(triangles), dtype=np.float32)
+
+    def look(first: int, last: int) -> None:
+        ranking.shapes(field.points, triangles, turn, first, last, shape)
+
+    share(look, 0, -(-len(triangles) // LANES))
+    wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * len(triangles)))
+    cells: NDArray[np.int32] = ranking.worst(shape, wanted)
+    return cells
+
+
+def create(options: Options) -> WorstFirst:
+    """There is nothing to choose."""
+    return WorstFirst()
+
+
+METHOD = Method(
+    name="worst-first",
+    summary="Newton steps on high powers of q at the free nodes of the worst cells alone",
+    source="Freitag, Plassmann: Local optimization-based simplicial mesh untangling and improvement (2000), its aim",
+    create=create,
+)
