@@ -11,6 +11,8 @@ import numpy as np
 from gmsnet.kernels.compile import kernel
 from gmsnet.kernels.predicates import determinant_and_bound
 
+TINY = 1e-290  # stands in for a squared length of zero
+
 
 @kernel
 def surplus(points, a, b, c, unit, grain):
@@ -107,16 +109,66 @@ def cut(nodes, start, ring, number):
 
 
 @kernel
-def average(points, nodes, start, ring):
-    """Puts each of the nodes, one after another, into the mean of its ring, whatever becomes of its cells."""
+def bad_in_star(points, v, start, ring, unit, grain):
+    """How many cells of the star of v are not certified."""
+    count = 0
+    before = ring[start[v + 1] - 1]
+    for at in range(start[v], start[v + 1]):
+        after = ring[at]
+        count += not surplus(points, v, before, after, unit, grain) > 0.0
+        before = after
+    return count
+
+
+@kernel
+def bad_shares(points, nodes, start, ring, unit, grain):
+    """Which share of the cells of each node's star is not certified."""
+    out = np.empty(len(nodes))
+    for k in range(len(nodes)):
+        v = nodes[k]
+        out[k] = bad_in_star(points, v, start, ring, unit, grain) / (start[v + 1] - start[v])
+    return out
+
+
+@kernel
+def average(points, nodes, start, ring, weighing, unit, grain, single):
+    """Puts each of the nodes, one after another, into the mean of its ring, if a cell of its star is bad by then.
+
+    Whatever becomes of those cells. weighing: so many steps from the mean towards the geometric median (E. Weiszfeld,
+    Tôhoku Mathematical Journal 43, 1937), which a neighbour far away hardly pulls. single: rounded to float32.
+    """
     for v in nodes:
+        if not bad_in_star(points, v, start, ring, unit, grain):
+            continue
         x, y = 0.0, 0.0
         for k in range(start[v], start[v + 1]):
             x += points[ring[k], 0]
             y += points[ring[k], 1]
         degree = start[v + 1] - start[v]
-        points[v, 0] = x / degree
-        points[v, 1] = y / degree
+        x /= degree
+        y /= degree
+        for _ in range(weighing):
+            x, y = weigh(points, v, start, ring, x, y)
+        if single:
+            x, y = np.float64(np.float32(x)), np.float64(np.float32(y))
+        points[v, 0], points[v, 1] = x, y
+
+
+@kernel
+def weigh(points, v, start, ring, x, y):
+    """The mean of the ring of v weighted by the inverse distances from (x, y), the nearest one's a little larger."""
+    nearest = np.inf
+    for k in range(start[v], start[v + 1]):
+        dx, dy = points[ring[k], 0] - x, points[ring[k], 1] - y
+        nearest = min(nearest, dx * dx + dy * dy)
+    total, sx, sy = 0.0, 0.0, 0.0
+    for k in range(start[v], start[v + 1]):
+        dx, dy = points[ring[k], 0] - x, points[ring[k], 1] - y
+        weight = 1.0 / np.sqrt(dx * dx + dy * dy + 0.1 * nearest + TINY)
+        total += weight
+        sx += weight * dx
+        sy += weight * dy
+    return x + sx / total, y + sy / total
 
 
 @kernel

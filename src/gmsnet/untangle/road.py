@@ -13,7 +13,8 @@ from gmsnet.untangle.patch import Flags, Floats, Patch, in_order
 from gmsnet.untangle.result import Stage
 from gmsnet.untangle.tangle import Tangle
 
-LAPLACIAN_SWEEPS = 5
+LAPLACIAN_SWEEPS = 8
+MEDIANS, WEIGHING = 2, 5  # the first sweeps are to medians of the rings, by so many steps from the mean
 RINGS = (2, 6, 20, 10**9)  # of the patches around what is left to mend
 NEWTON_SWEEPS = 30
 ROUNDS, ITERATIONS = 30, 60  # of L-BFGS: so many values of ε, so many iterations for each
@@ -46,7 +47,7 @@ def bad_stars(tangle: Tangle) -> Stage:
     while tangle.left and sweeps < LAPLACIAN_SWEEPS:
         chosen = tangle.bad_nodes()
         visited |= chosen
-        tangle.average(in_order(tangle.topology, chosen))
+        tangle.average(in_order(tangle.topology, chosen), WEIGHING if sweeps < MEDIANS else 0)
         tangle.look()
         sweeps += 1
     return Stage("Laplacian, bad stars", int(visited.sum()), sweeps, tangle.left)

@@ -54,11 +54,17 @@ class Tangle:
         """(N,) the free nodes of bad cells."""
         return free_nodes_of(self.topology, self.bad)
 
-    def average(self, nodes: Ints) -> None:
-        """One Laplacian sweep over some free nodes, which no guard holds back."""
-        topology = self.topology
-        kernels.average(self.points, nodes, topology.near_start, topology.near_ring)
-        self.points[nodes] = self.rounded(self.points[nodes])
+    def average(self, nodes: Ints, weighing: int) -> None:
+        """One Laplacian sweep over those of some free nodes that have bad cells, which no guard holds back.
+
+        Those with the largest share of bad cells come first: most likely they are the culprits, and when it is the turn
+        of their neighbours, these have nothing to mend any more. weighing: see the kernel.
+        """
+        topology, precision = self.topology, self.precision
+        rings = topology.near_start, topology.near_ring
+        shares = kernels.bad_shares(self.points, nodes, *rings, precision.unit, precision.grain)
+        nodes = nodes[np.argsort(-shares, kind="stable")]
+        kernels.average(self.points, nodes, *rings, weighing, precision.unit, precision.grain, precision.single)
 
     def around(self, rings: int) -> Patch:
         """The patch of the free nodes of bad cells and those within so many rings of them."""
