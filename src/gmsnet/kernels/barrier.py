@@ -20,37 +20,19 @@ the mean of its ring.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from gmsnet.kernels import stars
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.barrier_star import FAR, MOST, descend
+from gmsnet.kernels.compile import LANES, inlined, kernel
 from gmsnet.kernels.stars import REACH, SIZE
 
-MOST = 50.0
-FAR = 0.7
-REPEATS, HALVINGS = 20, 30
 SMALL = 1e-5  # of F: a fall that float32 may not see; the step is then so short that it is Newton's to rounding
 
 # Rows of a block's sums: F, −∇F, the Hessian without its isotropic part, Σ c/D, the least D; after the step F, the
-# least D, and gᵀH⁻¹g.
-VALUE, GX, GY, XX, XY, YY, ROUND, LEAST, AFTER, LEAST_AFTER, FALL = range(11)
-SUMS = 11
-
-
-class Power(NamedTuple):
-    """Q^p = Q(one + Q(two + four Q²)): which of the three is 1, the others are 0. ratio: 1 + 1/p."""
-
-    one: float
-    two: float
-    four: float
-    ratio: float
-
-    @classmethod
-    def of(cls, p: int) -> Power:
-        """For p = 1, 2 or 4."""
-        return cls(float(p == 1), float(p == 2), float(p == 4), 1.0 + 1.0 / p)
+# least D, gᵀH⁻¹g, and whether to do it over.
+VALUE, GX, GY, XX, XY, YY, ROUND, LEAST, AFTER, LEAST_AFTER, FALL, REDO = range(12)
+SUMS = 12
 
 
 @kernel
@@ -79,37 +61,53 @@ def relate(x, ring, n, work, local):
 def derive(local, n, power, sums):
     """F with its two derivatives, and the least D."""
     real = sums.dtype.type
-    one, two, four = real(power.one), real(power.two), real(power.four)
-    c2, c4, e4 = real(2.0) * two, real(4.0) * four, real(12.0) * four
-    unity = real(1.0)
+    two, four = real(power.two), real(power.four)
     sums[: LEAST * LANES] = 0.0
     sums[LEAST * LANES : (LEAST + 1) * LANES] = np.inf
     for j in range(n):
         i = n - 1 if j == 0 else j - 1
         r = local[2 * i * LANES : 2 * (i + 1) * LANES]
         s = local[2 * j * LANES : 2 * (j + 1) * LANES]
-        for lane in range(LANES):
-            ax, ay, bx, by = r[lane], r[LANES + lane], s[lane], s[LANES + lane]
-            wx, wy = ay - by, bx - ax
-            d = ax * by - ay * bx
-            inverse = unity / d
-            q = ((bx * bx + by * by) + (ay * wx - ax * wy)) * inverse
-            gx = ((ax + bx) + q * wx) * inverse
-            gy = ((ay + by) + q * wy) * inverse
-            qq = q * q
-            c = one + q * (c2 + c4 * qq)
-            e = c2 + e4 * qq
-            u = c * inverse
-            tx, ty = u * wx, u * wy
-            mx, my = e * gx + tx, e * gy + ty
-            sums[VALUE * LANES + lane] += q * (one + q * (two + four * qq))
-            sums[GX * LANES + lane] += c * gx
-            sums[GY * LANES + lane] += c * gy
-            sums[XX * LANES + lane] += gx * (mx + tx)
-            sums[XY * LANES + lane] += gx * my + tx * gy
-            sums[YY * LANES + lane] += gy * (my + ty)
-            sums[ROUND * LANES + lane] += u
-            sums[LEAST * LANES + lane] = min(sums[LEAST * LANES + lane], d)
+        if power.one > 0.0:
+            for lane in range(LANES):
+                q, d, u, wx, wy, gx, gy = triangle(lane, r, s)
+                tx, ty = u * wx, u * wy
+                sums[VALUE * LANES + lane] += q
+                sums[GX * LANES + lane] += gx
+                sums[GY * LANES + lane] += gy
+                sums[XX * LANES + lane] += gx * (tx + tx)
+                sums[XY * LANES + lane] += gx * ty + tx * gy
+                sums[YY * LANES + lane] += gy * (ty + ty)
+                sums[ROUND * LANES + lane] += u
+                sums[LEAST * LANES + lane] = min(sums[LEAST * LANES + lane], d)
+        else:
+            c2, c4, e4 = real(2.0) * two, real(4.0) * four, real(12.0) * four
+            for lane in range(LANES):
+                q, d, u, wx, wy, gx, gy = triangle(lane, r, s)
+                square = q * q
+                c, e = q * (c2 + c4 * square), c2 + e4 * square
+                u *= c
+                tx, ty = u * wx, u * wy
+                mx, my = e * gx + tx, e * gy + ty
+                sums[VALUE * LANES + lane] += square * (two + four * square)
+                sums[GX * LANES + lane] += c * gx
+                sums[GY * LANES + lane] += c * gy
+                sums[XX * LANES + lane] += gx * (mx + tx)
+                sums[XY * LANES + lane] += gx * my + tx * gy
+                sums[YY * LANES + lane] += gy * (my + ty)
+                sums[ROUND * LANES + lane] += u
+                sums[LEAST * LANES + lane] = min(sums[LEAST * LANES + lane], d)
+
+
+@inlined
+def triangle(lane, r, s):
+    """Q, D, 1/D, w and G of one lane's triangle with the spokes in r and s."""
+    ax, ay, bx, by = r[lane], r[LANES + lane], s[lane], s[LANES + lane]
+    wx, wy = ay - by, bx - ax
+    d = ax * by - ay * bx
+    inverse = r.dtype.type(1.0) / d
+    q = ((bx * bx + by * by) + (ay * wx - ax * wy)) * inverse
+    return q, d, inverse, wx, wy, ((ax + bx) + q * wx) * inverse, ((ay + by) + q * wy) * inverse
 
 
 @kernel
@@ -153,87 +151,25 @@ def judge(local, n, power, step, sums):
 
 
 @kernel
-def derivatives(x, y, ring, n, lane, power):
-    """One star in float64 with its free node at (x, y): F, −∇F, the Hessian (xx, xy, yy), the least D."""
-    value, gx, gy, xx, xy, yy, even, least = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.inf
-    a = 2 * (n - 1) * LANES + lane
-    ax, ay = ring[a] - x, ring[a + LANES] - y
-    for j in range(n):
-        b = 2 * j * LANES + lane
-        bx, by = ring[b] - x, ring[b + LANES] - y
-        wx, wy = ay - by, bx - ax
-        d = ax * by - ay * bx
-        least = min(least, d)
-        inverse = 1.0 / d
-        q = ((bx * bx + by * by) + (ay * wx - ax * wy)) * inverse
-        ux = ((ax + bx) + q * wx) * inverse
-        uy = ((ay + by) + q * wy) * inverse
-        qq = q * q
-        c = power.one + q * (2.0 * power.two + 4.0 * power.four * qq)
-        e = 2.0 * power.two + 12.0 * power.four * qq
-        u = c * inverse
-        tx, ty = u * wx, u * wy
-        value += q * (power.one + q * (power.two + power.four * qq))
-        gx += c * ux
-        gy += c * uy
-        xx += ux * (e * ux + 2.0 * tx)
-        xy += e * ux * uy + (ux * ty + tx * uy)
-        yy += uy * (e * uy + 2.0 * ty)
-        even += u
-        ax, ay = bx, by
-    return value, gx, gy, xx + 2.0 * even, xy, yy + 2.0 * even, least
-
-
-@kernel
-def value_at(x, y, ring, n, lane, power):
-    """F of one star with its free node at (x, y), infinite where a triangle is not positive."""
-    value = 0.0
-    a = 2 * (n - 1) * LANES + lane
-    ax, ay = ring[a] - x, ring[a + LANES] - y
-    for j in range(n):
-        b = 2 * j * LANES + lane
-        bx, by = ring[b] - x, ring[b + LANES] - y
-        d = ax * by - ay * bx
-        if not d > 0.0:
-            return np.inf
-        q = ((bx * bx + by * by) + (ay * (ay - by) - ax * (bx - ax))) / d
-        value += q * (power.one + q * (power.two + power.four * (q * q)))
-        ax, ay = bx, by
-    return value
-
-
-@kernel
-def descend(x, y, ring, n, lane, power):
-    """The shift of one star: Newton steps, halved until F falls, on and on while it falls by more than 1 − FAR.
-
-    No shift where nothing is gained; that to the mean of the ring where a triangle is not positive.
-    """
-    dx, dy = 0.0, 0.0
-    for number in range(REPEATS):
-        value, gx, gy, xx, xy, yy, least = derivatives(x + dx, y + dy, ring, n, lane, power)
-        if number == 0 and not least > 0.0:
-            for j in range(n):
-                dx += ring[2 * j * LANES + lane] - x
-                dy += ring[(2 * j + 1) * LANES + lane] - y
-            return dx / n, dy / n
-        determinant = xx * yy - xy * xy
-        if not determinant > 0.0:  # F is convex: only rounding does that
-            break
-        sx, sy = (yy * gx - xy * gy) / determinant, (xx * gy - xy * gx) / determinant
-        share = 1.0 / max(1.0 - power.ratio * (gx * sx + gy * sy) / value, 1.0 / MOST)
-        after = np.inf
-        for _ in range(HALVINGS):
-            after = value_at(x + dx + share * sx, y + dy + share * sy, ring, n, lane, power)
-            if after < value:
-                break
-            share *= 0.5
-        if not after < value:
-            break
-        dx += share * sx
-        dy += share * sy
-        if not after < FAR * value:
-            break
-    return dx, dy
+def settle(sums, step, mean, mean_sums, with_mean):
+    """Takes the mean instead of the step where F falls by it. Row REDO: 1 where float64 is called for, else 0."""
+    real = sums.dtype.type
+    far, small, slightly = real(FAR), real(SMALL), real(1.0 + SMALL)
+    yes, no = real(1.0), real(0.0)
+    for lane in range(LANES):
+        value, after, inside = sums[VALUE * LANES + lane], sums[AFTER * LANES + lane], sums[LEAST * LANES + lane]
+        falls = after < value or (sums[FALL * LANES + lane] < small * value and after < slightly * value)
+        kept = falls and not after < far * value  # what is no number is neither
+        least = min(inside, sums[LEAST_AFTER * LANES + lane])
+        sums[REDO * LANES + lane] = no if kept and least > no else yes
+    if with_mean:
+        for lane in range(LANES):
+            falls = mean_sums[AFTER * LANES + lane] < sums[VALUE * LANES + lane]
+            least = min(sums[LEAST * LANES + lane], mean_sums[LEAST_AFTER * LANES + lane])
+            taken = falls and least > no
+            step[lane] = mean[lane] if taken else step[lane]
+            step[LANES + lane] = mean[LANES + lane] if taken else step[LANES + lane]
+            sums[REDO * LANES + lane] = no if taken else sums[REDO * LANES + lane]
 
 
 @kernel
@@ -241,22 +177,38 @@ def refine(x, ring, n, count, work, power, sums, step, shift):
     """The shifts to be committed, in float64 over row SIZE of work: the lanes' steps, or what ``descend`` finds."""
     for k in range(2 * LANES):
         shift[k] = step[k]
-    for lane in range(count):
-        value, after = sums[VALUE * LANES + lane], sums[AFTER * LANES + lane]
-        falls = after < value or (sums[FALL * LANES + lane] < SMALL * value and after < (1.0 + SMALL) * value)
-        inside = sums[LEAST * LANES + lane] > 0.0 and sums[LEAST_AFTER * LANES + lane] > 0.0
-        if not (inside and falls) or after < FAR * value:  # what is no number is neither
-            dx, dy = descend(x[lane], x[LANES + lane], ring, n, lane, power)
-            shift[lane] = dx / work[SIZE * LANES + lane]
-            shift[LANES + lane] = dy / work[SIZE * LANES + lane]
+    if sums[REDO * LANES : (REDO + 1) * LANES].max() > 0.0:
+        for lane in range(count):
+            if sums[REDO * LANES + lane] > 0.0:
+                dx, dy = descend(x[lane], x[LANES + lane], ring, n, lane, power)
+                shift[lane] = dx / work[SIZE * LANES + lane]
+                shift[LANES + lane] = dy / work[SIZE * LANES + lane]
 
 
 @kernel
-def sweep(points, blocks, first, last, guard, power, relaxation, tally):
-    """Visits the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
+def average(local, n, stretch, mean):
+    """So many times the mean of the ring, as a step."""
+    mean[:] = 0.0
+    for j in range(n):
+        p = local[2 * j * LANES : 2 * (j + 1) * LANES]
+        for k in range(2 * LANES):
+            mean[k] += p[k]
+    factor = mean.dtype.type(stretch / n)
+    for k in range(2 * LANES):
+        mean[k] *= factor
+
+
+@kernel
+def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally):
+    """Visits the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to.
+
+    stretch: that many times the way to the mean of the ring is taken instead of a step where F falls by it; 0: steps
+    only.
+    """
     x, ring, work, counts = stars.room(blocks.most)
     local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
-    sums, step = np.empty(SUMS * LANES, dtype=np.float32), np.empty(2 * LANES, dtype=np.float32)
+    sums, mean_sums = np.empty(SUMS * LANES, dtype=np.float32), np.empty(SUMS * LANES, dtype=np.float32)
+    step, mean = np.empty(2 * LANES, dtype=np.float32), np.empty(2 * LANES, dtype=np.float32)
     shift = np.empty(2 * LANES)
     for block in range(first, last):
         n = blocks.degree[block]
@@ -265,6 +217,10 @@ def sweep(points, blocks, first, last, guard, power, relaxation, tally):
         derive(local, n, power, sums)
         propose(sums, relaxation, power.ratio, step)
         judge(local, n, power, step, sums)
+        if stretch > 0.0:
+            average(local, n, stretch, mean)
+            judge(local, n, power, mean, mean_sums)
+        settle(sums, step, mean, mean_sums, stretch > 0.0)
         refine(x, ring, n, blocks.filled[block], work, power, sums, step, shift)
         stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
     for k in range(len(tally)):

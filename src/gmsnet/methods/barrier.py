@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import barrier as kernels
+from gmsnet.kernels.barrier_star import Power
 from gmsnet.kernels.guard import Guard
 from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Field, Method, StarSmoother, Tally
@@ -26,14 +27,21 @@ from gmsnet.workers import Share
 
 POWERS = {"q2": 2, "q": 1, "q4": 4}
 RELAXATION, RELAXED = 1.5, 8  # ω, and for how many sweeps
+STRETCH, MEANS = 1.1, 1  # how far to the mean, and in how many sweeps
 
 
 class Barrier(StarSmoother):
-    """One objective. relaxation: ω, by which a Newton step is lengthened in the first ``relaxed`` sweeps."""
+    """One objective.
 
-    def __init__(self, objective: str, relaxation: float = RELAXATION, relaxed: int = RELAXED) -> None:
-        self.power = kernels.Power.of(POWERS[objective])
-        self.relaxation, self.relaxed = relaxation, relaxed
+    relaxation: ω, by which a Newton step is lengthened in the first ``relaxed`` sweeps. In the first ``means`` sweeps
+    a node goes STRETCH times the way to the mean of its ring instead, where its objective falls by that.
+    """
+
+    def __init__(
+        self, objective: str, relaxation: float = RELAXATION, relaxed: int = RELAXED, means: int = MEANS
+    ) -> None:
+        self.power = Power.of(POWERS[objective])
+        self.relaxation, self.relaxed, self.means = relaxation, relaxed, means
         self.sweeps = 0
 
     def visit(
@@ -41,7 +49,8 @@ class Barrier(StarSmoother):
     ) -> None:
         """See StarSmoother."""
         relaxation = self.relaxation if self.sweeps < self.relaxed else 1.0
-        kernels.sweep(points, blocks, first, last, guard, self.power, relaxation, tally)
+        stretch = STRETCH if self.sweeps < self.means else 0.0
+        kernels.sweep(points, blocks, first, last, guard, self.power, relaxation, stretch, tally)
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
