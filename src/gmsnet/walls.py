@@ -1,0 +1,132 @@
+"""Near which walls the sizes of cells are meant to be what they are.
+
+A mesh that is refined towards a body is so on purpose: what happens there, in about a boundary layer's thickness, must
+be resolved as its maker wanted. In isotropic regions the connectivity carries the grading, so they are smoothed freely;
+but converged smoothing changes single areas by a factor of up to two. So cells near such a wall keep their areas
+within a band, unless they are damaged; their shapes are improved as far as the band lets them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError, cKDTree
+from scipy.spatial.distance import pdist
+
+from gmsnet.kernels import quality
+from gmsnet.mesh import Mesh
+from gmsnet.topology import Topology, planar_points
+
+Flags = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+
+NEAR = 0.02  # of a wall's diameter: how far from it a cell's middle may lie
+REFINED = 0.25  # cells there have edges of at most this share of those that cells of the mesh's mean area would have
+MOST = 0.5  # at least this share of the cells near a wall is refined, or it is not refined towards that wall
+# How far a cell's area may lie from the mean of its neighbours', in logarithms, averaged over the stars of its corners.
+CALM, ROUGH = 0.125, 0.4  # the median near a wall (more: all there has been disturbed); a cell (more: it is damaged)
+SOUND = 0.5  # the least 1/q of a cell
+CANDIDATES = 8  # edges of the wall, by their middles, among which the nearest is looked for
+
+
+def near_walls(mesh: Mesh, topology: Topology) -> Flags:
+    """(N,) by node id: the corners of cells of a planar mesh that keep their areas.
+
+    topology: of this mesh, with what is stretched on purpose held: cells that cannot change are not looked at for
+    damage. The cells are those whose middle lies within NEAR of a wall's diameter from it (a wall is a piece of the
+    boundary that hangs together), provided that the mesh is refined towards that wall and has not been disturbed there;
+    but for the neighbours of damaged cells. Most cells near a refined wall are at most REFINED of the mesh's mean size,
+    and so small that at least one row of them is near.
+    """
+    triangles = topology.triangles
+    kept = np.zeros(len(topology.memory), dtype=bool)
+    if topology.plane is None or not len(triangles):
+        return kept
+    points = planar_points(mesh)
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    double = np.abs((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
+    edge = np.sqrt(double * (2.0 / np.sqrt(3.0)))  # of an equilateral triangle of that area
+    largest = REFINED * float(np.sqrt(double.mean() * (2.0 / np.sqrt(3.0))))
+    if not (largest > 0.0 and (edge <= largest).any()):
+        return kept
+    middle = (a + b + c) / 3.0
+    rough: Floats | None = None
+    for wall in _walls(triangles, len(points)):
+        near = NEAR * _diameter(points[np.unique(wall)])
+        rows = np.flatnonzero(_distance(middle, points[wall], near) <= near)
+        if not rows.size or (edge[rows] <= min(largest, near)).mean() < MOST:
+            continue
+        if rough is None:
+            rough = _roughness(triangles, double, len(points))
+        if np.median(rough[rows]) <= CALM:
+            kept[triangles[rows]] = True
+    if rough is not None and kept.any():
+        low, high, shape, aspect = (np.empty(len(triangles)) for _ in range(4))
+        quality.per_cell(points, triangles, topology.turn, low, high, shape, aspect)
+        free = np.zeros(len(kept), dtype=bool)
+        free[topology.free] = True
+        damaged = ((rough > ROUGH) | (shape < SOUND)) & free[triangles].any(axis=1)
+        kept[triangles[damaged]] = False
+    return kept
+
+
+def _roughness(triangles: NDArray[np.int32], double: Floats, nodes: int) -> Floats:
+    """(T,) how far areas lie from the mean of their neighbours' (in logarithms), around the corners of each cell.
+
+    A steady growth from row to row cancels in it.
+    """
+    size = np.log(np.maximum(double, np.finfo(float).tiny))
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
+    key = edges[:, 0] * nodes + edges[:, 1]
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    one, other = order[same] // 3, order[same + 1] // 3
+    both, across = np.concatenate([one, other]), np.concatenate([other, one])
+    count = np.bincount(both, minlength=len(size))
+    mean = np.bincount(both, size[across], minlength=len(size)) / np.maximum(count, 1)
+    off = np.where(count > 0, np.abs(size - mean), 0.0)
+    corners = triangles.ravel()
+    around = np.bincount(corners, np.repeat(off, 3), minlength=nodes) / np.maximum(
+        np.bincount(corners, minlength=nodes), 1
+    )
+    return np.asarray(around[triangles].mean(axis=1))
+
+
+def _walls(triangles: NDArray[np.int32], nodes: int) -> list[NDArray[np.int64]]:
+    """The boundary edges (k, 2) of each piece of the boundary that hangs together."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
+    key, count = np.unique(edges[:, 0] * nodes + edges[:, 1], return_counts=True)
+    outer = np.column_stack(np.divmod(key[count == 1], nodes))
+    graph = scipy.sparse.coo_matrix((np.ones(len(outer)), (outer[:, 0], outer[:, 1])), shape=(nodes, nodes))
+    _, piece = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    of = piece[outer[:, 0]]
+    order = np.argsort(of, kind="stable")
+    return [outer[part] for part in np.split(order, np.flatnonzero(np.diff(of[order])) + 1) if len(part)]
+
+
+def _diameter(points: Floats) -> float:
+    """The largest distance between two of the points."""
+    try:
+        points = points[ConvexHull(points).vertices]
+    except QhullError:  # all in one line
+        along = points[:, int(np.argmax(np.ptp(points, axis=0)))]
+        points = points[[int(along.argmin()), int(along.argmax())]]
+    return float(pdist(points).max(initial=0.0))
+
+
+def _distance(points: Floats, ends: Floats, near: float) -> Floats:
+    """(n,) distance from a wall with the edges (k, 2, 2); ∞ where it is certainly larger than ``near``."""
+    out = np.full(len(points), np.inf)
+    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    reach = near + 0.5 * float(np.linalg.norm(along, axis=1).max())
+    count = min(CANDIDATES, len(ends))
+    far, nearest = cKDTree(ends.mean(axis=1)).query(points, k=count, distance_upper_bound=reach)
+    far, nearest = far.reshape(len(points), count), nearest.reshape(len(points), count)
+    for k in range(count):
+        some = np.flatnonzero(far[:, k] < np.inf)
+        edge = nearest[some, k]
+        away, step = points[some] - start[edge], along[edge]
+        share = np.clip((away * step).sum(axis=1) / np.maximum((step * step).sum(axis=1), 1e-300), 0.0, 1.0)
+        out[some] = np.minimum(out[some], np.linalg.norm(away - share[:, None] * step, axis=1))
+    return out
