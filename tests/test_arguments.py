@@ -13,6 +13,7 @@ from gmsnet.errors import InputError
 USABLE = {
     "max_sweeps": 100, "threads": None, "target_quality": None, "seed": 0, "callback": None, "weights": None,
     "best_by": "shape", "guard": "worst",
+    "target_angle": None, "preserve": "shape", "fix_layers": False, "untangle": True,
 }  # fmt: skip
 NO_WHOLE_NUMBERS = [-1, 1.0, 2.5, "3", True, np.True_, np.array([1, 2]), np.array(3), 1j, float("nan")]
 
@@ -35,6 +36,9 @@ NO_WHOLE_NUMBERS = [-1, 1.0, 2.5, "3", True, np.True_, np.array([1, 2]), np.arra
         {"weights": Path("a.safetensors")},
         {"best_by": "aspect"},
         {"guard": "star"},
+        {"target_angle": 60},
+        {"preserve": "size"},
+        {"preserve": "none", "fix_layers": True, "untangle": False},
     ],
 )
 def test_usable_options_pass(given):
@@ -53,6 +57,10 @@ def test_usable_options_pass(given):
         ]),
         ("callback", ["x", 3, [print], np.array([0, 1])]),
         ("weights", [3, b"a.safetensors", ["a.safetensors"], {"linear.bias": np.zeros(3)}, True]),
+        ("target_angle", ["20", True, 0, -1.0, 60.5, float("nan"), [20]]),
+        ("preserve", ["areas", "", None, True, ["size"]]),
+        ("fix_layers", [None, 1, "yes"]),
+        ("untangle", [None, 0, "no"]),
         ("guard", ["none", "", None, 1, ["worst"]]),
         ("best_by", ["qhat", "", None, 1, ["shape"]]),
     ],

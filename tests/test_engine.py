@@ -33,7 +33,7 @@ def test_the_input_is_not_changed(square):
 
 
 def test_max_sweeps_is_kept_and_the_history_tells(square):
-    result = gmsnet.smooth(square, max_sweeps=3)
+    result = gmsnet.smooth(square, "gmsnet", max_sweeps=3)
     assert (result.sweeps, result.stop_reason) == (3, engine.MAX_SWEEPS)
     assert [s.index for s in result.history] == [1, 2, 3]
     assert result.history[0].moved > 0
@@ -77,7 +77,7 @@ def test_a_target_out_of_reach_is_not_called_reached(square):
 
 def test_the_callback_sees_each_sweep_and_stops_the_run(square):
     seen = []
-    result = gmsnet.smooth(square, callback=lambda sweep: seen.append(sweep) or len(seen) == 4)
+    result = gmsnet.smooth(square, "gmsnet", callback=lambda sweep: seen.append(sweep) or len(seen) == 4)
     assert result.stop_reason == engine.CALLBACK
     assert seen == result.history
     assert result.sweeps == 4
@@ -96,7 +96,7 @@ def test_an_interrupt_keeps_the_best_so_far(square):
         if sweep.index == 5:
             raise KeyboardInterrupt
 
-    result = gmsnet.smooth(square, callback=interrupt)
+    result = gmsnet.smooth(square, "gmsnet", callback=interrupt)
     assert result.stop_reason == engine.INTERRUPTED
     assert result.after.qhat == pytest.approx(max(s.qhat for s in result.history), abs=1e-12)
     assert result.after.qhat > result.before.qhat
@@ -213,7 +213,7 @@ def test_no_threads_are_left_behind(monkeypatch):
         ({"fixed": np.ones(3, dtype=bool)}, "one value per node"),
         ({"fixed": [0.5]}, "fixed must be"),
         ({"fixed": "nowhere"}, "no marker 'nowhere'"),
-        ({"weights": "no-such.safetensors"}, "no-such.safetensors"),
+        ({"method": "gmsnet", "weights": "no-such.safetensors"}, "no-such.safetensors"),
     ],
 )
 def test_what_cannot_be_used_is_refused(square, options, message):

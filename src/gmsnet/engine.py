@@ -17,16 +17,19 @@ from gmsnet.errors import InputError
 from gmsnet.fixed import fixed_mask
 from gmsnet.measure import QualityReport, measure
 from gmsnet.mesh import Mesh
-from gmsnet.methods import smoother
+from gmsnet.methods import Smoother, smoother
+from gmsnet.preserve import method_for, protected
 from gmsnet.run import CALLBACK as CALLBACK
 from gmsnet.run import INTERRUPTED as INTERRUPTED
 from gmsnet.run import MAX_SWEEPS as MAX_SWEEPS
 from gmsnet.run import NO_PROGRESS as NO_PROGRESS
 from gmsnet.run import NOTHING_TO_MOVE as NOTHING_TO_MOVE
 from gmsnet.run import TARGET_REACHED as TARGET_REACHED
-from gmsnet.run import Run
+from gmsnet.run import Run, outcome, precision_of
 from gmsnet.run import Sweep as Sweep
-from gmsnet.topology import Topology
+from gmsnet.tangles import UnmendedCell, mended, still_inverted
+from gmsnet.targets import Target, reach_target
+from gmsnet.topology import Topology, planar_points
 from gmsnet.workers import available_threads
 
 Floats = NDArray[np.float64]
@@ -38,7 +41,9 @@ class SmoothResult:
 
     mesh: of the type that came in. points: (N, dim) float64. before, after: QualityReports. sweeps: how many were
     made. stop_reason: one of the texts above. moved: (N,) bool, which nodes are elsewhere than in the input.
-    held: reason → ids of the nodes that were not free. history: one Sweep each. seconds: for the whole call.
+    held: reason → ids of the nodes that were not free. history: one Sweep for each look. notes: what else there is to
+    know, a sentence each. unmended: the cells that untangling could not mend and that are inverted still, and why.
+    seconds: for the whole call.
     """
 
     mesh: Any
@@ -50,24 +55,30 @@ class SmoothResult:
     moved: NDArray[np.bool_]
     held: dict[str, NDArray[np.int64]]
     history: list[Sweep]
+    notes: list[str]
+    unmended: list[UnmendedCell]
     seconds: float
 
 
 def smooth(
     mesh: Any,
-    method: str = "gmsnet",
+    method: str = "auto",
     *,
     variant: str | None = None,
     objective: str | None = None,
     max_sweeps: int = 100,
     threads: int | None = None,
     target_quality: float | None = None,
+    target_angle: float | None = None,
     fixed: Any = None,
+    preserve: str = "shape",
+    fix_layers: bool = False,
+    untangle: bool = True,
+    guard: str = "worst",
     seed: int = 0,
     callback: Callable[[Sweep], bool | None] | None = None,
     weights: str | os.PathLike[str] | None = None,
     best_by: str = "shape",
-    guard: str = "worst",
 ) -> SmoothResult:
     """Moves the free nodes of a planar triangle mesh so that its elements become better; changes nothing else.
 
@@ -77,43 +88,83 @@ def smooth(
     mesh: (points, cells) arrays, a Mesh, or a meshio, meshlane or PyVista object; it is not changed. method: a name in
     METHODS. variant, objective: names out of the method's own lists (default: their first). max_sweeps: at most so many
     visits of each node. threads: at most so many (default: the processors at hand); the result is the same bits for any
-    number. target_quality: stop once the least 1/q of a cell is at least this, in (0, 1]. fixed: nodes to hold besides
-    boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. seed: for methods that draw
-    random numbers (none does so far). callback: called after each sweep; a true answer stops the run. weights: a
-    safetensors file for methods with weights. best_by: which 1/q enters the q̂ that says which mesh is the best:
-    "shape" (1/q) or "aspect" (1/q_V, with which the paper's tables are formed). guard: what each sweep keeps besides
-    validity: "valid" nothing (as the paper), "worst" that the worst 1/q of the cells with a free node never falls,
-    "star" that the worst 1/q around any free node never falls.
+    number. target_quality, target_angle: the least 1/q, in (0, 1], and the least angle, in (0, 60] degrees, that every
+    cell is to have: only cells that miss it and what is around them are smoothed, until none misses it. fixed: nodes to
+    hold besides boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. preserve: "shape"
+    holds the nodes of layers that are stretched on purpose, "size" besides keeps the areas of cells, "none" neither.
+    fix_layers: hold stretched layers whatever ``preserve`` says. untangle: mend inverted cells first, where there are
+    any. guard: what each sweep keeps besides validity: "valid" nothing (as the paper), "worst" that the worst 1/q of
+    the cells with a free node never falls, "star" that the worst 1/q around any free node never falls. seed: for
+    methods that draw random numbers (none does so far). callback: called after each look at the mesh, with most methods
+    after each sweep; a true answer stops the run. weights: a safetensors file for methods with weights. best_by: which
+    1/q enters the q̂ that says which mesh is the best: "shape" (1/q) or "aspect" (1/q_V, with which the paper's tables
+    are formed).
 
     Raises InputError for what cannot be used, before anything is moved.
     """
     began = time.perf_counter()
-    check_arguments(max_sweeps, threads, target_quality, seed, callback, weights, best_by, guard)
-    chosen = smoother(method, variant=variant, objective=objective, weights=weights, seed=seed)
-    held_mesh, restore = to_mesh(mesh)
-    refuse_unless_planar(held_mesh)
-    topology = Topology.of(held_mesh, fixed_mask(held_mesh, fixed))
-    before = measure(held_mesh, topology)
-    run = Run(held_mesh, topology, chosen, threads or available_threads(), best_by, guard)
-    stop_reason = run.to_the_end(max_sweeps, target_quality, callback)
+    create = check_options(
+        method, variant=variant, objective=objective, max_sweeps=max_sweeps, threads=threads,
+        target_quality=target_quality, target_angle=target_angle, preserve=preserve, fix_layers=fix_layers,
+        untangle=untangle, guard=guard, seed=seed, callback=callback, weights=weights, best_by=best_by,
+    )  # fmt: skip
+    target, chosen = Target(target_quality, target_angle), create()
+    given, restore = to_mesh(mesh)
+    refuse_unless_planar(given)
+    topology = Topology.of(given, fixed_mask(given, fixed))
+    before = measure(given, topology)
+    topology, notes = protected(given, topology, preserve, fix_layers)
+    start = planar_points(given)[topology.memory]
+    reasons: dict[tuple[int, ...], str] = {}
+    if untangle and before.inverted:
+        start, note, reasons = mended(start, topology, precision_of(given))
+        notes.append(note)
+
+    options: dict[str, Any] = {"threads": threads or available_threads(), "best_by": best_by, "guard": guard}
+    if target:
+        best, stop_reason, history = reach_target(
+            given, topology, create, target, start, max_sweeps=max_sweeps, callback=callback, **options
+        )
+    else:
+        run = Run(given, topology, chosen, points=start, **options)
+        stop_reason = run.to_the_end(max_sweeps, None, callback)
+        best, history = run.best, run.history
 
     try:
-        points, moved, after = run.outcome(before)
+        points, moved, after = outcome(given, topology, best, before, best_by)
     except KeyboardInterrupt:  # nothing is lost by finishing what takes less than a sweep
         stop_reason = INTERRUPTED
-        points, moved, after = run.outcome(before)
+        points, moved, after = outcome(given, topology, best, before, best_by)
     return SmoothResult(
         mesh=restore(points),
         points=points.copy(),
         before=before,
         after=after,
-        sweeps=len(run.history),
+        sweeps=history[-1].index if history else 0,
         stop_reason=stop_reason,
         moved=moved,
         held=topology.held,
-        history=run.history,
+        history=history,
+        notes=notes,
+        unmended=still_inverted(after, topology, reasons),
         seconds=time.perf_counter() - began,
     )
+
+
+def check_options(
+    method: str, *, variant: Any = None, objective: Any = None, weights: Any = None, seed: Any = 0,
+    preserve: Any, target_quality: Any, target_angle: Any, callback: Any = None, **others: Any,
+) -> Callable[[], Smoother]:  # fmt: skip
+    """What makes the smoother that the options of ``smooth`` name; InputError for the first that cannot be used."""
+    check_arguments(
+        preserve=preserve, target_quality=target_quality, target_angle=target_angle, callback=callback,
+        weights=weights, seed=seed, **others,
+    )  # fmt: skip
+    target = Target(target_quality, target_angle)
+    name = method_for(method, preserve, target)
+    if name == "auto" and variant is None and target:
+        variant = "patch"
+    return lambda: smoother(name, variant=variant, objective=objective, weights=weights, seed=seed)
 
 
 def quality(mesh: Any) -> QualityReport:

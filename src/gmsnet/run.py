@@ -13,9 +13,11 @@ from gmsnet.arguments import ASPECT
 from gmsnet.kernels import quality as kernels
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import LEVELS, Precision
-from gmsnet.measure import QualityReport, measure, weighted_metric
+from gmsnet.kernels.stars import MOVED
+from gmsnet.measure import QualityReport, measure
 from gmsnet.mesh import Mesh
-from gmsnet.methods import Field, Smoother
+from gmsnet.methods import Field, Smoother, Tally
+from gmsnet.standing import Standing
 from gmsnet.topology import Topology, planar_points, scale_exponent
 from gmsnet.workers import Share, workers
 
@@ -30,14 +32,18 @@ NOTHING_TO_MOVE = "nothing to move"
 
 PATIENCE = 10  # sweeps within which q̂ must rise by LEAST_GAIN, or a cell be mended, for the run to go on
 LEAST_GAIN = 1e-4
-ROUNDING = 1e-12  # a smaller gain in q̂ is no gain
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """What one sweep did, and the mesh after it. index counts from 1; moved, truncated, dropped count nodes."""
+    """What one sweep did, and the mesh after it. moved, truncated, dropped count nodes.
+
+    index: sweeps so far; methods that need not know how the mesh is after each sweep leave some out, and the counts are
+    of all since the last one told. stage: what of the method it was, "" for methods of one stage.
+    """
 
     index: int
+    stage: str
     moved: int
     truncated: int
     dropped: int
@@ -48,72 +54,68 @@ class Sweep:
 
 
 class Run:
-    """The state of one run: coordinates in memory order, the best so far, and the record."""
+    """The state of one run: coordinates in memory order, the best so far, and the record.
+
+    points: to start from, in memory order (default: the mesh's own). history: to go on with.
+    """
 
     def __init__(
-        self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str, guard: str
-    ) -> None:
-        self.mesh, self.topology, self.smoother, self.best_by = mesh, topology, smoother, best_by
-        self.start = planar_points(mesh)[topology.memory]
-        precision = Precision.of(single=mesh.single, exponent=scale_exponent(mesh))
-        self.field = Field(self.start.copy(), topology, precision, LEVELS.index(guard))
+        self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str, guard: str,
+        points: Floats | None = None, history: list[Sweep] | None = None,
+    ) -> None:  # fmt: skip
+        self.topology, self.smoother, self.best_by = topology, smoother, best_by
+        start = planar_points(mesh)[topology.memory] if points is None else points
+        self.field = Field(start.copy(), topology, precision_of(mesh), LEVELS.index(guard))
         self.threads = threads
-        self.history: list[Sweep] = []
+        self.history: list[Sweep] = [] if history is None else history
+        self.sweeps = self.history[-1].index if self.history else 0
+        self.first = len(self.history)
+        self.tally: Tally = np.zeros(3, dtype=np.int64)  # since the last look
         self.sums = np.empty((-(-len(topology.near) // LANES), kernels.SUMS))
-        self.best, self.best_standing = self.start, self._standing()
+        self.best, self.best_standing = start, self._standing()
 
     def to_the_end(self, max_sweeps: int, target: float | None, callback: Callable[[Sweep], bool | None] | None) -> str:
-        """Sweeps until a stop rule says why to stop."""
+        """Sweeps until a stop rule says why to stop. target: the least 1/q of a cell that is enough."""
         if not len(self.topology.free):
             return NOTHING_TO_MOVE
         if target is not None and self.best_standing.min_shape >= target:
             return TARGET_REACHED
         try:
+            self.smoother.told(self.best_standing)
             with workers(self.threads, len(self.topology.stars.blocks.filled)) as share:
-                while len(self.history) < max_sweeps:
-                    sweep = self._sweep(share)
+                while self.sweeps < max_sweeps:
+                    moved = self._sweep(share)
+                    settled = self.smoother.settled or (self.smoother.idle_ends and not moved)
+                    if not (self.smoother.looks or settled or self.sweeps == max_sweeps):
+                        continue
+                    sweep = self._look(share)
                     if callback is not None and callback(sweep):
                         return CALLBACK
                     if target is not None and self.best_standing.min_shape >= target:
                         return TARGET_REACHED
-                    if sweep.moved == 0 or self.smoother.settled or self._stalled():
+                    if settled or self.smoother.settled or self._stalled():
                         return NO_PROGRESS
         except KeyboardInterrupt:  # the best mesh so far is whole: it is a copy
             return INTERRUPTED
         return MAX_SWEEPS
 
-    def _best_points(self) -> tuple[Floats, NDArray[np.bool_]]:
-        """The best coordinates (N, dim) and which nodes they move. All others keep their very bits."""
-        elsewhere = (self.best != self.start).any(axis=1)
-        ids = self.topology.memory[elsewhere]
-        points = self.mesh.points.copy()
-        plane = self.mesh.plane
-        assert plane is not None
-        points[np.ix_(ids, plane)] = np.ldexp(self.best[elsewhere], scale_exponent(self.mesh))
-        moved = np.zeros(len(points), dtype=bool)
-        moved[ids] = True
-        return points, moved
-
-    def outcome(self, before: QualityReport) -> tuple[Floats, NDArray[np.bool_], QualityReport]:
-        """Points, which of them moved, and their measures; those of the input if the quick sums misjudged it."""
-        points, moved = self._best_points()
-        if moved.any():
-            after = measure(self.mesh.with_points(points), self.topology)
-            if (after.inverted, -self._qhat(after)) <= (before.inverted, -self._qhat(before)):
-                return points, moved, after
-        return self.mesh.points, np.zeros(len(points), dtype=bool), before
-
-    def _qhat(self, report: QualityReport) -> float:
-        return report.qhat_aspect if self.best_by == ASPECT else report.qhat
-
-    def _sweep(self, share: Share) -> Sweep:
+    def _sweep(self, share: Share) -> int:
+        """One sweep; returns how many nodes moved."""
         tally = self.smoother.sweep(self.field, share, lambda: self._keep_if_best(self._standing(share)))
+        self.tally += tally
+        self.sweeps += 1
+        return int(tally[MOVED])
+
+    def _look(self, share: Share) -> Sweep:
+        """Measures the mesh as it is now, keeps it if it is the best, and writes the record."""
         standing = self._standing(share)
         self._keep_if_best(standing)
-        moved, truncated, dropped = tally.tolist()
+        moved, truncated, dropped = self.tally.tolist()
+        self.tally[:] = 0
+        self.smoother.told(standing)
         sweep = Sweep(
-            len(self.history) + 1, moved, truncated, dropped, standing.inverted, standing.qhat, standing.min_shape,
-            standing.mean_shape,
+            self.sweeps, self.smoother.stage, moved, truncated, dropped, standing.inverted, standing.qhat,
+            standing.min_shape, standing.mean_shape,
         )  # fmt: skip
         self.history.append(sweep)
         return sweep
@@ -138,10 +140,11 @@ class Run:
         return Standing.of(self.sums, len(triangles), self.best_by)
 
     def _stalled(self) -> bool:
-        """Has nothing been gained for PATIENCE sweeps?"""
-        if len(self.history) <= PATIENCE:
+        """Has nothing been gained for PATIENCE looks?"""
+        own = self.history[self.first :]
+        if len(own) <= PATIENCE:
             return False
-        earlier, recent = self.history[:-PATIENCE], self.history[-PATIENCE:]
+        earlier, recent = own[:-PATIENCE], own[-PATIENCE:]
         fewest = min(s.inverted for s in earlier)
         if min(s.inverted for s in recent) < fewest:
             return False
@@ -149,33 +152,32 @@ class Run:
         return max((s.qhat for s in recent if s.inverted == fewest), default=-math.inf) < best + LEAST_GAIN
 
 
-@dataclass(frozen=True)
-class Standing:
-    """Where a mesh stands in the comparison of meshes on the way."""
+def precision_of(mesh: Mesh) -> Precision:
+    """How exactly the coordinates of a mesh are known, in the units of ``planar_points``."""
+    return Precision.of(single=mesh.single, exponent=scale_exponent(mesh))
 
-    inverted: int
-    qhat: float
-    min_shape: float
-    mean_shape: float
 
-    @classmethod
-    def of(cls, sums: Floats, triangles: int, best_by: str) -> Standing:
-        """From the rows of sums that kernels.quality.summarise leaves."""
-        if triangles == 0:
-            return cls(0, math.nan, math.inf, math.nan)
-        low, high, shape = (float(sums[:, k].sum()) / triangles for k in range(3))
-        worst_low, worst_high = float(sums[:, kernels.MIN_LOW].min()), float(sums[:, kernels.MAX_HIGH].max())
-        worst_shape = float(sums[:, kernels.MIN_SHAPE].min())
-        low, worst_low, worst_high, high = map(math.degrees, (low, worst_low, worst_high, high))
-        mean, worst = shape, worst_shape
-        if best_by == ASPECT:
-            mean = float(sums[:, kernels.SUM_ASPECT].sum()) / triangles
-            worst = float(sums[:, kernels.MIN_ASPECT].min())
-        qhat = weighted_metric(low, worst_low, worst_high, high, mean, worst)
-        return cls(int(sums[:, kernels.INVERTED].sum()), qhat, worst_shape, shape)
+def outcome(
+    mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, best_by: str
+) -> tuple[Floats, NDArray[np.bool_], QualityReport]:
+    """Points (N, dim), which of them moved, and their measures; those of the input if the quick sums misjudged them.
 
-    def beats(self, other: Standing) -> bool:
-        """Fewer inverted cells first, then a larger q̂, by more than rounding."""
-        if self.inverted != other.inverted:
-            return self.inverted < other.inverted
-        return self.qhat > other.qhat + ROUNDING
+    best: (N, 2) in memory order. All nodes that it does not move keep their very bits.
+    """
+    elsewhere = (best != planar_points(mesh)[topology.memory]).any(axis=1)
+    moved = np.zeros(len(mesh.points), dtype=bool)
+    if elsewhere.any():
+        ids, plane = topology.memory[elsewhere], mesh.plane
+        assert plane is not None
+        points = mesh.points.copy()
+        points[np.ix_(ids, plane)] = np.ldexp(best[elsewhere], scale_exponent(mesh))
+        moved[ids] = True
+        after = measure(mesh.with_points(points), topology)
+        if (after.inverted, -_qhat(after, best_by)) <= (before.inverted, -_qhat(before, best_by)):
+            return points, moved, after
+        moved[:] = False
+    return mesh.points, moved, before
+
+
+def _qhat(report: QualityReport, best_by: str) -> float:
+    return report.qhat_aspect if best_by == ASPECT else report.qhat

@@ -7,7 +7,7 @@ area is the positive one), and the memory order of the nodes, which does not inf
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -137,6 +137,15 @@ class Topology:
             # In the order of the node ids, so that colours follow from the connectivity alone.
             near_colours=connectivity.colour(position[free], start, ring, is_free[memory]),
         )
+
+    def holding(self, chosen: Flags, reason: str) -> Topology:
+        """The same, with the free nodes among the chosen (N,) by id held for this reason."""
+        newly = self.free[chosen[self.free]]
+        if not len(newly):
+            return self
+        colours = np.where(chosen[self.memory], -1, self.near_colours).astype(np.int32)
+        held = {**self.held, reason: newly.astype(np.int64)}
+        return replace(self, held=held, free=self.free[~chosen[self.free]], near_colours=colours)
 
     @cached_property
     def stars(self) -> Stars:

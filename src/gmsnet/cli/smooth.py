@@ -11,7 +11,7 @@ from gmsnet.cli.signals import Deferral, Interrupted
 from gmsnet.errors import GmsnetError, InputError
 
 if TYPE_CHECKING:
-    from gmsnet.cli.target import Target
+    from gmsnet.cli.target import Target as Output
     from gmsnet.engine import Sweep
     from gmsnet.mesh import Mesh
 
@@ -35,16 +35,40 @@ def smooth(
     ] = None,
     method: Annotated[
         str, typer.Option(help="The smoother; see 'gmsnet methods'.", autocompletion=_method_names)
-    ] = "gmsnet",
+    ] = "auto",
     variant: Annotated[str | None, typer.Option(help="A variant of the method; see 'gmsnet methods'.")] = None,
     objective: Annotated[str | None, typer.Option(help="What 'optimize' minimises; see 'gmsnet methods'.")] = None,
     max_sweeps: Annotated[int, typer.Option(min=0, help="Visit each node at most this often.")] = 100,
     target_quality: Annotated[
         float | None,
         typer.Option(
-            help="Stop once the least 1/q of a cell is at least this, in (0, 1]; exit code 1 if it is not met."
+            help="Smooth only around cells whose 1/q is below this, in (0, 1], until none is; exit code 1 if some stay."
         ),
     ] = None,
+    target_angle: Annotated[
+        float | None, typer.Option(help="The same for the least angle of a cell, in degrees, in (0, 60].")
+    ] = None,
+    guard: Annotated[
+        str,
+        typer.Option(
+            help="What each sweep keeps: valid (no cell is inverted), worst (besides, the worst cell of the mesh does "
+            "not get worse) or star (nor does the worst one around any node).",
+            autocompletion=lambda: ["valid", "worst", "star"],
+        ),
+    ] = "worst",
+    preserve: Annotated[
+        str,
+        typer.Option(
+            help="shape: hold layers of cells that are stretched on purpose; size: keep the areas of cells, too; none.",
+            autocompletion=lambda: ["shape", "size", "none"],
+        ),
+    ] = "shape",
+    fix_layers: Annotated[
+        bool, typer.Option("--fix-layers", help="Hold layers of stretched cells whatever --preserve says.")
+    ] = False,
+    untangle: Annotated[
+        bool, typer.Option("--untangle/--no-untangle", help="Mend inverted cells first, where there are any.")
+    ] = True,
     best_by: Annotated[
         str, typer.Option(help="Which 1/q says which mesh is the best: shape, or aspect (Verdict's, as in the paper).")
     ] = "shape",
@@ -79,8 +103,11 @@ def smooth(
     """Smooth a mesh: move its free nodes so that its triangles become better, and change nothing else.
 
     Boundary, interfaces between regions and the nodes of markers stay where they are, and no cell that is valid
-    becomes invalid. The result is never worse than the input. Formats are told by the suffix: .su2 .msh .vtk .vtu .mesh
-    .node/.ele .stl .obj .off .ply; OUT of another format than IN is converted.
+    becomes invalid. Inverted cells are mended first. The worst cell never gets worse, and the result is never worse
+    than the input. Exit code 1: a target is missed, or cells are inverted still.
+
+    Formats are told by the suffix: .su2 .msh .vtk .vtu .mesh .node/.ele .stl .obj .off .ply; OUT of another format
+    than IN is converted.
 
     Ctrl-C stops the smoothing; the best mesh so far is written. A second one ends at once and writes nothing.
     """
@@ -97,12 +124,16 @@ def smooth(
     from gmsnet.cli.fix import fixed_nodes
     from gmsnet.cli.progress import Progress
     from gmsnet.cli.smooth_report import Outcome
-    from gmsnet.engine import refuse_unless_planar
+    from gmsnet.engine import check_options, refuse_unless_planar
     from gmsnet.engine import smooth as run
-    from gmsnet.methods import smoother
+    from gmsnet.targets import Target
 
     choice: dict[str, Any] = {"variant": variant, "objective": objective, "weights": weights, "seed": seed}
-    smoother(method, **choice)  # so that a wrong name is told before a large file is read
+    options: dict[str, Any] = {
+        "max_sweeps": max_sweeps, "threads": threads, "target_quality": target_quality, "target_angle": target_angle,
+        "best_by": best_by, "guard": guard, "preserve": preserve, "fix_layers": fix_layers, "untangle": untangle,
+    }  # fmt: skip
+    check_options(method, **choice, **options)  # so that what is wrong is told before a large file is read
     written: str | None = None
     lost: list[str] = []
     try:
@@ -130,12 +161,9 @@ def smooth(
             result = run(
                 mesh,
                 method,
-                max_sweeps=max_sweeps,
-                threads=threads,
-                target_quality=target_quality,
                 fixed=fixed,
                 callback=after_sweep,
-                best_by=best_by,
+                **options,
                 **choice,
             )
             interruption.begin()
@@ -148,7 +176,9 @@ def smooth(
                 progress.stage(f"drawing {plot}")
                 _draw(mesh, result.mesh, plot, written)
 
-        outcome = Outcome(input, written, method, mesh, result, target_quality, lost, plot, choice)
+        outcome = Outcome(
+            input, written, method, mesh, result, Target(target_quality, target_angle), lost, plot, choice
+        )  # fmt: skip
         if json:
             outcome.print_json()
         elif not quiet:
@@ -157,12 +187,13 @@ def smooth(
         if written is None:
             raise
         raise Interrupted(f"interrupted; the mesh is written to {written}") from None
-    if not outcome.target_met:
-        typer.echo(f"gmsnet: target not met: {outcome.shortfall()}", err=True)
+    if faults := outcome.faults():
+        for fault in faults:
+            typer.echo(f"gmsnet: {fault}", err=True)
         raise typer.Exit(1)
 
 
-def _check_conversion(mesh: Mesh, target: Target) -> None:
+def _check_conversion(mesh: Mesh, target: Output) -> None:
     """Raise now what writing would raise after the work: the format of the output cannot hold the mesh."""
     from gmsnet.io.files import output_format
 

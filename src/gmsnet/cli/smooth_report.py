@@ -9,12 +9,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet import engine
 from gmsnet.cli import output, report
 from gmsnet.cli.target import shown
 from gmsnet.engine import SmoothResult
 from gmsnet.mesh import Mesh
+from gmsnet.targets import Target
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +32,7 @@ class Outcome:
     method: str
     mesh: Mesh
     result: SmoothResult
-    target: float | None
+    target: Target
     lost: list[str]
     plot: str | None
     choice: Mapping[str, Any] = field(default_factory=dict)
@@ -40,17 +42,49 @@ class Outcome:
         """The least 1/q of a cell after smoothing; infinite where there are no triangles."""
         return float(self.result.after.shape.min(initial=math.inf))
 
+    @cached_property
+    def missed(self) -> NDArray[np.int64]:
+        """Rows of the cells that miss the target as they are now, if any was asked for, the worst first."""
+        after = self.result.after
+        missed = np.flatnonzero(self.target.missed(after.shape, after.min_angle))
+        return missed[np.argsort(after.shape[missed], kind="stable")]
+
     @property
     def target_met(self) -> bool:
-        """Whether the cells as they are now reach the target quality, if any was asked for."""
-        return self.target is None or self.least >= self.target
+        """Whether the cells as they are now reach the target."""
+        return not len(self.missed)
+
+    def faults(self) -> list[str]:
+        """What was asked for and is not so: cells that miss the target, cells that are inverted still."""
+        faults = []
+        if not self.target_met:
+            faults.append(f"target not met: {self.shortfall()}")
+        if self.result.after.inverted:
+            faults.append(f"inverted still: {self.tangle()}")
+        return faults
 
     def shortfall(self) -> str:
         """By how much the target is missed, and by which cells."""
-        assert self.target is not None
-        gap = self.target - self.least
-        cells = report.below(self.result.after, self.target)
-        return f"the least 1/q is {self.least:.4g}, {gap:.4g} below {self.target:g}; {cells}"
+        after = self.result.after
+        figures = []
+        if self.target.quality is not None and self.least < self.target.quality:
+            figures.append(f"the least 1/q is {self.least:.4g}, {self.target.quality - self.least:.4g} below")
+        angle = float(after.min_angle.min(initial=math.inf))
+        if self.target.angle is not None and angle < self.target.angle:
+            figures.append(f"the least angle is {angle:.4g}°, {self.target.angle - angle:.4g}° below")
+        return f"{'; '.join([*figures, str(self.target)])}; {report.named_cells(after, self.missed)} below it"
+
+    def tangle(self) -> str:
+        """Which cells are inverted still, where, and why as far as that is known."""
+        after = self.result.after
+        rows = np.flatnonzero(after.valid <= 0)
+        why = {cell.cell: cell.reason for cell in self.result.unmended}
+        first = [
+            f"cell {cell} at {' '.join(f'{value:.6g}' for value in centre)}: {why.get(cell, 'not mended')}"
+            for cell, centre in zip(after.cell[rows].tolist(), after.centre[rows].tolist(), strict=True)
+        ][: report.NAMED]
+        more = f"; and {len(rows) - len(first):,} more" if len(rows) > len(first) else ""
+        return f"{report.amount(len(rows), 'cell')} (numbers from 0): {'; '.join(first)}{more}"
 
     @cached_property
     def worst(self) -> list[dict[str, Any]]:
@@ -72,6 +106,8 @@ class Outcome:
             console.print(report.worst_table(self.worst))
             console.print()
         console.print(self.verdict())
+        for note in self.result.notes:
+            console.print(note)
         if result.held and self.free:
             held = len(self.mesh.points) - self.free
             console.print(f"held: {held:,} of {report.amount(len(self.mesh.points), 'node')} ({self._reasons()})")
@@ -127,9 +163,12 @@ class Outcome:
                 "held": {reason: len(ids) for reason, ids in result.held.items()},
                 "sweeps": result.sweeps,
                 "stop_reason": result.stop_reason,
-                "target_quality": self.target,
+                "target_quality": self.target.quality,
+                "target_angle": self.target.angle,
                 "target_met": self.target_met,
-                "below_target": 0 if self.target is None else int((after.shape < self.target).sum()),
+                "below_target": len(self.missed),
+                "notes": result.notes,
+                "unmended": [cell._asdict() for cell in result.unmended],
                 "worst": self.worst,
                 "lost": self.lost,
                 "history": [asdict(sweep) for sweep in result.history],

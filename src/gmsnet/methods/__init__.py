@@ -7,12 +7,13 @@ import os
 from collections.abc import Iterable
 
 from gmsnet.errors import InputError
-from gmsnet.methods import angle, barrier, cpt, cvt, getme, gmsnet, laplacian, nn, optimize
+from gmsnet.methods import angle, auto, barrier, cpt, cvt, getme, gmsnet, laplacian, nn, optimize, worst_first
 from gmsnet.methods.base import Field, Method, Options, Smoother, StarSmoother, Tally
 
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
+        auto.METHOD,
         gmsnet.METHOD,
         laplacian.METHOD,
         angle.METHOD,
@@ -21,6 +22,7 @@ METHODS: dict[str, Method] = {
         getme.METHOD,
         optimize.METHOD,
         barrier.METHOD,
+        worst_first.METHOD,
         nn.METHOD,
     )
 }

@@ -7,7 +7,6 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, Precision, most_ratios, star_floors
 from gmsnet.kernels.stars import Blocks
+from gmsnet.standing import Standing
 from gmsnet.topology import Topology
 from gmsnet.workers import Share
 
@@ -49,27 +49,33 @@ class Field:
         return Guard(*self.precision, self.level, floor, floors)
 
 
-class Smoother(Protocol):
+class Smoother(ABC):
     """A method ready for one run.
 
-    settled: it has its own rule when to stop, and that has come true.
+    settled: it has its own rule when to stop, and that has come true. looks: the mesh is worth measuring after the last
+    sweep. idle_ends: a sweep that moved nothing is the last. stage: what of the method the last sweep was, "" for
+    methods of one stage.
     """
 
-    settled: bool
+    settled = False
+    looks = True
+    idle_ends = True
+    stage = ""
 
+    @abstractmethod
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """Visits the mesh once: about as many shifts as there are free nodes. Returns what happened to them.
 
         share: runs kernels on ranges, on threads where that pays. test: measures the mesh as it stands, keeps it if it
         is the best so far, and tells whether it is; for methods that look more often than after each sweep.
         """
-        ...
+
+    def told(self, standing: Standing) -> None:  # noqa: B027 (most methods need not know)
+        """How the mesh stands before the first sweep and at each look."""
 
 
-class StarSmoother(ABC):
+class StarSmoother(Smoother):
     """A method that looks at one star at a time: a sweep visits colour after colour."""
-
-    settled = False
 
     @abstractmethod
     def visit(

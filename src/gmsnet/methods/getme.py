@@ -40,7 +40,7 @@ TRANSFORMATIONS = {  # θ, λ, ρ, η
 }
 
 
-class SequentialGetme:
+class SequentialGetme(Smoother):
     """The worst element first.
 
     A sweep makes as many steps as there are free nodes, rounded to whole periods between tests, one at least. A period
@@ -71,10 +71,8 @@ class SequentialGetme:
         return tally
 
 
-class SimultaneousGetme:
+class SimultaneousGetme(Smoother):
     """All elements at once; then the guard moves the nodes, colour by colour."""
-
-    settled = False
 
     def __init__(self, transformation: Transformation) -> None:
         self.transformation = transformation

@@ -34,6 +34,7 @@ class Contender:
         return smooth(
             mesh, self.method, variant=self.variant or None, objective=self.objective or None, max_sweeps=sweeps,
             threads=1, best_by=ASPECT, guard="valid",
+            preserve="none",
         )  # fmt: skip
 
     def smoother(self) -> Smoother:

@@ -43,7 +43,8 @@ def smooth_all(context: Context, case: str, loss: str, seed: int) -> Result:
         context.go_on()
         mesh = CASES[case].mesh(run, context.plan.seed)
         result = smooth(
-            mesh, "gmsnet", weights=weights, max_sweeps=context.plan.sweeps, threads=1, best_by=ASPECT, guard="valid",
+            mesh, "gmsnet", weights=weights, max_sweeps=context.plan.sweeps, threads=1, best_by=ASPECT,
+            guard="valid", preserve="none",
         )  # fmt: skip
         runs.append({"after": result.after.summary(), "sweeps": result.sweeps})
     return Result({"runs": runs})
