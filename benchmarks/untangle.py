@@ -28,7 +28,7 @@ from gmsnet.measure import exact_signs
 from gmsnet.topology import Topology, planar_points, scale_exponent
 from gmsnet.untangle import untangle
 from gmsnet.untangle.patch import Patch, in_order
-from gmsnet.untangle.road import whole
+from gmsnet.untangle.road import LAST_PATIENCE, whole
 from gmsnet.untangle.tangle import Tangle
 
 REAL = (
@@ -66,7 +66,7 @@ def tangled(mesh, topology, severity, seed):
 def by_lbfgs(points, topology, precision):
     """The cells that whole-mesh L-BFGS leaves inverted."""
     tangle = Tangle(points, topology, precision)
-    whole(tangle, Patch.of(topology, in_order(topology, topology.near_colours >= 0)))
+    whole(tangle, Patch.of(topology, in_order(topology, topology.near_colours >= 0)), LAST_PATIENCE)
     return tangle.look()
 
 
@@ -115,7 +115,7 @@ def main():
             if row["after"] or row["lbfgs_after"]:
                 failed = "FAILED" if row["after"] else "L-BFGS failed"
                 print(f"{failed}: {name}, {severity}: {row}", flush=True)
-    heads = "severity meshes mended share L-BFGS ms(median) ms(L-BFGS) ratio(median) inverted-before".split()
+    heads = ("severity", "meshes", "mended", "share", "L-BFGS", "ms", "ms(L-BFGS)", "times", "inverted before")
     print(("{:>18}" + "{:>16}" * (len(heads) - 1)).format(*heads))
     for severity in (*SEVERITIES, "all"):
         chosen = [r for r in rows if severity in (r["severity"], "all") and r["before"]]

@@ -206,6 +206,21 @@ def find_violated(points, before, triangles, turn, was_bad, floor, unit, grain, 
 
 
 @kernel
+def find_slivers(points, before, triangles, turn, limit, slivers):
+    """Marks the cells with a node that has moved whose D/L is below a limit."""
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        slivers[t] = False
+        for i in (a, b, c):
+            if points[i, 0] != before[i, 0] or points[i, 1] != before[i, 1]:
+                slivers[t] = True
+        if slivers[t]:
+            if turn[t] < 0:
+                b, c = c, b
+            slivers[t] = share(points, a, b, c) < limit
+
+
+@kernel
 def share(points, a, b, c):
     """D/L of the triangle a, b, c; 0 where all its nodes are in one place."""
     px, py = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]

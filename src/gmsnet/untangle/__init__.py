@@ -7,7 +7,7 @@ from gmsnet.topology import Topology
 from gmsnet.untangle.patch import Floats
 from gmsnet.untangle.reasons import reasons
 from gmsnet.untangle.result import ALL, NOTHING, PART, Stage, Unmended, Untangled
-from gmsnet.untangle.road import follow
+from gmsnet.untangle.road import follow, polish
 from gmsnet.untangle.tangle import Precision, Tangle
 from gmsnet.untangle.transaction import guarded, moved, take
 
@@ -33,6 +33,10 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     if tangle.left and tangle.bad_nodes().any():
         stages.append(guarded(tangle))
         taken = PART if taken == NOTHING and moved(tangle).any() else taken
+    if taken != NOTHING:
+        stages.append(polish(tangle))
     after = int((exact_signs(tangle.points, topology.near, topology.near_turn) <= 0).sum())
     sweeps = sum(stage.sweeps for stage in stages)
-    return Untangled(tangle.points, before, after, taken, why, tuple(stages), reasons(tangle, sweeps))
+    return Untangled(
+        tangle.points, before, after, taken, why, tuple(stages), reasons(topology, tangle.points, tangle.bad, sweeps)
+    )

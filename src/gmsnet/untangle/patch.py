@@ -53,6 +53,10 @@ class Patch:
         """(count,) places in memory of the moved nodes."""
         return self.every[: self.count]
 
+    def only(self, topology: Topology, wanted: Flags) -> Patch:
+        """The wanted ones (parts,) of its pieces, as one patch."""
+        return self if wanted.all() else Patch.of(topology, self.nodes[wanted[self.part]])
+
     def pieces(self, topology: Topology, wanted: Flags) -> Iterator[Patch]:
         """The wanted ones (parts,) of its pieces, as patches."""
         for piece in np.flatnonzero(wanted):

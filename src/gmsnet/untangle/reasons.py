@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.optimize
+import scipy.sparse
 
 from gmsnet.measure import exact_signs
 from gmsnet.topology import Topology
 from gmsnet.untangle.crossings import held_edges, near_crossings
-from gmsnet.untangle.patch import Floats
+from gmsnet.untangle.patch import Flags, Floats
 from gmsnet.untangle.result import Unmended
-from gmsnet.untangle.tangle import Tangle
 
 HELD = "all its nodes are held"
 CROSSING = "the boundary crosses itself here"
 HELD_CROSSING = "edges whose nodes are held cross each other here"
 EMPTY = "no position of its free node makes all triangles of its star positive"
+CLUSTER = 100  # bad cells around one that cannot be mended, at most: more may have reasons of their own
 ROUNDING = "it is positive, but by no more than its coordinates may be off by"
 
 
-def reasons(tangle: Tangle, sweeps: int) -> tuple[Unmended, ...]:
-    """One row for each bad cell, ascending."""
-    topology, points = tangle.topology, tangle.points
-    rows = np.flatnonzero(tangle.bad)
+def reasons(topology: Topology, points: Floats, bad: Flags, sweeps: int) -> tuple[Unmended, ...]:
+    """One row for each bad cell (T, bool), ascending. sweeps: how many there were."""
+    rows = np.flatnonzero(bad)
     if not len(rows):
         return ()
     cells = topology.near[rows]
@@ -46,6 +46,19 @@ def reasons(tangle: Tangle, sweeps: int) -> tuple[Unmended, ...]:
             reason, place = HELD_CROSSING, fixed[k]
         out.append(Unmended(row, reason, (float(place[0]), float(place[1]))))
     return tuple(out)
+
+
+def proven(topology: Topology, points: Floats, bad: Flags) -> bool:
+    """Is there, for each bad cell or a few that hang together with it, a reason that no larger patch does away with?"""
+    rows = reasons(topology, points, bad, 0)
+    cells = topology.near[bad]
+    nodes, count = len(points), len(rows)
+    own = np.repeat(np.arange(count), 3)
+    graph = scipy.sparse.csr_matrix((np.ones(3 * count), (own, count + cells.ravel())), shape=(count + nodes,) * 2)
+    cluster = scipy.sparse.csgraph.connected_components(graph, directed=False)[1][:count]
+    known = np.array([row.reason in (CROSSING, HELD, EMPTY, HELD_CROSSING) for row in rows])
+    size, reasons_known = np.bincount(cluster), np.bincount(cluster, known)
+    return bool(known.all() or ((reasons_known > 0) & (size <= CLUSTER))[cluster].all())
 
 
 def has_no_place(points: Floats, topology: Topology, v: int, known: dict[int, bool]) -> bool:

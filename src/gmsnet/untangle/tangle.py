@@ -76,14 +76,18 @@ class Tangle:
         """As they will be kept."""
         return points.astype(np.float32).astype(np.float64) if self.precision.single else points
 
-    def certified(self, points: Floats, patch: Patch) -> bool:
-        """Are all cells of a patch certified, its points (m, 2) rounded?"""
+    def uncertified(self, points: Floats, patch: Patch) -> int:
+        """How many cells of a patch are not certified, its points (m, 2) rounded."""
         precision = self.precision
         kept = points
         if precision.single:
             kept = points.copy()
             kept[: patch.count] = self.rounded(points[: patch.count])
-        return not kernels.uncertified(kept, patch.cells, precision.unit, precision.grain)
+        return int(kernels.uncertified(kept, patch.cells, precision.unit, precision.grain))
+
+    def certified(self, points: Floats, patch: Patch) -> bool:
+        """Are all cells of a patch certified, its points (m, 2) rounded?"""
+        return not self.uncertified(points, patch)
 
     def put(self, points: Floats, patch: Patch) -> None:
         """Takes over the moved points of a patch (m, 2)."""

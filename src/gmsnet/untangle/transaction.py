@@ -13,7 +13,7 @@ import numpy as np
 from gmsnet.kernels import untangle as kernels
 from gmsnet.kernels import untangle_barrier as barrier
 from gmsnet.untangle import road
-from gmsnet.untangle.patch import Flags, Patch, free_nodes_of, in_order
+from gmsnet.untangle.patch import Flags, free_nodes_of
 from gmsnet.untangle.result import ALL, NOTHING, PART, Stage
 from gmsnet.untangle.tangle import Tangle
 
@@ -35,8 +35,8 @@ def take(tangle: Tangle) -> tuple[str, str]:
             break
         first = first or count
         put_back(tangle, free_nodes_of(topology, violated) & moved(tangle))
-    gains_alone(tangle)
     tangle.look()
+    road.keep_gains(tangle, tangle.before, tangle.was_bad)
     left = moved(tangle).sum()
     if left == tried:
         return (ALL, "") if left else (NOTHING, "no inverted cell has a node that may move")
@@ -61,21 +61,6 @@ def put_back(tangle: Tangle, nodes: Flags) -> None:
     tangle.points[nodes] = tangle.before[nodes]
 
 
-def gains_alone(tangle: Tangle) -> None:
-    """Of the pieces that have moved, those in which no fewer cells are inverted go back."""
-    topology = tangle.topology
-    tangle.look()
-    patch = Patch.of(topology, in_order(topology, moved(tangle)))
-    piece = np.full(len(tangle.points), -1, dtype=np.int32)
-    piece[patch.nodes] = patch.part
-    of_cell = piece[topology.near].max(axis=1)  # no cell has nodes of two
-    before, after = (
-        np.bincount(of_cell[flags & (of_cell >= 0)], minlength=patch.parts) for flags in (tangle.was_bad, tangle.bad)
-    )
-    useless = after >= before
-    put_back(tangle, (piece >= 0) & useless[piece] if patch.parts else piece >= 0)
-
-
 def guarded(tangle: Tangle) -> Stage:
     """Barrier sweeps around what is left that never do what ``take`` would take back; all or no gain per piece."""
     patch = tangle.around(GUARDED_RINGS)
@@ -90,6 +75,5 @@ def guarded(tangle: Tangle) -> Stage:
         if not road.sweep(tangle, patch, points, scale, epsilon, barrier.GUARDED, floor):
             break
     tangle.put(points, patch)
-    gains_alone(tangle)
-    tangle.look()
+    road.keep_gains(tangle, tangle.before, tangle.was_bad)
     return Stage("barrier, guarded", patch.count, sweeps, tangle.left)
