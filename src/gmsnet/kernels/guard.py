@@ -128,11 +128,11 @@ def permitted(was, now, delta, floor):
 
 
 @kernel
-def most_ratios(points, triangles, turn, unit, grain, first, last, least):
-    """The least ``most_of`` over each block of LANES triangles in first…last, into ``least``."""
+def most_ratios(points, triangles, turn, blocks, unit, grain, first, last, least):
+    """The least ``most_of`` over each of the blocks of LANES triangles with the places first…last, into ``least``."""
     block, ratio = np.empty(6 * LANES), np.empty(LANES)
     for number in range(first, last):
-        start = number * LANES
+        start = blocks[number] * LANES
         for lane in range(LANES):
             t = min(start + lane, len(triangles) - 1)
             a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]

@@ -5,16 +5,14 @@
 - Newton sweeps on the barrier Σq, which bring the rest and keep cells from collapsing.
 - worst-first: the worst few cells alone, on high powers of q.
 
-After each stage the mesh is measured: Newton sweeps go on as long as q̂ rises by more than GAIN, and as long as all
-stages together bring more than GAIN they start over with Newton sweeps. What each stage is worth
-is measured by ``benchmarks/auto.py``. The variant ``patch`` leaves the cheap sweeps out; it is what a target
-(``target_quality``, ``target_angle``) uses on the patches around the cells that miss it, which others surround that are
-good as they are.
+After each stage the mesh is measured; pairs of Newton sweeps go on as long as they bring more than GAIN in the mean of
+1/q. What each stage is worth is measured by ``benchmarks/auto.py``. The variant ``patch`` leaves the cheap sweeps out;
+it is what a target (``target_quality``, ``target_angle``) uses on the patches around the cells that miss it, which
+others surround that are good as they are.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -26,7 +24,7 @@ from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.standing import Standing
 from gmsnet.workers import Share
 
-GAIN = 0.002  # in q̂: what a stage must bring to be made once more
+GAIN = 0.004  # in the mean of 1/q: what the sweeps of a stage must bring to be made once more
 
 
 class Stage(NamedTuple):
@@ -42,7 +40,7 @@ class Stage(NamedTuple):
 
 
 CHEAP = Stage("smart Laplacian", lambda: Laplacian("smart"), 2)
-NEWTON = Stage("Newton on q", lambda: Barrier("q"), 4, repeats=True)
+NEWTON = Stage("Newton on q", lambda: Barrier("q"), 2, repeats=True)
 WORST = Stage("worst first", WorstFirst, None)
 
 VARIANTS = {"full": (CHEAP, NEWTON, WORST), "patch": (NEWTON, WORST)}
@@ -56,7 +54,6 @@ class Auto(Smoother):
     def __init__(self, stages: Sequence[Stage] = VARIANTS["full"]) -> None:
         self.stages = stages
         self.last: Standing | None = None  # at the last look
-        self.round: Standing | None = None  # when the stages began
         self._enter(0)
 
     def _enter(self, stage: int) -> None:
@@ -74,25 +71,16 @@ class Auto(Smoother):
 
     def told(self, standing: Standing) -> None:
         """Goes on to the next stage, or makes this one again, or settles."""
-        if self.last is None or self.round is None:  # nothing is done yet
-            self.last = self.round = standing
+        last, self.last = self.last, standing
+        if last is None:  # nothing is done yet
             return
-        gained = gain(self.last, standing)
-        self.last = standing
-        if gained > GAIN and self.stages[self.at].repeats:
+        gains = standing.inverted < last.inverted or standing.mean_shape > last.mean_shape + GAIN
+        if gains and self.stages[self.at].repeats:
             self.made = 0
         elif self.at + 1 < len(self.stages):
             self._enter(self.at + 1)
-        elif gain(self.round, standing) > GAIN:
-            self.round = standing
-            self._enter(next((k for k, stage in enumerate(self.stages) if stage.repeats), 0))
         else:
             self.settled = True
-
-
-def gain(before: Standing, after: Standing) -> float:
-    """In q̂; infinite where cells were mended."""
-    return math.inf if after.inverted < before.inverted else after.qhat - before.qhat
 
 
 METHOD = Method(

@@ -6,7 +6,7 @@ import math
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from gmsnet.workers import Share
 Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.stars)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Field:
     """What is smoothed. points: (N, 2) in memory order, changed in place by the guard alone. level: of the guard."""
 
@@ -29,24 +29,52 @@ class Field:
     topology: Topology
     precision: Precision
     level: int = VALID
+    floor: Floor = field(default_factory=lambda: Floor())
 
     def guard(self, share: Share) -> Guard:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
-        triangles, turn = self.topology.changeable
-        unit, grain, _ = self.precision
         floor, floors = -math.inf, np.empty(0)
         if self.level == WORST:
-            least = np.empty(-(-len(triangles) // LANES))
-
-            def look(first: int, last: int) -> None:
-                most_ratios(self.points, triangles, turn, unit, grain, first, last, least)
-
-            share(look, 0, len(least))
-            floor = float(least.min(initial=math.inf))
+            floor = self.floor.of(self.points, self.topology, self.precision, share)
         elif self.level == STAR:
             floors = np.empty(len(self.points))
+            triangles, turn = self.topology.changeable
+            unit, grain, _ = self.precision
             star_floors(self.points, triangles, turn, self.topology.near_free, unit, grain, floors)
         return Guard(*self.precision, self.level, floor, floors)
+
+
+class Floor:
+    """The floor of the level WORST. Any cell's D/L is an upper bound of the worst one's, and so a floor that keeps it.
+
+    Which blocks of triangles hold the worst changes slowly. Therefore all are looked at only every LOOKS-th time, and
+    between only those that were the worst then, one in SHARE. A floor that is too high by that holds a few stars back
+    until the next look at all.
+    """
+
+    LOOKS, SHARE, FEWEST = 4, 16, 64
+
+    def __init__(self) -> None:
+        self.asked = 0
+        self.blocks = np.empty(0, dtype=np.int32)
+
+    def of(self, points: NDArray[np.float64], topology: Topology, precision: Precision, share: Share) -> float:
+        """An upper bound of the least D/L of the triangles with a free node, as the points are now."""
+        triangles, turn = topology.changeable
+        count = -(-len(triangles) // LANES)
+        everywhere = self.asked % self.LOOKS == 0
+        self.asked += 1
+        blocks = np.arange(count, dtype=np.int32) if everywhere else self.blocks
+        least = np.empty(len(blocks))
+
+        def look(first: int, last: int) -> None:
+            most_ratios(points, triangles, turn, blocks, precision.unit, precision.grain, first, last, least)
+
+        share(look, 0, len(blocks))
+        if everywhere:
+            worst = max(self.FEWEST, count // self.SHARE)
+            self.blocks = blocks if worst >= count else np.sort(np.argpartition(least, worst)[:worst]).astype(np.int32)
+        return float(least.min(initial=math.inf))
 
 
 class Smoother(ABC):
