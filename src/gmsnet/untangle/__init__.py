@@ -35,7 +35,9 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
         taken = PART if taken == NOTHING and moved(tangle).any() else taken
     if taken != NOTHING:
         stages.append(polish(tangle))
-    after = int((exact_signs(tangle.points, topology.near, topology.near_turn) <= 0).sum())
+    after = 0
+    if tangle.left:  # else all are certified that have moved or were not positive
+        after = int((exact_signs(tangle.points, topology.near, topology.near_turn) <= 0).sum())
     sweeps = sum(stage.sweeps for stage in stages)
     return Untangled(
         tangle.points, before, after, taken, why, tuple(stages), reasons(topology, tangle.points, tangle.bad, sweeps)

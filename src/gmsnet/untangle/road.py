@@ -70,13 +70,15 @@ def keep_gains(tangle: Tangle, before: Floats, bad: Flags) -> None:
 
 def bad_stars(tangle: Tangle) -> Stage:
     """Laplacian sweeps over the stars that have a bad cell at the time."""
-    visited = np.zeros(len(tangle.points), dtype=bool)
+    chosen = tangle.bad_nodes()
+    visited = chosen.copy()
     sweeps = 0
-    while sweeps < LAPLACIAN_SWEEPS and (chosen := tangle.bad_nodes()).any():
-        visited |= chosen
+    while sweeps < LAPLACIAN_SWEEPS and chosen.any():
         tangle.average(in_order(tangle.topology, chosen), WEIGHING if sweeps < MEDIANS else 0)
-        tangle.look()
+        chosen = tangle.bad_among(chosen)
+        visited |= chosen
         sweeps += 1
+    tangle.look()
     return Stage("Laplacian, bad stars", int(visited.sum()), sweeps, tangle.left)
 
 
@@ -177,4 +179,4 @@ def polish(tangle: Tangle) -> Stage:
     for _ in range(POLISH):
         sweep(tangle, patch, points, scale, epsilon, barrier.CERTIFIED)
     tangle.put(points, patch)
-    return Stage("barrier, slivers", patch.count, POLISH, tangle.look())
+    return Stage("barrier, slivers", patch.count, POLISH, tangle.left)  # no cell changes its sign by that

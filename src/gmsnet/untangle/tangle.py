@@ -54,6 +54,18 @@ class Tangle:
         """(N,) the free nodes of bad cells."""
         return free_nodes_of(self.topology, self.bad)
 
+    def bad_among(self, moved: Flags) -> Flags:
+        """(N,) of some free nodes that may have moved, and of their neighbours, those with an uncertified cell."""
+        topology, precision = self.topology, self.precision
+        around = moved.copy()
+        kernels.grow(around, topology.near_start, topology.near_ring, 1)
+        nodes = np.flatnonzero(around)
+        shares = kernels.bad_shares(
+            self.points, nodes, topology.near_start, topology.near_ring, precision.unit, precision.grain
+        )
+        around[nodes[shares == 0.0]] = False
+        return around
+
     def average(self, nodes: Ints, weighing: int) -> None:
         """One Laplacian sweep over those of some free nodes that have bad cells, which no guard holds back.
 

@@ -22,6 +22,8 @@ GUARDED_SWEEPS, GUARDED_RINGS = 30, 2
 
 def take(tangle: Tangle) -> tuple[str, str]:
     """Takes back what cannot be taken; returns how much of what was moved is left, and why not all."""
+    if not tangle.left:
+        return ALL, ""
     precision, topology = tangle.precision, tangle.topology
     violated = np.empty(len(topology.near), dtype=bool)
     floor = worst(tangle)
