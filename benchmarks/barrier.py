@@ -6,11 +6,11 @@ counter-clockwise, D = a×b, κ = 1/√3 and w = ∇D = (a_y − b_y, b_x − a_
     q = κ(|a|² + |b|² − a·b)/D,   ∇q = −(κ(a + b) + q w)/D,   ∇²q = (2κI − w∇qᵀ − ∇q wᵀ)/D
 
 and q^p has p q^{p−1} ∇q and p q^{p−1} ∇²q + p(p − 1) q^{p−2} ∇q∇qᵀ. In the coordinates of one node it is convex, so
-the 2×2 blocks of the Hessian on the diagonal are positive definite: their inverses, at the place where the step starts,
-are L-BFGS's H₀ (times the usual γ; Nocedal, Wright: Numerical Optimization, section 7.2). Cells of q 1e6 beside cells
-of q 1 need that. The line search brackets a step that fulfils the weak Wolfe conditions (Lewis, Overton: Nonsmooth
-optimization via quasi-Newton methods, 2013, algorithm 4.6) between 0 and the largest step at which no triangle has
-come to area zero, which is exact: D is a quadratic function of the step.
+the 2×2 blocks of the Hessian on the diagonal are positive definite: their inverses, at the place where the step starts
+or some steps before it, are L-BFGS's H₀ (times the usual γ; Nocedal, Wright: Numerical Optimization, section 7.2).
+Cells of q 1e6 beside cells of q 1 need that. The line search brackets a step that fulfils the weak Wolfe conditions
+(Lewis, Overton: Nonsmooth optimization via quasi-Newton methods, 2013, algorithm 4.6) between 0 and the largest step at
+which no triangle has come to area zero, which is exact: D is a quadratic function of the step.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ PAIRS = 12  # steps that L-BFGS remembers
 ARMIJO, WOLFE = 1e-4, 0.9
 TRIALS = 60  # of one line search
 INSIDE = 0.95  # of the way to where a first triangle has area zero
+UNSTEADY, REFRESH = 100, 20  # the blocks are computed in each of the first iterations, then in every so many
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,8 +273,9 @@ def minimise(problem: Problem, start: np.ndarray, power: int, *, top: float = 1.
         steps[first], changes[first] = trial - points, trial_gradient - gradient
         count = min(count + 1, PAIRS) if dot(steps[first], changes[first]) > 0.0 else 0
         points = trial
-        value = evaluate(points, triangles, top, doublings, gradient, blocks)
-        gradient[~free] = 0.0
-        if iteration % 50 == 0:
+        value, gradient, trial_gradient = found, trial_gradient, gradient
+        if iteration < UNSTEADY or iteration % REFRESH == 0:
+            evaluate(points, triangles, top, doublings, gradient, blocks)
+            gradient[~free] = 0.0
             mean_distance(points, triangles, sizes)
     return Minimum(points, value, float(np.linalg.norm(gradient)), step, iteration, evaluations, step <= tolerance)
