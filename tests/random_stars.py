@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels import gmsnet as kernels_gmsnet
+from gmsnet.kernels import gmsnet2 as kernels_gmsnet2
 from gmsnet.kernels import nn as kernels_nn
 from gmsnet.kernels import stars as kernels_stars
 from gmsnet.kernels.compile import LANES
 from gmsnet.methods.gmsnet import fold
+from gmsnet.methods.gmsnet2 import fold as fold_gmsnet2
 from gmsnet.methods.nn import fold as fold_nn
 from gmsnet.weights import Weights, shapes
 
@@ -40,6 +42,15 @@ def random_nn_weights(rng, scale=0.5):
     return Weights(model="nn", tensors=tensors, metadata={})
 
 
+def random_gmsnet2_weights(rng, hidden=8, activation="silu", scale=0.5):
+    """Weights of an untrained network of GMSNet 2 whose last layer is not zero."""
+    tensors = {
+        name: (scale * rng.normal(size=shape) / shape[-1] ** 0.5).astype(np.float32)
+        for name, shape in shapes.gmsnet2(hidden).items()
+    }
+    return Weights(model="gmsnet2", tensors=tensors, metadata={"activation": activation})
+
+
 def proposed(stars, propose, dtype=np.float64):
     """What a kernel proposes for (centre, ring) pairs, as shifts in the coordinates of each star.
 
@@ -67,6 +78,17 @@ def compiled_shifts(stars, weights):
 
     def propose(local, n, shift):
         kernels_gmsnet.propose(local, n, folded, hidden, m, row, features, decoded, shift)
+
+    return proposed(stars, propose, np.float32)
+
+
+def compiled_gmsnet2_shifts(stars, weights):
+    """As ``compiled_shifts``, by GMSNet 2."""
+    network = fold_gmsnet2(weights)
+    work = kernels_gmsnet2.room(network, max(len(ring) for _, ring in stars))
+
+    def propose(local, n, shift):
+        kernels_gmsnet2.propose(local, n, network, work, shift)
 
     return proposed(stars, propose, np.float32)
 

@@ -40,7 +40,9 @@ def test_reads_what_was_written(tmp_path, hidden):
             tensor[0] = 0
 
 
-SHIPPED = [(model, variant) for model, variants in weights.SHIPPED.items() for variant in variants]
+SHIPPED = [
+    (model, variant) for model in ("gmsnet", "nn") for variant in weights.SHIPPED[model]
+]  # the paper's, all trained alike
 
 
 @pytest.mark.parametrize(("model", "variant"), SHIPPED)
@@ -68,6 +70,22 @@ def test_shipped_weights_tell_their_recipe(model, variant):
     assert float(metadata["validation_metric_loss"]) < float(metadata["validation_metric_loss_before"])
 
 
+def test_shipped_weights_of_gmsnet2_tell_their_recipe():
+    shipped = weights.load(model="gmsnet2")
+    metadata = shipped.metadata
+    assert shipped.parameters == 4 * shipped.hidden**2 + 11 * shipped.hidden + 3 == int(metadata["parameters"])
+    recipe = json.loads(metadata["recipe"])
+    assert (recipe["model"], recipe["hidden"], recipe["activation"]) == ("gmsnet2", shipped.hidden, shipped.activation)
+    assert metadata["command"].startswith("gmsnet train --model gmsnet2")
+    curve = json.loads(metadata["validation_curve"])["gmsnet2"]
+    assert curve[-1][0] == recipe["epochs"]
+    best = json.loads(metadata["validation_best_loss"])["gmsnet2"]
+    assert best == pytest.approx(float(metadata["validation_loss"]), abs=1e-5)
+    assert best < 0.2 * float(metadata["validation_loss_before"])
+    assert float(metadata["test_loss"]) == pytest.approx(best, rel=0.1)  # it has learned more than its meshes
+    assert float(metadata["test_metric_loss"]) < 0.11
+
+
 def test_shipped_gmsnet_comes_near_the_optimum_of_its_loss():
     metadata = weights.load().metadata
     assert weights.load().hidden == 8
@@ -78,6 +96,20 @@ def test_shipped_gmsnet_comes_near_the_optimum_of_its_loss():
 def test_variants_that_do_not_exist():
     with pytest.raises(InputError, match="no weights of gmsnet for 'q'; there are some for metric, cosine"):
         weights.load(variant="q")
+
+
+def test_weights_of_gmsnet2(tmp_path):
+    rng = np.random.default_rng(1)
+    tensors = {name: rng.normal(size=shape).astype(np.float32) for name, shape in weights.shapes.gmsnet2(5).items()}
+    metadata = {**METADATA, "model": "gmsnet2", "activation": "relu"}
+    loaded = weights.load(written(tmp_path / "w.safetensors", tensors, metadata), model="gmsnet2")
+    assert (loaded.hidden, loaded.activation, loaded.parameters) == (5, "relu", 4 * 25 + 11 * 5 + 3)
+    path = written(tmp_path / "w.safetensors", tensors, {**metadata, "activation": "tanh"})
+    with pytest.raises(InputError, match="the activation must be one of silu, relu, here it is 'tanh'"):
+        weights.load(path, model="gmsnet2")
+    path = written(tmp_path / "w.safetensors", {**tensors, "encode.bias": np.zeros(3, np.float32)}, metadata)
+    with pytest.raises(InputError, match="hidden width must lie between 4 and 64, here it is 3"):
+        weights.load(path, model="gmsnet2")
 
 
 def changed(**other):

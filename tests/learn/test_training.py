@@ -137,7 +137,7 @@ def test_metadata_tells_how_the_weights_were_made(tmp_path, whole):
     assert recipe["loss"] == "metric"
     assert metadata["command"] == SHORT.command
     assert metadata["command"] == (
-        "gmsnet train --epochs 12 --nodes-per-mesh 8 --patience 2 --seed 3 --mesh-seed 1 --hidden 4"
+        "gmsnet train --epochs 12 --nodes-per-mesh 8 --seed 3 --mesh-seed 1 --patience 2 --hidden 4"
     )
     assert metadata["parameters"] == "74"
     assert metadata["seed"] == "3"

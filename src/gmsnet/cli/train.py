@@ -23,11 +23,15 @@ STOPPED = 130  # exit code after Ctrl-C, as shells count it
 def train(
     context: typer.Context,
     out: Annotated[Path, typer.Option(help="Folder for weights, curves and checkpoint.")] = Path("gmsnet-training"),
-    model: Annotated[str, typer.Option(help="What is trained: gmsnet, or nn (NN-Smoothing).")] = "gmsnet",
+    model: Annotated[
+        str, typer.Option(help="What is trained: gmsnet, gmsnet2 (its successor), or nn (NN-Smoothing).")
+    ] = "gmsnet",
     loss: Annotated[
         str, typer.Option(help="What GMSNet minimises: metric (MetricLoss), q (aspect ratio), cosine, min-max-angle.")
     ] = "metric",
-    hidden: Annotated[int, typer.Option(help="Hidden features H of GMSNet; 2H² + 10H + 2 parameters.")] = 8,
+    hidden: Annotated[
+        int, typer.Option(help="Hidden features H of GMSNet (2H² + 10H + 2 parameters) and GMSNet 2 (4H² + 11H + 3).")
+    ] = 8,
     labels: Annotated[
         str,
         typer.Option(
@@ -35,9 +39,22 @@ def train(
             "paper), or star (where optimisation puts the node of each star as it stands)."
         ),
     ] = "mesh",
-    epochs: Annotated[int, typer.Option(help="Adam steps, one an epoch.")] = 4000,
+    activation: Annotated[str, typer.Option(help="Of GMSNet 2: silu, or relu.")] = "silu",
+    meshes: Annotated[
+        str, typer.Option(help="What GMSNet 2 learns from: uniform (random squares), or mixed (graded, stretched too).")
+    ] = "uniform",
+    warm_up: Annotated[int, typer.Option(help="Epochs of GMSNet 2 on single stars, before whole sweeps.")] = 4000,
+    sweep_rate: Annotated[
+        float, typer.Option(help="Learning rate of GMSNet 2 at the start of the epochs of whole sweeps.")
+    ] = 3e-3,
+    power: Annotated[int, typer.Option(help="p of the mean of q^p that whole sweeps of GMSNet 2 minimise.")] = 4,
+    epochs: Annotated[int, typer.Option(help="Adam steps, one an epoch; 6000 for GMSNet 2.")] = 4000,
     nodes_per_mesh: Annotated[
-        int, typer.Option(help="Nodes that an epoch draws from each training mesh, for each network.")
+        int,
+        typer.Option(
+            help="Nodes that an epoch draws from each training mesh, for each network; for GMSNet 2 those inside each "
+            "mesh of whole sweeps (250)."
+        ),
     ] = 32,
     learning_rate: Annotated[float, typer.Option(help="Learning rate at the start.")] = 1e-2,
     decay: Annotated[float, typer.Option(help="Factor of the learning rate when validation stalls.")] = 0.5,

@@ -8,6 +8,7 @@ from gmsnet.errors import MissingExtraError
 
 try:
     import torch
+    from torch.optim.lr_scheduler import LambdaLR, ReduceLROnPlateau
 
     with warnings.catch_warnings():
         # PyTorch Geometric compiles some of its own layers with torch.jit when it is imported.
@@ -22,4 +23,4 @@ except ModuleNotFoundError as error:
         f'training needs {error.name}, which is not installed: pip install "gmsnet[train]"'
     ) from error
 
-__all__ = ["Data", "GCNConv", "GraphNorm", "gcn_norm", "torch"]
+__all__ = ["Data", "GCNConv", "GraphNorm", "LambdaLR", "ReduceLROnPlateau", "gcn_norm", "torch"]

@@ -1,6 +1,7 @@
 """The state of a training in one file, so that it goes on after a kill as if nothing had happened.
 
-The draws of an epoch depend on the seed and the epoch's number alone, so there is no state of a generator to keep.
+The draws of an epoch depend on the seed and the epoch's number alone, so there is no state of a generator to keep;
+what a trainee has made of its meshes by then is kept.
 """
 
 from __future__ import annotations
@@ -17,12 +18,13 @@ from safetensors import SafetensorError, safe_open
 
 from gmsnet.errors import InputError
 from gmsnet.io.atomic import replace_files
-from gmsnet.learn.backend import torch
+from gmsnet.learn.backend import LambdaLR, ReduceLROnPlateau, torch
 from gmsnet.learn.encoding import safetensors_bytes
-from gmsnet.learn.options import Options, options_for
+from gmsnet.learn.options import GMSNet2Options, Options, PlateauOptions, options_for
 from gmsnet.learn.trainee import Row
 
 NAME = "checkpoint.safetensors"
+STATE = "trainee/"  # before the names of its tensors
 
 
 @dataclass
@@ -34,7 +36,7 @@ class Member:
 
     net: torch.nn.Module
     optimizer: torch.optim.Adam
-    schedule: torch.optim.lr_scheduler.ReduceLROnPlateau
+    schedule: ReduceLROnPlateau | LambdaLR
     best: dict[str, torch.Tensor] = field(default_factory=dict)
     least: float = np.inf
     history: list[Row] = field(default_factory=list)
@@ -43,14 +45,17 @@ class Member:
     def of(cls, net: torch.nn.Module, options: Options) -> Member:
         """The network at the start."""
         optimizer = torch.optim.Adam(net.parameters(), lr=options.learning_rate)
-        schedule = torch.optim.lr_scheduler.ReduceLROnPlateau(
-            optimizer, factor=options.decay, patience=options.patience
-        )
-        return cls(net, optimizer, schedule)
+        if isinstance(options, PlateauOptions):
+            return cls(net, optimizer, ReduceLROnPlateau(optimizer, factor=options.decay, patience=options.patience))
+        assert isinstance(options, GMSNet2Options)
+        return cls(net, optimizer, LambdaLR(optimizer, lambda epoch: options.rate(epoch) / options.learning_rate))
 
     def judge(self, row: Row) -> None:
         """Take down an epoch; keep the parameters if they are the best so far."""
-        self.schedule.step(row.validation_loss)
+        if isinstance(self.schedule, ReduceLROnPlateau):
+            self.schedule.step(row.validation_loss)
+        else:
+            self.schedule.step()
         if row.validation_loss < self.least or not self.best:
             self.least = row.validation_loss
             self.best = {name: value.clone() for name, value in self.net.state_dict().items()}
@@ -88,20 +93,22 @@ class Member:
         self.optimizer.load_state_dict({"state": state, "param_groups": groups})
 
 
-def save(folder: Path, options: Options, members: Mapping[str, Member]) -> None:
-    """Write the checkpoint into a folder. Raises InputError where it cannot be written."""
+def save(folder: Path, options: Options, members: Mapping[str, Member], state: Mapping[str, NDArray[Any]]) -> None:
+    """Write the checkpoint into a folder, with the trainee's state. Raises InputError where it cannot be written."""
     tensors = {f"{name}/{key}": value for name, member in members.items() for key, value in member.tensors().items()}
+    tensors |= {f"{STATE}{name}": value for name, value in state.items()}
     schedules = {name: member.schedule.state_dict() for name, member in members.items()}
     metadata = {"options": json.dumps(options.as_dict()), "schedules": json.dumps(schedules)}
     replace_files({str(folder / NAME): safetensors_bytes(tensors, metadata)})
 
 
-def restore(folder: Path, members: Mapping[str, Member]) -> None:
-    """Take over the state in a folder. Raises InputError where it cannot be read."""
+def restore(folder: Path, members: Mapping[str, Member]) -> dict[str, torch.Tensor]:
+    """Take over the state in a folder; returns that of the trainee. Raises InputError where it cannot be read."""
     tensors, metadata = _read(folder)
     schedules = json.loads(metadata["schedules"])
     for name, member in members.items():
         member.restore(_below(tensors, f"{name}/"), schedules[name])
+    return _below(tensors, STATE)
 
 
 def saved_options(folder: Path) -> Options | None:

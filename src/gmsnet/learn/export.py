@@ -38,6 +38,7 @@ def weights_bytes(
         "command": options.command,
         "recipe": json.dumps(options.as_dict()),
         "seed": str(options.seed),
+        **options.traits,
         "data": DESCRIPTION,
         "versions": json.dumps({name: version(name) for name in PACKAGES}),
         "validation_best_epoch": json.dumps({name: at + 1 for name, at in best.items()}),

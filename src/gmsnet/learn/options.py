@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 from gmsnet.errors import InputError
 from gmsnet.weights import LEAST_HIDDEN, MOST_HIDDEN
+from gmsnet.weights.shapes import ACTIVATIONS
 
 LOSS_TITLES = MappingProxyType(
     {
@@ -20,6 +21,8 @@ LOSS_TITLES = MappingProxyType(
         "min-max-angle": "min-max angle loss (radians)",
     }
 )
+LAST_RATE = 0.01
+MESHES = ("uniform", "mixed")  # random squares; a third of them each as they are, graded, and stretched
 LABELS = ("mesh", "star")  # where NN-Smoothing's labels come from, see ``labels``
 
 
@@ -28,8 +31,7 @@ class Options(ABC):
     """What all models have in common. Raises InputError for values out of range.
 
     epochs: Adam steps, one an epoch. nodes_per_mesh: how many free nodes of each training mesh an epoch draws for each
-    network. learning_rate: at the start; it is multiplied by ``decay`` whenever the validation loss has not become
-    better for ``patience`` epochs. seed: of the first weights and of the draws. mesh_seed: of the 20 meshes.
+    network. learning_rate: at the start. seed: of the first weights and of the draws. mesh_seed: of the 20 meshes.
     """
 
     model: ClassVar[str]
@@ -37,20 +39,23 @@ class Options(ABC):
     epochs: int = 4000
     nodes_per_mesh: int = 32
     learning_rate: float = 1e-2
-    decay: float = 0.5
-    patience: int = 150
     seed: int = 0
     mesh_seed: int = 0
 
     def __post_init__(self) -> None:
-        for name, least in (("epochs", 1), ("nodes_per_mesh", 1), ("patience", 1), ("seed", 0), ("mesh_seed", 0)):
+        self._check_least(epochs=1, nodes_per_mesh=1, seed=0, mesh_seed=0)
+        self._check_rates("learning_rate")
+
+    def _check_least(self, **least: int) -> None:
+        for name, value in least.items():
+            if getattr(self, name) < value:
+                raise InputError(f"{flag(name)} must be at least {value}, got {getattr(self, name)}")
+
+    def _check_rates(self, *names: str) -> None:
+        for name in names:
             value = getattr(self, name)
-            if value < least:
-                raise InputError(f"{flag(name)} must be at least {least}, got {value}")
-        if not (math.isfinite(self.learning_rate) and self.learning_rate > 0):
-            raise InputError(f"--learning-rate must be a positive number, got {self.learning_rate}")
-        if not 0 < self.decay < 1:
-            raise InputError(f"--decay must lie between 0 and 1, got {self.decay}")
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"{flag(name)} must be a positive number, got {value}")
 
     @property
     def command(self) -> str:
@@ -69,13 +74,33 @@ class Options(ABC):
     def loss_title(self) -> str:
         """What is minimised, for the axis of a picture."""
 
+    @property
+    def traits(self) -> dict[str, str]:
+        """What the network is, beside its parameters; goes into the metadata of the weights."""
+        return {}
+
     def as_dict(self) -> dict[str, Any]:
         """The model and the options by name."""
         return {"model": self.model, **asdict(self)}
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainOptions(Options):
+class PlateauOptions(Options):
+    """Of models whose learning rate is multiplied by ``decay`` whenever the validation loss has not become better for
+    ``patience`` epochs."""
+
+    decay: float = 0.5
+    patience: int = 150
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._check_least(patience=1)
+        if not 0 < self.decay < 1:
+            raise InputError(f"--decay must lie between 0 and 1, got {self.decay}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainOptions(PlateauOptions):
     """For GMSNet. hidden: features H. loss: what is minimised, a name of ``losses.LOSSES``."""
 
     model = "gmsnet"
@@ -103,7 +128,7 @@ class TrainOptions(Options):
 
 
 @dataclass(frozen=True, kw_only=True)
-class NNOptions(Options):
+class NNOptions(PlateauOptions):
     """For NN-Smoothing. labels: what it is taught, one of ``LABELS``."""
 
     model = "nn"
@@ -126,7 +151,62 @@ class NNOptions(Options):
         return "mean squared distance to the label"
 
 
-MODELS: Mapping[str, type[Options]] = MappingProxyType({kind.model: kind for kind in (TrainOptions, NNOptions)})
+@dataclass(frozen=True, kw_only=True)
+class GMSNet2Options(Options):
+    """For GMSNet 2 (train_gmsnet2). nodes_per_mesh: inside each mesh of the second stage, all of which are moved.
+
+    hidden: features H. activation: one of weights.shapes.ACTIVATIONS. meshes: what is learned from, one of ``MESHES``.
+    warm_up: so many of the epochs are the first stage. sweep_rate: the learning rate at the start of the second stage;
+    in both it falls to LAST_RATE of its start along half a cosine. power: of q in the loss of the second stage.
+    """
+
+    model = "gmsnet2"
+
+    epochs: int = 6000
+    nodes_per_mesh: int = 250
+    hidden: int = 8
+    activation: str = "silu"
+    meshes: str = "uniform"
+    warm_up: int = 4000
+    sweep_rate: float = 3e-3
+    power: int = 4
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not LEAST_HIDDEN <= self.hidden <= MOST_HIDDEN:
+            raise InputError(f"--hidden must lie between {LEAST_HIDDEN} and {MOST_HIDDEN}, got {self.hidden}")
+        for name, names in (("activation", ACTIVATIONS), ("meshes", MESHES)):
+            if getattr(self, name) not in names:
+                raise InputError(f"{flag(name)} must be one of {', '.join(names)}; got {getattr(self, name)!r}")
+        self._check_least(warm_up=0, power=1)
+        self._check_rates("sweep_rate")
+
+    def rate(self, epoch: int) -> float:
+        """The learning rate of an epoch."""
+        second = epoch >= self.warm_up
+        first, end = (self.warm_up, self.epochs) if second else (0, self.warm_up)
+        share = 0.5 + 0.5 * math.cos(math.pi * min(1.0, (epoch - first) / max(end - first, 1)))
+        return (self.sweep_rate if second else self.learning_rate) * (LAST_RATE + (1.0 - LAST_RATE) * share)
+
+    @property
+    def file_name(self) -> str:
+        """Of the weights."""
+        return "gmsnet2.safetensors"
+
+    @property
+    def loss_title(self) -> str:
+        """See Options."""
+        return "¼ log mean q⁴, mean of ten sweeps"
+
+    @property
+    def traits(self) -> dict[str, str]:
+        """See Options."""
+        return {"activation": self.activation}
+
+
+MODELS: Mapping[str, type[Options]] = MappingProxyType(
+    {kind.model: kind for kind in (TrainOptions, GMSNet2Options, NNOptions)}
+)
 
 
 def options_for(model: str, values: Mapping[str, Any]) -> Options:

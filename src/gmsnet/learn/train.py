@@ -20,8 +20,9 @@ from gmsnet.learn.backend import torch
 from gmsnet.learn.checkpoint import NAME, Member, saved_options
 from gmsnet.learn.curves import check_plotting, csv_bytes, png_bytes
 from gmsnet.learn.export import weights_bytes
-from gmsnet.learn.options import NNOptions, Options, TrainOptions
+from gmsnet.learn.options import GMSNet2Options, NNOptions, Options, TrainOptions
 from gmsnet.learn.train_gmsnet import GMSNetTrainee
+from gmsnet.learn.train_gmsnet2 import GMSNet2Trainee
 from gmsnet.learn.train_nn import NNTrainee
 from gmsnet.learn.trainee import Row, Trainee
 from gmsnet.mesh import Mesh
@@ -92,7 +93,7 @@ def train(
         trainee = _trainee(options, data.meshes(options.mesh_seed))
         members = {name: Member.of(net, options) for name, net in trainee.nets.items()}
         if resume:
-            checkpoint.restore(folder, members)
+            trainee.restore(checkpoint.restore(folder, members))
         history = {name: member.history for name, member in members.items()}
         done = len(next(iter(history.values())))
         for epoch in range(done, options.epochs):
@@ -104,7 +105,7 @@ def train(
             stop = should_stop is not None and should_stop()
             last = epoch + 1 == options.epochs
             if stop or last or (epoch + 1) % CHECKPOINT_EVERY == 0:
-                checkpoint.save(folder, options, members)
+                checkpoint.save(folder, options, members, trainee.state())
             if stop and not last:
                 return TrainResult(options, Ending.STOPPED, history, {}, [folder / NAME])
         for member in members.values():
@@ -118,6 +119,8 @@ def train(
 def _trainee(options: Options, meshes: Sequence[Mesh]) -> Trainee:
     if isinstance(options, NNOptions):
         return NNTrainee(options, meshes)
+    if isinstance(options, GMSNet2Options):
+        return GMSNet2Trainee(options, meshes)
     assert isinstance(options, TrainOptions)
     return GMSNetTrainee(options, meshes)
 

@@ -14,6 +14,7 @@ from gmsnet.learn.losses import LOSSES, Loss, metric_loss, truncation
 from gmsnet.learn.model import GMSNet
 from gmsnet.learn.optimum import optimal_position
 from gmsnet.learn.options import TrainOptions
+from gmsnet.learn.trainee import Trainee
 from gmsnet.mesh import Mesh
 
 
@@ -44,7 +45,7 @@ class Batch:
         return loss(self.ring, self.degree, position).mean()
 
 
-class GMSNetTrainee:
+class GMSNetTrainee(Trainee):
     """See trainee.Trainee; one network, "gmsnet"."""
 
     def __init__(self, options: TrainOptions, meshes: Sequence[Mesh]) -> None:

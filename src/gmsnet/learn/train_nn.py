@@ -19,6 +19,7 @@ from gmsnet.learn.labels import Labelled, labelled
 from gmsnet.learn.losses import metric_loss, truncation
 from gmsnet.learn.model_nn import NNSmoothing, frame
 from gmsnet.learn.options import NNOptions
+from gmsnet.learn.trainee import Trainee
 from gmsnet.mesh import Mesh
 from gmsnet.weights.shapes import NN_HIDDEN
 
@@ -77,7 +78,7 @@ class Rings:
         )
 
 
-class NNTrainee:
+class NNTrainee(Trainee):
     """See trainee.Trainee; the networks are "degree3" … "degree9"."""
 
     def __init__(self, options: NNOptions, meshes: Sequence[Mesh]) -> None:

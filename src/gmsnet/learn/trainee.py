@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ class Row(NamedTuple):
     learning_rate: float
 
 
-class Trainee(Protocol):
+class Trainee(ABC):
     """A model in training: one or more networks that share no parameters, each with an optimiser of its own.
 
     nets: by name. Losses are means over stars, those of the validation without a gradient.
@@ -32,18 +33,26 @@ class Trainee(Protocol):
 
     nets: Mapping[str, torch.nn.Module]
 
+    @abstractmethod
     def training_losses(self, epoch: int) -> Mapping[str, torch.Tensor]:
         """For each network the loss of the nodes that this epoch draws; their sum has gradients."""
-        ...
 
+    @abstractmethod
     def validation_losses(self) -> Mapping[str, tuple[float, float]]:
         """For each network its loss and the MetricLoss of the validation meshes."""
-        ...
 
+    @abstractmethod
     def marks(self) -> dict[str, float]:
         """Further losses of the networks as they are now, by name, and what to compare them with; takes seconds."""
-        ...
 
+    @abstractmethod
     def tensors(self) -> dict[str, NDArray[np.float32]]:
         """The parameters under the names of the weights file."""
-        ...
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """What else a later epoch depends on, by name, so that a training can go on; restored by ``restore``."""
+        return {}
+
+    def restore(self, state: Mapping[str, torch.Tensor]) -> None:
+        """Take over what ``state`` gave."""
+        assert not state

@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable
 
 from gmsnet.errors import InputError
-from gmsnet.methods import angle, auto, barrier, cpt, cvt, getme, gmsnet, laplacian, nn, optimize, worst_first
+from gmsnet.methods import angle, auto, barrier, cpt, cvt, getme, gmsnet, gmsnet2, laplacian, nn, optimize, worst_first
 from gmsnet.methods.base import Field, Method, Options, Smoother, StarSmoother, Tally
 
 METHODS: dict[str, Method] = {
@@ -15,6 +15,7 @@ METHODS: dict[str, Method] = {
     for method in (
         auto.METHOD,
         gmsnet.METHOD,
+        gmsnet2.METHOD,
         laplacian.METHOD,
         angle.METHOD,
         cvt.METHOD,

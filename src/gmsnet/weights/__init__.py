@@ -27,17 +27,19 @@ SHIPPED: Mapping[str, Mapping[str, str]] = MappingProxyType(
                 "min-max-angle": "gmsnet-h8-min-max-angle.safetensors",
             }
         ),
+        "gmsnet2": MappingProxyType({"sweeps": "gmsnet2.safetensors"}),
         "nn": MappingProxyType({"mesh": "nn.safetensors", "star": "nn-star.safetensors"}),
     }
 )  # model → variant, the default first → file beside this module
+FIRST_BIAS = MappingProxyType({"gmsnet": "linear.bias", "gmsnet2": "encode.bias"})  # as long as the model is wide
 
 
 @dataclass(frozen=True, eq=False)
 class Weights:
     """The parameters of a model.
 
-    model: "gmsnet" or "nn". tensors: name → float32 array, read-only, see ``shapes``. metadata: the recipe, the
-    versions of the packages, the validation curve, …, all as text.
+    model: "gmsnet", "gmsnet2" or "nn". tensors: name → float32 array, read-only, see ``shapes``. metadata: the recipe,
+    the versions of the packages, the validation curve, …, all as text.
     """
 
     model: str
@@ -52,7 +54,12 @@ class Weights:
     @property
     def hidden(self) -> int:
         """GMSNet's H."""
-        return len(self.tensors["linear.bias"])
+        return len(self.tensors[FIRST_BIAS[self.model]])
+
+    @property
+    def activation(self) -> str:
+        """GMSNet 2's, one of ``shapes.ACTIVATIONS``."""
+        return self.metadata["activation"]
 
 
 def load(path: str | os.PathLike[str] | None = None, *, model: str = "gmsnet", variant: str = "") -> Weights:
@@ -91,12 +98,18 @@ def _load(path: Path, model: str) -> Weights:
             f"{path}: weights of format version {metadata.get('format_version')!r}, "
             f"but this gmsnet reads version {FORMAT_VERSION!r}"
         )
-    hidden = tensors["linear.bias"].size if "linear.bias" in tensors else 0
-    if model == "gmsnet" and not LEAST_HIDDEN <= hidden <= MOST_HIDDEN:
+    first = FIRST_BIAS.get(model)
+    hidden = tensors[first].size if first in tensors else 0
+    if first is not None and not LEAST_HIDDEN <= hidden <= MOST_HIDDEN:
         raise InputError(
             f"{path}: the hidden width must lie between {LEAST_HIDDEN} and {MOST_HIDDEN}, here it is {hidden}"
         )
-    expected = shapes.nn() if model == "nn" else shapes.gmsnet(hidden)
+    if model == "gmsnet2" and metadata.get("activation") not in shapes.ACTIVATIONS:
+        raise InputError(
+            f"{path}: the activation must be one of {', '.join(shapes.ACTIVATIONS)}, "
+            f"here it is {metadata.get('activation')!r}"
+        )
+    expected = {"nn": shapes.nn(), "gmsnet2": shapes.gmsnet2(hidden), "gmsnet": shapes.gmsnet(hidden)}[model]
     if tensors.keys() != expected.keys():
         names = ", ".join(sorted(tensors.keys() ^ expected.keys()))
         raise InputError(f"{path}: not the tensors of {model!r}; missing or unknown: {names}")

@@ -1,4 +1,4 @@
-"""Names and shapes of the tensors of each model (float32; matrices as output × input)."""
+"""Names and shapes of the tensors of each model (float32; matrices as output × input), and what else a file may say."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 LEAST_HIDDEN, MOST_HIDDEN = 4, 64
+ACTIVATIONS = ("silu", "relu")  # of GMSNet 2
 NN_HIDDEN: Mapping[int, tuple[int, int]] = MappingProxyType(
     {3: (20, 6), 4: (20, 8), 5: (20, 10), 6: (24, 12), 7: (28, 14), 8: (32, 16), 9: (30, 18)}
 )  # degree → neurons of the two hidden layers (Guo et al. 2021)
@@ -29,6 +30,22 @@ def gmsnet(hidden: int) -> dict[str, tuple[int, ...]]:
         "mlp.0.bias": (h,),
         "mlp.1.weight": (2, h),
         "mlp.1.bias": (2,),
+    }
+
+
+def gmsnet2(hidden: int) -> dict[str, tuple[int, ...]]:
+    """GMSNet 2 with H hidden features: W₁ to W₅ of kernels/gmsnet2.py, in that order."""
+    h = hidden
+    return {
+        "encode.weight": (h, 5),
+        "encode.bias": (h,),
+        "pool.weight": (h, 2 * h),
+        "pool.bias": (h,),
+        "triangle.weight": (h, h),
+        "triangle.bias": (h,),
+        "context.weight": (h, h),
+        "decode.weight": (3, h),
+        "decode.bias": (3,),
     }
 
 
