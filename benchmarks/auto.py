@@ -1,7 +1,7 @@
 """Is a method as good as converged optimisation, near the ceiling of the mesh, and done within so many sweeps?
 
     python benchmarks/auto.py [--method auto] [--variant V] [--objective O] [--nodes 1e3 1e4 1e5] [--seeds 0 1 2 3 4]
-        [--guard worst] [--sweeps 100] [--repeats 5] [--ceilings benchmarks/ceilings.json] [--json FILE]
+        [--guard worst] [--sweeps 100] [--repeats 5] [--leave-out] [--ceilings benchmarks/ceilings.json] [--json FILE]
 
 On random squares, with the defaults of ``gmsnet.smooth`` but for what is named. Each mesh must come to q̂ and a least
 1/q of at least those of whole-mesh L-BFGS on q, q² and q⁴ (reference.py), a mean 1/q of at most 0.004 less, and a q̂ at
@@ -13,6 +13,8 @@ are there to the moment that the run stops; and to the first look after which th
 SciPy's sparse averaging matrix over the coordinates in the same memory order: 20 of them in a row, over 20. Both are
 seconds of the thread, so that other programs take none of them, and take turns; medians count. At 10,000 and 100,000
 nodes at most 20 L are allowed, 12 are aimed at.
+
+--leave-out: besides, ``auto`` without each of its stages in turn, its other rules as they are.
 """
 
 from __future__ import annotations
@@ -29,8 +31,10 @@ from reference import figures, stored
 from sweeps import averaging_matrix
 
 import gmsnet
+from gmsnet.measure import measure
 from gmsnet.methods import smoother
-from gmsnet.run import Run
+from gmsnet.methods.auto import VARIANTS, Auto
+from gmsnet.run import Run, outcome
 from gmsnet.topology import Topology, planar_points
 
 LESS_MEAN, BELOW_CEILING = 0.004, 0.005
@@ -60,7 +64,7 @@ class Timed:
         self.topology = Topology.of(mesh)
         self.topology.stars  # noqa: B018 (set-up: made when it is first asked for)
         self.matrix, self.points = averaging_matrix(self.topology), planar_points(mesh)[self.topology.memory]
-        self.seconds, self.products, self.history, self.moments = [], [], [], []
+        self.seconds, self.products, self.history, self.moments, self.best = [], [], [], [], None
 
     def turn(self):
         """One run, and a row of L."""
@@ -70,6 +74,7 @@ class Timed:
         run.to_the_end(self.sweeps, None, lambda sweep: moments.append(time.thread_time()))
         self.seconds.append(time.thread_time() - began)
         self.history, self.moments = run.history, [*self.moments, [moment - began for moment in moments]]
+        self.best = run.best
         points = self.points
         began = time.thread_time()
         for _ in range(ROW_OF_L):
@@ -89,14 +94,15 @@ class Timed:
         return None
 
 
-def study(mesh, wanted, create, smooth, guard, sweeps, repeats):
+def study(mesh, wanted, create, guard, sweeps, repeats):
     """What a method makes of a mesh: figures, which checks it passes, and times."""
-    found = smooth(mesh)
     timed = Timed(mesh, create, guard, sweeps)
     for _ in range(repeats + 1):
         timed.turn()
     seconds, product = timed.to_the_end()
     until = timed.until(wanted)
+    points, _, _ = outcome(mesh, timed.topology, timed.best, measure(mesh, timed.topology), "shape")
+    found = figures(mesh.with_points(points))
     return {
         "found": found,
         "passed": checks(found, wanted),
@@ -142,6 +148,26 @@ def summary(rows, sizes):
     return good
 
 
+def stage_table(rows, without, sizes):
+    """What leaving a stage out does: medians over the meshes of a size, and how many pass."""
+    for nodes in sizes:
+        print(f"\n  {nodes:,} nodes{'':24} pass       q̂  min 1/q  mean 1/q    time")
+        for label, found in {"all stages": rows, **{f"without {name}": each for name, each in without.items()}}.items():
+            here = [row for name, row in found.items() if name.startswith(f"{nodes}/")]
+            passed = sum(all(row["passed"].values()) for row in here)
+            qhat, least, mean = (median(row["found"][key] for row in here) for key in KEYS)
+            in_l = median(row["in_L"] for row in here)
+            print(f"    {label:32} {passed} of {len(here)}  {qhat:7.4f}  {least:7.4f}  {mean:8.4f}  {in_l:6.1f} L")
+
+
+def called(name, method, names, options):
+    """The figures of what ``gmsnet.smooth`` makes of a mesh."""
+    nodes, seed = map(int, name.split("/"))
+    mesh = gmsnet.random_mesh(nodes, seed=seed)
+    result = gmsnet.smooth(mesh, method, **names, guard=options.guard, max_sweeps=options.sweeps, threads=1)
+    return figures(mesh.with_points(result.points))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--method", default="auto")
@@ -152,6 +178,7 @@ def main():
     parser.add_argument("--guard", default="worst")
     parser.add_argument("--sweeps", type=int, default=100)
     parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--leave-out", action="store_true")
     parser.add_argument("--ceilings", type=Path, default=Path(__file__).with_name("ceilings.json"))
     parser.add_argument("--json")
     options = parser.parse_args()
@@ -159,25 +186,38 @@ def main():
     names = {"variant": options.variant, "objective": options.objective}
     references = stored(options.ceilings, sizes, options.seeds)
 
-    def smooth(mesh):
-        result = gmsnet.smooth(mesh, options.method, **names, guard=options.guard, max_sweeps=options.sweeps, threads=1)
-        return figures(mesh.with_points(result.points))
+    def studies(create):
+        """Name → ``study``, of all meshes."""
+        return {
+            f"{nodes}/{seed}": study(
+                gmsnet.random_mesh(nodes, seed=seed), references[f"{nodes}/{seed}"], create, options.guard,
+                options.sweeps, options.repeats,
+            )
+            for nodes in sizes for seed in options.seeds
+        }  # fmt: skip
 
     print(describe())
     print(f"{options.method}, one thread; medians of {options.repeats} runs in turns with L")
-    rows = {}
-    for nodes in sizes:
-        for seed in options.seeds:
-            name = f"{nodes}/{seed}"
-            rows[name] = study(
-                gmsnet.random_mesh(nodes, seed=seed), references[name], lambda: smoother(options.method, **names),
-                smooth, options.guard, options.sweeps, options.repeats,
-            )  # fmt: skip
-            print(f"  {name}: {rows[name]['in_L']:.1f} L", file=sys.stderr, flush=True)
+    rows = studies(lambda: smoother(options.method, **names))
+    differs = [name for name, row in rows.items() if row["found"] != called(name, options.method, names, options)]
     table(rows, references)
     good = summary(rows, sizes)
+    if differs:
+        raise SystemExit(f"gmsnet.smooth makes another mesh than the run that was timed, of {', '.join(differs)}")
+    without = {}
+    if options.leave_out:
+        stages = VARIANTS[options.variant or "full"]
+        for stage in stages:
+            rest = tuple(other for other in stages if other is not stage)
+            without[stage.name] = studies(lambda rest=rest: Auto(rest))
+        stage_table(rows, without, sizes)
     if options.json:
-        document = {"machine": describe(), "method": {"name": options.method, **names}, "meshes": rows}
+        document = {
+            "machine": describe(),
+            "method": {"name": options.method, **names},
+            "meshes": rows,
+            "without": without,
+        }
         Path(options.json).write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return 0 if good else 1
 
