@@ -10,26 +10,30 @@ import numpy as np
 from gmsnet.kernels.compile import LANES, inlined, kernel
 from gmsnet.kernels.quality import TINY, TWO_SQRT3
 
-BINS = 4096  # of the histogram of 1/q between −1 and 1
+HALVINGS = 24  # of the interval in which a limit is looked for: single precision has no more
 
 
 @kernel
 def shapes(points, triangles, turn, first, last, shape):
     """1/q of the triangles in the blocks first…last of LANES, with the sign of their area, into shape (T,)."""
-    ends, row = np.empty(6 * LANES), np.empty(LANES)
+    edges, row = np.empty(4 * LANES), np.empty(LANES)
     for block in range(first, last):
         start = block * LANES
         count = min(LANES, len(triangles) - start)
+        for lane in range(count):
+            t = start + lane
+            # Unsigned, so that nothing is compared with zero.
+            a, b, c = np.uint32(triangles[t, 0]), np.uint32(triangles[t, 1]), np.uint32(triangles[t, 2])
+            x, y = points[a, 0], points[a, 1]
+            edges[lane] = points[b, 0] - x
+            edges[LANES + lane] = points[b, 1] - y
+            edges[2 * LANES + lane] = points[c, 0] - x
+            edges[3 * LANES + lane] = points[c, 1] - y
+        for lane in range(count, LANES):
+            edges[lane] = edges[LANES + lane] = edges[2 * LANES + lane] = edges[3 * LANES + lane] = 0.0
         for lane in range(LANES):
-            t = min(start + lane, len(triangles) - 1)
-            for k in range(3):
-                i = triangles[t, k]
-                ends[2 * k * LANES + lane] = points[i, 0]
-                ends[(2 * k + 1) * LANES + lane] = points[i, 1]
-        for lane in range(LANES):
-            ax, ay = ends[lane], ends[LANES + lane]
-            bx, by = ends[2 * LANES + lane], ends[3 * LANES + lane]
-            row[lane] = shape_of(bx - ax, by - ay, ends[4 * LANES + lane] - ax, ends[5 * LANES + lane] - ay)
+            px, py, qx, qy = edges[lane], edges[LANES + lane], edges[2 * LANES + lane], edges[3 * LANES + lane]
+            row[lane] = shape_of(px, py, qx, qy)
         for lane in range(count):
             shape[start + lane] = turn[start + lane] * row[lane]
 
@@ -53,25 +57,36 @@ def shapes_of(points, triangles, turn, cells, shape):
 
 
 @kernel
-def bin_of(shape):
-    """Where a value stands in the histogram."""
-    return max(0, min(BINS - 1, int((shape + 1.0) * (0.5 * BINS))))
+def count_up_to(shape, limit):
+    """How many of the values are at most the limit."""
+    count = 0
+    for t in range(len(shape)):
+        count += shape[t] <= limit
+    return count
 
 
 @kernel
 def worst(shape, wanted):
-    """Indices (int32) of the worst cells: all in the lowest bins that hold as many as are wanted."""
-    counts = np.zeros(BINS, dtype=np.int64)
-    for t in range(len(shape)):
-        counts[bin_of(shape[t])] += 1
-    total, end = 0, 0
-    while total < wanted and end < BINS:
-        total += counts[end]
-        end += 1
-    cells = np.empty(total, dtype=np.int32)
+    """Indices (int32) of the worst cells, as many as are wanted or up to a quarter more, or any number if many are equal.
+
+    shape: (T,) between −1 and 1. They are all those up to a limit, which is found by halving.
+    """
+    low, high = -1.0, 1.0 + 1e-6
+    count = len(shape)
+    for _ in range(HALVINGS):
+        if count <= wanted + wanted // 4:
+            break
+        middle = 0.5 * (low + high)
+        fewer = count_up_to(shape, shape.dtype.type(middle))
+        if fewer < wanted:
+            low = middle
+        else:
+            high, count = middle, fewer
+    limit = shape.dtype.type(high)
+    cells = np.empty(count, dtype=np.int32)
     found = 0
     for t in range(len(shape)):
-        if bin_of(shape[t]) < end:
+        if shape[t] <= limit:
             cells[found] = t
             found += 1
     return cells

@@ -16,11 +16,12 @@ import numpy as np
 
 from gmsnet.kernels.compile import inlined, kernel
 from gmsnet.kernels.guard import STAR, permitted, surplus_above, surplus_above_zero
-from gmsnet.kernels.stars import DROPPED, HALVINGS, MOVED, TRUNCATED
+from gmsnet.kernels.stars import HALVINGS
 
 MOST = 50.0  # times a Newton step: the longest one
 STEPS, FAR = 8, 0.8  # of a visit, at most: on while a step brings F below FAR of what it was
 SHORTENINGS = 30
+SMALLEST = 1e-200  # F, with margin: below it powers underflow
 
 
 @inlined
@@ -33,14 +34,12 @@ def power(t, doublings):
 
 @kernel
 def largest(ring, n, x, y):
-    """The largest Q with the free node at (x, y), infinite where a triangle is not positive. ring: x, y of each."""
+    """The largest Q with the free node at (x, y), all triangles being positive. ring: x and y of each ring node."""
     most = 0.0
     ax, ay = ring[2 * n - 2] - x, ring[2 * n - 1] - y
     for j in range(n):
         bx, by = ring[2 * j] - x, ring[2 * j + 1] - y
         d = ax * by - ay * bx
-        if not d > 0.0:
-            return np.inf
         most = max(most, ((bx * bx + by * by) + (ay * (ay - by) - ax * (bx - ax))) / d)
         ax, ay = bx, by
     return most
@@ -64,14 +63,16 @@ def value_at(ring, n, x, y, inverse, doublings):
 
 @kernel
 def newton(ring, n, x, y, inverse, doublings):
-    """F with the free node at (x, y), 1/M given, and the step from there: none where rounding hides it."""
+    """F with the free node at (x, y), 1/M given; the step from there, none where rounding hides it; and the least D."""
     p = 2.0**doublings
+    least = np.inf
     value, gx, gy, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     ax, ay = ring[2 * n - 2] - x, ring[2 * n - 1] - y
     for j in range(n):
         bx, by = ring[2 * j] - x, ring[2 * j + 1] - y
         wx, wy = ay - by, bx - ax
         d = ax * by - ay * bx
+        least = min(least, d)
         square = (bx * bx + by * by) + (ay * wx - ax * wy)
         both = 1.0 / (square * d)
         per_square, per_d = d * both, square * both
@@ -87,25 +88,26 @@ def newton(ring, n, x, y, inverse, doublings):
         ax, ay = bx, by
     determinant = xx * yy - xy * xy
     if not determinant > 0.0:  # F is convex: only rounding does that
-        return value, 0.0, 0.0
+        return value, 0.0, 0.0, least
     dx, dy = (yy * gx - xy * gy) / determinant, (xx * gy - xy * gx) / determinant
     longer = 1.0 / max(1.0 - (p + 1.0) * (gx * dx + gy * dy) / value, 1.0 / MOST)
-    return value, longer * dx, longer * dy
+    return value, longer * dx, longer * dy, least
 
 
 @kernel
-def descend(ring, n, x, y, doublings):
-    """Where the free node at (x, y) is to go: nowhere else if F falls nowhere; to the mean if the star is tangled."""
-    most = largest(ring, n, x, y)
-    if not most < np.inf:
-        x, y = 0.0, 0.0
-        for j in range(n):
-            x += ring[2 * j] / n
-            y += ring[2 * j + 1] / n
-        return x, y
-    for _ in range(STEPS):
-        inverse = 1.0 / most
-        value, dx, dy = newton(ring, n, x, y, inverse, doublings)
+def descend(ring, n, x, y, scale, doublings):
+    """Where the free node at (x, y) is to go: nowhere else if F falls nowhere; to the mean if the star is tangled.
+
+    scale: the value to take for 1/M if no power of it is lost to rounding with that; else the star's own is taken.
+    """
+    inverse = scale
+    for step in range(STEPS):
+        value, dx, dy, least = newton(ring, n, x, y, inverse, doublings)
+        if step == 0 and not least > 0.0:
+            return mean(ring, n)
+        if not (SMALLEST < value < 1.0 / SMALLEST):
+            inverse = 1.0 / largest(ring, n, x, y)
+            value, dx, dy, least = newton(ring, n, x, y, inverse, doublings)
         after = np.inf
         for _ in range(SHORTENINGS):
             after = value_at(ring, n, x + dx, y + dy, inverse, doublings)
@@ -119,81 +121,86 @@ def descend(ring, n, x, y, doublings):
         y += dy
         if after >= FAR * value:
             break
-        most = largest(ring, n, x, y)
     return x, y
 
 
 @kernel
-def gather(points, i, start, around, guard, ring, floors):
-    """Ring and floors of one star, x and y of each ring node and of each triangle before it; its largest coordinate."""
+def mean(ring, n):
+    """Of the ring."""
+    x, y = 0.0, 0.0
+    for j in range(n):
+        x += ring[2 * j] / n
+        y += ring[2 * j + 1] / n
+    return x, y
+
+
+@kernel
+def gather(points, i, start, around, guard, star):
+    """Ring and floors of one star, and its largest coordinate, into ``star``.
+
+    There: x and y of each ring node, the floor of each triangle, j lying before ring node j, and that coordinate.
+    """
     n = start[i + 1] - start[i]
     reach = max(abs(points[i, 0]), abs(points[i, 1]))
     for j in range(n):
         k = around[start[i] + j]
-        ring[2 * j], ring[2 * j + 1] = points[k, 0], points[k, 1]
+        star[2 * j], star[2 * j + 1] = points[k, 0], points[k, 1]
         reach = max(reach, max(abs(points[k, 0]), abs(points[k, 1])))
-        floors[j] = guard.floor
-        if guard.level == STAR:
-            before = around[start[i] + (n - 1 if j == 0 else j - 1)]
-            floors[j] = max(guard.floors[i], max(guard.floors[before], guard.floors[k]))
-    return n, reach
+        star[2 * n + j] = guard.floor
+    if guard.level == STAR:
+        for j in range(n):
+            before, after = around[start[i] + (n - 1 if j == 0 else j - 1)], around[start[i] + j]
+            star[2 * n + j] = max(guard.floors[i], max(guard.floors[before], guard.floors[after]))
+    star[3 * n] = reach
+    return n
 
 
 @kernel
-def allowed(ring, n, x, y, tx, ty, delta, floors, was, now):
-    """The rule of the guard for a star whose free node is to go from (x, y) to (tx, ty). was, now: (6,) to work in."""
+def certified(star, n, tx, ty, delta):
+    """Are all triangles certified above 0 and their floors with the free node at (tx, ty)?"""
+    ax, ay = star[2 * n - 2] - tx, star[2 * n - 1] - ty
+    least = np.inf
+    for j in range(n):
+        bx, by, floor = star[2 * j] - tx, star[2 * j + 1] - ty, star[2 * n + j]
+        if floor > 0.0:
+            surplus = surplus_above(ax, ay, bx, by, delta, floor)
+        else:
+            surplus = surplus_above_zero(ax, ay, bx, by, delta)
+        least = surplus if not surplus >= least else least
+        ax, ay = bx, by
+    return least > 0.0
+
+
+@kernel
+def allowed(star, n, x, y, tx, ty, delta):
+    """The rule of the guard for a free node that is to go from (x, y) to (tx, ty), inverted triangles and all."""
+    was, now = np.empty(6), np.empty(6)
+    was[4], was[5], now[4], now[5] = x, y, tx, ty
     for j in range(n):
         i = n - 1 if j == 0 else j - 1
-        px, py, qx, qy = ring[2 * i] - tx, ring[2 * i + 1] - ty, ring[2 * j] - tx, ring[2 * j + 1] - ty
-        if floors[j] > 0.0:
-            surplus = surplus_above(px, py, qx, qy, delta, floors[j])
-        else:
-            surplus = surplus_above_zero(px, py, qx, qy, delta)
-        if surplus > 0.0:
-            continue
-        was[0], was[1], was[2], was[3] = ring[2 * i], ring[2 * i + 1], ring[2 * j], ring[2 * j + 1]
+        was[0], was[1], was[2], was[3] = star[2 * i], star[2 * i + 1], star[2 * j], star[2 * j + 1]
         now[:4] = was[:4]
-        was[4], was[5], now[4], now[5] = x, y, tx, ty
-        if not permitted(was, now, delta, floors[j]):
+        if not permitted(was, now, delta, star[2 * n + j]):
             return False
     return True
 
 
 @kernel
-def commit(points, i, ring, n, reach, tx, ty, guard, floors, corners, tally):
-    """Moves node i to (tx, ty), or as far there as the guard allows, halving the way (kernels.stars.truncate)."""
-    x, y = points[i, 0], points[i, 1]
+def way_there(star, n, x, y, tx, ty, unit, grain, single):
+    """How far (x, y) may go to (tx, ty): the halved shift that the guard allows (kernels.stars), and how often it was.
+
+    No shift and HALVINGS if none is allowed.
+    """
     dx, dy = tx - x, ty - y
     for halving in range(HALVINGS):
         tx, ty = x + dx, y + dy
-        if guard.single:
+        if single:
             tx, ty = np.float64(np.float32(tx)), np.float64(np.float32(ty))
         if tx == x and ty == y:
             break
-        delta = guard.unit * max(reach, max(abs(tx), abs(ty))) + guard.grain
-        if allowed(ring, n, x, y, tx, ty, delta, floors, corners[:6], corners[6:]):
-            points[i, 0], points[i, 1] = tx, ty
-            tally[MOVED] += 1
-            tally[TRUNCATED] += halving > 0
-            return
+        delta = unit * max(star[3 * n], max(abs(tx), abs(ty))) + grain
+        if certified(star, n, tx, ty, delta) or allowed(star, n, x, y, tx, ty, delta):
+            return tx, ty, halving
         dx *= 0.5
         dy *= 0.5
-    tally[DROPPED] += 1
-
-
-@kernel
-def visit(points, nodes, start, around, guard, doublings, sweeps, tally):
-    """Visits the nodes in their order, so many times, p = 2^doublings. tally: (3,), added to.
-
-    start, around: the rings of all nodes, in CSR form.
-    """
-    most = 0
-    for i in nodes:
-        most = max(most, start[i + 1] - start[i])
-    ring, floors, corners = np.empty(2 * most), np.empty(most), np.empty(12)
-    for _ in range(sweeps):
-        for i in nodes:
-            n, reach = gather(points, i, start, around, guard, ring, floors)
-            tx, ty = descend(ring, n, points[i, 0], points[i, 1], doublings)
-            if tx != points[i, 0] or ty != points[i, 1]:
-                commit(points, i, ring, n, reach, tx, ty, guard, floors, corners, tally)
+    return x, y, HALVINGS

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import ranking
-from gmsnet.kernels import worst_first as kernels
+from gmsnet.kernels import worst_first_cycles as kernels
 from gmsnet.kernels.compile import LANES
 from gmsnet.methods.base import Field, Method, Options, Smoother, Tally
 from gmsnet.workers import Share
@@ -58,27 +58,19 @@ class WorstFirst(Smoother):
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """See Smoother. The visits depend on each other, so that they are made on one thread."""
-        tally = np.zeros(3, dtype=np.int64)
-        guard, topology = field.guard(share), field.topology
+        topology, tally = field.topology, np.zeros(3, dtype=np.int64)
         triangles, turn = topology.changeable
         if self.cells is None or self.next >= len(self.cycles):
             self.cells = candidates(field, share)
-        shape = np.empty(len(self.cells))
-        ranking.shapes_of(field.points, triangles, turn, self.cells, shape)
-        before = float(shape.min())
         late = self.next >= len(self.cycles)
         chosen = LAST if late else self.cycles[self.next : self.next + self.at_once]
-        seen = np.zeros(len(field.points), dtype=np.bool_)
-        for cycle in chosen:
-            wanted = min(len(shape), max(FEWEST, math.ceil(cycle.share * len(triangles))))
-            limit = np.partition(shape, wanted - 1)[wanted - 1]
-            colours = topology.near_colours
-            nodes = ranking.free_nodes(triangles, self.cells, shape, limit, colours, topology.stars.colours, seen)
-            start, ring = topology.near_start, topology.near_ring
-            kernels.visit(field.points, nodes, start, ring, guard, cycle.power, cycle.sweeps, tally)
-            ranking.shapes_of(field.points, triangles, turn, self.cells, shape)
+        plan = [(max(FEWEST, math.ceil(cycle.share * len(triangles))), cycle.power, cycle.sweeps) for cycle in chosen]
+        before, after = kernels.cycles(
+            field.points, triangles, turn, self.cells, topology.near_colours, topology.stars.colours,
+            topology.near_start, topology.near_ring, field.guard(share), np.array(plan), tally,
+        )  # fmt: skip
         self.next += len(chosen)
-        self.settled = late and float(shape.min()) < before + GAIN
+        self.settled = late and after < before + GAIN
         return tally
 
 

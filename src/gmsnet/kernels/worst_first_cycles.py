@@ -1,0 +1,74 @@
+"""Cycles of ranking the worst cells and visiting their free nodes: see methods/worst_first.py."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.ranking import free_nodes, shapes_of
+from gmsnet.kernels.stars import DROPPED, HALVINGS, MOVED, TRUNCATED
+from gmsnet.kernels.worst_first import descend, gather, way_there
+
+STILL = 1e-8  # of a spoke's square: a move of less leaves a star be
+LEAST = 1e-6  # of 1/q, where cells are inverted: the scale of q is taken from there
+
+
+@kernel
+def cycles(points, triangles, turn, cells, colours, colours_most, start, around, guard, plan, tally):
+    """Makes the cycles of a plan among the cells; returns the least 1/q of these before and after it.
+
+    cells: indices of triangles. colours: (N,), −1 where held. start, around: the rings of all nodes, in CSR form.
+    plan: (C, 3) of cells to take, log₂ of the power p, and visits to their free nodes. tally: (3,), added to.
+    """
+    shape, mark = np.empty(len(cells)), np.zeros(len(points), dtype=np.bool_)
+    shapes_of(points, triangles, turn, cells, shape)
+    before = shape.min()
+    for c in range(len(plan)):
+        wanted = min(plan[c, 0], len(cells))
+        limit = np.partition(shape, wanted - 1)[wanted - 1]
+        scale = max(shape.min(), LEAST) / math.sqrt(3.0)
+        nodes = free_nodes(triangles, cells, shape, limit, colours, colours_most, mark)
+        visit(points, nodes, start, around, guard, plan[c, 1], plan[c, 2], scale, mark, tally)
+        shapes_of(points, triangles, turn, cells, shape)
+    return before, shape.min()
+
+
+@kernel
+def visit(points, nodes, start, around, guard, doublings, sweeps, scale, awake, tally):
+    """Visits the nodes in their order, so many times, p = 2^doublings. tally: (3,), added to.
+
+    start, around: the rings of all nodes, in CSR form. scale: see ``descend``. awake: (N,) bool, all False before and
+    after: a node is left out while neither it nor a neighbour has moved since it was found to move no more.
+    """
+    unit, grain, single = guard.unit, guard.grain, guard.single
+    most = 0
+    for i in nodes:
+        most = max(most, start[i + 1] - start[i])
+        awake[i] = True
+    star = np.empty(3 * most + 1)
+    for _ in range(sweeps):
+        for i in nodes:
+            if not awake[i]:
+                continue
+            n = gather(points, i, start, around, guard, star)
+            x, y = points[i, 0], points[i, 1]
+            tx, ty = descend(star, n, x, y, scale, doublings)
+            awake[i] = False
+            if tx == x and ty == y:
+                continue
+            tx, ty, halvings = way_there(star, n, x, y, tx, ty, unit, grain, single)
+            tally[DROPPED] += halvings == HALVINGS
+            tally[TRUNCATED] += 0 < halvings < HALVINGS
+            tally[MOVED] += halvings < HALVINGS
+            points[i, 0], points[i, 1] = tx, ty
+            dx, dy, sx, sy = tx - x, ty - y, star[0] - x, star[1] - y
+            if dx * dx + dy * dy > STILL * (sx * sx + sy * sy):
+                awake[i] = True
+                for k in range(start[i], start[i + 1]):
+                    awake[around[k]] = True
+    for i in nodes:
+        awake[i] = False
+        for k in range(start[i], start[i + 1]):
+            awake[around[k]] = False
