@@ -6,8 +6,8 @@
 The target is the quantile of 1/q that so many cells reach: of a random square as it comes, and of the same after some
 smart Laplacian sweeps, whose worst cells are scattered among good ones. Both runs are calls of ``gmsnet.smooth`` on one
 thread. A third call has a target that is met everywhere, so that nothing is left but reading, set-up, measures and
-result: less that, the others are the smoothing alone. All three take turns, medians count. A run with a target should
-take at most a fifth.
+result: less that, the others are the smoothing alone. Seconds of the thread; all three take turns, medians count. A run
+with a target should take at most a fifth.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ def study(mesh, smooth, met, repeats):
     results = {}
     for repeat in range(repeats + 1):  # the first time they are compiled, and not counted
         for name, run in runs.items():
-            began = time.perf_counter()
+            began = time.thread_time()
             results[name] = run()
             if repeat:
-                seconds[name].append(time.perf_counter() - began)
+                seconds[name].append(time.thread_time() - began)
     if results["nothing"].moved.any():
         raise SystemExit("the run with nothing to do has moved nodes")
     taken = {name: median(each) for name, each in seconds.items()}
