@@ -27,8 +27,9 @@ from gmsnet.kernels.guard import Precision
 from gmsnet.measure import exact_signs
 from gmsnet.topology import Topology, planar_points, scale_exponent
 from gmsnet.untangle import untangle
+from gmsnet.untangle.lbfgs import whole
 from gmsnet.untangle.patch import Patch, in_order
-from gmsnet.untangle.road import LAST_PATIENCE, whole
+from gmsnet.untangle.road import LAST_PATIENCE
 from gmsnet.untangle.tangle import Tangle
 
 REAL = (

@@ -172,6 +172,36 @@ def weigh(points, v, start, ring, x, y):
 
 
 @kernel
+def go_back(points, before, nodes, start, ring, limit, unit, grain):
+    """Puts nodes (one after another) back to where they were at first where nothing is lost by it; how many are back.
+
+    All cells of the star must be certified before and after it; those that then have a node elsewhere than at first
+    must have a D/L of at least limit or what they had.
+    """
+    back = 0
+    for v in nodes:
+        x, y = points[v, 0], points[v, 1]
+        if (x == before[v, 0] and y == before[v, 1]) or bad_in_star(points, v, start, ring, unit, grain):
+            continue
+        end = start[v + 1]
+        fits = True
+        for at in range(start[v], end):
+            a, b = ring[at - 1 if at > start[v] else end - 1], ring[at]
+            least = min(limit, share(points, v, a, b))
+            points[v, 0], points[v, 1] = before[v, 0], before[v, 1]
+            away = points[a, 0] != before[a, 0] or points[a, 1] != before[a, 1]
+            away |= points[b, 0] != before[b, 0] or points[b, 1] != before[b, 1]
+            fits = surplus(points, v, a, b, unit, grain) > 0.0 and (not away or share(points, v, a, b) >= least)
+            points[v, 0], points[v, 1] = x, y
+            if not fits:
+                break
+        if fits:
+            points[v, 0], points[v, 1] = before[v, 0], before[v, 1]
+            back += 1
+    return back
+
+
+@kernel
 def uncertified(points, cells, unit, grain):
     """How many of the cells (c, 3), counter-clockwise, are not certified."""
     count = 0

@@ -29,7 +29,7 @@ ARMIJO = 1e-4
 STEEP = 0.1  # while one step lowers the sum of a star by more than this share, the next follows on the spot
 REPEATS = 5
 TINY = 1e-300
-FREELY, CERTIFIED, GUARDED = range(3)  # what a sweep may do to cells
+FREELY, CERTIFIED, GUARDED, MENDING = range(4)  # what a sweep may do to cells
 
 
 @inlined
@@ -137,12 +137,13 @@ def sweep(points, nodes, start, ring, scale, epsilon, mode, unit, grain, single,
     """Newton steps for each of the nodes, one after another; returns how many have moved.
 
     points: (m, 2), changed, and rounded to float32 if single. epsilon: (m,). mode: FREELY, or CERTIFIED: only stars
-    that are certified are looked at, and they stay so, or GUARDED: see ``keeps``; floor is for that alone.
+    that are certified are looked at, and they stay so, or GUARDED: see ``keeps``, with its floor, or MENDING: besides,
+    only stars that are not certified when their turn comes.
     A step is halved until the sum falls by ARMIJO of what the slope promises, and repeated while the sum falls steeply.
     """
     moved = 0
     for v in nodes:
-        if mode == CERTIFIED and not is_certified(points, v, start, ring, unit, grain):
+        if mode in (CERTIFIED, MENDING) and is_certified(points, v, start, ring, unit, grain) != (mode == CERTIFIED):
             continue
         x0, y0 = points[v, 0], points[v, 1]
         total, gx, gy, xx, xy, yy = star(points, x0, y0, v, start, ring, scale, epsilon[v])
@@ -164,7 +165,7 @@ def sweep(points, nodes, start, ring, scale, epsilon, mode, unit, grain, single,
                     tx, ty = np.float64(np.float32(tx)), np.float64(np.float32(ty))
                 total, gx, gy, xx, xy, yy = star(points, tx, ty, v, start, ring, scale, epsilon[v])
                 taken = total <= old + ARMIJO * slope
-                if taken and mode == GUARDED:
+                if taken and mode >= GUARDED:
                     taken = keeps(points, v, tx, ty, start, ring, unit, grain, floor)
                 if taken:
                     points[v, 0], points[v, 1] = tx, ty

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from gmsnet.measure import exact_signs
 from gmsnet.topology import Topology
+from gmsnet.untangle.guarded import what_is_left
+from gmsnet.untangle.newton import polish
 from gmsnet.untangle.patch import Floats
 from gmsnet.untangle.reasons import reasons
 from gmsnet.untangle.result import ALL, NOTHING, PART, Stage, Unmended, Untangled
-from gmsnet.untangle.road import follow, polish
+from gmsnet.untangle.road import follow
 from gmsnet.untangle.tangle import Precision, Tangle
-from gmsnet.untangle.transaction import guarded, moved, take
+from gmsnet.untangle.transaction import give_back, moved, take
 
 __all__ = ["ALL", "NOTHING", "PART", "Stage", "Unmended", "Untangled", "untangle"]
 
@@ -31,14 +33,20 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     stages = list(follow(tangle))
     taken, why = take(tangle)
     if tangle.left and tangle.bad_nodes().any():
-        stages.append(guarded(tangle))
+        stages.append(what_is_left(tangle))
         taken = PART if taken == NOTHING and moved(tangle).any() else taken
     if taken != NOTHING:
-        stages.append(polish(tangle))
+        stages += give_back(tangle), polish(tangle)
     after = 0
     if tangle.left:  # else all are certified that have moved or were not positive
         after = int((exact_signs(tangle.points, topology.near, topology.near_turn) <= 0).sum())
     sweeps = sum(stage.sweeps for stage in stages)
     return Untangled(
-        tangle.points, before, after, taken, why, tuple(stages), reasons(topology, tangle.points, tangle.bad, sweeps)
+        tangle.points,
+        before,
+        after,
+        taken,
+        why,
+        tuple(stage for stage in stages if stage.nodes),
+        reasons(topology, tangle.points, tangle.bad, sweeps),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -39,6 +40,11 @@ class Tangle:
         self.left = 0
         self.look()
 
+    @cached_property
+    def worst(self) -> float:
+        """The least D/L of the cells at first."""
+        return float(kernels.least_share(self.before, self.topology.near, self.topology.near_turn))
+
     def look(self) -> int:
         """Finds the bad cells of the points as they are now; returns how many there are."""
         precision, topology = self.precision, self.topology
@@ -53,6 +59,17 @@ class Tangle:
     def bad_nodes(self) -> Flags:
         """(N,) the free nodes of bad cells."""
         return free_nodes_of(self.topology, self.bad)
+
+    def worst_first(self, nodes: Ints) -> Ints:
+        """Some free nodes, those with the largest share of bad cells first: most likely they are the culprits.
+
+        When it is the turn of their neighbours, these have nothing to mend any more.
+        """
+        topology, precision = self.topology, self.precision
+        shares = kernels.bad_shares(
+            self.points, nodes, topology.near_start, topology.near_ring, precision.unit, precision.grain
+        )
+        return nodes[np.argsort(-shares, kind="stable")]
 
     def bad_among(self, moved: Flags) -> Flags:
         """(N,) of some free nodes that may have moved, and of their neighbours, those with an uncertified cell."""
@@ -69,14 +86,13 @@ class Tangle:
     def average(self, nodes: Ints, weighing: int) -> None:
         """One Laplacian sweep over those of some free nodes that have bad cells, which no guard holds back.
 
-        Those with the largest share of bad cells come first: most likely they are the culprits, and when it is the turn
-        of their neighbours, these have nothing to mend any more. weighing: see the kernel.
+        The worst come first. weighing: see the kernel.
         """
         topology, precision = self.topology, self.precision
-        rings = topology.near_start, topology.near_ring
-        shares = kernels.bad_shares(self.points, nodes, *rings, precision.unit, precision.grain)
-        nodes = nodes[np.argsort(-shares, kind="stable")]
-        kernels.average(self.points, nodes, *rings, weighing, precision.unit, precision.grain, precision.single)
+        kernels.average(
+            self.points, self.worst_first(nodes), topology.near_start, topology.near_ring, weighing, precision.unit,
+            precision.grain, precision.single,
+        )  # fmt: skip
 
     def around(self, rings: int) -> Patch:
         """The patch of the free nodes of bad cells and those within so many rings of them."""

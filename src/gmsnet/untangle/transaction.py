@@ -11,13 +11,13 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels import untangle as kernels
-from gmsnet.kernels import untangle_barrier as barrier
-from gmsnet.untangle import road
-from gmsnet.untangle.patch import Flags, free_nodes_of
+from gmsnet.kernels.quality import TWO_SQRT3
+from gmsnet.untangle.newton import keep_gains
+from gmsnet.untangle.patch import Flags, free_nodes_of, in_order
 from gmsnet.untangle.result import ALL, NOTHING, PART, Stage
 from gmsnet.untangle.tangle import Tangle
 
-GUARDED_SWEEPS, GUARDED_RINGS = 30, 2
+BACK_SWEEPS, FINE = 20, 0.1  # a cell between nodes that went back and others may have this 1/q
 
 
 def take(tangle: Tangle) -> tuple[str, str]:
@@ -26,7 +26,7 @@ def take(tangle: Tangle) -> tuple[str, str]:
         return ALL, ""
     precision, topology = tangle.precision, tangle.topology
     violated = np.empty(len(topology.near), dtype=bool)
-    floor = worst(tangle)
+    floor = tangle.worst
     tried, first = moved(tangle).sum(), 0
     while True:
         count = kernels.find_violated(
@@ -38,18 +38,12 @@ def take(tangle: Tangle) -> tuple[str, str]:
         first = first or count
         put_back(tangle, free_nodes_of(topology, violated) & moved(tangle))
     tangle.look()
-    road.keep_gains(tangle, tangle.before, tangle.was_bad)
+    keep_gains(tangle, tangle.before, tangle.was_bad)
     left = moved(tangle).sum()
     if left == tried:
         return (ALL, "") if left else (NOTHING, "no inverted cell has a node that may move")
     why = f"{first} cells that were positive, or better, would have been inverted" if first else "no cell was mended"
     return (PART if left else NOTHING), why
-
-
-def worst(tangle: Tangle) -> float:
-    """The least D/L of the cells at first."""
-    least: float = kernels.least_share(tangle.before, tangle.topology.near, tangle.topology.near_turn)
-    return least
 
 
 def moved(tangle: Tangle) -> Flags:
@@ -63,19 +57,16 @@ def put_back(tangle: Tangle, nodes: Flags) -> None:
     tangle.points[nodes] = tangle.before[nodes]
 
 
-def guarded(tangle: Tangle) -> Stage:
-    """Barrier sweeps around what is left that never do what ``take`` would take back; all or no gain per piece."""
-    patch = tangle.around(GUARDED_RINGS)
-    points, floor = tangle.points[patch.every], worst(tangle)
-    scale = barrier.local_area(points, patch.cells, road.AVERAGING)
-    least = np.empty(patch.parts)
-    sweeps, precision = 0, tangle.precision
-    for _ in range(GUARDED_SWEEPS):
-        barrier.least(points, patch.cells, scale, patch.part, precision.unit, precision.grain, least)
-        epsilon = road.closing(least)[patch.part]
+def give_back(tangle: Tangle) -> Stage:
+    """Nodes that need not be elsewhere go back to their very bits: what was made thin on purpose stays as it was."""
+    topology, precision = tangle.topology, tangle.precision
+    nodes = in_order(topology, moved(tangle))
+    sweeps = 0
+    for _ in range(BACK_SWEEPS):
         sweeps += 1
-        if not road.sweep(tangle, patch, points, scale, epsilon, barrier.GUARDED, floor):
+        if not kernels.go_back(
+            tangle.points, tangle.before, nodes, topology.near_start, topology.near_ring, FINE / TWO_SQRT3,
+            precision.unit, precision.grain,
+        ):  # fmt: skip
             break
-    tangle.put(points, patch)
-    road.keep_gains(tangle, tangle.before, tangle.was_bad)
-    return Stage("barrier, guarded", patch.count, sweeps, tangle.left)
+    return Stage("back where possible", len(nodes), sweeps, tangle.left)

@@ -1,0 +1,50 @@
+"""Sweeps that do no harm at any step: certified cells stay so, bad ones become less inverted.
+
+They mend what a few nodes alone have done, without moving a neighbour, before anything wilder is tried; and at the end
+they get what can be had where not all can be mended.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmsnet.kernels import untangle_barrier as barrier
+from gmsnet.untangle.newton import AVERAGING, closing, keep_gains, sweep
+from gmsnet.untangle.patch import Ints, Patch, in_order
+from gmsnet.untangle.result import Stage
+from gmsnet.untangle.tangle import Tangle
+
+FIRST_SWEEPS, FEW_NODES = 3, 0.1  # only where no more than this share of the free nodes has bad cells
+LAST_SWEEPS, RINGS = 30, 2
+
+
+def culprits(tangle: Tangle) -> Stage:
+    """The nodes with bad cells, the worst first, each only if its star is still bad when its turn comes."""
+    nodes = tangle.worst_first(in_order(tangle.topology, tangle.bad_nodes()))
+    if len(nodes) > FEW_NODES * len(tangle.topology.free):
+        return Stage("barrier, guarded, worst first", 0, 0, tangle.left)
+    return guarded(tangle, nodes, FIRST_SWEEPS, barrier.MENDING, "barrier, guarded, worst first")
+
+
+def what_is_left(tangle: Tangle) -> Stage:
+    """All nodes around bad cells."""
+    return guarded(tangle, tangle.around(RINGS).nodes, LAST_SWEEPS, barrier.GUARDED, "barrier, guarded")
+
+
+def guarded(tangle: Tangle, nodes: Ints, most: int, mode: int, name: str) -> Stage:
+    """At most so many sweeps over some nodes; pieces in which no cell is mended by that go back."""
+    patch = Patch.of(tangle.topology, nodes)
+    points = tangle.points[patch.every]
+    scale = barrier.local_area(points, patch.cells, AVERAGING)
+    least = np.empty(patch.parts)
+    sweeps, precision = 0, tangle.precision
+    before, bad = tangle.points.copy(), tangle.bad.copy()
+    while sweeps < most:
+        barrier.least(points, patch.cells, scale, patch.part, precision.unit, precision.grain, least)
+        sweeps += 1
+        if not sweep(tangle, patch, points, scale, closing(least)[patch.part], mode, tangle.worst):
+            break
+    tangle.put(points, patch)
+    tangle.look()
+    keep_gains(tangle, before, bad)
+    return Stage(name, patch.count, sweeps, tangle.left)
