@@ -43,12 +43,12 @@ def train(
     meshes: Annotated[
         str, typer.Option(help="What GMSNet 2 learns from: uniform (random squares), or mixed (graded, stretched too).")
     ] = "uniform",
-    warm_up: Annotated[int, typer.Option(help="Epochs of GMSNet 2 on single stars, before whole sweeps.")] = 4000,
+    warm_up: Annotated[int, typer.Option(help="Epochs of GMSNet 2 on single stars, before whole sweeps.")] = 2000,
     sweep_rate: Annotated[
         float, typer.Option(help="Learning rate of GMSNet 2 at the start of the epochs of whole sweeps.")
-    ] = 3e-3,
+    ] = 1e-2,
     power: Annotated[int, typer.Option(help="p of the mean of q^p that whole sweeps of GMSNet 2 minimise.")] = 4,
-    epochs: Annotated[int, typer.Option(help="Adam steps, one an epoch; 6000 for GMSNet 2.")] = 4000,
+    epochs: Annotated[int, typer.Option(help="Adam steps, one an epoch; 4500 for GMSNet 2.")] = 4000,
     nodes_per_mesh: Annotated[
         int,
         typer.Option(

@@ -10,7 +10,7 @@ import numpy as np
 
 from gmsnet.kernels.compile import inlined
 
-ONE, TWO, HALF = np.float32(1.0), np.float32(2.0), np.float32(0.5)
+ONE, TWO = np.float32(1.0), np.float32(2.0)
 MOST_EXPONENT = np.float32(80.0)  # arguments of exp are brought to ±this, so that nothing overflows
 PER_LN2 = np.float32(1.4426950408889634)
 LN2, LN2_HIGH, LN2_LOW = np.float32(0.6931471805599453), np.float32(0.693359375), np.float32(-2.12194440e-4)

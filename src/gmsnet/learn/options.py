@@ -162,13 +162,13 @@ class GMSNet2Options(Options):
 
     model = "gmsnet2"
 
-    epochs: int = 6000
+    epochs: int = 4500
     nodes_per_mesh: int = 250
     hidden: int = 8
     activation: str = "silu"
     meshes: str = "uniform"
-    warm_up: int = 4000
-    sweep_rate: float = 3e-3
+    warm_up: int = 2000
+    sweep_rate: float = 1e-2
     power: int = 4
 
     def __post_init__(self) -> None:

@@ -32,7 +32,7 @@ CYCLE = 14  # sweeps until a group of the first stage starts anew
 SWEEPS, ROUNDS = 3, 3
 JUDGED = 10  # sweeps over the validation meshes
 JUDGE_EVERY = 50  # epochs; in between the last loss stands
-MOST_GRADIENT = 1.0  # of each parameter: one sliver shall not undo what was learned
+MOST_GRADIENT = 0.25  # of each parameter: one sliver shall not undo what was learned
 STRETCH = 4.0  # at most, of mixed training meshes
 
 
