@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from gmsnet.adapters import to_mesh
 from gmsnet.arguments import check_arguments
 from gmsnet.errors import InputError
 from gmsnet.fixed import fixed_mask
+from gmsnet.limits import Limits, limits
 from gmsnet.measure import QualityReport, measure
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Smoother, smoother
@@ -43,6 +45,7 @@ class SmoothResult:
     made. stop_reason: one of the texts above. moved: (N,) bool, which nodes are elsewhere than in the input.
     held: reason → ids of the nodes that were not free. history: one Sweep for each look. notes: what else there is to
     know, a sentence each. unmended: the cells that untangling could not mend and that are inverted still, and why.
+    topology: what follows from the connectivity, with the nodes that were held.
     seconds: for the whole call.
     """
 
@@ -57,7 +60,13 @@ class SmoothResult:
     history: list[Sweep]
     notes: list[str]
     unmended: list[UnmendedCell]
+    topology: Topology
     seconds: float
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Upper bounds of the worst cells with this connectivity and these held nodes; made when first asked for."""
+        return limits(to_mesh(self.mesh)[0], self.topology)
 
 
 def smooth(
@@ -147,6 +156,7 @@ def smooth(
         history=history,
         notes=notes,
         unmended=still_inverted(after, topology, reasons),
+        topology=topology,
         seconds=time.perf_counter() - began,
     )
 

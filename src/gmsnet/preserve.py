@@ -8,23 +8,43 @@ from gmsnet.layers import stretched_layers
 from gmsnet.mesh import Mesh
 from gmsnet.targets import Target
 from gmsnet.topology import Topology
+from gmsnet.walls import near_walls
 
-LAYER = "stretched layer"
+LAYER, WALL = "stretched layer", "refined near a wall"
 
 
 def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool) -> tuple[Topology, list[str]]:
-    """The topology with the nodes of stretched layers held where that is asked for, and what to say about layers."""
+    """The topology with nodes held that are where they are on purpose, and what to say about that.
+
+    Those are the nodes of stretched layers, unless ``preserve`` is "none" and fix_layers is false, and the nodes next
+    to walls that the mesh is refined towards, unless ``preserve`` is "none".
+    """
+    notes: list[str] = []
     if not len(topology.free):
-        return topology, []
+        return topology, notes
     layers = stretched_layers(mesh, topology)
-    if not layers:
-        return topology, ["fix_layers: no stretched layers were found, so none are held"] if fix_layers else []
-    if preserve == NONE and not fix_layers:
-        return topology, [f"{layers.summary}; nothing is held for that (preserve={preserve!r})"]
-    inner = topology.holding(layers.nodes, LAYER)
-    count = len(inner.held.get(LAYER, ()))
-    why = "fix_layers" if fix_layers else f"preserve={preserve!r}"
-    return inner, [f"{layers.summary}; {count:,} nodes are held for that ({why})"]
+    held = fix_layers or preserve != NONE
+    if layers and held:
+        topology = topology.holding(layers.nodes, LAYER)
+        why = "fix_layers" if preserve == NONE else f"preserve={preserve!r}"
+        notes.append(f"{layers.summary}; {_amount(topology, LAYER)} held for that ({why})")
+    elif layers:
+        notes.append(f"{layers.summary}; nothing is held for that (preserve={preserve!r})")
+    elif fix_layers:
+        notes.append("fix_layers: no stretched layers were found, so none are held")
+    if preserve != NONE:
+        topology = topology.holding(near_walls(mesh, topology), WALL)
+        if WALL in topology.held:
+            notes.append(
+                f"the mesh is refined towards its walls: {_amount(topology, WALL)} held next to them "
+                f"(preserve={preserve!r})"
+            )
+    return topology, notes
+
+
+def _amount(topology: Topology, reason: str) -> str:
+    count = len(topology.held.get(reason, ()))
+    return f"{count:,} node is" if count == 1 else f"{count:,} nodes are"
 
 
 def method_for(method: str, preserve: str, target: Target) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -39,6 +40,16 @@ class Target:
         if self.angle is not None:
             missed |= ~((min_angle >= self.angle) & (shape > 0.0))
         return missed
+
+    @property
+    def shape(self) -> float:
+        """The least 1/q that a cell has which meets it: of all triangles with angles of α or more, (α, α, π − 2α)."""
+        least = self.quality or 0.0
+        if self.angle is not None:
+            alpha = math.radians(self.angle)
+            long = 2.0 * math.cos(alpha)  # the sides are 1, 1 and this, the height is sin α
+            least = max(least, 2.0 * math.sqrt(3.0) * long * math.sin(alpha) / (2.0 + long * long))
+        return least
 
     def __str__(self) -> str:
         given = (("1/q", self.quality, ""), ("the smallest angle", self.angle, "°"))

@@ -72,7 +72,17 @@ class Outcome:
         angle = float(after.min_angle.min(initial=math.inf))
         if self.target.angle is not None and angle < self.target.angle:
             figures.append(f"the least angle is {angle:.4g}°, {self.target.angle - angle:.4g}° below")
-        return f"{'; '.join([*figures, str(self.target)])}; {report.named_cells(after, self.missed)} below it"
+        cells = self.missed[: report.NAMED]
+        why = self.result.limits.reasons(cells, self.target.shape)
+        reasons = "".join(f"\n  cell {after.cell[row]}: {why[row]}" for row in cells.tolist())
+        return f"{'; '.join([*figures, str(self.target)])}; {report.named_cells(after, self.missed)} below it{reasons}"
+
+    def nearness(self) -> str:
+        """How near the least 1/q is to the most that it can be, as far as a bound is known."""
+        bounds = self.result.limits
+        if not len(bounds.bound) or not len(self.result.after.cell):
+            return "no bound is known for the least 1/q"
+        return f"the least 1/q is {self.least:.4g} and cannot exceed {bounds.ceiling:.4g}: {bounds.describe(0)}"
 
     def tangle(self) -> str:
         """Which cells are inverted still, where, and why as far as that is known."""
@@ -108,6 +118,8 @@ class Outcome:
         console.print(self.verdict())
         for note in self.result.notes:
             console.print(note)
+        if len(result.after.cell) and self.free:
+            console.print(self.nearness())
         if result.held and self.free:
             held = len(self.mesh.points) - self.free
             console.print(f"held: {held:,} of {report.amount(len(self.mesh.points), 'node')} ({self._reasons()})")
@@ -167,6 +179,7 @@ class Outcome:
                 "target_angle": self.target.angle,
                 "target_met": self.target_met,
                 "below_target": len(self.missed),
+                "ceiling": result.limits.ceiling,
                 "notes": result.notes,
                 "unmended": [cell._asdict() for cell in result.unmended],
                 "worst": self.worst,

@@ -5,14 +5,15 @@
 - Newton sweeps on the barrier Σq, which bring the rest and keep cells from collapsing.
 - worst-first: the worst few cells alone, on high powers of q.
 
-After each stage the mesh is measured; pairs of Newton sweeps go on as long as they bring more than GAIN in the mean of
-1/q. What each stage is worth is measured by ``benchmarks/auto.py``. The variant ``patch`` leaves the cheap sweeps out;
-it is what a target (``target_quality``, ``target_angle``) uses on the patches around the cells that miss it, which
-others surround that are good as they are.
+After each stage the mesh is measured; pairs of Newton sweeps go on as long as more than GAIN in the mean of 1/q is to
+come, if it goes on as with the last two. What each stage is worth is measured by ``benchmarks/auto.py``. The variant
+``patch`` leaves the cheap sweeps out; it is what a target (``target_quality``, ``target_angle``) uses on the patches
+around the cells that miss it, which others surround that are good as they are.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -24,7 +25,8 @@ from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.standing import Standing
 from gmsnet.workers import Share
 
-GAIN = 0.004  # in the mean of 1/q: what the sweeps of a stage must bring to be made once more
+RELAXATION, ALWAYS = 1.6, 10**9  # of the Newton steps, and for how many sweeps: where many are needed, it halves them
+GAIN = 0.003  # in the mean of 1/q: what is to come for a stage to be made once more
 
 
 class Stage(NamedTuple):
@@ -40,7 +42,7 @@ class Stage(NamedTuple):
 
 
 CHEAP = Stage("smart Laplacian", lambda: Laplacian("smart"), 2)
-NEWTON = Stage("Newton on q", lambda: Barrier("q"), 2, repeats=True)
+NEWTON = Stage("Newton on q", lambda: Barrier("q", RELAXATION, ALWAYS), 2, repeats=True)
 WORST = Stage("worst first", WorstFirst, None)
 
 VARIANTS = {"full": (CHEAP, NEWTON, WORST), "patch": (NEWTON, WORST)}
@@ -54,10 +56,11 @@ class Auto(Smoother):
     def __init__(self, stages: Sequence[Stage] = VARIANTS["full"]) -> None:
         self.stages = stages
         self.last: Standing | None = None  # at the last look
+        self.gained = math.inf  # in the mean of 1/q by what was done between the last two looks
         self._enter(0)
 
     def _enter(self, stage: int) -> None:
-        self.at, self.made = stage, 0
+        self.at, self.made, self.gained = stage, 0, math.inf
         self.smoother = self.stages[stage].create()
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
@@ -74,13 +77,24 @@ class Auto(Smoother):
         last, self.last = self.last, standing
         if last is None:  # nothing is done yet
             return
-        gains = standing.inverted < last.inverted or standing.mean_shape > last.mean_shape + GAIN
-        if gains and self.stages[self.at].repeats:
+        gained, before = standing.mean_shape - last.mean_shape, self.gained
+        self.gained = gained
+        mends = standing.inverted < last.inverted
+        if self.stages[self.at].repeats and (mends or to_come(before, gained) > GAIN):
             self.made = 0
         elif self.at + 1 < len(self.stages):
             self._enter(self.at + 1)
         else:
             self.settled = True
+
+
+def to_come(before: float, gained: float) -> float:
+    """What is to be gained yet, if gains go on to fall by the same factor."""
+    if gained <= 0.0:
+        return 0.0
+    if before == math.inf:
+        return math.inf
+    return gained * gained / (before - gained) if gained < before else math.inf
 
 
 METHOD = Method(

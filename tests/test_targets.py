@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gmsnet
+from gmsnet import engine
+from gmsnet.generate import disturb
+from gmsnet.targets import Target, around, restricted, spans
+from gmsnet.topology import Topology
+
+
+@pytest.fixture(scope="module")
+def good():
+    """A mesh that is smoothed already."""
+    return gmsnet.smooth(gmsnet.random_mesh(3000, seed=2)).mesh
+
+
+def test_only_what_is_around_the_cells_that_miss_a_target_moves(good):
+    """A few nodes were moved in a good mesh: only their neighbourhoods are smoothed, until none misses the target."""
+    free = Topology.of(good).free
+    bad = disturb(good, free[100:110], 0.6, seed=1)
+    target = float(gmsnet.quality(good).shape.min())
+    below = gmsnet.quality(bad).shape < target
+    assert 0 < below.sum() < 50
+    result = gmsnet.smooth(bad, target_quality=target)
+    assert result.stop_reason == engine.TARGET_REACHED
+    assert result.after.shape.min() >= target
+    assert 0 < result.moved.sum() < 0.05 * len(good.points)
+    corners = Topology.of(bad).triangles
+    near = np.zeros(len(good.points), dtype=bool)
+    near[corners[below]] = True
+    for _ in range(7):  # the largest patches
+        near[corners[near[corners].any(axis=1)]] = True
+    assert not (result.moved & ~near).any()
+
+
+@pytest.mark.parametrize("method", ["auto", "gmsnet", "laplacian", "getme", "barrier", "worst-first"])
+def test_any_method_can_work_for_a_target(method):
+    mesh = gmsnet.random_mesh(500, seed=4)
+    start = float(gmsnet.quality(mesh).shape.min())
+    result = gmsnet.smooth(mesh, method, target_quality=start + 0.03)
+    assert result.stop_reason == engine.TARGET_REACHED
+    assert result.after.shape.min() >= start + 0.03
+
+
+def test_angles_can_be_the_target():
+    mesh = gmsnet.random_mesh(500, seed=5)
+    result = gmsnet.smooth(mesh, target_angle=12.0)
+    assert result.stop_reason == engine.TARGET_REACHED
+    assert result.after.min_angle.min() >= 12.0 > result.before.min_angle.min()
+
+
+def test_both_together(good):
+    least, angle = gmsnet.quality(good).shape.min(), gmsnet.quality(good).min_angle.min()
+    result = gmsnet.smooth(good, target_quality=float(least), target_angle=float(angle))
+    assert (result.sweeps, result.stop_reason) == (0, engine.TARGET_REACHED)
+
+
+def test_no_cell_is_lost_for_another(good):
+    """However far the target is out of reach, never more cells miss it than before."""
+    for target in (0.5, 0.55, 0.7):
+        result = gmsnet.smooth(good, target_quality=target, max_sweeps=60)
+        assert (result.after.shape < target).sum() <= (result.before.shape < target).sum()
+        assert result.after.shape.min() >= result.before.shape.min()
+        assert result.stop_reason in (engine.NO_PROGRESS, engine.MAX_SWEEPS)
+
+
+def test_what_is_held_cannot_be_mended():
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.01]])
+    result = gmsnet.smooth((points, np.array([[0, 1, 2]])), target_quality=0.5)
+    assert result.stop_reason == engine.NOTHING_TO_MOVE
+
+
+def test_stopping_is_obeyed_on_patches(good):
+    seen = []
+    result = gmsnet.smooth(good, "barrier", target_quality=0.99, callback=lambda s: seen.append(s) or len(seen) == 3)
+    assert result.stop_reason == engine.CALLBACK
+    assert [s.index for s in seen] == [1, 2, 3]
+    result = gmsnet.smooth(good, "barrier", target_quality=0.99, max_sweeps=5)
+    assert (result.sweeps, result.stop_reason) == (5, engine.MAX_SWEEPS)
+
+
+def test_what_misses_a_target():
+    shape, angle = np.array([0.5, 0.2, -0.9, np.nan, 0.31]), np.array([30.0, 11.0, 60.0, np.nan, 19.0])
+    assert Target(quality=0.3).missed(shape, angle).tolist() == [False, True, True, True, False]
+    assert Target(angle=20.0).missed(shape, angle).tolist() == [False, True, True, True, True]
+    assert not Target().missed(shape, angle).any()
+    assert str(Target(0.3, 20)) == "1/q ≥ 0.3 and the smallest angle ≥ 20°"
+
+
+def test_patches_against_a_slow_twin():
+    mesh = gmsnet.random_mesh(300, seed=6)
+    topology = Topology.of(mesh)
+    chosen = topology.near[[7, 200]]
+    for rings in (1, 2, 3):
+        wanted = set(chosen.ravel().tolist())
+        for ring in range(rings):
+            wanted = {node for node in wanted if topology.near_free[node]}
+            if ring < rings - 1:
+                wanted |= {n for row in topology.near if wanted & set(row.tolist()) for n in row.tolist()}
+        active = around(topology, chosen, rings)
+        assert set(np.flatnonzero(active).tolist()) == {node for node in wanted if topology.near_free[node]}
+        patch, rows = restricted(topology, active)
+        assert set(topology.memory[np.flatnonzero(active)].tolist()) == set(patch.free.tolist())
+        assert [bool(set(row.tolist()) & set(np.flatnonzero(active).tolist())) for row in topology.near] == [
+            row in set(rows.tolist()) for row in range(len(topology.near))
+        ]
+    start = np.array([0, 2, 2, 5, 6])
+    assert spans(start, np.array([3, 0, 2])).tolist() == [5, 0, 1, 2, 3, 4]
+    assert spans(start, np.array([1])).tolist() == []
