@@ -7,7 +7,21 @@ import os
 from collections.abc import Iterable
 
 from gmsnet.errors import InputError
-from gmsnet.methods import angle, auto, barrier, cpt, cvt, getme, gmsnet, gmsnet2, laplacian, nn, optimize, worst_first
+from gmsnet.methods import (
+    angle,
+    auto,
+    barrier,
+    cpt,
+    cvt,
+    getme,
+    gmsnet,
+    gmsnet2,
+    laplacian,
+    nn,
+    optimize,
+    sized,
+    worst_first,
+)
 from gmsnet.methods.base import Field, Method, Options, Smoother, StarSmoother, Tally
 
 METHODS: dict[str, Method] = {
@@ -24,6 +38,7 @@ METHODS: dict[str, Method] = {
         optimize.METHOD,
         barrier.METHOD,
         worst_first.METHOD,
+        sized.METHOD,
         nn.METHOD,
     )
 }

@@ -1,0 +1,52 @@
+"""Shape and size: each node goes to where its cells are good and as large as they were, by Newton steps.
+
+The objective stands in kernels/sized.py. WEIGHT says how much size counts beside shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels import sized as kernels
+from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.stars import Blocks
+from gmsnet.methods.base import Field, Method, StarSmoother, Tally
+from gmsnet.topology import Topology
+from gmsnet.workers import Share
+
+WEIGHT = 4.0
+
+
+class Sized(StarSmoother):
+    """Keeps the areas that the cells have when the first sweep begins."""
+
+    def __init__(self, weight: float = WEIGHT) -> None:
+        self.weight = weight
+        self.topology: Topology | None = None
+        self.areas = np.empty(0)
+
+    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+        """See Smoother."""
+        if field.topology is not self.topology:
+            self.topology = field.topology
+            blocks = field.topology.stars.blocks
+            self.areas = np.empty(len(blocks.rings))
+            kernels.targets(field.points, field.topology.near, blocks, self.areas)
+        return super().sweep(field, share, test)
+
+    def visit(
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        kernels.sweep(points, blocks, self.areas, self.weight, first, last, guard, tally)
+
+
+METHOD = Method(
+    name="sized",
+    summary="shape and size: to where the cells of the star are good and as large as they were",
+    source="this package; Knupp: Algebraic mesh quality metrics (2001), the relative size metric",
+    create=lambda options: Sized(),
+)
