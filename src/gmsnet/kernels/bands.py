@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.compile import LANES, kernel
-from gmsnet.kernels.stars import SIZE
 
 
 class Bands(NamedTuple):
@@ -34,17 +33,17 @@ def no_bands() -> Bands:
 
 
 @kernel
-def shorten(bands, blocks, block, x, ring, work, shift):
+def shorten(bands, blocks, block, x, ring, sizes, shift):
     """Shortens the shifts (2·LANES, over the stars' sizes) of a block so that they end inside all bands.
 
-    x, ring, work: as ``stars.fetch`` leaves them.
+    x, ring: as ``stars.gather`` leaves them; sizes: (LANES,).
     """
     n, offset = blocks.degree[block], blocks.offset[block]
     for lane in range(LANES):
         c = blocks.centre[block * LANES + lane]
         if not bands.kept[c]:
             continue
-        size, share = work[SIZE * LANES + lane], 1.0
+        size, share = sizes[lane], 1.0
         dx, dy = size * shift[lane], size * shift[LANES + lane]
         for j in range(n):
             i = n - 1 if j == 0 else j - 1

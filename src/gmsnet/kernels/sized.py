@@ -23,7 +23,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels import stars
+from gmsnet.kernels import bands, stars
 from gmsnet.kernels.compile import LANES, inlined, kernel
 from gmsnet.kernels.objectives import aspect_squared
 
@@ -172,8 +172,11 @@ def descend(local, n, wanted, weight, state):
 
 
 @kernel
-def sweep(points, blocks, areas, weight, first, last, guard, tally):
-    """Visits the blocks first…last (of one colour) once. areas: as ``targets`` leaves them. tally: (3,), added to."""
+def sweep(points, blocks, areas, weight, kept, first, last, guard, tally):
+    """Visits the blocks first…last (of one colour) once. tally: (3,), added to.
+
+    areas: as ``targets`` leaves them. kept: bands.Bands that no shift leaves.
+    """
     x, ring, work, counts = stars.room(blocks.most)
     local, wanted = np.empty(2 * blocks.most * LANES), np.empty(blocks.most * LANES)
     state, shift = np.empty(STATE * LANES), np.empty(2 * LANES)
@@ -193,6 +196,8 @@ def sweep(points, blocks, areas, weight, first, last, guard, tally):
                 for j in range(n):
                     shift[lane] += local[2 * j * LANES + lane] / n
                     shift[LANES + lane] += local[(2 * j + 1) * LANES + lane] / n
+        if len(kept.kept):
+            bands.shorten(kept, blocks, block, x, ring, work[stars.SIZE * LANES : (stars.SIZE + 1) * LANES], shift)
         stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
     for k in range(len(tally)):
         tally[k] += counts[k]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import sized as kernels
+from gmsnet.kernels.bands import Bands, no_bands
 from gmsnet.kernels.guard import Guard
 from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Field, Method, StarSmoother, Tally
@@ -18,13 +19,14 @@ from gmsnet.topology import Topology
 from gmsnet.workers import Share
 
 WEIGHT = 4.0
+BAND = 0.1
 
 
 class Sized(StarSmoother):
-    """Keeps the areas that the cells have when the first sweep begins."""
+    """Keeps the areas that the cells have when the first sweep begins. bands: areas that stay within hard bounds."""
 
-    def __init__(self, weight: float = WEIGHT) -> None:
-        self.weight = weight
+    def __init__(self, weight: float = WEIGHT, bands: Bands | None = None) -> None:
+        self.weight, self.bands = weight, bands or no_bands()
         self.topology: Topology | None = None
         self.areas = np.empty(0)
 
@@ -41,7 +43,15 @@ class Sized(StarSmoother):
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, self.areas, self.weight, first, last, guard, tally)
+        kernels.sweep(points, blocks, self.areas, self.weight, self.bands, first, last, guard, tally)
+
+
+def banded(start: NDArray[np.float64], kept: NDArray[np.bool_]) -> Sized:
+    """For cells whose areas are to stay: shape alone, with each area within a tenth of what it is in ``start``.
+
+    start: (N, 2) points in memory order. kept: (N,) bool, in memory order: cells all of whose corners are kept stay.
+    """
+    return Sized(0.0, Bands(np.ascontiguousarray(start), kept, BAND))
 
 
 METHOD = Method(
