@@ -32,17 +32,17 @@ GAIN = 0.003  # in the mean of 1/q: what is to come for a stage to be made once 
 class Stage(NamedTuple):
     """name: for the record. create: its smoother. sweeps: made before the next stage; None: until that has settled.
 
-    repeats: whether it is made again as long as it gains.
+    rounds: how often at most, as long as it gains.
     """
 
     name: str
     create: Callable[[], Smoother]
     sweeps: int | None
-    repeats: bool = False
+    rounds: int = 1
 
 
 CHEAP = Stage("smart Laplacian", lambda: Laplacian("smart"), 2)
-NEWTON = Stage("Newton on q", lambda: Barrier("q", RELAXATION, ALWAYS), 2, repeats=True)
+NEWTON = Stage("Newton on q", lambda: Barrier("q", RELAXATION, ALWAYS), 2, rounds=40)
 WORST = Stage("worst first", WorstFirst, None)
 
 VARIANTS = {"full": (CHEAP, NEWTON, WORST), "patch": (NEWTON, WORST)}
@@ -60,7 +60,7 @@ class Auto(Smoother):
         self._enter(0)
 
     def _enter(self, stage: int) -> None:
-        self.at, self.made, self.gained = stage, 0, math.inf
+        self.at, self.made, self.rounds, self.gained = stage, 0, 0, math.inf
         self.smoother = self.stages[stage].create()
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
@@ -80,7 +80,8 @@ class Auto(Smoother):
         gained, before = standing.mean_shape - last.mean_shape, self.gained
         self.gained = gained
         mends = standing.inverted < last.inverted
-        if self.stages[self.at].repeats and (mends or to_come(before, gained) > GAIN):
+        self.rounds += 1
+        if self.rounds < self.stages[self.at].rounds and (mends or to_come(before, gained) > GAIN):
             self.made = 0
         elif self.at + 1 < len(self.stages):
             self._enter(self.at + 1)
