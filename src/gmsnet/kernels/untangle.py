@@ -82,7 +82,8 @@ def cut(nodes, start, ring, number):
         number[nodes[k]] = k
         spokes += start[nodes[k] + 1] - start[nodes[k]]
     every = np.empty(count + spokes, dtype=np.int32)
-    every[:count] = nodes
+    for k in range(count):  # assigning a slice would take seconds to compile
+        every[k] = nodes[k]
     new_start = np.zeros(count + 1, dtype=np.int32)
     new_ring = np.empty(spokes, dtype=np.int32)
     cells = np.empty((spokes, 3), dtype=np.int32)

@@ -76,7 +76,7 @@ class Tangle:
         topology, precision = self.topology, self.precision
         around = moved.copy()
         kernels.grow(around, topology.near_start, topology.near_ring, 1)
-        nodes = np.flatnonzero(around)
+        nodes = np.flatnonzero(around).astype(np.int32)  # as elsewhere, so that nothing is compiled twice
         shares = kernels.bad_shares(
             self.points, nodes, topology.near_start, topology.near_ring, precision.unit, precision.grain
         )
