@@ -7,13 +7,16 @@ from gmsnet.topology import Topology
 from gmsnet.untangle.guarded import what_is_left
 from gmsnet.untangle.newton import polish
 from gmsnet.untangle.patch import Floats
-from gmsnet.untangle.reasons import reasons
+from gmsnet.untangle.reasons import freeze, reasons
 from gmsnet.untangle.result import ALL, NOTHING, PART, Stage, Unmended, Untangled
 from gmsnet.untangle.road import follow
 from gmsnet.untangle.tangle import Precision, Tangle
 from gmsnet.untangle.transaction import give_back, moved, take
 
 __all__ = ["ALL", "NOTHING", "PART", "Stage", "Unmended", "Untangled", "untangle"]
+
+
+ROUNDS = 2  # after the first, nodes of cells that cannot be mended stand still, for the sake of those beside them
 
 
 def untangle(points: Floats, topology: Topology, precision: Precision) -> Untangled:
@@ -30,11 +33,17 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     before = int(tangle.was_bad.sum())
     if not before:
         return Untangled(tangle.points, 0, 0, ALL, "", (), ())
-    stages = list(follow(tangle))
-    taken, why = take(tangle)
-    if tangle.left and tangle.bad_nodes().any():
+    stages, whys = list[Stage](), list[str]()
+    for _ in range(ROUNDS):
+        stages += follow(tangle)
+        whys.append(take(tangle))
+        if not tangle.bad_nodes().any():
+            break
         stages.append(what_is_left(tangle))
-        taken = PART if taken == NOTHING and moved(tangle).any() else taken
+        if not freeze(tangle):
+            break
+    why = next(filter(None, whys), "")
+    taken = NOTHING if not moved(tangle).any() else PART if why else ALL
     if taken != NOTHING:
         stages += give_back(tangle), polish(tangle)
     after = 0

@@ -9,14 +9,16 @@ import scipy.sparse
 from gmsnet.measure import exact_signs
 from gmsnet.topology import Topology
 from gmsnet.untangle.crossings import held_edges, near_crossings
-from gmsnet.untangle.patch import Flags, Floats
+from gmsnet.untangle.patch import Flags, Floats, free_nodes_of
 from gmsnet.untangle.result import Unmended
+from gmsnet.untangle.tangle import Tangle
 
 HELD = "all its nodes are held"
 CROSSING = "the boundary crosses itself here"
 HELD_CROSSING = "edges whose nodes are held cross each other here"
 EMPTY = "no position of its free node makes all triangles of its star positive"
 CLUSTER = 100  # bad cells around one that cannot be mended, at most: more may have reasons of their own
+FOR_GOOD = (CROSSING, HELD, EMPTY, HELD_CROSSING)
 ROUNDING = "it is positive, but by no more than its coordinates may be off by"
 
 
@@ -56,9 +58,17 @@ def proven(topology: Topology, points: Floats, bad: Flags) -> bool:
     own = np.repeat(np.arange(count), 3)
     graph = scipy.sparse.csr_matrix((np.ones(3 * count), (own, count + cells.ravel())), shape=(count + nodes,) * 2)
     cluster = scipy.sparse.csgraph.connected_components(graph, directed=False)[1][:count]
-    known = np.array([row.reason in (CROSSING, HELD, EMPTY, HELD_CROSSING) for row in rows])
+    known = np.array([row.reason in FOR_GOOD for row in rows])
     size, reasons_known = np.bincount(cluster), np.bincount(cluster, known)
     return bool(known.all() or ((reasons_known > 0) & (size <= CLUSTER))[cluster].all())
+
+
+def freeze(tangle: Tangle) -> bool:
+    """Freezes the free nodes of bad cells with such a reason; is there something new to try?"""
+    topology, before = tangle.topology, tangle.frozen.sum()
+    rows = [row.triangle for row in reasons(topology, tangle.points, tangle.bad, 0) if row.reason in FOR_GOOD]
+    tangle.frozen |= free_nodes_of(topology, np.array(rows, dtype=np.intp))
+    return bool(tangle.frozen.sum() > before and tangle.bad_nodes().any())
 
 
 def has_no_place(points: Floats, topology: Topology, v: int, known: dict[int, bool]) -> bool:

@@ -28,7 +28,8 @@ class Tangle:
     """points: (N, 2) in memory order, of which free nodes are moved. before: the same at first, not changed.
 
     signs: (T,) exact signs at first. bad: (T,) which cells are to be mended: not certified (kernels.untangle), and
-    inverted at first or with a node that has moved. left: how many.
+    inverted at first or with a node that has moved. left: how many. frozen: (N,) free nodes that stand
+    still all the same.
     """
 
     def __init__(self, points: Floats, topology: Topology, precision: Precision) -> None:
@@ -38,6 +39,7 @@ class Tangle:
         self.was_bad = self.signs <= 0
         self.bad = np.empty(len(topology.near), dtype=bool)
         self.left = 0
+        self.frozen = np.zeros(len(points), dtype=bool)
         self.look()
 
     @cached_property
@@ -57,8 +59,8 @@ class Tangle:
         return self.left
 
     def bad_nodes(self) -> Flags:
-        """(N,) the free nodes of bad cells."""
-        return free_nodes_of(self.topology, self.bad)
+        """(N,) the free nodes of bad cells, without those that are frozen."""
+        return free_nodes_of(self.topology, self.bad) & ~self.frozen
 
     def worst_first(self, nodes: Ints) -> Ints:
         """Some free nodes, those with the largest share of bad cells first: most likely they are the culprits.
@@ -76,6 +78,7 @@ class Tangle:
         topology, precision = self.topology, self.precision
         around = moved.copy()
         kernels.grow(around, topology.near_start, topology.near_ring, 1)
+        around &= ~self.frozen
         nodes = np.flatnonzero(around).astype(np.int32)  # as elsewhere, so that nothing is compiled twice
         shares = kernels.bad_shares(
             self.points, nodes, topology.near_start, topology.near_ring, precision.unit, precision.grain
@@ -98,6 +101,7 @@ class Tangle:
         """The patch of the free nodes of bad cells and those within so many rings of them."""
         chosen = self.bad_nodes()
         kernels.grow(chosen, self.topology.near_start, self.topology.near_ring, rings)
+        chosen &= ~self.frozen
         return Patch.of(self.topology, in_order(self.topology, chosen))
 
     def rounded(self, points: Floats) -> Floats:

@@ -14,16 +14,16 @@ from gmsnet.kernels import untangle as kernels
 from gmsnet.kernels.quality import TWO_SQRT3
 from gmsnet.untangle.newton import keep_gains
 from gmsnet.untangle.patch import Flags, free_nodes_of, in_order
-from gmsnet.untangle.result import ALL, NOTHING, PART, Stage
+from gmsnet.untangle.result import Stage
 from gmsnet.untangle.tangle import Tangle
 
 BACK_SWEEPS, FINE = 20, 0.1  # a cell between nodes that went back and others may have this 1/q
 
 
-def take(tangle: Tangle) -> tuple[str, str]:
-    """Takes back what cannot be taken; returns how much of what was moved is left, and why not all."""
+def take(tangle: Tangle) -> str:
+    """Takes back what cannot be taken; returns why, or "" if all is taken."""
     if not tangle.left:
-        return ALL, ""
+        return ""
     precision, topology = tangle.precision, tangle.topology
     violated = np.empty(len(topology.near), dtype=bool)
     floor = tangle.worst
@@ -39,11 +39,11 @@ def take(tangle: Tangle) -> tuple[str, str]:
         put_back(tangle, free_nodes_of(topology, violated) & moved(tangle))
     tangle.look()
     keep_gains(tangle, tangle.before, tangle.was_bad)
-    left = moved(tangle).sum()
-    if left == tried:
-        return (ALL, "") if left else (NOTHING, "no inverted cell has a node that may move")
-    why = f"{first} cells that were positive, or better, would have been inverted" if first else "no cell was mended"
-    return (PART if left else NOTHING), why
+    if not tried:
+        return "no inverted cell has a node that may move"
+    if moved(tangle).sum() == tried:
+        return ""
+    return f"{first} cells that were positive, or better, would have been inverted" if first else "no cell was mended"
 
 
 def moved(tangle: Tangle) -> Flags:
