@@ -39,7 +39,7 @@ class Sweep:
     """What one sweep did, and the mesh after it. moved, truncated, dropped count nodes.
 
     index: sweeps so far; methods that need not know how the mesh is after each sweep leave some out, and the counts are
-    of all since the last one told. stage: what of the method it was, "" for methods of one stage.
+    of all since the last one told. stage: what of the method they were, "" for methods of one stage.
     """
 
     index: int
@@ -71,6 +71,7 @@ class Run:
         self.sweeps = self.history[-1].index if self.history else 0
         self.first = len(self.history)
         self.tally: Tally = np.zeros(3, dtype=np.int64)  # since the last look
+        self.stages: dict[str, None] = {}  # since the last look, in their order
         self.sums = np.empty((-(-len(topology.near) // LANES), kernels.SUMS))
         self.best, self.best_standing = start, self._standing()
 
@@ -103,6 +104,7 @@ class Run:
         """One sweep; returns how many nodes moved."""
         tally = self.smoother.sweep(self.field, share, lambda: self._keep_if_best(self._standing(share)))
         self.tally += tally
+        self.stages[self.smoother.stage] = None
         self.sweeps += 1
         return int(tally[MOVED])
 
@@ -114,10 +116,11 @@ class Run:
         self.tally[:] = 0
         self.smoother.told(standing)
         sweep = Sweep(
-            self.sweeps, self.smoother.stage, moved, truncated, dropped, standing.inverted, standing.qhat,
+            self.sweeps, ", ".join(self.stages), moved, truncated, dropped, standing.inverted, standing.qhat,
             standing.min_shape, standing.mean_shape,
         )  # fmt: skip
         self.history.append(sweep)
+        self.stages.clear()
         return sweep
 
     def _keep_if_best(self, standing: Standing) -> bool:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from gmsnet.measure import QualityReport
+    from gmsnet.run import Sweep
 
 WORST = 5  # cells are shown
 NAMED = 10  # cells are named in one line
@@ -93,6 +94,15 @@ def worst_table(cells: Sequence[Mapping[str, Any]]) -> Table:
     ]
     with_held = any("held_corners" in cell for cell in cells)
     return table([*columns, *(["held corners"] if with_held else [])], rows)
+
+
+def stage_table(stages: Sequence[tuple[str, int, Sweep]]) -> Table:
+    """What was done one after the other: its name, how many sweeps, and the mesh after it."""
+    rows = [
+        [name, f"{sweeps}", f"{sweep.min_shape:.4f}", f"{sweep.mean_shape:.4f}", f"{sweep.qhat:.4f}"]
+        for name, sweeps, sweep in stages
+    ]
+    return table(["stage", "sweeps", "1/q, least", "1/q, mean", "q-hat"], rows)
 
 
 def corners_of(mesh: Mesh, cell: int) -> NDArray[np.int64]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from gmsnet import engine
 from gmsnet.cli import output, report
 from gmsnet.cli.target import shown
-from gmsnet.engine import SmoothResult
+from gmsnet.engine import SmoothResult, Sweep
 from gmsnet.mesh import Mesh
 from gmsnet.targets import Target
 
@@ -77,6 +78,17 @@ class Outcome:
         reasons = "".join(f"\n  cell {after.cell[row]}: {why[row]}" for row in cells.tolist())
         return f"{'; '.join([*figures, str(self.target)])}; {report.named_cells(after, self.missed)} below it{reasons}"
 
+    def stages(self) -> list[tuple[str, int, Sweep]]:
+        """What the method did one after the other, with how many sweeps, and the mesh then; empty if all was one."""
+        found: list[tuple[str, int, Sweep]] = []
+        begun = 0
+        for stage, looks in groupby(self.result.history, key=lambda sweep: sweep.stage):
+            *_, last = looks
+            if stage:
+                found.append((stage, last.index - begun, last))
+            begun = last.index
+        return found
+
     def nearness(self) -> str:
         """How near the least 1/q is to the most that it can be, as far as a bound is known."""
         bounds = self.result.limits
@@ -114,6 +126,9 @@ class Outcome:
             console.print(report.figures({"before": result.before, "after": result.after}))
             console.print(f"\nworst cells{' now' if moved else ''} (numbers from 0)")
             console.print(report.worst_table(self.worst))
+            console.print()
+        if stages := self.stages():
+            console.print(report.stage_table(stages))
             console.print()
         console.print(self.verdict())
         for note in self.result.notes:
