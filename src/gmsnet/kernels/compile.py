@@ -11,6 +11,7 @@ folder; where none of them can be written, functions are compiled anew in each p
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -36,5 +37,24 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Callable
     try:
         compiled: Callable[..., Any] = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no folder for the cache can be written
-        compiled = numba.njit(**options)(function)
+        return numba.njit(**options)(function)  # type: ignore[no-any-return]
+    _outlive_upgrades(compiled)
     return compiled
+
+
+def _outlive_upgrades(compiled: Any) -> None:
+    """Takes a cache that cannot be read for a stale one, so that the function is compiled anew.
+
+    Numba asks whether a cache is older than the source file only once it is unpickled, which fails where an argument's
+    class stood in another module when it was written: after an upgrade, that is.
+    """
+    file = compiled._cache._cache_file
+    load = file._load_index
+
+    def load_or_start_anew() -> Any:
+        try:
+            return load()
+        except (AttributeError, ImportError, EOFError, pickle.UnpicklingError):
+            return {}
+
+    file._load_index = load_or_start_anew
