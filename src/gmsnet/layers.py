@@ -4,8 +4,8 @@ A sliver is stretched, too. What tells a layer from slivers is that its cells ar
 neighbourhood. So the vector v of kernels.stretch, no longer than log 4, so that one sliver cannot outvote its
 neighbours, is averaged over the two rings around each node: on random Delaunay meshes the mean is 1.25 (as a stretch
 exp |v|), and hardly ever above 2.6; in layers it is the stretch itself, or 4. From where it is SEED or more, a layer
-extends over the neighbours whose stars have a mean stretch of REACH or more, whatever its direction: so it goes around
-corners, where directions change, and up to where its cells are no longer stretched.
+extends over the neighbours whose stars have a mean stretch of REACH or more, whatever its direction, or ALIKE or more
+in one direction: so it goes around corners, where directions change, and up to where its cells are no longer stretched.
 
 Cells at the boundary, or at an interface, do not count for a seed: where the nodes there are closer together, or
 further apart, than those inside, one row of cells is stretched alike without anybody's intent. A layer has at least two
@@ -31,9 +31,12 @@ Floats = NDArray[np.float64]
 MOST = math.log(4.0)  # a larger stretch counts as this one where means are formed
 SEED = math.log(2.8)  # the stretch of the mean over two rings from which cells are stretched on purpose
 REACH = math.log(2.5)  # the mean stretch of a star to which a layer extends; right triangles with legs 1 and 2 have it
+ALIKE = math.log(1.8)  # the same of the mean of v, if in little: the halves of squares have 1.73
 FEW = 4  # cells: nodes of fewer weigh less
 FEWEST = 6  # nodes above SEED that hang together
 RINGS = 4  # how far a layer extends beyond those, in edges
+EVEN = 0.2  # of the mean area of a star: the least of its areas where a layer goes around a corner
+NEXT = 3.0  # how many times the area of a cell's neighbour in a layer its own may be, or the other way round
 BROKEN = 0.05  # of the mean area around: a cell of less is damaged, and its nodes are not held
 
 
@@ -88,7 +91,11 @@ def stretched_layers(mesh: Mesh, topology: Topology) -> Layers:
         return nothing
     means = np.empty((count, stretch.COLUMNS))
     stretch.to_nodes(triangles, np.zeros(count, dtype=bool), 1, cells, means, number)
-    layer = _grown(triangles, seeds, means[:, stretch.LENGTH] >= REACH)
+    alike = np.hypot(means[:, stretch.ALONG], means[:, stretch.ACROSS]) >= ALIKE
+    least = np.full(count, np.inf)
+    np.minimum.at(least, triangles.ravel(), np.repeat(cells[:, stretch.AREA], 3))
+    even = least >= EVEN * means[:, stretch.AREA]
+    layer = _grown(triangles, seeds, alike | (even & (means[:, stretch.LENGTH] >= REACH)))
     if not layer.any():
         return nothing
     held = np.empty(count, dtype=bool)
@@ -135,14 +142,30 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers:
     cells, number = np.empty((len(triangles), stretch.COLUMNS)), np.empty(len(layer), dtype=np.int32)
     points = planar_points(mesh)
     stretch.per_cell(points, triangles, topology.turn, math.inf, cells)
-    corners = layer[triangles].sum(axis=1)
-    chosen = (corners == 3) | ((corners == 2) & (cells[:, stretch.LENGTH] >= REACH))
+    chosen: Flags = np.asarray(layer[triangles].all(axis=1))
+    chosen |= _next_row(triangles, layer, chosen, cells)
     damaged = chosen & (cells[:, stretch.AREA] <= BROKEN * _area_around(triangles, cells, number))
     nodes = np.zeros(len(layer), dtype=bool)
     nodes[triangles[chosen]] = True
     nodes[triangles[damaged]] = False
     lengths = np.exp(cells[chosen, stretch.LENGTH])
     return Layers(nodes, chosen, float(np.median(lengths)), float(lengths.max()), int(damaged.sum()))
+
+
+def _next_row(triangles: NDArray[np.int32], layer: Flags, inside: Flags, cells: Floats) -> Flags:
+    """(T,) stretched cells that have an edge, and about the area, in common with a cell of a layer."""
+    rim = np.flatnonzero((layer[triangles].sum(axis=1) == 2) & (cells[:, stretch.LENGTH] >= ALIKE))
+    own = triangles[rim][layer[triangles[rim]]].reshape(-1, 2)
+    edges = triangles[inside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    key, known = (e.min(axis=1).astype(np.int64) * len(layer) + e.max(axis=1) for e in (own, edges))
+    order = np.argsort(known, kind="stable")
+    place = np.minimum(np.searchsorted(known[order], key), max(len(known) - 1, 0))
+    next_row = np.zeros(len(triangles), dtype=bool)
+    if len(known):
+        across = np.repeat(np.abs(cells[inside, stretch.AREA]), 3)[order][place]
+        size = np.abs(cells[rim, stretch.AREA])
+        next_row[rim] = (known[order][place] == key) & (size <= NEXT * across) & (across <= NEXT * size)
+    return next_row
 
 
 def _area_around(triangles: NDArray[np.int32], cells: Floats, number: NDArray[np.int32]) -> Floats:

@@ -52,6 +52,7 @@ def near_walls(mesh: Mesh, topology: Topology) -> Flags:
         return kept
     middle = (a + b + c) / 3.0
     rough: Floats | None = None
+    chosen = np.zeros(len(triangles), dtype=bool)
     for wall in _walls(triangles, len(points)):
         near = NEAR * _diameter(points[np.unique(wall)])
         rows = np.flatnonzero(_distance(middle, points[wall], near) <= near)
@@ -60,13 +61,14 @@ def near_walls(mesh: Mesh, topology: Topology) -> Flags:
         if rough is None:
             rough = _roughness(triangles, double, len(points))
         if np.median(rough[rows]) <= CALM:
-            kept[triangles[rows]] = True
-    if rough is not None and kept.any():
+            chosen[rows] = True
+    if rough is not None and chosen.any():
+        kept[triangles[chosen]] = True
         low, high, shape, aspect = (np.empty(len(triangles)) for _ in range(4))
         quality.per_cell(points, triangles, topology.turn, low, high, shape, aspect)
         free = np.zeros(len(kept), dtype=bool)
         free[topology.free] = True
-        damaged = ((rough > ROUGH) | (shape < SOUND)) & free[triangles].any(axis=1)
+        damaged = chosen & ((rough > ROUGH) | (shape < SOUND)) & free[triangles].any(axis=1)
         kept[triangles[damaged]] = False
     return kept
 
