@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -86,7 +88,9 @@ def test_what_misses_a_target():
     assert Target(quality=0.3).missed(shape, angle).tolist() == [False, True, True, True, False]
     assert Target(angle=20.0).missed(shape, angle).tolist() == [False, True, True, True, True]
     assert not Target().missed(shape, angle).any()
-    assert str(Target(0.3, 20)) == "1/q ≥ 0.3 and the smallest angle ≥ 20°"
+    assert Target(quality=0.3).shape == 0.3
+    assert Target(angle=60.0).shape == pytest.approx(1.0)
+    assert Target(quality=0.1, angle=30.0).shape == pytest.approx(2 * math.sqrt(3) * (math.sqrt(3) / 2) / 5)
 
 
 def test_patches_against_a_slow_twin():

@@ -51,10 +51,6 @@ class Target:
             least = max(least, 2.0 * math.sqrt(3.0) * long * math.sin(alpha) / (2.0 + long * long))
         return least
 
-    def __str__(self) -> str:
-        given = (("1/q", self.quality, ""), ("the smallest angle", self.angle, "°"))
-        return " and ".join(f"{name} ≥ {value:g}{unit}" for name, value, unit in given if value is not None)
-
 
 @dataclass(frozen=True)
 class Patches:

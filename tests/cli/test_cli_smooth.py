@@ -14,6 +14,7 @@ import pytest
 import gmsnet
 from gmsnet import engine
 from gmsnet.cli.smooth_report import Outcome
+from gmsnet.targets import Target
 
 
 def listing(folder):
@@ -110,8 +111,8 @@ def test_a_target_that_is_not_met_is_exit_1_and_names_the_cells(run, square, tmp
     worst = int(after.cell[after.worst(1)[0]])
     gap = 0.99 - after.shape.min()
     assert re.fullmatch(
-        rf"gmsnet: target not met: the least 1/q is \S+, {gap:.4g} below 0\.99; {few:,} cells below it "
-        rf"\(numbers from 0, worst first: {worst}, .*\)\n",
+        rf"gmsnet: target not met: the least 1/q is \S+, {gap:.4g} below 0\.99; {few:,} cells miss it "
+        rf"\(numbers from 0, worst first: {worst}, [^)]*\)(\n  cell \d+: .+){{10}}\n",
         done.err,
     )
     if flag == "--json":
@@ -230,9 +231,9 @@ def test_the_target_is_judged_by_the_cells_and_not_by_the_reason_to_stop(square)
         (np.nextafter(least, 1), engine.TARGET_REACHED, False),
         (least, engine.MAX_SWEEPS, True),
     ):
-        outcome = Outcome("in", "out", "gmsnet", mesh, replace(result, stop_reason=reason), float(target), [], None)
+        outcome = Outcome("in", "out", "gmsnet", mesh, replace(result, stop_reason=reason), Target(target), [], None)
         assert outcome.target_met is met
-    assert "1 cell below it" in Outcome("", "", "", mesh, result, float(np.nextafter(least, 1)), [], None).shortfall()
+    assert "1 cell miss it" in Outcome("", "", "", mesh, result, Target(np.nextafter(least, 1)), [], None).shortfall()
 
 
 def test_a_bug_is_one_line_and_a_traceback_on_demand(run, square, tmp_path, monkeypatch):
@@ -271,5 +272,5 @@ def test_the_metric_by_which_the_best_mesh_is_chosen(run, square, tmp_path):
     assert results["shape"]["history"][0]["qhat"] != results["aspect"]["history"][0]["qhat"]
     refused = run("smooth", square, tmp_path / "out.su2", "--best-by", "qhat")
     assert refused.code == 2
-    assert "best_by must be 'shape' or 'aspect'" in refused.err
+    assert "best_by must be one of 'shape', 'aspect'" in refused.err
     assert not (tmp_path / "out.su2").exists()

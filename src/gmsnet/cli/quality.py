@@ -66,6 +66,6 @@ def quality(
         if plot is not None:
             console.print(f"picture: {plot}")
     if threshold is not None and few:
-        cells = report.named_cells(found, found.worst(few))
+        cells = report.named_cells(found, found.worst(few), "below it")
         typer.echo(f"gmsnet: below the threshold {threshold:g}: {cells}", err=True)
         raise typer.Exit(1)

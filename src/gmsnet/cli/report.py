@@ -114,11 +114,11 @@ def corners_of(mesh: Mesh, cell: int) -> NDArray[np.int64]:
     raise IndexError(cell)
 
 
-def named_cells(report: QualityReport, rows: NDArray[np.int64]) -> str:
-    """The cells of these rows, the worst first, in words: how many, and the first of them by number."""
+def named_cells(report: QualityReport, rows: NDArray[np.int64], what: str) -> str:
+    """The cells of these rows, the worst first, in words: how many are what, and the first of them by number."""
     named = ", ".join(str(cell) for cell in report.cell[rows[:NAMED]].tolist())
     more = ", …" if len(rows) > NAMED else ""
-    return f"{amount(len(rows), 'cell')} (numbers from 0, worst first: {named}{more})"
+    return f"{amount(len(rows), 'cell')} {what} (numbers from 0, worst first: {named}{more})"
 
 
 def _at(summary: Mapping[str, Any], path: Sequence[str]) -> Any:

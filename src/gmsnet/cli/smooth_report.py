@@ -67,16 +67,17 @@ class Outcome:
     def shortfall(self) -> str:
         """By how much the target is missed, and by which cells."""
         after = self.result.after
-        figures = []
-        if self.target.quality is not None and self.least < self.target.quality:
-            figures.append(f"the least 1/q is {self.least:.4g}, {self.target.quality - self.least:.4g} below")
+        figures, wanted = [], self.target
+        if wanted.quality is not None and self.least < wanted.quality:
+            gap = wanted.quality - self.least
+            figures.append(f"the least 1/q is {self.least:.4g}, {gap:.4g} below {wanted.quality:g}")
         angle = float(after.min_angle.min(initial=math.inf))
-        if self.target.angle is not None and angle < self.target.angle:
-            figures.append(f"the least angle is {angle:.4g}°, {self.target.angle - angle:.4g}° below")
+        if wanted.angle is not None and angle < wanted.angle:
+            figures.append(f"the least angle is {angle:.4g}°, {wanted.angle - angle:.4g}° below {wanted.angle:g}°")
         cells = self.missed[: report.NAMED]
         why = self.result.limits.reasons(cells, self.target.shape)
         reasons = "".join(f"\n  cell {after.cell[row]}: {why[row]}" for row in cells.tolist())
-        return f"{'; '.join([*figures, str(self.target)])}; {report.named_cells(after, self.missed)} below it{reasons}"
+        return f"{'; '.join(figures)}; {report.named_cells(after, self.missed, 'miss it')}{reasons}"
 
     def stages(self) -> list[tuple[str, int, Sweep]]:
         """What the method did one after the other, with how many sweeps, and the mesh then; empty if all was one."""
@@ -92,7 +93,7 @@ class Outcome:
     def nearness(self) -> str:
         """How near the least 1/q is to the most that it can be, as far as a bound is known."""
         bounds = self.result.limits
-        if not len(bounds.bound) or not len(self.result.after.cell):
+        if not len(bounds.bound):
             return "no bound is known for the least 1/q"
         return f"the least 1/q is {self.least:.4g} and cannot exceed {bounds.ceiling:.4g}: {bounds.describe(0)}"
 

@@ -1,0 +1,117 @@
+"""gmsnet smooth: targets, inverted cells, layers and levels of the guard, as the command line tells them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import gmsnet
+from gmsnet.generate import disturb
+from gmsnet.topology import Topology
+
+
+@pytest.fixture
+def tangled(square, tmp_path):
+    """The square with nodes thrown over each other."""
+    mesh = gmsnet.read(square)
+    path = tmp_path / "tangled.su2"
+    gmsnet.write(disturb(mesh, Topology.of(mesh).free[:40], 1.5, seed=3, keep_valid=False), path)
+    assert gmsnet.quality(gmsnet.read(path)).inverted > 5
+    return path
+
+
+def test_inverted_cells_are_mended_by_default_and_told(run, tangled, tmp_path):
+    out = tmp_path / "out.su2"
+    done = run("smooth", tangled, out)
+    assert done.code == 0
+    assert "untangling: all" in done.out
+    assert gmsnet.quality(gmsnet.read(out)).inverted == 0
+    document = json.loads(run("smooth", tangled, out, "--json").out)
+    assert document["unmended"] == []
+    assert any(note.startswith("untangling") for note in document["notes"])
+
+
+def test_what_stays_inverted_is_exit_1_with_its_cells_and_why(run, tmp_path):
+    path, out = tmp_path / "twisted.obj", tmp_path / "out.obj"
+    # A strip of three triangles, the middle one folded over; all nodes are on the boundary.
+    path.write_text("v 0 0 0\nv 2 0 0\nv 1 2 0\nv 1.2 0.5 0\nv 3 1 0\nf 1 2 3\nf 1 2 4\nf 2 5 3\n")
+    assert gmsnet.quality(gmsnet.read(path)).inverted == 1
+    done = run("smooth", path, out)
+    assert done.code == 1
+    assert "gmsnet: inverted still: 1 cell (numbers from 0): cell 1 at 1.06667 0.166667 0: " in done.err
+    assert "held" in done.err
+    document = json.loads(run("smooth", path, out, "--json").out)
+    assert [cell["cell"] for cell in document["unmended"]] == [1]
+
+
+def test_without_untangling_methods_mend_what_they_can(run, tangled, tmp_path):
+    done = run("smooth", tangled, tmp_path / "out.su2", "--no-untangle", "--max-sweeps", 0)
+    assert done.code == 1
+    assert "inverted still" in done.err
+    assert "untangling:" not in done.out
+
+
+def test_an_angle_can_be_the_target(run, square, tmp_path):
+    out = tmp_path / "out.su2"
+    assert run("smooth", square, out, "--target-angle", 12).code == 0
+    assert gmsnet.quality(gmsnet.read(out)).min_angle.min() >= 12
+    done = run("smooth", square, out, "--target-angle", 59.5)
+    assert done.code == 1
+    assert "below 59.5°" in done.err
+    assert "cannot all exceed" in done.err
+    assert run("smooth", square, out, "--target-angle", 61).code == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--guard", "best"], "guard must be one of 'valid', 'worst', 'star'"),
+        (["--preserve", "everything"], "preserve must be one of 'shape', 'size', 'none'"),
+        (["--preserve", "size", "--method", "cvt"], "cvt does not keep the sizes"),
+        (["--preserve", "size", "--target-quality", 0.3], "contradict"),
+        (["--target-quality", 1.5], r"must lie in (0, 1]"),
+    ],
+)
+def test_what_cannot_be_used_is_said_before_anything_is_read(run, tmp_path, options, said):
+    done = run("smooth", tmp_path / "nowhere.su2", tmp_path / "out.su2", *options)
+    assert done.code == 2
+    assert said in done.err
+
+
+def test_the_stages_and_the_limit_are_told(run, square, tmp_path):
+    text = run("smooth", square, tmp_path / "out.su2").out
+    for stage in ("smart Laplacian, Newton on q²", "worst first", "Newton on q "):
+        assert stage in text
+    assert "the least 1/q is" in text
+    assert "cannot exceed" in text
+    assert json.loads(run("smooth", square, tmp_path / "out.su2", "--json").out)["ceiling"] <= 1
+
+
+@pytest.mark.parametrize("guard", ["valid", "worst", "star"])
+def test_every_level_of_the_guard(run, square, tmp_path, guard):
+    out = tmp_path / "out.su2"
+    assert run("smooth", square, out, "--guard", guard).code == 0
+    expected = gmsnet.smooth(gmsnet.read(square), guard=guard)
+    np.testing.assert_array_equal(gmsnet.read(out).points, expected.points)
+
+
+def test_layers_are_told_and_held(run, tmp_path):
+    x, y = np.meshgrid(np.arange(31.0), np.concatenate([np.arange(10) / 40, 10 / 40 + np.arange(20)]))
+    nodes = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = (part.ravel() for part in (nodes[:-1, :-1], nodes[:-1, 1:], nodes[1:, 1:], nodes[1:, :-1]))
+    triangles = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    mesh = gmsnet.Mesh(
+        np.column_stack([x.ravel(), y.ravel()]),
+        (gmsnet.CellBlock("triangle", triangles, np.zeros(len(triangles), int)),),
+    )
+    path, out = tmp_path / "layers.vtk", tmp_path / "out.vtk"
+    gmsnet.write(mesh, path)
+    text = run("smooth", path, out).out
+    assert "anisotropic on purpose" in text
+    assert "stretched layer:" in text
+    still = mesh.points[:, 1] < 0.2
+    np.testing.assert_array_equal(gmsnet.read(out).points[still, :2], mesh.points[still])
+    assert "nothing is held" in run("smooth", path, out, "--preserve", "none").out
+    assert "(fix_layers)" in run("smooth", path, out, "--preserve", "none", "--fix-layers").out
