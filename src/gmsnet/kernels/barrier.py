@@ -13,9 +13,9 @@ Near a sliver F ~ s^−p, s its short height, and a Newton step lengthens s only
 F^(−1/p), which is nearly linear there, is the same step times 1/(1 − (1 + 1/p)λ), λ = gᵀH⁻¹g/F (g, H: gradient and
 Hessian of F; λ → p/(p + 1) at the sliver). It is taken at most MOST times as long, at least ω times (over-relaxation).
 
-Lanes compute in float32, relative to a length of the star. Where F does not fall beyond doubt, or falls below FAR of
-what it was, the star is done over in float64, with as many steps as fall so far (``descend``). A tangled star goes to
-the mean of its ring.
+Lanes compute in float32, relative to a length of the star. Where triangles are FLAT, F does not fall beyond doubt, or
+falls below FAR of what it was, the star is done over in float64, with as many steps as fall so far (``descend``).
+So F never rises, but for the rounding of float32. A tangled star goes to the mean of its ring.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from gmsnet.kernels.compile import LANES, inlined, kernel
 from gmsnet.kernels.stars import REACH, SIZE
 
 SMALL = 1e-5  # of F: a fall that float32 may not see; the step is then so short that it is Newton's to rounding
+
+FLAT = 300.0  # mean Q of a star: D of a triangle is off by a few times 2⁻²⁴·Q in float32
 
 # Rows of a block's sums: F, −∇F, the Hessian without its isotropic part, Σ c/D, the least D; after the step F, the
 # least D, gᵀH⁻¹g, and whether to do it over.
@@ -151,22 +153,26 @@ def judge(local, n, power, step, sums):
 
 
 @kernel
-def settle(sums, step, mean, mean_sums, with_mean):
-    """Takes the mean instead of the step where F falls by it. Row REDO: 1 where float64 is called for, else 0."""
+def settle(sums, most, step, mean, mean_sums, with_mean):
+    """Takes the mean instead of the step where F falls by it. Row REDO: 1 where float64 is called for, else 0.
+
+    most: the largest F that float32 can be trusted with.
+    """
     real = sums.dtype.type
+    most = real(most)
     far, small, slightly = real(FAR), real(SMALL), real(1.0 + SMALL)
     yes, no = real(1.0), real(0.0)
     for lane in range(LANES):
         value, after, inside = sums[VALUE * LANES + lane], sums[AFTER * LANES + lane], sums[LEAST * LANES + lane]
         falls = after < value or (sums[FALL * LANES + lane] < small * value and after < slightly * value)
-        kept = falls and not after < far * value  # what is no number is neither
+        kept = falls and value < most and not after < far * value  # what is no number is neither
         least = min(inside, sums[LEAST_AFTER * LANES + lane])
         sums[REDO * LANES + lane] = no if kept and least > no else yes
     if with_mean:
         for lane in range(LANES):
             falls = mean_sums[AFTER * LANES + lane] < sums[VALUE * LANES + lane]
             least = min(sums[LEAST * LANES + lane], mean_sums[LEAST_AFTER * LANES + lane])
-            taken = falls and least > no
+            taken = falls and least > no and sums[VALUE * LANES + lane] < most
             step[lane] = mean[lane] if taken else step[lane]
             step[LANES + lane] = mean[LANES + lane] if taken else step[LANES + lane]
             sums[REDO * LANES + lane] = no if taken else sums[REDO * LANES + lane]
@@ -210,6 +216,7 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
     sums, mean_sums = np.empty(SUMS * LANES, dtype=np.float32), np.empty(SUMS * LANES, dtype=np.float32)
     step, mean = np.empty(2 * LANES, dtype=np.float32), np.empty(2 * LANES, dtype=np.float32)
     shift = np.empty(2 * LANES)
+    most = FLAT * (power.one + FLAT * (power.two + power.four * (FLAT * FLAT)))
     for block in range(first, last):
         n = blocks.degree[block]
         stars.gather(points, blocks, block, n, x, ring)
@@ -220,7 +227,7 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
         if stretch > 0.0:
             average(local, n, stretch, mean)
             judge(local, n, power, mean, mean_sums)
-        settle(sums, step, mean, mean_sums, stretch > 0.0)
+        settle(sums, most * n, step, mean, mean_sums, stretch > 0.0)
         refine(x, ring, n, blocks.filled[block], work, power, sums, step, shift)
         stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
     for k in range(len(tally)):

@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, inlined, kernel
 
 MOST = 50.0  # times a Newton step: the longest one
 FAR = 0.7  # of F: below it a step has led far, and another one pays
 STEPS, HALVINGS = 20, 30
+FLAT = 1e-10  # of the square of a trace: a smaller determinant is not known
 
 
 class Power(NamedTuple):
@@ -77,9 +78,21 @@ def value_at(x, y, ring, n, lane, power):
     return value
 
 
+@inlined
+def newton_step(gx, gy, xx, xy, yy):
+    """H⁻¹g; where H is too flat to be inverted (close to a sliver), the least of the same quadratic along g."""
+    determinant, trace = xx * yy - xy * xy, xx + yy
+    if determinant > FLAT * trace * trace:
+        return (yy * gx - xy * gy) / determinant, (xx * gy - xy * gx) / determinant
+    bend = gx * (xx * gx + xy * gy) + gy * (xy * gx + yy * gy)
+    length = (gx * gx + gy * gy) / bend if bend > 0.0 else 0.0
+    return length * gx, length * gy
+
+
 @kernel
 def descend(x, y, ring, n, lane, power):
-    """The shift of one star from (x, y): steps, halved until F falls, on and on while a step brings it below FAR of it.
+    """The shift of one star from (x, y): steps, halved until F falls, on and on
+    until a whole one leaves it above FAR of what it was.
 
     No shift where nothing is gained; that to the mean of the ring where a triangle is not positive.
     """
@@ -91,21 +104,19 @@ def descend(x, y, ring, n, lane, power):
                 dx += ring[2 * j * LANES + lane] - x
                 dy += ring[(2 * j + 1) * LANES + lane] - y
             return dx / n, dy / n
-        determinant = xx * yy - xy * xy
-        if not determinant > 0.0:  # F is convex: only rounding does that
-            break
-        sx, sy = (yy * gx - xy * gy) / determinant, (xx * gy - xy * gx) / determinant
+        sx, sy = newton_step(gx, gy, xx, xy, yy)
         share = 1.0 / max(1.0 - power.ratio * (gx * sx + gy * sy) / value, 1.0 / MOST)
-        after = np.inf
+        after, whole = np.inf, True
         for _ in range(HALVINGS):
             after = value_at(x + dx + share * sx, y + dy + share * sy, ring, n, lane, power)
             if after < value:
                 break
             share *= 0.5
+            whole = False
         if not after < value:
             break
         dx += share * sx
         dy += share * sy
-        if not after < FAR * value:
+        if whole and after >= FAR * value:
             break
     return dx, dy

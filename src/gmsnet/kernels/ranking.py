@@ -67,7 +67,7 @@ def count_up_to(shape, limit):
 
 @kernel
 def worst(shape, wanted):
-    """Indices (int32) of the worst cells, as many as are wanted or up to a quarter more, or any number if many are equal.
+    """Indices (int32) of the worst cells, as many as are wanted or a quarter more, or any number if many are equal.
 
     shape: (T,) between −1 and 1. They are all those up to a limit, which is found by halving.
     """

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gmsnet.kernels.barrier_star import newton_step
 from gmsnet.kernels.compile import inlined, kernel
 from gmsnet.kernels.guard import STAR, permitted, surplus_above, surplus_above_zero
 from gmsnet.kernels.stars import HALVINGS
@@ -63,7 +64,7 @@ def value_at(ring, n, x, y, inverse, doublings):
 
 @kernel
 def newton(ring, n, x, y, inverse, doublings):
-    """F with the free node at (x, y), 1/M given; the step from there, none where rounding hides it; and the least D."""
+    """F with the free node at (x, y), 1/M given; the step from there; and the least D."""
     p = 2.0**doublings
     least = np.inf
     value, gx, gy, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -86,10 +87,7 @@ def newton(ring, n, x, y, inverse, doublings):
         xy += t * ((p - 1.0) * (ux * uy) + (vx * uy + ux * vy))
         yy += t * (uy * ((p - 1.0) * uy + 2.0 * vy) + 2.0 * per_square)
         ax, ay = bx, by
-    determinant = xx * yy - xy * xy
-    if not determinant > 0.0:  # F is convex: only rounding does that
-        return value, 0.0, 0.0, least
-    dx, dy = (yy * gx - xy * gy) / determinant, (xx * gy - xy * gx) / determinant
+    dx, dy = newton_step(gx, gy, xx, xy, yy)
     longer = 1.0 / max(1.0 - (p + 1.0) * (gx * dx + gy * dy) / value, 1.0 / MOST)
     return value, longer * dx, longer * dy, least
 
@@ -108,18 +106,19 @@ def descend(ring, n, x, y, scale, doublings):
         if not (SMALLEST < value < 1.0 / SMALLEST):
             inverse = 1.0 / largest(ring, n, x, y)
             value, dx, dy, least = newton(ring, n, x, y, inverse, doublings)
-        after = np.inf
+        after, whole = np.inf, True
         for _ in range(SHORTENINGS):
             after = value_at(ring, n, x + dx, y + dy, inverse, doublings)
-            if after < value or (dx == 0.0 and dy == 0.0):
+            if after < value:
                 break
             dx *= 0.5
             dy *= 0.5
+            whole = False
         if not after < value:
             break
         x += dx
         y += dy
-        if after >= FAR * value:
+        if whole and after >= FAR * value:
             break
     return x, y
 

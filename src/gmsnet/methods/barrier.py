@@ -26,7 +26,7 @@ from gmsnet.methods.base import Field, Method, StarSmoother, Tally
 from gmsnet.workers import Share
 
 POWERS = {"q2": 2, "q": 1, "q4": 4}
-RELAXATION, RELAXED = 1.5, 8  # ω, and for how many sweeps
+RELAXATION, RELAXED = 1.6, 8  # ω, and for how many sweeps
 STRETCH, MEANS = 1.1, 1  # how far to the mean, and in how many sweeps
 
 

@@ -33,7 +33,7 @@ class Cycle(NamedTuple):
 
 
 CANDIDATES = 0.02  # the share of all cells that is ranked within a list of cycles
-FEWEST, FEWEST_CANDIDATES = 6, 50  # cells
+FEWEST, FEWEST_CANDIDATES = 12, 100  # cells
 CYCLES = (
     Cycle(0.002, 3, 3),
     Cycle(0.002, 3, 3),
