@@ -32,6 +32,7 @@ from gmsnet.run import Sweep as Sweep
 from gmsnet.tangles import UnmendedCell, mended, still_inverted
 from gmsnet.targets import Target, reach_target
 from gmsnet.topology import Topology, planar_points
+from gmsnet.wall_stage import improve_near_walls
 from gmsnet.workers import available_threads
 
 Floats = NDArray[np.float64]
@@ -122,7 +123,8 @@ def smooth(
     refuse_unless_planar(given)
     topology = Topology.of(given, fixed_mask(given, fixed))
     before = measure(given, topology)
-    topology, notes = protected(given, topology, preserve, fix_layers)
+    protection = protected(given, topology, preserve, fix_layers)
+    topology, notes = protection.topology, protection.notes
     start = planar_points(given)[topology.memory]
     reasons: dict[tuple[int, ...], str] = {}
     if untangle and before.inverted:
@@ -138,6 +140,12 @@ def smooth(
         run = Run(given, topology, chosen, points=start, **options)
         stop_reason = run.to_the_end(max_sweeps, None, callback)
         best, history = run.best, run.history
+        if protection.kept is not None and stop_reason in (NO_PROGRESS, NOTHING_TO_MOVE):
+            best, stop_reason, history = improve_near_walls(
+                given, protection.outer, protection.kept, best, history, max_sweeps=max_sweeps, callback=callback,
+                **options,
+            )  # fmt: skip
+            topology = protection.outer
 
     try:
         points, moved, after = outcome(given, topology, best, before, best_by)

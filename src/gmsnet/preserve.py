@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from gmsnet.arguments import NONE, SIZE
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.arguments import NONE, SHAPE, SIZE
 from gmsnet.errors import InputError
 from gmsnet.layers import stretched_layers
 from gmsnet.mesh import Mesh
+from gmsnet.methods.sized import BAND
 from gmsnet.targets import Target
 from gmsnet.topology import Topology
 from gmsnet.walls import near_walls
@@ -13,37 +19,49 @@ from gmsnet.walls import near_walls
 LAYER, WALL = "stretched layer", "refined near a wall"
 
 
-def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool) -> tuple[Topology, list[str]]:
-    """The topology with nodes held that are where they are on purpose, and what to say about that.
+@dataclass(frozen=True, eq=False)
+class Protection:
+    """topology: with the nodes held that are where they are on purpose. notes: what to say about that.
 
-    Those are the nodes of stretched layers, unless ``preserve`` is "none" and fix_layers is false, and the nodes next
-    to walls that the mesh is refined towards, unless ``preserve`` is "none".
+    kept: (N,) bool by id, the nodes next to walls that the mesh is refined towards, which move in a stage of their own
+    (wall_stage.py); None where there are none. outer: the topology in which they are free.
+    """
+
+    topology: Topology
+    notes: list[str]
+    outer: Topology
+    kept: NDArray[np.bool_] | None = None
+
+
+def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool) -> Protection:
+    """What of a mesh is protected: stretched layers, unless ``preserve`` is "none" and fix_layers is false, and the
+    areas of cells next to walls that the mesh is refined towards, unless ``preserve`` is "none".
     """
     notes: list[str] = []
     if not len(topology.free):
-        return topology, notes
+        return Protection(topology, notes, topology)
     layers = stretched_layers(mesh, topology)
-    held = fix_layers or preserve != NONE
-    if layers and held:
+    if layers and (fix_layers or preserve != NONE):
         topology = topology.holding(layers.nodes, LAYER)
         why = "fix_layers" if preserve == NONE else f"preserve={preserve!r}"
-        notes.append(f"{layers.summary}; {_amount(topology, LAYER)} held for that ({why})")
+        notes.append(f"{layers.summary}; {_amount(len(topology.held.get(LAYER, ())))} held for that ({why})")
     elif layers:
         notes.append(f"{layers.summary}; nothing is held for that (preserve={preserve!r})")
     elif fix_layers:
         notes.append("fix_layers: no stretched layers were found, so none are held")
-    if preserve != NONE:
-        topology = topology.holding(near_walls(mesh, topology), WALL)
-        if WALL in topology.held:
-            notes.append(
-                f"the mesh is refined towards its walls: {_amount(topology, WALL)} held next to them "
-                f"(preserve={preserve!r})"
-            )
-    return topology, notes
+    if preserve != SHAPE:
+        return Protection(topology, notes, topology)
+    inner = topology.holding(kept := near_walls(mesh, topology), WALL)
+    if WALL not in inner.held:
+        return Protection(topology, notes, topology)
+    notes.append(
+        f"the mesh is refined towards its walls: the {len(inner.held[WALL]):,} nodes next to them move only as far as "
+        f"the areas of their cells stay within {BAND:.0%} (preserve={preserve!r})"
+    )
+    return Protection(inner, notes, topology, kept)
 
 
-def _amount(topology: Topology, reason: str) -> str:
-    count = len(topology.held.get(reason, ()))
+def _amount(count: int) -> str:
     return f"{count:,} node is" if count == 1 else f"{count:,} nodes are"
 
 

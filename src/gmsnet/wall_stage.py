@@ -20,18 +20,19 @@ ELSEWHERE = "not near a wall"
 
 def improve_near_walls(
     mesh: Mesh, topology: Topology, kept: NDArray[np.bool_], points: Floats, history: list[Sweep], *,
-    threads: int, best_by: str, guard: str, callback: Callable[[Sweep], bool | None] | None = None,
+    threads: int, best_by: str, guard: str, max_sweeps: int = 1000,
+    callback: Callable[[Sweep], bool | None] | None = None,
 ) -> tuple[Floats, str, list[Sweep]]:  # fmt: skip
     """Moves the free nodes among ``kept`` alone; each cell whose corners all are keeps its area within a tenth.
 
     topology: of the mesh, in which the nodes near walls are not held on that account. kept: (N,) bool by id, from
     ``walls.near_walls``. points: (N, 2) in memory order, where other stages have left the mesh, with the kept nodes
-    where they are in ``mesh``; not changed. history: to go on with.
+    where they are in ``mesh``; not changed. history: to go on with. max_sweeps: with those of the history.
 
     Returns the new points, why it ended, and the record.
     """
     zone = topology.holding(~kept, ELSEWHERE)
     smoother = banded(planar_points(mesh)[topology.memory], kept[topology.memory])
     run = Run(mesh, zone, smoother, threads, best_by, guard, points=points, history=history)
-    stop_reason = run.to_the_end(run.sweeps + SWEEPS, None, callback)
+    stop_reason = run.to_the_end(min(run.sweeps + SWEEPS, max_sweeps), None, callback)
     return run.best, stop_reason, run.history
