@@ -28,7 +28,7 @@ def test_the_airfoil_of_the_real_meshes(real_meshes):
     ratio = doubles(best, topology.near) / doubles(start, topology.near)
     cells = inside[topology.near].all(axis=1)
     assert cells.sum() > 1600
-    assert np.abs(ratio[cells] - 1.0).max() <= 0.1 + 1e-9
+    assert np.abs(ratio[cells] - 1.0).max() <= 0.1
     points = mesh.points.copy()
     points[np.ix_(topology.memory, mesh.plane)] = np.ldexp(best, scale_exponent(mesh))
     near = kept[topology.triangles].all(axis=1)
@@ -36,9 +36,10 @@ def test_the_airfoil_of_the_real_meshes(real_meshes):
     assert before.min() < 0.56
     assert after.min() > 0.62
     assert after.mean() > before.mean()
+    assert len(improve_near_walls(mesh, topology, kept, start, [], max_sweeps=2, **options)[2]) == 2
     again, _, more = improve_near_walls(mesh, topology, kept, best, history, **options)
     assert more[: len(history)] == history
-    assert np.abs((doubles(again, topology.near) / doubles(start, topology.near))[cells] - 1.0).max() <= 0.1 + 1e-9
+    assert np.abs((doubles(again, topology.near) / doubles(start, topology.near))[cells] - 1.0).max() <= 0.1
 
 
 def test_nothing_to_move():

@@ -19,7 +19,7 @@ from gmsnet.topology import Topology
 from gmsnet.workers import Share
 
 WEIGHT = 4.0
-BAND = 0.1
+BAND = 0.099  # a tenth, and room for the rounding of what is written
 
 
 class Sized(StarSmoother):
@@ -47,7 +47,7 @@ class Sized(StarSmoother):
 
 
 def banded(start: NDArray[np.float64], kept: NDArray[np.bool_]) -> Sized:
-    """For cells whose areas are to stay: shape alone, with each area within a tenth of what it is in ``start``.
+    """For cells whose areas are to stay: shape alone, with each area within BAND of what it is in ``start``.
 
     start: (N, 2) points in memory order. kept: (N,) bool, in memory order: cells all of whose corners are kept stay.
     """
