@@ -37,6 +37,7 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     for _ in range(ROUNDS):
         stages += follow(tangle)
         whys.append(take(tangle))
+        tangle.frozen[:] = False
         if not tangle.bad_nodes().any():
             break
         stages.append(what_is_left(tangle))

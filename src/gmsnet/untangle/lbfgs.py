@@ -16,6 +16,7 @@ from gmsnet.untangle.tangle import Tangle
 Floats = NDArray[np.float64]
 
 ROUNDS, ITERATIONS = 30, 60  # so many values of ε, so many iterations for each
+BUDGET = 50_000_000  # iterations times nodes
 MEMORY = 10  # pairs of steps that L-BFGS remembers
 
 
@@ -30,6 +31,8 @@ def whole(tangle: Tangle, patch: Patch, patience: int) -> int:
     worst = np.empty(patch.parts)
     iterations, best, since = 0, -math.inf, 0
     for _ in range(ROUNDS):
+        if iterations * patch.count > BUDGET:
+            break
         barrier.least(points, patch.cells, scale, patch.part, precision.unit, precision.grain, worst)
         if worst[0] > 0.0 and tangle.certified(points, patch):
             break

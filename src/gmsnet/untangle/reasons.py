@@ -50,25 +50,32 @@ def reasons(topology: Topology, points: Floats, bad: Flags, sweeps: int) -> tupl
     return tuple(out)
 
 
-def proven(topology: Topology, points: Floats, bad: Flags) -> bool:
-    """Is there, for each bad cell or a few that hang together with it, a reason that no larger patch does away with?"""
-    rows = reasons(topology, points, bad, 0)
-    cells = topology.near[bad]
+def give_up(tangle: Tangle, points: Floats, bad: Flags) -> bool:
+    """Freezes the free nodes of what no patch can mend, however large: the bad cells (of some points) with a reason of
+    FOR_GOOD, and the few that hang together with them. Are there new ones?
+    """
+    rows = reasons(tangle.topology, points, bad, 0)
+    known = np.array([row.reason in FOR_GOOD for row in rows])
+    if not known.any():
+        return False
+    cells = tangle.topology.near[bad]
     nodes, count = len(points), len(rows)
     own = np.repeat(np.arange(count), 3)
     graph = scipy.sparse.csr_matrix((np.ones(3 * count), (own, count + cells.ravel())), shape=(count + nodes,) * 2)
     cluster = scipy.sparse.csgraph.connected_components(graph, directed=False)[1][:count]
-    known = np.array([row.reason in FOR_GOOD for row in rows])
     size, reasons_known = np.bincount(cluster), np.bincount(cluster, known)
-    return bool(known.all() or ((reasons_known > 0) & (size <= CLUSTER))[cluster].all())
+    hopeless = known | ((reasons_known > 0) & (size <= CLUSTER))[cluster]
+    before = tangle.frozen.sum()
+    tangle.frozen |= free_nodes_of(tangle.topology, np.flatnonzero(bad)[hopeless])
+    return bool(tangle.frozen.sum() > before)
 
 
 def freeze(tangle: Tangle) -> bool:
-    """Freezes the free nodes of bad cells with such a reason; is there something new to try?"""
-    topology, before = tangle.topology, tangle.frozen.sum()
+    """Freezes the free nodes of bad cells with such a reason; are there any, and bad cells without one?"""
+    topology = tangle.topology
     rows = [row.triangle for row in reasons(topology, tangle.points, tangle.bad, 0) if row.reason in FOR_GOOD]
-    tangle.frozen |= free_nodes_of(topology, np.array(rows, dtype=np.intp))
-    return bool(tangle.frozen.sum() > before and tangle.bad_nodes().any())
+    tangle.frozen = free_nodes_of(topology, np.array(rows, dtype=np.intp))
+    return bool(tangle.frozen.any() and tangle.bad_nodes().any())
 
 
 def has_no_place(points: Floats, topology: Topology, v: int, known: dict[int, bool]) -> bool:

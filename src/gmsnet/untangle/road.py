@@ -11,13 +11,14 @@ from gmsnet.untangle.harmonic import harmonic
 from gmsnet.untangle.lbfgs import whole
 from gmsnet.untangle.newton import keep_gains, newton
 from gmsnet.untangle.patch import Patch, in_order
-from gmsnet.untangle.reasons import proven
+from gmsnet.untangle.reasons import give_up
 from gmsnet.untangle.result import Stage
 from gmsnet.untangle.tangle import Tangle
 
 LAPLACIAN_SWEEPS = 8
 MEDIANS, WEIGHING = 2, 5  # the first sweeps are to medians of the rings, by so many steps from the mean
-RINGS = (2, 6, 20, 10**9)  # of the patches around what is left to mend
+RINGS = (2, 6, 20, 60, 10**9)  # of the patches around what is left to mend
+LEAP = 10  # how many times as many nodes the largest patch may have as the one before
 MOST = 0.75  # a patch of a larger share of the free nodes becomes one of all
 FEW = 0.25  # harmonic places are a better start if they leave no more than this share of the cells to mend
 PATIENCE, LAST_PATIENCE = 3, 8  # of L-BFGS, and where the patch cannot grow any more
@@ -39,13 +40,15 @@ def follow(tangle: Tangle) -> Iterator[Stage]:
             patch = tangle.around(RINGS[-1])
         if not patch.count or (tried and np.array_equal(patch.every, tried.every)):
             break
+        if tried and rings == RINGS[-1] and patch.count > LEAP * tried.count:
+            break  # what so large a patch could not mend is not mended by one of all nodes either
         tried = patch
         last = patch.count == len(tangle.topology.free)
         yield from mend(tangle, patch, "all nodes" if last else f"{rings} rings", LAST_PATIENCE if last else PATIENCE)
         if tangle.left < left:
             points, bad, left = tangle.points.copy(), tangle.bad.copy(), tangle.left
-        if proven(tangle.topology, points, bad):
-            break
+        if tangle.left and give_up(tangle, points, bad):
+            keep_gains(tangle, points, bad)
     if tangle.left:
         keep_gains(tangle, points, bad)
 
