@@ -24,7 +24,7 @@ from gmsnet.workers import Share, workers
 Floats = NDArray[np.float64]
 
 MAX_SWEEPS = "max sweeps"
-NO_PROGRESS = "no progress"
+NO_PROGRESS = "no further gain"
 TARGET_REACHED = "target reached"
 CALLBACK = "stopped by callback"
 INTERRUPTED = "interrupted"

@@ -211,7 +211,7 @@ def test_it_settles_after_twenty_tests_without_gain():
 def test_a_run_ends_where_nothing_can_be_done():
     mesh = hopeless()
     result = gmsnet.smooth(mesh, "getme", max_sweeps=10**6)
-    assert result.stop_reason == "no progress"
+    assert result.stop_reason == "no further gain"
     assert result.sweeps <= 21
     assert result.points.tobytes() == mesh.points.tobytes()
 
@@ -255,7 +255,7 @@ def test_tangled_meshes_come_to_an_end_and_get_no_worse(name):
     for seed in range(3):
         mesh = tangled(300, seed)
         result = gmsnet.smooth(mesh, "getme", variant=name, max_sweeps=1000)
-        assert result.stop_reason == "no progress"
+        assert result.stop_reason == "no further gain"
         was, now = result.before.valid, result.after.valid
         assert (was <= 0).sum() > 20
         assert (now[was > 0] > 0).all()
