@@ -44,19 +44,17 @@ def near_walls(mesh: Mesh, topology: Topology) -> Flags:
     if topology.plane is None or not len(triangles):
         return kept
     points = planar_points(mesh)
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    double = np.abs((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
-    edge = np.sqrt(double * (2.0 / np.sqrt(3.0)))  # of an equilateral triangle of that area
-    largest = REFINED * float(np.sqrt(double.mean() * (2.0 / np.sqrt(3.0))))
-    if not (largest > 0.0 and (edge <= largest).any()):
-        return kept
-    middle = (a + b + c) / 3.0
+    double = _double(points, triangles)
+    largest = REFINED * float(_edge(double.mean()))
     rough: Floats | None = None
     chosen = np.zeros(len(triangles), dtype=bool)
-    for wall in _walls(triangles, len(points)):
+    for wall, cells in _walls(topology):
         near = NEAR * _diameter(points[np.unique(wall)])
-        rows = np.flatnonzero(_distance(middle, points[wall], near) <= near)
-        if not rows.size or (edge[rows] <= min(largest, near)).mean() < MOST:
+        most = min(largest, near)
+        if not most > 0.0 or (_edge(double[cells]) <= most).mean() < MOST:
+            continue
+        rows = _rows_near(points, triangles, points[wall], near)
+        if not rows.size or (_edge(double[rows]) <= most).mean() < MOST:
             continue
         if rough is None:
             rough = _roughness(triangles, double, len(points))
@@ -89,22 +87,46 @@ def _roughness(triangles: NDArray[np.int32], double: Floats, nodes: int) -> Floa
     mean = np.bincount(both, size[across], minlength=len(size)) / np.maximum(count, 1)
     off = np.where(count > 0, np.abs(size - mean), 0.0)
     corners = triangles.ravel()
-    around = np.bincount(corners, np.repeat(off, 3), minlength=nodes) / np.maximum(
-        np.bincount(corners, minlength=nodes), 1
-    )
+    number = np.maximum(np.bincount(corners, minlength=nodes), 1)
+    around = np.bincount(corners, np.repeat(off, 3), minlength=nodes) / number
     return np.asarray(around[triangles].mean(axis=1))
 
 
-def _walls(triangles: NDArray[np.int32], nodes: int) -> list[NDArray[np.int64]]:
-    """The boundary edges (k, 2) of each piece of the boundary that hangs together."""
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
-    key, count = np.unique(edges[:, 0] * nodes + edges[:, 1], return_counts=True)
-    outer = np.column_stack(np.divmod(key[count == 1], nodes))
-    graph = scipy.sparse.coo_matrix((np.ones(len(outer)), (outer[:, 0], outer[:, 1])), shape=(nodes, nodes))
-    _, piece = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    of = piece[outer[:, 0]]
-    order = np.argsort(of, kind="stable")
-    return [outer[part] for part in np.split(order, np.flatnonzero(np.diff(of[order])) + 1) if len(part)]
+def _double(points: Floats, triangles: NDArray[np.int32]) -> Floats:
+    """(T,) twice the area."""
+    (ax, bx, cx), (ay, by, cy) = (points[:, axis][triangles].T for axis in range(2))
+    return np.asarray(np.abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)))
+
+
+def _edge(double: Floats) -> Floats:
+    """The edges of equilateral triangles of such areas."""
+    return np.asarray(np.sqrt(double * (2.0 / np.sqrt(3.0))))
+
+
+def _walls(topology: Topology) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """The boundary edges (k, 2) of each piece of the boundary that hangs together, and the row of the cell at each."""
+    nodes = len(topology.memory)
+    rim = np.zeros(nodes, dtype=bool)
+    rim[topology.held.get("boundary", np.empty(0, dtype=np.int64))] = True
+    rows = np.flatnonzero(rim[topology.triangles].sum(axis=1) >= 2)
+    edges = np.sort(topology.triangles[rows][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
+    key, place, count = np.unique(edges[:, 0] * nodes + edges[:, 1], return_index=True, return_counts=True)
+    # An edge that leads away from the boundary may have one cell among these rows, too.
+    outer = place[(count == 1) & rim[np.column_stack(np.divmod(key, nodes))].all(axis=1)]
+    ends, cells = edges[outer], rows[outer // 3]
+    graph = scipy.sparse.coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(nodes, nodes))
+    piece = scipy.sparse.csgraph.connected_components(graph, directed=False)[1][ends[:, 0]]
+    order = np.argsort(piece, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
+    return [(ends[part], cells[part]) for part in parts if len(part)]
+
+
+def _rows_near(points: Floats, triangles: NDArray[np.int32], wall: Floats, near: float) -> NDArray[np.int64]:
+    """The triangles whose middles lie within ``near`` of a wall with the edges (k, 2, 2)."""
+    middle = np.column_stack([points[:, axis][triangles].mean(axis=1) for axis in range(2)])
+    low, high = wall.min(axis=(0, 1)) - near, wall.max(axis=(0, 1)) + near
+    rows = np.flatnonzero(((middle >= low) & (middle <= high)).all(axis=1))
+    return rows[_distance(middle[rows], wall, near) <= near]
 
 
 def _diameter(points: Floats) -> float:
