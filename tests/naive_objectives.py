@@ -45,7 +45,7 @@ def largest_angle(p, a, b):
 TRIANGLES = {
     "metric": metric,
     "q": q,
-    **{f"q{p}": lambda *triangles, p=p: q(*triangles) ** p for p in (2, 4, 8, 16, 64, 256)},
+    **{f"q{p}": lambda *triangles, p=p: q(*triangles) ** p for p in (2, 4, 8, 16, 64)},
     "cosine": cosine,
     "min-max-angle": largest_angle,
 }

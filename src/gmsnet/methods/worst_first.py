@@ -44,7 +44,7 @@ CYCLES = (
     Cycle(0.0003, 6, 16),
 )
 LAST = (Cycle(0.0003, 7, 16), Cycle(0.0003, 8, 16))
-GAIN = 1e-5  # in the least 1/q: less is none
+GAIN = 1e-4  # in the least 1/q: less is none
 
 
 class WorstFirst(Smoother):
