@@ -20,7 +20,9 @@ from gmsnet.kernels.guard import STAR, permitted, surplus_above, surplus_above_z
 HALVINGS = 20
 MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
 COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
-SIZE, REACH, TARGET, MARGIN, FLOORS = 0, 1, 2, 4, 8  # rows of a block's work array; TARGET has two, FLOORS n
+FEW_HALVINGS = 6
+# Rows of a block's work array; TARGET and KEPT have two, FLOORS n.
+SIZE, REACH, TARGET, MARGIN, SHARE, KEPT, FLOORS = 0, 1, 2, 4, 5, 6, 8
 
 
 class Blocks(NamedTuple):
@@ -218,6 +220,7 @@ def commit(points, blocks, block, x, ring, work, shift, guard, tally):
     if guard.level == STAR:
         gather_floors(blocks, block, guard, work)
         margins_above_each(ring, n, work)
+        halve_abreast(x, ring, n, shift, single, work)
     elif guard.floor > 0.0:
         margins_above(ring, n, work, guard.floor)
     else:
@@ -228,13 +231,57 @@ def commit(points, blocks, block, x, ring, work, shift, guard, tally):
         if work[MARGIN * LANES + lane] > 0.0:
             tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
             tally[MOVED] += tx != x[lane] or ty != x[LANES + lane]
+            tally[TRUNCATED] += guard.level == STAR and work[SHARE * LANES + lane] < 1.0
             points[i, 0] = tx
             points[i, 1] = ty
+        elif work[MARGIN * LANES + lane] == -np.inf and guard.level == STAR:
+            tally[DROPPED] += 1
         else:
             if not known:
                 gather_floors(blocks, block, guard, work)
                 known = True
             truncate(points, i, x, ring, n, lane, work, shift, single, tally)
+
+
+@kernel
+def halve_abreast(x, ring, n, shift, single, work):
+    """Halves the shifts of the lanes that are not allowed, all at once, until none is left or FEW_HALVINGS are made.
+
+    For the level STAR, which refuses many moves whatever their length: those that make the worst cell of a star worse
+    to first order. Row MARGIN: positive where the target is allowed; −∞ where the shift is to be dropped; else the
+    scalar form, which knows inverted cells, is to try. Row SHARE: how much of the shift is left, 0 if none is allowed.
+    """
+    for lane in range(LANES):
+        work[SHARE * LANES + lane] = 1.0
+    for _ in range(FEW_HALVINGS):
+        refused = 0
+        for lane in range(LANES):
+            halve = not work[MARGIN * LANES + lane] > 0.0
+            refused += halve
+            share = work[SHARE * LANES + lane] * (0.5 if halve else 1.0)
+            work[SHARE * LANES + lane] = share
+            size = work[SIZE * LANES + lane] * share
+            work[TARGET * LANES + lane] = x[lane] + size * shift[lane]
+            work[(TARGET + 1) * LANES + lane] = x[LANES + lane] + size * shift[LANES + lane]
+        if refused == 0:
+            return
+        if single:
+            for lane in range(TARGET * LANES, (TARGET + 2) * LANES):
+                work[lane] = np.float64(np.float32(work[lane]))
+        margins_above_each(ring, n, work)
+    for lane in range(LANES):
+        allowed_now = work[MARGIN * LANES + lane] > 0.0
+        work[SHARE * LANES + lane] = work[SHARE * LANES + lane] if allowed_now else 0.0
+        work[KEPT * LANES + lane] = work[TARGET * LANES + lane]
+        work[(KEPT + 1) * LANES + lane] = work[(TARGET + 1) * LANES + lane]
+        work[TARGET * LANES + lane] = x[lane]
+        work[(TARGET + 1) * LANES + lane] = x[LANES + lane]
+    margins(ring, n, work)  # of the stars as they are
+    for lane in range(LANES):
+        margin = -np.inf if work[MARGIN * LANES + lane] > 0.0 else 0.0
+        work[MARGIN * LANES + lane] = 1.0 if work[SHARE * LANES + lane] > 0.0 else margin
+        work[TARGET * LANES + lane] = work[KEPT * LANES + lane]
+        work[(TARGET + 1) * LANES + lane] = work[(KEPT + 1) * LANES + lane]
 
 
 @kernel
