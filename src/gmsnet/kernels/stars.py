@@ -128,24 +128,7 @@ def margins(ring, n, work):
 
 
 @kernel
-def margins_above(ring, n, work, floor):
-    """As ``margins``, above one floor of D/L that is not negative."""
-    for lane in range(LANES):
-        work[MARGIN * LANES + lane] = np.inf
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
-        p = ring[2 * i * LANES : 2 * (i + 1) * LANES]
-        q = ring[2 * j * LANES : 2 * (j + 1) * LANES]
-        for lane in range(LANES):
-            tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
-            delta, least = work[REACH * LANES + lane], work[MARGIN * LANES + lane]
-            px, py, qx, qy = p[lane] - tx, p[LANES + lane] - ty, q[lane] - tx, q[LANES + lane] - ty
-            surplus = surplus_above(px, py, qx, qy, delta, floor)
-            work[MARGIN * LANES + lane] = surplus if not surplus >= least else least
-
-
-@kernel
-def margins_above_each(ring, n, work):
+def margins_above(ring, n, work):
     """As ``margins``, each triangle above the floor in its row from FLOORS on."""
     for lane in range(LANES):
         work[MARGIN * LANES + lane] = np.inf
@@ -217,15 +200,14 @@ def commit(points, blocks, block, x, ring, work, shift, guard, tally):
     for lane in range(LANES):
         target = max(abs(work[TARGET * LANES + lane]), abs(work[(TARGET + 1) * LANES + lane]))
         work[REACH * LANES + lane] = unit * max(work[REACH * LANES + lane], target) + grain
-    if guard.level == STAR:
+    known = guard.level == STAR or guard.floor > 0.0
+    if known:
         gather_floors(blocks, block, guard, work)
-        margins_above_each(ring, n, work)
-        halve_abreast(x, ring, n, shift, single, work)
-    elif guard.floor > 0.0:
-        margins_above(ring, n, work, guard.floor)
+        margins_above(ring, n, work)
     else:
         margins(ring, n, work)
-    known = guard.level == STAR
+    if guard.level == STAR:
+        halve_abreast(x, ring, n, shift, single, work)
     for lane in range(count):
         i = centre[block * LANES + lane]
         if work[MARGIN * LANES + lane] > 0.0:
@@ -268,7 +250,7 @@ def halve_abreast(x, ring, n, shift, single, work):
         if single:
             for lane in range(TARGET * LANES, (TARGET + 2) * LANES):
                 work[lane] = np.float64(np.float32(work[lane]))
-        margins_above_each(ring, n, work)
+        margins_above(ring, n, work)
     for lane in range(LANES):
         allowed_now = work[MARGIN * LANES + lane] > 0.0
         work[SHARE * LANES + lane] = work[SHARE * LANES + lane] if allowed_now else 0.0
