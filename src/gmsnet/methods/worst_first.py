@@ -37,11 +37,13 @@ FEWEST, FEWEST_CANDIDATES = 12, 100  # cells
 CYCLES = (
     Cycle(0.002, 3, 3),
     Cycle(0.002, 3, 3),
-    Cycle(0.0006, 4, 4),
-    Cycle(0.0006, 5, 4),
-    Cycle(0.0003, 5, 8),
+    Cycle(0.001, 4, 4),
+    Cycle(0.001, 4, 4),
+    Cycle(0.001, 5, 4),
+    Cycle(0.0006, 5, 6),
+    Cycle(0.0006, 6, 6),
     Cycle(0.0003, 6, 8),
-    Cycle(0.0003, 6, 16),
+    Cycle(0.0003, 7, 12),
 )
 LAST = (Cycle(0.0003, 7, 16), Cycle(0.0003, 8, 16))
 GAIN = 1e-4  # in the least 1/q: less is none
