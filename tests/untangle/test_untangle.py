@@ -209,3 +209,13 @@ def test_nothing_can_be_taken_or_only_a_part():
     check(result, points, topology)
     assert result.taken == PART
     assert 0 < result.after < result.before
+
+
+def test_a_mesh_whose_nodes_are_all_in_wrong_places_boundary_included():
+    mesh = grid(12)
+    topology = Topology.of(mesh)
+    mesh = mesh.with_points(np.random.default_rng(0).permutation(mesh.points))
+    result, points, _, _ = untangled(mesh, topology)
+    check(result, points, topology)
+    assert 0 < result.after < result.before
+    assert result.taken == PART

@@ -3,30 +3,43 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.spatial
 from numpy.typing import NDArray
 
 from gmsnet.measure import exact_signs
 from gmsnet.topology import Topology
-from gmsnet.untangle.patch import Floats, Ints
+from gmsnet.untangle.patch import Flags, Floats, Ints
 
-CHUNK = 1_000_000  # pairs of boxes that are compared at a time
+CHUNK, MANY = 1_000_000, 20  # pairs of boxes that are compared at a time; at most so many times
 
 
 def near_crossings(points: Floats, edges: Ints, cells: Ints) -> Floats:
-    """(k, 2) for each cell the next crossing of some edges (e, 2), in its box or at most its size from it; else nan."""
+    """(k, 2) for each cell the next crossing of some edges (e, 2), at most its size off along either axis; else nan."""
     found = np.full((len(cells), 2), np.nan)
     low, high = points[cells].min(axis=1), points[cells].max(axis=1)
-    reach = (high - low).max(axis=1)[:, None]
-    low, high = low - reach, high + reach
+    middle, reach = (low + high) / 2, 1.5 * (high - low).max(axis=1)
     left, right = points[edges].min(axis=1), points[edges].max(axis=1)
-    near = np.unique(meeting(low, high, left, right)[:, 1])
+    near = np.flatnonzero(near_any(middle, reach, left, right))
     pairs = near[meeting(left[near], right[near], left[near], right[near])]
     places = crossings(points, edges[pairs[pairs[:, 0] < pairs[:, 1]]])
-    for k, cell in enumerate(cells):
-        inside = places[((places >= low[k]) & (places <= high[k])).all(axis=1)]
-        if len(inside):
-            found[k] = inside[np.argmin(((inside - points[cell].mean(axis=0)) ** 2).sum(axis=1))]
+    if len(places):
+        distance, nearest = scipy.spatial.cKDTree(places).query(middle, p=np.inf)
+        found[distance <= reach] = places[nearest[distance <= reach]]
     return found
+
+
+def near_any(middle: Floats, reach: Floats, left: Floats, right: Floats) -> Flags:
+    """Which of some boxes meet any square around (k, 2) of so much (k,) on all sides; or all, for many of both."""
+    if len(left) * len(middle) > MANY * CHUNK:
+        return np.ones(len(left), dtype=bool)
+    out = np.zeros(len(left), dtype=bool)
+    step = max(1, CHUNK // max(1, len(left)))
+    for first in range(0, len(middle), step):
+        low = middle[first : first + step] - reach[first : first + step, None]
+        high = middle[first : first + step] + reach[first : first + step, None]
+        apart = np.any((low[:, None] > right) | (high[:, None] < left), axis=2)
+        out |= np.asarray(~apart).any(axis=0)
+    return out
 
 
 def held_edges(topology: Topology) -> tuple[Ints, Ints]:

@@ -16,7 +16,7 @@ from gmsnet.untangle.tangle import Tangle
 Floats = NDArray[np.float64]
 
 ROUNDS, ITERATIONS = 30, 60  # so many values of ε, so many iterations for each
-BUDGET = 50_000_000  # iterations times nodes
+BUDGET = 50_000_000  # iterations times nodes, all in all: many seconds, and then no more
 MEMORY = 10  # pairs of steps that L-BFGS remembers
 
 
@@ -31,7 +31,7 @@ def whole(tangle: Tangle, patch: Patch, patience: int) -> int:
     worst = np.empty(patch.parts)
     iterations, best, since = 0, -math.inf, 0
     for _ in range(ROUNDS):
-        if iterations * patch.count > BUDGET:
+        if tangle.work > BUDGET:
             break
         barrier.least(points, patch.cells, scale, patch.part, precision.unit, precision.grain, worst)
         if worst[0] > 0.0 and tangle.certified(points, patch):
@@ -40,7 +40,9 @@ def whole(tangle: Tangle, patch: Patch, patience: int) -> int:
         best = max(best, float(worst[0]))
         if since > patience:
             break
-        iterations += minimise(points, patch, scale, float(closing(worst)[0]), ITERATIONS)
+        made = minimise(points, patch, scale, float(closing(worst)[0]), ITERATIONS)
+        iterations += made
+        tangle.work += made * patch.count
     tangle.put(points, patch)
     return iterations
 

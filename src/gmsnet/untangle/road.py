@@ -44,7 +44,8 @@ def follow(tangle: Tangle) -> Iterator[Stage]:
             break  # what so large a patch could not mend is not mended by one of all nodes either
         tried = patch
         last = patch.count == len(tangle.topology.free)
-        yield from mend(tangle, patch, "all nodes" if last else f"{rings} rings", LAST_PATIENCE if last else PATIENCE)
+        where = "all nodes" if last else "all rings" if rings == RINGS[-1] else f"{rings} rings"
+        yield from mend(tangle, patch, where, LAST_PATIENCE if last else PATIENCE)
         if tangle.left < left:
             points, bad, left = tangle.points.copy(), tangle.bad.copy(), tangle.left
         if tangle.left and give_up(tangle, points, bad):

@@ -29,7 +29,7 @@ class Tangle:
 
     signs: (T,) exact signs at first. bad: (T,) which cells are to be mended: not certified (kernels.untangle), and
     inverted at first or with a node that has moved. left: how many. frozen: (N,) free nodes that stand
-    still all the same.
+    still all the same. work: iterations of L-BFGS so far, times nodes.
     """
 
     def __init__(self, points: Floats, topology: Topology, precision: Precision) -> None:
@@ -38,7 +38,7 @@ class Tangle:
         self.signs = exact_signs(points, topology.near, topology.near_turn)
         self.was_bad = self.signs <= 0
         self.bad = np.empty(len(topology.near), dtype=bool)
-        self.left = 0
+        self.left = self.work = 0
         self.frozen = np.zeros(len(points), dtype=bool)
         self.look()
 
