@@ -16,11 +16,6 @@ FOLDER = Path("build/learned")
 TRIALS = {
     "H=8": {},
     "H=4": {"hidden": 4},
-    "H=16": {"hidden": 16},
-    "ReLU": {"activation": "relu"},
-    "ReLU, H=4": {"activation": "relu", "hidden": 4},
-    "mixed meshes": {"meshes": "mixed"},
-    "q⁸": {"power": 8},
     "single stars only": {"epochs": 2000},
 }
 

@@ -6,7 +6,7 @@ import pytest
 
 from gmsnet.errors import InputError
 from gmsnet.learn.losses import LOSSES
-from gmsnet.learn.options import LOSS_TITLES, MODELS, NNOptions, TrainOptions, changed, options_for
+from gmsnet.learn.options import LOSS_TITLES, MODELS, GMSNet2Options, NNOptions, TrainOptions, changed, options_for
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,8 @@ def test_options_of_nn_smoothing():
 
 
 @pytest.mark.parametrize(
-    "options", [TrainOptions(loss="q", hidden=9), NNOptions(labels="star", decay=0.4), NNOptions()]
+    "options",
+    [TrainOptions(loss="q", hidden=9), NNOptions(labels="star", decay=0.4), NNOptions(), GMSNet2Options(power=8)],
 )
 def test_options_survive_as_values(options):
     values = options.as_dict()

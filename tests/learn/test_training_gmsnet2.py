@@ -58,7 +58,7 @@ def test_the_same_options_make_the_same_bytes(tmp_path, whole):
     assert [k for k in range(1, 14) if rows[k].validation_loss != rows[k - 1].validation_loss] == [3, 7, 11, 13]
 
 
-@pytest.mark.parametrize("stop", [2, 7, 9, 12])
+@pytest.mark.parametrize("stop", [5, 10])  # in either stage
 def test_stopped_and_resumed_is_as_if_never_stopped(tmp_path, whole, stop):
     seen = []
     stopped = training.train(SHORT, tmp_path, on_epoch=seen.append, should_stop=lambda: len(seen) == stop)
