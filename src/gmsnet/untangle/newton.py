@@ -78,8 +78,10 @@ def keep_gains(tangle: Tangle, before: Floats, bad: Flags) -> None:
     patch = Patch.of(topology, in_order(topology, (tangle.points != before).any(axis=1)))
     piece = np.full(len(tangle.points), -1, dtype=np.int32)
     piece[patch.nodes] = patch.part
-    of_cell = piece[topology.near].max(axis=1)  # no cell has moved nodes of two
-    was, now = (np.bincount(of_cell[flags & (of_cell >= 0)], minlength=patch.parts) for flags in (bad, tangle.bad))
+    rows = np.flatnonzero(bad | tangle.bad)
+    of_cell = piece[topology.near[rows]].max(axis=1, initial=-1)  # no cell has moved nodes of two
+    rows, of_cell = rows[of_cell >= 0], of_cell[of_cell >= 0]
+    was, now = (np.bincount(of_cell[flags[rows]], minlength=patch.parts) for flags in (bad, tangle.bad))
     useless = patch.nodes[(now >= was)[patch.part]]
     tangle.points[useless] = before[useless]
     tangle.look()
