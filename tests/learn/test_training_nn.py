@@ -80,7 +80,7 @@ def test_the_best_of_each_network_is_kept(tmp_path, whole):
     recipe = json.loads(loaded.metadata["recipe"])
     assert options_for(recipe.pop("model"), recipe) == SHORT
     assert loaded.metadata["command"] == (
-        "gmsnet train --model nn --epochs 12 --nodes-per-mesh 8 --patience 2 --seed 3"
+        "gmsnet train --model nn --epochs 12 --nodes-per-mesh 8 --seed 3 --patience 2"
     )
     best = json.loads(loaded.metadata["validation_best_loss"])
     curves = json.loads(loaded.metadata["validation_curve"])
