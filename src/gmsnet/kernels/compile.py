@@ -10,9 +10,11 @@ folder; where none of them can be written, functions are compiled anew in each p
 
 from __future__ import annotations
 
+import hashlib
 import os
 import pickle
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 if folder := os.environ.get("GMSNET_CACHE"):
@@ -21,6 +23,10 @@ if folder := os.environ.get("GMSNET_CACHE"):
 import numba
 
 LANES = 64  # stars or triangles that go through the processor abreast
+
+SOURCES = hashlib.sha256(
+    b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
+).hexdigest()  # of all kernels together
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -38,17 +44,19 @@ def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Callable
         compiled: Callable[..., Any] = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no folder for the cache can be written
         return numba.njit(**options)(function)  # type: ignore[no-any-return]
-    _outlive_upgrades(compiled)
+    _outlive_changes(compiled)
     return compiled
 
 
-def _outlive_upgrades(compiled: Any) -> None:
-    """Takes a cache that cannot be read for a stale one, so that the function is compiled anew.
+def _outlive_changes(compiled: Any) -> None:
+    """Takes what was cached for stale if any kernel is another now, or if it cannot be read.
 
-    Numba asks whether a cache is older than the source file only once it is unpickled, which fails where an argument's
-    class stood in another module when it was written: after an upgrade, that is.
+    Numba looks at the function's own file alone, though what it calls stands in others and is compiled into it. And it
+    asks for the age of a cache only once that is unpickled, which fails where an argument's class stood in another
+    module when it was written: after an upgrade, that is.
     """
     file = compiled._cache._cache_file
+    file._source_stamp = (file._source_stamp, SOURCES)
     load = file._load_index
 
     def load_or_start_anew() -> Any:

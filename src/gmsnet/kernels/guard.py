@@ -135,7 +135,7 @@ def most_ratios(points, triangles, turn, blocks, unit, grain, first, last, least
         start = blocks[number] * LANES
         for lane in range(LANES):
             t = min(start + lane, len(triangles) - 1)
-            a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            a, b, c = np.uint32(triangles[t, 0]), np.uint32(triangles[t, 1]), np.uint32(triangles[t, 2])
             block[lane], block[LANES + lane] = points[a, 0], points[a, 1]
             block[2 * LANES + lane], block[3 * LANES + lane] = points[b, 0], points[b, 1]
             block[4 * LANES + lane], block[5 * LANES + lane] = points[c, 0], points[c, 1]

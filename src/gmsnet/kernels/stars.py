@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from gmsnet.kernels.compile import LANES, kernel
 from gmsnet.kernels.guard import STAR, permitted, surplus_above, surplus_above_zero
 
-HALVINGS = 20
+HALVINGS, FEW_HALVINGS = 20, 6
 MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
 COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
-FEW_HALVINGS = 6
 # Rows of a block's work array; TARGET and KEPT have two, FLOORS n.
 SIZE, REACH, TARGET, MARGIN, SHARE, KEPT, FLOORS = 0, 1, 2, 4, 5, 6, 8
 
@@ -62,16 +61,19 @@ def fetch(points, blocks, block, x, ring, work, local):
 @kernel
 def gather(points, blocks, block, n, x, ring):
     """Coordinates of the stars of a block, as they stand now."""
-    rings, offset = blocks.rings, blocks.offset[block]
+    offset = blocks.offset[block]
+    centre = blocks.centre[block * LANES : (block + 1) * LANES]
     for lane in range(LANES):
-        i = blocks.centre[block * LANES + lane]
+        i = np.uint32(centre[lane])  # an index that may be negative is looked at twice
         x[lane] = points[i, 0]
         x[LANES + lane] = points[i, 1]
     for j in range(n):
+        nodes = blocks.rings[offset + j * LANES : offset + (j + 1) * LANES]
+        row = ring[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
-            i = rings[offset + j * LANES + lane]
-            ring[2 * j * LANES + lane] = points[i, 0]
-            ring[(2 * j + 1) * LANES + lane] = points[i, 1]
+            i = np.uint32(nodes[lane])
+            row[lane] = points[i, 0]
+            row[LANES + lane] = points[i, 1]
 
 
 @kernel
@@ -163,6 +165,18 @@ def gather_floors(blocks, block, guard, work):
 
 
 @kernel
+def clear(tx, ty, ring, n, lane, delta, floor):
+    """Is each triangle of one lane certified above a floor that is not negative, with the free node at (tx, ty)?"""
+    px, py = ring[2 * (n - 1) * LANES + lane] - tx, ring[(2 * n - 1) * LANES + lane] - ty
+    for j in range(n):
+        qx, qy = ring[2 * j * LANES + lane] - tx, ring[(2 * j + 1) * LANES + lane] - ty
+        if not surplus_above(px, py, qx, qy, delta, floor) > 0.0:
+            return False
+        px, py = qx, qy
+    return True
+
+
+@kernel
 def allowed(tx, ty, x, ring, n, lane, delta, work):
     """May the free node of one lane move to (tx, ty)? The scalar form of the rule, which also knows inverted cells.
 
@@ -222,7 +236,7 @@ def commit(points, blocks, block, x, ring, work, shift, guard, tally):
             if not known:
                 gather_floors(blocks, block, guard, work)
                 known = True
-            truncate(points, i, x, ring, n, lane, work, shift, single, tally)
+            truncate(points, i, x, ring, n, lane, work, shift, guard, tally)
 
 
 @kernel
@@ -267,22 +281,31 @@ def halve_abreast(x, ring, n, shift, single, work):
 
 
 @kernel
-def truncate(points, i, x, ring, n, lane, work, shift, single, tally):
-    """Halves the shift of one lane until it is allowed (Algorithm 1), or drops it."""
+def truncate(points, i, x, ring, n, lane, work, shift, guard, tally):
+    """Halves the shift of one lane until it is allowed (Algorithm 1), or drops it.
+
+    Below a floor a triangle comes by its first-order change, so that more than FEW_HALVINGS hardly ever help.
+    """
+    single, halvings = guard.single, HALVINGS if guard.floor <= 0.0 else FEW_HALVINGS
     size, delta = work[SIZE * LANES + lane], work[REACH * LANES + lane]
     dx = size * shift[lane]
     dy = size * shift[LANES + lane]
     if not (np.isfinite(dx) and np.isfinite(dy)):
         tally[DROPPED] += 1
         return
-    for halving in range(HALVINGS):
+    for halving in range(halvings):
         tx = x[lane] + dx
         ty = x[LANES + lane] + dy
         if single:
             tx, ty = np.float64(np.float32(tx)), np.float64(np.float32(ty))
         if tx == x[lane] and ty == x[LANES + lane]:
             break
-        if allowed(tx, ty, x, ring, n, lane, delta, work):
+        # Above a positive floor no triangle is inverted; what was inverted is for the whole rule to judge.
+        if (
+            clear(tx, ty, ring, n, lane, delta, guard.floor)
+            if guard.floor > 0.0
+            else allowed(tx, ty, x, ring, n, lane, delta, work)
+        ):
             points[i, 0] = tx
             points[i, 1] = ty
             tally[MOVED] += 1

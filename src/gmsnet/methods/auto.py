@@ -1,15 +1,19 @@
 """The default: each stage does what it is best at for its time, and the next one starts where it no longer pays.
 
-- cheap sweeps: smart Laplacian ones, which take the mean of the ring only where Σq falls by it. Two bring most of what
-  can be gained in the mean.
-- Newton sweeps on the barrier Σq², which bring the rest and keep cells from collapsing.
+- Newton sweeps on the barrier Σq. The first takes the mean of the ring where Σq falls by it. They bring the mean of 1/q
+  and keep cells from collapsing.
 - worst-first: the worst few cells alone, on high powers of q.
-- Newton sweeps on Σq: what the powers took from the mean for the worst cells comes back. The guard keeps the worst.
+- Newton sweeps on Σq again: what the powers took from the mean for the worst cells comes back. The guard keeps the
+  worst cell.
 
-After each stage the mesh is measured; pairs of Newton sweeps go on as long as more than GAIN in the mean of 1/q is to
-come, if it goes on as with the last two. What each stage is worth is measured by ``benchmarks/auto.py``. The variant
-``patch`` leaves the cheap sweeps out; it is what a target (``target_quality``, ``target_angle``) uses on the patches
-around the cells that miss it, which others surround that are good as they are.
+On meshes of up to SMALL free nodes, where all this takes milliseconds, more is made of it: Newton sweeps go on as long
+as there is anything to gain, and around the worst cells come sweeps of Newton's method on MetricLoss, for the mean,
+with every cell kept above a floor.
+
+After each stage the mesh is measured. A stage goes on as long as more than its ``gain`` in the mean of 1/q is to come,
+if gains go on as at the last two looks. What each stage is worth is measured by ``benchmarks/auto.py``; see
+docs/auto.md. The variant ``patch`` has the first two stages; it is what a target (``target_quality``,
+``target_angle``) uses on the patches around the cells that miss it.
 """
 
 from __future__ import annotations
@@ -21,78 +25,95 @@ from typing import NamedTuple
 from gmsnet.kernels.stars import MOVED
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field, Method, Smoother, Tally
-from gmsnet.methods.laplacian import Laplacian
+from gmsnet.methods.optimize import Newton
 from gmsnet.methods.worst_first import CYCLES, WorstFirst
 from gmsnet.standing import Standing
 from gmsnet.workers import Share
 
-RELAXATION, ALWAYS = 1.6, 10**9  # of the Newton steps, and for how many sweeps: where many are needed, it halves them
-GAIN = 0.005  # in the mean of 1/q: what is to come for a stage to be made once more
+SMALL = 5000  # free nodes
+ALWAYS = 10**9  # sweeps
+RELAXATION = 1.6  # of the Newton steps
 
 
 class Stage(NamedTuple):
-    """name: for the record. create: its smoother. sweeps: made before the next stage, unless it has settled before.
+    """name: for the record. create: its smoother. sweeps: made before the next look, unless it has settled before.
 
-    rounds: how often at most, as long as it gains. looks: whether the mesh is measured after it.
+    first: sweeps before the first look, if others. rounds: how often it is made at most. gain: what must be to come, in
+    the mean of 1/q, for it to be made once more.
     """
 
     name: str
     create: Callable[[], Smoother]
     sweeps: int
+    first: int = 0
     rounds: int = 1
-    looks: bool = True
+    gain: float = math.inf
 
 
-CHEAP = Stage("smart Laplacian", lambda: Laplacian("smart"), 2, looks=False)
-NEWTON = Stage("Newton on q²", lambda: Barrier("q2", RELAXATION, ALWAYS), 2, rounds=40)
+def newton(relaxation: float = RELAXATION, *, means: int = 0) -> Barrier:
+    """Newton steps on Σq, over-relaxed throughout: where many sweeps are needed, it halves them."""
+    return Barrier("q", relaxation, ALWAYS, means)
+
+
+NEWTON = Stage("Newton on q", lambda: newton(means=1), 2, first=3, rounds=40, gain=0.006)
 WORST = Stage("worst first", lambda: WorstFirst(at_once=len(CYCLES)), 6)
-MEAN = Stage("Newton on q", lambda: Barrier("q", RELAXATION, ALWAYS), 2)
+MEAN = Stage("Newton on q, worst kept", newton, 2, rounds=10, gain=0.002)
+MORE = Stage("Newton on q, to its end", lambda: newton(1.85), 4, rounds=20, gain=0.00005)
+ABOVE = Stage("MetricLoss, above 1/q = 0.4", lambda: Newton("metric", floor=0.4), 1, rounds=8, gain=0.0003)
+POLISH = Stage("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1, rounds=8, gain=0.0003)
 
-VARIANTS = {"full": (CHEAP, NEWTON, WORST, MEAN), "patch": (NEWTON, WORST)}
+LARGE_PLAN = (NEWTON, WORST, MEAN)
+SMALL_PLAN = (NEWTON, MORE, ABOVE, WORST._replace(sweeps=1), POLISH)
+PATCH_PLAN = (NEWTON, WORST)
+VARIANTS = ("full", "patch")
 
 
 class Auto(Smoother):
-    """The stages one after the other."""
+    """The stages one after the other. Without any: those for the size of the mesh."""
 
     idle_ends = False
 
-    def __init__(self, stages: Sequence[Stage] = VARIANTS["full"]) -> None:
+    def __init__(self, stages: Sequence[Stage] = ()) -> None:
         self.stages = stages
         self.last: Standing | None = None  # at the last look
         self.gained = math.inf  # in the mean of 1/q by what was done between the last two looks
-        self._enter(0)
+        self.at = -1
 
     def _enter(self, stage: int) -> None:
+        if stage == len(self.stages):
+            self.settled = True
+            return
         self.at, self.made, self.rounds, self.gained = stage, 0, 0, math.inf
         self.smoother = self.stages[stage].create()
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
+        if self.at < 0:
+            self.stages = self.stages or (SMALL_PLAN if len(field.topology.free) <= SMALL else LARGE_PLAN)
+            self._enter(0)
         stage = self.stages[self.at]
         tally = self.smoother.sweep(field, share, test)
         self.stage = stage.name
         self.made += 1
-        done = self.made == stage.sweeps or self.smoother.settled or not tally[MOVED]
-        self.looks = done and stage.looks
-        if done and not stage.looks:
-            self._enter(self.at + 1)
+        wanted = stage.first if stage.first and not self.rounds else stage.sweeps
+        self.looks = self.made == wanted or self.smoother.settled or not tally[MOVED]
         return tally
 
     def told(self, standing: Standing) -> None:
         """Goes on to the next stage, or makes this one again, or settles."""
-        stage, last, self.last = self.stages[self.at], self.last, standing
+        last, self.last = self.last, standing
         if last is None:  # nothing is done yet
             return
+        stage = self.stages[self.at]
         gained, before = standing.mean_shape - last.mean_shape, self.gained
         self.rounds += 1
-        self.gained = gained if self.rounds > 1 else math.inf  # the first round's is the stages' before, too
-        goes_on = self.rounds == 1 or standing.inverted < last.inverted or to_come(before, gained) > GAIN
-        if self.rounds < stage.rounds and goes_on:
+        # What a stage gains at first is no measure of what it will.
+        self.gained = gained if self.rounds > 1 or not stage.first else math.inf
+        goes_on = to_come(before, gained) > stage.gain or bool(stage.first and self.rounds == 1)
+        if self.rounds < stage.rounds and (goes_on or standing.inverted < last.inverted):
             self.made = 0
-        elif self.at + 1 < len(self.stages):
-            self._enter(self.at + 1)
         else:
-            self.settled = True
+            self._enter(self.at + 1)
 
 
 def to_come(before: float, gained: float) -> float:
@@ -106,8 +127,8 @@ def to_come(before: float, gained: float) -> float:
 
 METHOD = Method(
     name="auto",
-    summary="the default: cheap sweeps, then Newton's on a barrier, then the worst cells alone, while each pays",
+    summary="the default: Newton's method on a barrier, then the worst cells alone, then the mean, while each pays",
     source="this package; docs/auto.md",
-    create=lambda options: Auto(VARIANTS[options.variant]),
-    variants=tuple(VARIANTS),
+    create=lambda options: Auto(PATCH_PLAN if options.variant == "patch" else ()),
+    variants=VARIANTS,
 )

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import adam, newton, objectives
-from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.guard import LARGEST, Guard
 from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Method, Options, StarSmoother, Tally
 
@@ -37,15 +37,23 @@ class Adam(StarSmoother):
 
 
 class Newton(StarSmoother):
-    """Newton steps on one objective."""
+    """Newton steps on one objective.
 
-    def __init__(self, objective: str) -> None:
-        self.objective = objectives.NAMES.index(objective)
+    floor: of 1/q. If the guard has a floor, no cell may come below this one, nor below MARGIN times the guard's. For
+    bounded objectives, which make many cells as bad as they may become for the mean of the others.
+    """
+
+    MARGIN = 1.05
+
+    def __init__(self, objective: str, floor: float | None = None) -> None:
+        self.objective, self.floor = objectives.NAMES.index(objective), floor
 
     def visit(
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
+        if self.floor is not None and guard.floor > 0.0:
+            guard = guard._replace(floor=max(self.MARGIN * guard.floor, self.floor * LARGEST))
         newton.sweep(points, blocks, first, last, guard, self.objective, tally)
 
 
