@@ -54,7 +54,7 @@ def gather(points, triangles, turn, start, stop, block, sign):
     """Edge vectors b − a and c − a of the triangles start…stop into block (4·LANES); the lanes left over repeat."""
     for lane in range(LANES):
         t = min(start + lane, stop - 1)
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        a, b, c = np.uint32(triangles[t, 0]), np.uint32(triangles[t, 1]), np.uint32(triangles[t, 2])
         block[lane] = points[b, 0] - points[a, 0]
         block[LANES + lane] = points[b, 1] - points[a, 1]
         block[2 * LANES + lane] = points[c, 0] - points[a, 0]

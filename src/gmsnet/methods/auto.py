@@ -26,7 +26,7 @@ from gmsnet.kernels.stars import MOVED
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field, Method, Smoother, Tally
 from gmsnet.methods.optimize import Newton
-from gmsnet.methods.worst_first import CYCLES, WorstFirst
+from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
 from gmsnet.standing import Standing
 from gmsnet.workers import Share
 
@@ -55,16 +55,23 @@ def newton(relaxation: float = RELAXATION, *, means: int = 0) -> Barrier:
     return Barrier("q", relaxation, ALWAYS, means)
 
 
+def worst_first(more: int) -> WorstFirst:
+    """The list of cycles, and so many times the highest powers, in one sweep: one guard and one ranking for all."""
+    cycles = CYCLES + LAST * more
+    return WorstFirst(cycles, at_once=len(cycles))
+
+
 NEWTON = Stage("Newton on q", lambda: newton(means=1), 2, first=3, rounds=40, gain=0.006)
-WORST = Stage("worst first", lambda: WorstFirst(at_once=len(CYCLES)), 6)
+WORST = Stage("worst first", lambda: worst_first(3), 1)
 MEAN = Stage("Newton on q, worst kept", newton, 2, rounds=10, gain=0.002)
-MORE = Stage("Newton on q, to its end", lambda: newton(1.85), 4, rounds=20, gain=0.00005)
+SHORT = WORST._replace(create=lambda: worst_first(0))
+LONG = Stage("Newton on q, to its end", lambda: newton(1.85, means=1), 4, rounds=20, gain=0.00005)
 ABOVE = Stage("MetricLoss, above 1/q = 0.4", lambda: Newton("metric", floor=0.4), 1, rounds=8, gain=0.0003)
 POLISH = Stage("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1, rounds=8, gain=0.0003)
 
 LARGE_PLAN = (NEWTON, WORST, MEAN)
-SMALL_PLAN = (NEWTON, MORE, ABOVE, WORST._replace(sweeps=1), POLISH)
-PATCH_PLAN = (NEWTON, WORST)
+SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
+PATCH_PLAN = (NEWTON, WORST._replace(sweeps=6))
 VARIANTS = ("full", "patch")
 
 
