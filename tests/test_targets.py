@@ -8,7 +8,7 @@ import pytest
 import gmsnet
 from gmsnet import engine
 from gmsnet.generate import disturb
-from gmsnet.targets import Target, around, restricted, spans
+from gmsnet.targets import Target, around, spans
 from gmsnet.topology import Topology
 
 
@@ -105,7 +105,8 @@ def test_patches_against_a_slow_twin():
                 wanted |= {n for row in topology.near if wanted & set(row.tolist()) for n in row.tolist()}
         active = around(topology, chosen, rings)
         assert set(np.flatnonzero(active).tolist()) == {node for node in wanted if topology.near_free[node]}
-        patch, rows = restricted(topology, active)
+        patch, rows = topology.restricted(active, "elsewhere")
+        assert patch.changeable[0].tolist() == topology.near[rows].tolist()
         assert set(topology.memory[np.flatnonzero(active)].tolist()) == set(patch.free.tolist())
         assert [bool(set(row.tolist()) & set(np.flatnonzero(active).tolist())) for row in topology.near] == [
             row in set(rows.tolist()) for row in range(len(topology.near))

@@ -134,8 +134,9 @@ def smooth(
     options: dict[str, Any] = {"threads": threads or available_threads(), "best_by": best_by, "guard": guard}
     if target:
         best, stop_reason, history = reach_target(
-            given, topology, create, target, start, max_sweeps=max_sweeps, callback=callback, **options
-        )
+            given, topology, create, target, start, max_sweeps=max_sweeps, callback=callback,
+            report=None if before.inverted else before, **options,
+        )  # fmt: skip
     else:
         run = Run(given, topology, chosen, points=start, **options)
         stop_reason = run.to_the_end(max_sweeps, None, callback)

@@ -56,16 +56,17 @@ class Sweep:
 class Run:
     """The state of one run: coordinates in memory order, the best so far, and the record.
 
-    points: to start from, in memory order (default: the mesh's own). history: to go on with.
+    points: to start from, in memory order (default: the mesh's own). history: to go on with. precision: of
+    the mesh, where it is known.
     """
 
     def __init__(
         self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str, guard: str,
-        points: Floats | None = None, history: list[Sweep] | None = None,
+        points: Floats | None = None, history: list[Sweep] | None = None, precision: Precision | None = None,
     ) -> None:  # fmt: skip
         self.topology, self.smoother, self.best_by = topology, smoother, best_by
         start = planar_points(mesh)[topology.memory] if points is None else points
-        self.field = Field(start.copy(), topology, precision_of(mesh), LEVELS.index(guard))
+        self.field = Field(start.copy(), topology, precision or precision_of(mesh), LEVELS.index(guard))
         self.threads = threads
         self.history: list[Sweep] = [] if history is None else history
         self.sweeps = self.history[-1].index if self.history else 0

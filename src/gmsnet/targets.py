@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import quality as kernels
+from gmsnet.measure import QualityReport
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Smoother
-from gmsnet.run import MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED, Run, Sweep
-from gmsnet.topology import Ints, Topology
+from gmsnet.run import MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED, Run, Sweep, precision_of
+from gmsnet.topology import Ints, Topology, places
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 RINGS = (1, 2, 4, 8)  # of free nodes that move with the corners of a cell that misses the target
+FEWER, IDLE = 0.9, 2  # a round that leaves more of the cells below the target is idle; so many in a row are the last
+SURE = 1.0 + 1e-12  # times the target: what is above it is so however it is measured
 OUTSIDE = "outside of the patches around cells below the target"
 
 
@@ -42,6 +45,11 @@ class Target:
         return missed
 
     @property
+    def sure(self) -> float | None:
+        """The least 1/q at which no way to measure it leaves a doubt."""
+        return None if self.quality is None else self.quality * SURE
+
+    @property
     def shape(self) -> float:
         """The least 1/q that a cell has which meets it: of all triangles with angles of α or more, (α, α, π − 2α)."""
         least = self.quality or 0.0
@@ -52,87 +60,92 @@ class Target:
         return least
 
 
-@dataclass(frozen=True)
-class Patches:
-    """Where a run for a target stands. missed: rows of ``near`` below it. least: of their 1/q."""
-
-    missed: NDArray[np.int64]
-    least: float
-
-    def beats(self, other: Patches) -> bool:
-        """Fewer cells below the target, or as many and the worst of them better."""
-        return (len(self.missed), -self.least) < (len(other.missed), -other.least)
-
-
 def reach_target(
     mesh: Mesh, topology: Topology, create: Callable[[], Smoother], target: Target, points: Floats, *,
     threads: int, best_by: str, guard: str, max_sweeps: int, callback: Callable[[Sweep], bool | None] | None,
+    report: QualityReport | None = None,
 ) -> tuple[Floats, str, list[Sweep]]:  # fmt: skip
     """Smooths patches around the cells that miss the target until none does, or nothing is gained any more.
 
     create: makes the method ready for a run on one set of patches. points: (N, 2) in memory order, not changed.
-    Returns the new points, why it ended, and the record. A patch's result is taken if fewer cells miss the target, or
-    as many and the worst of them is better.
+    report: the measures of these points, if they are known. Returns the new points, why it ended, and the record. A
+    patch's result is taken if fewer of its cells miss the target, or as many and the worst of them is better.
     """
     history: list[Sweep] = []
-    triangles = topology.near
-    standing = look(points, topology, target, np.arange(len(triangles)))
-    if not len(standing.missed):
+    if report is None:
+        corners = topology.near[look(points, topology, target, np.arange(len(topology.near))).missed]
+    else:
+        corners = places(topology)[topology.triangles[target.missed(report.shape, report.min_angle)]]
+    if not len(corners):
         return points, TARGET_REACHED, history
-    if not len(topology.free):
-        return points, NOTHING_TO_MOVE, history
+    idle, precision = 0, precision_of(mesh)
+    hopeless = not topology.near_free[corners].any(axis=1).all()  # cells that miss it and cannot change
     for rings in RINGS:
-        active = around(topology, triangles[standing.missed], rings)
+        active = around(topology, corners, rings)
         if not active.any():
-            return points, NOTHING_TO_MOVE if not history else NO_PROGRESS, history
-        patch, rows = restricted(topology, active)
-        run = Run(mesh, patch, create(), threads, best_by, guard, points, history)
-        reason = run.to_the_end(max_sweeps, target.quality if target.angle is None else None, callback)
-        found = look(run.best, topology, target, np.union1d(rows, standing.missed))
-        if found.beats(standing):
-            points, standing = run.best, found
-        if not len(standing.missed):
-            return points, TARGET_REACHED, history
+            return points, NO_PROGRESS if history else NOTHING_TO_MOVE, history
+        patch, rows = topology.restricted(active, OUTSIDE)
+        before = look(points, topology, target, rows)
+        run = Run(mesh, patch, create(), threads, best_by, guard, points, history, precision)
+        reason = run.to_the_end(max_sweeps, target.sure if target.angle is None else None, callback)
+        after = look(run.best, topology, target, rows)
+        if after.beats(before):
+            points, corners = run.best, topology.near[after.missed]
+        if not len(after.missed):
+            return points, NO_PROGRESS if hopeless else TARGET_REACHED, history
         if reason not in (NO_PROGRESS, TARGET_REACHED):  # stopped from outside, or at the most sweeps
             return points, reason, history
         if run.sweeps >= max_sweeps:
             return points, MAX_SWEEPS, history
+        idle = idle + 1 if len(after.missed) > FEWER * len(before.missed) else 0
+        if idle == IDLE:
+            break
     return points, NO_PROGRESS, history
 
 
-def look(points: Floats, topology: Topology, target: Target, rows: NDArray[np.int64]) -> Patches:
+@dataclass(frozen=True)
+class Missed:
+    """Which cells of some miss a target. missed: rows of ``near``. least: of their 1/q."""
+
+    missed: NDArray[np.int32]
+    least: float
+
+    def beats(self, other: Missed) -> bool:
+        """Fewer cells below the target, or as many and the worst of them better."""
+        return (len(self.missed), -self.least) < (len(other.missed), -other.least)
+
+
+def look(points: Floats, topology: Topology, target: Target, rows: NDArray[Any]) -> Missed:
     """Which of these rows of ``near`` miss the target."""
-    low, high, shape, aspect = (np.empty(len(rows)) for _ in range(4))
-    kernels.per_cell(points, topology.near[rows], topology.near_turn[rows], low, high, shape, aspect)
-    missed = target.missed(shape, np.degrees(low))
-    return Patches(rows[missed], float(shape[missed].min(initial=np.inf)))
+    a, b, c = (points[topology.near[rows, k]] for k in range(3))
+    p, q, r = b - a, c - a, c - b
+    area = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
+    lengths = np.maximum((p * p).sum(axis=1) + (q * q).sum(axis=1) + (r * r).sum(axis=1), np.finfo(float).tiny)
+    shape = 2.0 * math.sqrt(3.0) * topology.near_turn[rows] * area / lengths
+    low = np.zeros(len(rows))
+    if target.angle is not None:
+        largest = np.maximum.reduce([(p * q).sum(axis=1), -(p * r).sum(axis=1), (q * r).sum(axis=1)])
+        low = np.degrees(np.arctan2(np.abs(area), largest))
+    missed = target.missed(shape / SURE, low / SURE)
+    return Missed(rows[missed], float(shape[missed].min(initial=np.inf)))
 
 
 def around(topology: Topology, triangles: Ints, rings: int) -> Flags:
     """(N,) by places in memory: the free corners of the triangles, and ``rings − 1`` rings of free nodes around."""
     free, start, ring = topology.near_free, topology.near_start, topology.near_ring
-    active = np.zeros(len(free), dtype=bool)
-    front = np.unique(triangles)
+    active, front = np.zeros(len(free), dtype=bool), np.zeros(len(free), dtype=bool)
+    front[triangles] = True
     for _ in range(rings):
-        front = front[free[front] & ~active[front]]
-        active[front] = True
-        front = np.unique(ring[spans(start, front)])
+        nodes = np.flatnonzero(front & free & ~active)
+        active[nodes] = True
+        front[:] = False
+        front[ring[spans(start, nodes)]] = True
     return active
 
 
-def spans(start: Ints, chosen: Ints) -> NDArray[np.int64]:
+def spans(start: Ints, chosen: NDArray[Any]) -> NDArray[np.int64]:
     """The places of the chosen rows of a CSR array, one after the other."""
     count = (start[chosen + 1] - start[chosen]).astype(np.int64)
     end = np.cumsum(count)
-    return (
-        np.arange(int(count.sum())) - np.repeat(end - count, count) + np.repeat(start[chosen].astype(np.int64), count)
-    )
-
-
-def restricted(topology: Topology, active: Flags) -> tuple[Topology, NDArray[np.int64]]:
-    """The same with only the active nodes (by places in memory) free and only the triangles around them; their rows."""
-    held = np.zeros(len(active), dtype=bool)
-    held[topology.memory] = ~active
-    rows = np.flatnonzero(active[topology.near].any(axis=1))
-    inner = topology.holding(held, OUTSIDE)
-    return replace(inner, near=topology.near[rows], near_turn=topology.near_turn[rows]), rows
+    within: NDArray[np.int64] = np.arange(int(count.sum())) + np.repeat(start[chosen] + count - end, count)
+    return within

@@ -147,6 +147,19 @@ class Topology:
         held = {**self.held, reason: newly.astype(np.int64)}
         return replace(self, held=held, free=self.free[~chosen[self.free]], near_colours=colours)
 
+    def restricted(self, active: Flags, reason: str) -> tuple[Topology, Ints]:
+        """The same with the active nodes (N,) by places in memory alone free, and only the triangles around them.
+
+        The others are held for this reason. Returns also the rows of those triangles in ``near``.
+        """
+        held = np.zeros(len(active), dtype=bool)
+        held[self.memory] = ~active
+        rows: Ints = connectivity.touching(self.near, active)
+        near, turn = self.near[rows], self.near_turn[rows]
+        inner = replace(self.holding(held, reason), near=near, near_turn=turn)
+        inner.__dict__["changeable"] = near, turn  # all of them
+        return inner, rows
+
     @cached_property
     def stars(self) -> Stars:
         """The patches in the order in which they are smoothed."""
@@ -179,13 +192,19 @@ class Topology:
     @cached_property
     def changeable(self) -> tuple[Ints, NDArray[np.int8]]:
         """The rows of near and near_turn that have a free node."""
-        chosen = self.near_free[self.near].any(axis=1)
-        return (self.near, self.near_turn) if chosen.all() else (self.near[chosen], self.near_turn[chosen])
+        rows = connectivity.touching(self.near, self.near_free)
+        every = len(rows) == len(self.near)
+        return (self.near, self.near_turn) if every else (self.near[rows], self.near_turn[rows])
 
     @cached_property
     def colours(self) -> Ints:
         """(N,) colour of each node by id, −1 where held."""
         return self.near_colours[_inverse(self.memory)]
+
+
+def places(topology: Topology) -> Ints:
+    """(N,) the place in memory of each node by id."""
+    return _inverse(topology.memory)
 
 
 def _inverse(order: Ints) -> Ints:

@@ -29,6 +29,18 @@ def half_edges(first, corner):
 
 
 @kernel
+def touching(triangles, chosen):
+    """Rows (int32, ascending) of the triangles (T, 3) that have a chosen node. chosen: (N,) bool."""
+    rows = np.empty(len(triangles), dtype=np.int32)
+    count = 0
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        rows[count] = t
+        count += chosen[a] or chosen[b] or chosen[c]
+    return rows[:count].copy()
+
+
+@kernel
 def counting_order(key, size):
     """The stable order that sorts ``key`` (values 0…size−1), and where each value starts (size + 1)."""
     start = np.zeros(size + 1, dtype=np.int32)
