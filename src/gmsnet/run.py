@@ -83,7 +83,6 @@ class Run:
         if target is not None and self.best_standing.min_shape >= target:
             return TARGET_REACHED
         try:
-            self.smoother.told(self.best_standing)
             with workers(self.threads, len(self.topology.stars.blocks.filled)) as share:
                 while self.sweeps < max_sweeps:
                     moved = self._sweep(share)
@@ -115,9 +114,8 @@ class Run:
         self._keep_if_best(standing)
         moved, truncated, dropped = self.tally.tolist()
         self.tally[:] = 0
-        self.smoother.told(standing)
         sweep = Sweep(
-            self.sweeps, ", ".join(self.stages), moved, truncated, dropped, standing.inverted, standing.qhat,
+            self.sweeps, " + ".join(self.stages), moved, truncated, dropped, standing.inverted, standing.qhat,
             standing.min_shape, standing.mean_shape,
         )  # fmt: skip
         self.history.append(sweep)

@@ -21,19 +21,24 @@ def runs(mesh, stages, guard="worst"):
     return run
 
 
+def told(history):
+    """The stages in their order, from the texts that looks at the mesh are told with."""
+    return list(dict.fromkeys(name for sweep in history for name in sweep.stage.split(" + ")))
+
+
 def test_stages_come_in_their_order_and_are_told():
     mesh = gmsnet.random_mesh(1000, seed=1)
     for plan in (SMALL_PLAN, LARGE_PLAN, PATCH_PLAN):
         run = runs(mesh, plan)
-        assert list(dict.fromkeys(sweep.stage for sweep in run.history)) == [stage.name for stage in plan]
+        assert told(run.history) == [stage.name for stage in plan]
         assert [sweep.index for sweep in run.history] == sorted({sweep.index for sweep in run.history})
-        assert run.history[0].index == (plan[0].first or plan[0].sweeps)
+        assert run.history[-1].index == run.sweeps
 
 
 @pytest.mark.parametrize(("nodes", "plan"), [(SMALL - 500, SMALL_PLAN), (SMALL + 500, LARGE_PLAN)])
 def test_the_size_of_the_mesh_says_how_much_is_made_of_it(nodes, plan):
     result = gmsnet.smooth(gmsnet.random_mesh(nodes, seed=1))
-    assert {sweep.stage for sweep in result.history} == {stage.name for stage in plan}
+    assert told(result.history) == [stage.name for stage in plan]
 
 
 @pytest.mark.parametrize("plan", [SMALL_PLAN, LARGE_PLAN])
@@ -72,9 +77,9 @@ def test_a_slow_change_of_the_whole_mesh_takes_many_newton_sweeps_but_not_all():
     assert result.before.inverted > 0
     assert result.after.inverted == 0
     newton = [sweep for sweep in result.history if sweep.stage.startswith("Newton on q")]
-    assert len(newton) == SMALL_PLAN[0].rounds
+    assert newton[-1].index == SMALL_PLAN[0].rounds * SMALL_PLAN[0].sweeps
     assert all(b.mean_shape > a.mean_shape for a, b in pairwise(newton))
-    assert newton[-1].mean_shape > newton[0].mean_shape + 0.2
+    assert newton[-1].mean_shape > newton[0].mean_shape + 0.15
     worst = [sweep for sweep in result.history if sweep.stage == "worst first"]
     assert worst
     assert worst[-1].min_shape > newton[-1].min_shape

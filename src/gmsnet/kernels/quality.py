@@ -113,6 +113,26 @@ def summarise(points, triangles, turn, first, last, with_aspect, sums):
 
 
 @kernel
+def glance(points, triangles, turn, stride):
+    """The mean shape over every stride-th block of LANES triangles."""
+    block, sign, shape = np.empty(4 * LANES), np.empty(LANES), np.empty(LANES)
+    total_shape, count = 0.0, 0
+    for start in range(0, len(triangles), stride * LANES):
+        stop = min(start + LANES, len(triangles))
+        gather(points, triangles, turn, start, stop, block, sign)
+        for lane in range(LANES):
+            px, py = block[lane], block[LANES + lane]
+            qx, qy = block[2 * LANES + lane], block[3 * LANES + lane]
+            rx, ry = qx - px, qy - py
+            lengths = px * px + py * py + qx * qx + qy * qy + rx * rx + ry * ry
+            shape[lane] = TWO_SQRT3 * sign[lane] * (px * qy - py * qx) / max(lengths, TINY)
+        for lane in range(stop - start):
+            total_shape += shape[lane]
+        count += stop - start
+    return total_shape / count
+
+
+@kernel
 def total(low, high, shape, aspect, count, row):
     """One row of sums (see the names above) over the first ``count`` lanes."""
     sum_low, sum_high, sum_shape, sum_aspect = 0.0, 0.0, 0.0, 0.0

@@ -10,10 +10,10 @@ On meshes of up to SMALL free nodes, where all this takes milliseconds, more is 
 as there is anything to gain, and around the worst cells come sweeps of Newton's method on MetricLoss, for the mean,
 with every cell kept above a floor.
 
-After each stage the mesh is measured. A stage goes on as long as more than its ``gain`` in the mean of 1/q is to come,
-if gains go on as at the last two looks. What each stage is worth is measured by ``benchmarks/auto.py``; see
-docs/auto.md. The variant ``patch`` has the first two stages; it is what a target (``target_quality``,
-``target_angle``) uses on the patches around the cells that miss it.
+A stage goes on as long as more than its ``gain`` in the mean of 1/q (of a sample of the cells) is to come, if gains go
+on as the last two did. What each stage is worth is measured by ``benchmarks/auto.py``; see docs/auto.md. The variant
+``patch`` has the first two stages; it is what a target (``target_quality``, ``target_angle``) uses on the patches
+around the cells that miss it.
 """
 
 from __future__ import annotations
@@ -22,24 +22,27 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from gmsnet.kernels.compile import LANES
+from gmsnet.kernels.quality import glance
 from gmsnet.kernels.stars import MOVED
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field, Method, Smoother, Tally
 from gmsnet.methods.optimize import Newton
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
-from gmsnet.standing import Standing
 from gmsnet.workers import Share
 
 SMALL = 5000  # free nodes
+SAMPLE = 256  # blocks of cells
+OFTEN = 4  # rounds after which the mesh is measured within a stage
 ALWAYS = 10**9  # sweeps
 RELAXATION = 1.6  # of the Newton steps
 
 
 class Stage(NamedTuple):
-    """name: for the record. create: its smoother. sweeps: made before the next look, unless it has settled before.
+    """name: for the record. create: its smoother. sweeps: how many, unless it has settled before.
 
-    first: sweeps before the first look, if others. rounds: how often it is made at most. gain: what must be to come, in
-    the mean of 1/q, for it to be made once more.
+    first: how many for the first time, if others. rounds: how often it is made at most. gain: what must be to come, in
+    the mean of 1/q, for it to be made once more. looks: whether the mesh is measured after it.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Stage(NamedTuple):
     first: int = 0
     rounds: int = 1
     gain: float = math.inf
+    looks: bool = True
 
 
 def newton(relaxation: float = RELAXATION, *, means: int = 0) -> Barrier:
@@ -69,7 +73,7 @@ LONG = Stage("Newton on q, to its end", lambda: newton(1.85, means=1), 4, rounds
 ABOVE = Stage("MetricLoss, above 1/q = 0.4", lambda: Newton("metric", floor=0.4), 1, rounds=8, gain=0.0003)
 POLISH = Stage("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1, rounds=8, gain=0.0003)
 
-LARGE_PLAN = (NEWTON, WORST, MEAN)
+LARGE_PLAN = (NEWTON._replace(looks=False), WORST, MEAN)
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 PATCH_PLAN = (NEWTON, WORST._replace(sweeps=6))
 VARIANTS = ("full", "patch")
@@ -82,45 +86,55 @@ class Auto(Smoother):
 
     def __init__(self, stages: Sequence[Stage] = ()) -> None:
         self.stages = stages
-        self.last: Standing | None = None  # at the last look
-        self.gained = math.inf  # in the mean of 1/q by what was done between the last two looks
         self.at = -1
 
-    def _enter(self, stage: int) -> None:
+    def _enter(self, stage: int, field: Field) -> None:
+        self.at, self.made, self.rounds, self.gained = stage, 0, 0, math.inf
         if stage == len(self.stages):
             self.settled = True
             return
-        self.at, self.made, self.rounds, self.gained = stage, 0, 0, math.inf
         self.smoother = self.stages[stage].create()
+        if self.stages[stage].rounds > 1:
+            self.mean = mean_shape(field)
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if self.at < 0:
             self.stages = self.stages or (SMALL_PLAN if len(field.topology.free) <= SMALL else LARGE_PLAN)
-            self._enter(0)
+            self._enter(0, field)
         stage = self.stages[self.at]
         tally = self.smoother.sweep(field, share, test)
         self.stage = stage.name
         self.made += 1
+        self.looks = False
         wanted = stage.first if stage.first and not self.rounds else stage.sweeps
-        self.looks = self.made == wanted or self.smoother.settled or not tally[MOVED]
+        if self.made == wanted or self.smoother.settled or not tally[MOVED]:
+            self._end_round(field)
         return tally
 
-    def told(self, standing: Standing) -> None:
-        """Goes on to the next stage, or makes this one again, or settles."""
-        last, self.last = self.last, standing
-        if last is None:  # nothing is done yet
-            return
+    def _end_round(self, field: Field) -> None:
+        """Makes the stage once more where that pays, else goes on to the next one, or settles."""
         stage = self.stages[self.at]
-        gained, before = standing.mean_shape - last.mean_shape, self.gained
         self.rounds += 1
-        # What a stage gains at first is no measure of what it will.
-        self.gained = gained if self.rounds > 1 or not stage.first else math.inf
-        goes_on = to_come(before, gained) > stage.gain or bool(stage.first and self.rounds == 1)
-        if self.rounds < stage.rounds and (goes_on or standing.inverted < last.inverted):
-            self.made = 0
-        else:
-            self._enter(self.at + 1)
+        self.made = 0
+        goes_on = False
+        if self.rounds < stage.rounds:
+            mean = mean_shape(field)
+            gained, before = mean - self.mean, self.gained
+            # What a stage gains at first is no measure of what it will.
+            is_first = bool(stage.first and self.rounds == 1)
+            self.mean, self.gained = mean, math.inf if is_first else gained
+            goes_on = is_first or to_come(before, gained) > stage.gain
+        self.looks = self.rounds % OFTEN == 0 if goes_on else stage.looks
+        if not goes_on:
+            self._enter(self.at + 1, field)
+
+
+def mean_shape(field: Field) -> float:
+    """The mean of 1/q over some of the cells, evenly taken."""
+    triangles, turn = field.topology.changeable
+    stride = max(1, len(triangles) // (SAMPLE * LANES))
+    return float(glance(field.points, triangles, turn, stride))
 
 
 def to_come(before: float, gained: float) -> float:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, Precision, most_ratios, star_floors
 from gmsnet.kernels.stars import Blocks
-from gmsnet.standing import Standing
 from gmsnet.topology import Topology
 from gmsnet.workers import Share
 
@@ -97,9 +96,6 @@ class Smoother(ABC):
         share: runs kernels on ranges, on threads where that pays. test: measures the mesh as it stands, keeps it if it
         is the best so far, and tells whether it is; for methods that look more often than after each sweep.
         """
-
-    def told(self, standing: Standing) -> None:  # noqa: B027 (most methods need not know)
-        """How the mesh stands before the first sweep and at each look."""
 
 
 class StarSmoother(Smoother):
