@@ -33,7 +33,7 @@ from sweeps import averaging_matrix
 import gmsnet
 from gmsnet.measure import measure
 from gmsnet.methods import smoother
-from gmsnet.methods.auto import VARIANTS, Auto
+from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, Auto
 from gmsnet.run import Run, outcome
 from gmsnet.topology import Topology, planar_points
 
@@ -154,10 +154,17 @@ def stage_table(rows, without, sizes):
         print(f"\n  {nodes:,} nodes{'':24} pass       q̂  min 1/q  mean 1/q    time")
         for label, found in {"all stages": rows, **{f"without {name}": each for name, each in without.items()}}.items():
             here = [row for name, row in found.items() if name.startswith(f"{nodes}/")]
+            if not here:
+                continue
             passed = sum(all(row["passed"].values()) for row in here)
             qhat, least, mean = (median(row["found"][key] for row in here) for key in KEYS)
             in_l = median(row["in_L"] for row in here)
             print(f"    {label:32} {passed} of {len(here)}  {qhat:7.4f}  {least:7.4f}  {mean:8.4f}  {in_l:6.1f} L")
+
+
+def plan(nodes):
+    """The stages of ``auto`` for a mesh of so many free nodes."""
+    return SMALL_PLAN if nodes <= SMALL else LARGE_PLAN
 
 
 def called(name, method, names, options):
@@ -186,11 +193,12 @@ def main():
     names = {"variant": options.variant, "objective": options.objective}
     references = stored(options.ceilings, sizes, options.seeds)
 
-    def studies(create):
-        """Name → ``study``, of all meshes."""
+    def studies(create, sizes):
+        """Name → ``study``, of all meshes of these sizes. create: makes a smoother for a number of nodes."""
         return {
             f"{nodes}/{seed}": study(
-                gmsnet.random_mesh(nodes, seed=seed), references[f"{nodes}/{seed}"], create, options.guard,
+                gmsnet.random_mesh(nodes, seed=seed), references[f"{nodes}/{seed}"],
+                lambda nodes=nodes: create(nodes), options.guard,
                 options.sweeps, options.repeats,
             )
             for nodes in sizes for seed in options.seeds
@@ -198,7 +206,7 @@ def main():
 
     print(describe())
     print(f"{options.method}, one thread; medians of {options.repeats} runs in turns with L")
-    rows = studies(lambda: smoother(options.method, **names))
+    rows = studies(lambda nodes: smoother(options.method, **names), sizes)
     differs = [name for name, row in rows.items() if row["found"] != called(name, options.method, names, options)]
     table(rows, references)
     good = summary(rows, sizes)
@@ -206,10 +214,11 @@ def main():
         raise SystemExit(f"gmsnet.smooth makes another mesh than the run that was timed, of {', '.join(differs)}")
     without = {}
     if options.leave_out:
-        stages = VARIANTS[options.variant or "full"]
-        for stage in stages:
-            rest = tuple(other for other in stages if other is not stage)
-            without[stage.name] = studies(lambda rest=rest: Auto(rest))
+        for name in dict.fromkeys(stage.name for nodes in sizes for stage in plan(nodes)):
+            without[name] = studies(
+                lambda nodes, name=name: Auto([stage for stage in plan(nodes) if stage.name != name]),
+                [nodes for nodes in sizes if name in [stage.name for stage in plan(nodes)]],
+            )
         stage_table(rows, without, sizes)
     if options.json:
         document = {

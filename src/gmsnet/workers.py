@@ -13,11 +13,16 @@ BLOCKS_PER_THREAD = 256  # about a millisecond of work: for less, waking a threa
 Share = Callable[[Callable[[int, int], Any], int, int], list[Any]]
 
 
+def serial(work: Callable[[int, int], Any], first: int, last: int) -> list[Any]:
+    """All of the range at once, in this thread."""
+    return [work(first, last)]
+
+
 @contextmanager
 def workers(threads: int, blocks: int) -> Iterator[Share]:
     """Gives a function that calls another on ranges first…last, in ``threads`` pieces side by side where that pays."""
     if threads == 1 or blocks < 2 * BLOCKS_PER_THREAD:
-        yield lambda work, first, last: [work(first, last)]
+        yield serial
         return
     with ThreadPoolExecutor(threads - 1) as pool:
 

@@ -15,7 +15,7 @@ from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, Precision, most_ratios, star_floors
 from gmsnet.kernels.stars import Blocks
 from gmsnet.topology import Topology
-from gmsnet.workers import Share
+from gmsnet.workers import Share, serial
 
 Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.stars)
 
@@ -116,6 +116,8 @@ class StarSmoother(Smoother):
             self.visit(field.points, stars.blocks, first, last, guard, counts)
             return counts
 
+        if share is serial:  # colour after colour, too: in that order the blocks stand
+            return visit(0, int(stars.first[-1]))
         for colour in range(stars.colours):
             tally += sum(share(visit, int(stars.first[colour]), int(stars.first[colour + 1])))
         return tally
