@@ -34,7 +34,7 @@ import gmsnet
 from gmsnet.measure import measure
 from gmsnet.methods import smoother
 from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, Auto
-from gmsnet.run import Run, outcome
+from gmsnet.run import Run, outcome, rank_by
 from gmsnet.topology import Topology, planar_points
 
 LESS_MEAN, BELOW_CEILING = 0.004, 0.005
@@ -101,7 +101,7 @@ def study(mesh, wanted, create, guard, sweeps, repeats):
         timed.turn()
     seconds, product = timed.to_the_end()
     until = timed.until(wanted)
-    points, _, _ = outcome(mesh, timed.topology, timed.best, measure(mesh, timed.topology), "shape")
+    points, _, _ = outcome(mesh, timed.topology, timed.best, measure(mesh, timed.topology), rank_by("shape"))
     found = figures(mesh.with_points(points))
     return {
         "found": found,

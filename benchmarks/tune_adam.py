@@ -27,7 +27,7 @@ from gmsnet.kernels.objectives import NAMES, OUT
 from gmsnet.measure import measure
 from gmsnet.methods.optimize import Adam
 from gmsnet.paper.cases import CASES
-from gmsnet.run import Run, outcome
+from gmsnet.run import Run, outcome, rank_by
 from gmsnet.topology import Topology
 from gmsnet.workers import workers
 
@@ -79,7 +79,7 @@ class Subject:
     def smoothed(self, objective, sizes, sweeps):
         run = Run(self.mesh, self.topology, Adam(objective, sizes), 1, "aspect", "valid")
         run.to_the_end(sweeps, None, None)
-        return outcome(self.mesh, self.topology, run.best, self.before, "aspect")[2]
+        return outcome(self.mesh, self.topology, run.best, self.before, rank_by("aspect"))[2]
 
 
 def gains(subjects, objective, sweeps, rows):

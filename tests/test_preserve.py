@@ -8,6 +8,7 @@ from scipy.spatial import Delaunay
 
 import gmsnet
 from gmsnet import InputError
+from gmsnet.generate import disturb
 from gmsnet.preserve import LAYER, WALL
 from gmsnet.topology import Topology
 
@@ -79,3 +80,18 @@ def test_a_delaunay_mesh_of_stretched_points_is_all_layers():
     triangles = Delaunay(points).simplices
     result = gmsnet.smooth((points * (20.0, 1.0), triangles))
     assert result.stop_reason == "nothing to move" or result.held[LAYER].size > 500
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_layers_stay_when_cells_beside_them_are_mended(seed):
+    """Untangling knows of nodes that are held on account of layers."""
+    mesh, heights = layered()
+    free = Topology.of(mesh).free
+    above = free[mesh.points[free, 1] > heights[11]]
+    tangled = disturb(mesh, above, 1.2, seed=seed, keep_valid=False)
+    result = gmsnet.smooth(tangled)
+    assert result.before.inverted > 10
+    assert result.after.inverted == 0
+    held = np.concatenate(list(result.held.values()))
+    assert result.held[LAYER].size > 200
+    assert not result.moved[held].any()

@@ -114,3 +114,45 @@ def test_patches_against_a_slow_twin():
     start = np.array([0, 2, 2, 5, 6])
     assert spans(start, np.array([3, 0, 2])).tolist() == [5, 0, 1, 2, 3, 4]
     assert spans(start, np.array([1])).tolist() == []
+
+
+def test_what_a_target_gains_is_kept_though_the_mean_pays_for_it():
+    """A held sliver is the worst cell; around other cells below the target the mean may fall."""
+    for seed in range(6):
+        mesh = gmsnet.smooth(gmsnet.random_mesh(300, seed=seed)).mesh
+        corners = Topology.of(mesh).triangles
+        sliver = np.array([[5.0, 0.0], [6.0, 0.0], [5.5, 1e-3]])
+        points = np.vstack([mesh.points[:, :2], sliver])
+        cells = np.vstack([corners, len(mesh.points) + np.arange(3)])
+        before = gmsnet.quality((points, cells))
+        result = gmsnet.smooth((points, cells), target_quality=0.5)
+        below, left = ((report.shape < 0.5).sum() for report in (before, result.after))
+        assert left <= below
+        assert (left < below) == result.moved.any()
+
+
+def test_an_interrupt_between_patches_keeps_what_is_done(monkeypatch):
+    mesh, rounds = gmsnet.random_mesh(600, seed=1), []
+    restricted = Topology.restricted
+
+    def interrupt(self, active, reason):
+        rounds.append(reason)
+        if len(rounds) == 2:
+            raise KeyboardInterrupt
+        return restricted(self, active, reason)
+
+    monkeypatch.setattr(Topology, "restricted", interrupt)
+    result = gmsnet.smooth(mesh, target_quality=0.6)
+    assert result.stop_reason == engine.INTERRUPTED
+    assert (result.after.shape < 0.6).sum() < (result.before.shape < 0.6).sum()
+
+
+def test_no_star_gets_worse_for_a_target_at_the_level_star():
+    for seed in range(3):
+        mesh = gmsnet.random_mesh(400, seed=seed)
+        result = gmsnet.smooth(mesh, target_quality=0.6, guard="star")
+        topology = Topology.of(mesh)
+        around_each = [np.flatnonzero((topology.triangles == node).any(axis=1)) for node in topology.free]
+        before, after = result.before.shape, result.after.shape
+        assert result.moved.any()
+        assert all(after[rows].min() >= before[rows].min() - 1e-12 for rows in around_each)

@@ -27,9 +27,9 @@ from gmsnet.run import MAX_SWEEPS as MAX_SWEEPS
 from gmsnet.run import NO_PROGRESS as NO_PROGRESS
 from gmsnet.run import NOTHING_TO_MOVE as NOTHING_TO_MOVE
 from gmsnet.run import TARGET_REACHED as TARGET_REACHED
-from gmsnet.run import Run, outcome, precision_of
+from gmsnet.run import Run, outcome, precision_of, rank_by
 from gmsnet.run import Sweep as Sweep
-from gmsnet.tangles import UnmendedCell, mended, still_inverted
+from gmsnet.tangles import UnmendedCell, beside, mended, still_inverted
 from gmsnet.targets import Target, reach_target
 from gmsnet.topology import Topology, planar_points
 from gmsnet.wall_stage import improve_near_walls
@@ -93,22 +93,24 @@ def smooth(
     """Moves the free nodes of a planar triangle mesh so that its elements become better; changes nothing else.
 
     No cell that is valid becomes invalid, the worst cell does not get worse (``guard``), and of all meshes on the way
-    the best is returned: the one with the fewest inverted cells, then with the largest q̂, the input among them.
+    the best is returned: the one with the fewest inverted cells, then with the largest q̂ (for a target: with the fewest
+    cells that miss it), the input among them.
 
-    mesh: (points, cells) arrays, a Mesh, or a meshio, meshlane or PyVista object; it is not changed. method: a name in
-    METHODS. variant, objective: names out of the method's own lists (default: their first). max_sweeps: at most so many
-    visits of each node. threads: at most so many (default: the processors at hand); the result is the same bits for any
-    number. target_quality, target_angle: the least 1/q, in (0, 1], and the least angle, in (0, 60] degrees, that every
-    cell is to have: only cells that miss it and what is around them are smoothed, until none misses it. fixed: nodes to
-    hold besides boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. preserve: "shape"
-    holds the nodes of layers that are stretched on purpose, "size" besides keeps the areas of cells, "none" neither.
-    fix_layers: hold stretched layers whatever ``preserve`` says. untangle: mend inverted cells first, where there are
-    any. guard: what each sweep keeps besides validity: "valid" nothing (as the paper), "worst" that the worst 1/q of
-    the cells with a free node never falls, "star" that the worst 1/q around any free node never falls. seed: for
-    methods that draw random numbers (none does so far). callback: called after each look at the mesh, with most methods
-    after each sweep; a true answer stops the run. weights: a safetensors file for methods with weights. best_by: which
-    1/q enters the q̂ that says which mesh is the best: "shape" (1/q) or "aspect" (1/q_V, with which the paper's tables
-    are formed).
+    mesh: (points, cells) arrays, a Mesh, or a meshio, meshlane or PyVista object; it is not changed. method: a name
+    in METHODS. variant, objective: names out of the method's own lists (default: their first). max_sweeps: at most
+    so many sweeps; in most, each node is visited once, in those of ``worst-first`` some nodes are often. threads:
+    at most so many (default: the processors at hand); the result is the same bits for any number. target_quality,
+    target_angle: the least 1/q, in (0, 1], and the least angle, in (0, 60] degrees, that every cell is to have:
+    only cells that miss it and what is around them are smoothed, until none misses it. fixed: nodes to hold besides
+    boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. preserve: "shape" holds the
+    nodes of layers that are stretched on purpose, "size" besides keeps the areas of cells, "none" neither.
+    fix_layers: hold stretched layers whatever ``preserve`` says. untangle: mend inverted cells first, where there
+    are any. guard: what each sweep keeps besides validity: "valid" nothing (as the paper), "worst" that the worst
+    1/q of the cells with a free node never falls, "star" that the worst 1/q around any free node never falls. seed:
+    for methods that draw random numbers (none does so far). callback: called after each look at the mesh, with most
+    methods after each sweep; a true answer stops the run. weights: a safetensors file for methods with weights.
+    best_by: which 1/q enters the q̂ that says which mesh is the best: "shape" (1/q) or "aspect" (1/q_V, with which
+    the paper's tables are formed).
 
     Raises InputError for what cannot be used, before anything is moved.
     """
@@ -124,12 +126,18 @@ def smooth(
     topology = Topology.of(given, fixed_mask(given, fixed))
     before = measure(given, topology)
     protection = protected(given, topology, preserve, fix_layers)
-    topology, notes = protection.topology, protection.notes
     start = planar_points(given)[topology.memory]
     reasons: dict[tuple[int, ...], str] = {}
+    untangling: list[str] = []
     if untangle and before.inverted:
-        start, note, reasons = mended(start, topology, precision_of(given))
-        notes.append(note)
+        start, note, reasons = mended(start, protection.topology, precision_of(given))
+        freed = protection.released(beside(reasons, protection.topology)) if reasons else None
+        if freed is not None:
+            protection, first = freed, note
+            start, note, reasons = mended(start, protection.topology, precision_of(given))
+            untangling.append(first)
+        untangling.append(note)
+    topology, notes = protection.topology, [*protection.notes, *untangling]
 
     options: dict[str, Any] = {"threads": threads or available_threads(), "best_by": best_by, "guard": guard}
     if target:
@@ -142,17 +150,21 @@ def smooth(
         stop_reason = run.to_the_end(max_sweeps, None, callback)
         best, history = run.best, run.history
         if protection.kept is not None and stop_reason in (NO_PROGRESS, NOTHING_TO_MOVE):
-            best, stop_reason, history = improve_near_walls(
-                given, protection.outer, protection.kept, best, history, max_sweeps=max_sweeps, callback=callback,
-                **options,
-            )  # fmt: skip
             topology = protection.outer
+            try:
+                best, stop_reason, history = improve_near_walls(
+                    given, topology, protection.kept, best, history, max_sweeps=max_sweeps, callback=callback,
+                    **options,
+                )  # fmt: skip
+            except KeyboardInterrupt:  # what was made before it is kept
+                stop_reason = INTERRUPTED
 
+    rank = target.rank if target else rank_by(best_by)
     try:
-        points, moved, after = outcome(given, topology, best, before, best_by)
+        points, moved, after = outcome(given, topology, best, before, rank)
     except KeyboardInterrupt:  # nothing is lost by finishing what takes less than a sweep
         stop_reason = INTERRUPTED
-        points, moved, after = outcome(given, topology, best, before, best_by)
+        points, moved, after = outcome(given, topology, best, before, rank)
     return SmoothResult(
         mesh=restore(points),
         points=points.copy(),
@@ -180,7 +192,7 @@ def check_options(
         weights=weights, seed=seed, **others,
     )  # fmt: skip
     target = Target(target_quality, target_angle)
-    name = method_for(method, preserve, target)
+    name = method_for(method, variant, preserve, target)
     if name == "auto" and variant is None and target:
         variant = "patch"
     return lambda: smoother(name, variant=variant, objective=objective, weights=weights, seed=seed)

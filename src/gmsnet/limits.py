@@ -95,7 +95,7 @@ class Limits:
         "no bound known" where there is none: it may be that the target can be reached, or that nothing says why not.
         """
         told = dict.fromkeys(map(int, rows), "")
-        for group in np.flatnonzero(self.bound < target).tolist():
+        for group in np.flatnonzero(self.bound <= target * (1.0 + 1e-9)).tolist():
             for row in self.cells(group).tolist():
                 if told.get(row) == "":
                     told[row] = self.describe(group)

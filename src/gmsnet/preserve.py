@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,21 +17,43 @@ from gmsnet.targets import Target
 from gmsnet.topology import Topology
 from gmsnet.walls import near_walls
 
+Flags = NDArray[np.bool_]
+
 LAYER, WALL = "stretched layer", "refined near a wall"
 
 
 @dataclass(frozen=True, eq=False)
 class Protection:
-    """topology: with the nodes held that are where they are on purpose. notes: what to say about that.
+    """What of a mesh is there on purpose. notes: what to say about that.
 
+    base: the topology without any. layers: (N,) bool by id, the nodes that are held on account of stretched layers.
     kept: (N,) bool by id, the nodes next to walls that the mesh is refined towards, which move in a stage of their own
-    (wall_stage.py); None where there are none. outer: the topology in which they are free.
+    (wall_stage.py). None where there are none.
     """
 
-    topology: Topology
+    base: Topology
     notes: list[str]
-    outer: Topology
-    kept: NDArray[np.bool_] | None = None
+    layers: Flags | None = None
+    kept: Flags | None = None
+
+    @cached_property
+    def outer(self) -> Topology:
+        """The topology with the nodes of layers held."""
+        return self.base if self.layers is None else self.base.holding(self.layers, LAYER)
+
+    @cached_property
+    def topology(self) -> Topology:
+        """The topology with all of them held."""
+        return self.outer if self.kept is None else self.outer.holding(self.kept, WALL)
+
+    def released(self, nodes: Flags) -> Protection | None:
+        """Without these nodes (N,) by id; None if none of them is protected."""
+        layers, kept = (None if held is None else held & ~nodes for held in (self.layers, self.kept))
+        count = len(set(self.base.free[nodes[self.base.free]].tolist()) - set(self.topology.free.tolist()))
+        if not count:
+            return None
+        note = f"{_amount(count)} let go again, for cells beside them were inverted"
+        return Protection(self.base, [*self.notes, note], layers, kept)
 
 
 def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool) -> Protection:
@@ -39,33 +62,34 @@ def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool) -
     """
     notes: list[str] = []
     if not len(topology.free):
-        return Protection(topology, notes, topology)
-    layers = stretched_layers(mesh, topology)
-    if layers and (fix_layers or preserve != NONE):
-        topology = topology.holding(layers.nodes, LAYER)
+        return Protection(topology, notes)
+    found = stretched_layers(mesh, topology)
+    layers = found.nodes if found and (fix_layers or preserve != NONE) else None
+    protection = Protection(topology, notes, layers)
+    if layers is not None:
         why = "fix_layers" if preserve == NONE else f"preserve={preserve!r}"
-        notes.append(f"{layers.summary}; {_amount(len(topology.held.get(LAYER, ())))} held for that ({why})")
-    elif layers:
-        notes.append(f"{layers.summary}; nothing is held for that (preserve={preserve!r})")
+        notes.append(f"{found.summary}; {_amount(len(protection.outer.held.get(LAYER, ())))} held for that ({why})")
+    elif found:
+        notes.append(f"{found.summary}; nothing is held for that (preserve={preserve!r})")
     elif fix_layers:
         notes.append("fix_layers: no stretched layers were found, so none are held")
     if preserve != SHAPE:
-        return Protection(topology, notes, topology)
-    inner = topology.holding(kept := near_walls(mesh, topology), WALL)
-    if WALL not in inner.held:
-        return Protection(topology, notes, topology)
+        return protection
+    near = Protection(topology, notes, layers, near_walls(mesh, protection.outer))
+    if WALL not in near.topology.held:
+        return protection
     notes.append(
-        f"the mesh is refined towards its walls: the {len(inner.held[WALL]):,} nodes next to them move only as far as "
-        f"the areas of their cells stay within {BAND:.0%} (preserve={preserve!r})"
+        f"the mesh is refined towards its walls: the {len(near.topology.held[WALL]):,} nodes next to them move only as "
+        f"far as the areas of their cells stay within {BAND:.0%} (preserve={preserve!r})"
     )
-    return Protection(inner, notes, topology, kept)
+    return near
 
 
 def _amount(count: int) -> str:
     return f"{count:,} node is" if count == 1 else f"{count:,} nodes are"
 
 
-def method_for(method: str, preserve: str, target: Target) -> str:
+def method_for(method: str, variant: str | None, preserve: str, target: Target) -> str:
     """The method that keeps what is to be preserved.
 
     Raises InputError where the given one cannot.
@@ -76,4 +100,6 @@ def method_for(method: str, preserve: str, target: Target) -> str:
         raise InputError(f"{method} does not keep the sizes of cells: for preserve='size' use the method auto or sized")
     if target:
         raise InputError("a target and preserve='size' contradict each other: cells that miss it may need other sizes")
+    if variant is not None:
+        raise InputError(f"preserve='size' has a method of its own, which has no variants: leave out {variant!r}")
     return "sized"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ LEAST_GAIN = 1e-4
 
 @dataclass(frozen=True)
 class Sweep:
-    """What one sweep did, and the mesh after it. moved, truncated, dropped count nodes.
+    """What one sweep did, and the mesh after it (for a target: its patches). moved, truncated, dropped count nodes.
 
     index: sweeps so far; methods that need not know how the mesh is after each sweep leave some out, and the counts are
     of all since the last one told. stage: what of the method they were, "" for methods of one stage.
@@ -160,11 +161,12 @@ def precision_of(mesh: Mesh) -> Precision:
 
 
 def outcome(
-    mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, best_by: str
+    mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any]
 ) -> tuple[Floats, NDArray[np.bool_], QualityReport]:
     """Points (N, dim), which of them moved, and their measures; those of the input if the quick sums misjudged them.
 
-    best: (N, 2) in memory order. All nodes that it does not move keep their very bits.
+    best: (N, 2) in memory order. All nodes that it does not move keep their very bits. rank: of two meshes that of the
+    lesser rank is the better.
     """
     elsewhere = (best != planar_points(mesh)[topology.memory]).any(axis=1)
     moved = np.zeros(len(mesh.points), dtype=bool)
@@ -175,11 +177,12 @@ def outcome(
         points[np.ix_(ids, plane)] = np.ldexp(best[elsewhere], scale_exponent(mesh))
         moved[ids] = True
         after = measure(mesh.with_points(points), topology)
-        if (after.inverted, -_qhat(after, best_by)) <= (before.inverted, -_qhat(before, best_by)):
+        if rank(after) <= rank(before):
             return points, moved, after
         moved[:] = False
     return mesh.points, moved, before
 
 
-def _qhat(report: QualityReport, best_by: str) -> float:
-    return report.qhat_aspect if best_by == ASPECT else report.qhat
+def rank_by(best_by: str) -> Callable[[QualityReport], Any]:
+    """Fewer inverted cells first, then the larger q̂."""
+    return lambda report: (report.inverted, -(report.qhat_aspect if best_by == ASPECT else report.qhat))

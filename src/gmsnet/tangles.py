@@ -40,6 +40,14 @@ def mended(points: Floats, topology: Topology, precision: Precision) -> tuple[Fl
     )
 
 
+def beside(reasons: Reasons, topology: Topology) -> NDArray[np.bool_]:
+    """(N,) bool by id: the nodes of the cells that have a reason, and their neighbours."""
+    chosen = np.zeros(len(topology.memory), dtype=bool)
+    chosen[[node for nodes in reasons for node in nodes]] = True
+    chosen[topology.triangles[chosen[topology.triangles].any(axis=1)]] = True
+    return chosen
+
+
 def still_inverted(after: QualityReport, topology: Topology, reasons: Reasons) -> list[UnmendedCell]:
     """The cells of zero or negative area that have a reason for it."""
     rows = np.flatnonzero(after.valid <= 0) if reasons else np.empty(0, dtype=int)

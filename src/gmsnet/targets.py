@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gmsnet.measure import QualityReport
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Smoother
-from gmsnet.run import MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED, Run, Sweep, precision_of
+from gmsnet.run import INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED, Run, Sweep, precision_of
 from gmsnet.topology import Ints, Topology, places
 
 Floats = NDArray[np.float64]
@@ -43,6 +43,11 @@ class Target:
         if self.angle is not None:
             missed |= ~((min_angle >= self.angle) & (shape > 0.0))
         return missed
+
+    def rank(self, report: QualityReport) -> tuple[int, int, float]:
+        """Of two meshes that of the lesser rank is nearer: by inverted cells, cells that miss it, the worst one."""
+        missed = self.missed(report.shape, report.min_angle)
+        return report.inverted, int(missed.sum()), -float(report.shape[missed].min(initial=np.inf))
 
     @property
     def sure(self) -> float | None:
@@ -80,26 +85,29 @@ def reach_target(
         return points, TARGET_REACHED, history
     idle, precision = 0, precision_of(mesh)
     hopeless = not topology.near_free[corners].any(axis=1).all()  # cells that miss it and cannot change
-    for rings in RINGS:
-        active = around(topology, corners, rings)
-        if not active.any():
-            return points, NO_PROGRESS if history else NOTHING_TO_MOVE, history
-        patch, rows = topology.restricted(active, OUTSIDE)
-        before = look(points, topology, target, rows)
-        run = Run(mesh, patch, create(), threads, best_by, guard, points, history, precision)
-        reason = run.to_the_end(max_sweeps, target.sure if target.angle is None else None, callback)
-        after = look(run.best, topology, target, rows)
-        if after.beats(before):
-            points, corners = run.best, topology.near[after.missed]
-        if not len(after.missed):
-            return points, NO_PROGRESS if hopeless else TARGET_REACHED, history
-        if reason not in (NO_PROGRESS, TARGET_REACHED):  # stopped from outside, or at the most sweeps
-            return points, reason, history
-        if run.sweeps >= max_sweeps:
-            return points, MAX_SWEEPS, history
-        idle = idle + 1 if len(after.missed) > FEWER * len(before.missed) else 0
-        if idle == IDLE:
-            break
+    try:
+        for rings in RINGS:
+            active = around(topology, corners, rings)
+            if not active.any():
+                return points, NO_PROGRESS if history else NOTHING_TO_MOVE, history
+            patch, rows = topology.restricted(active, OUTSIDE)
+            before = look(points, topology, target, rows)
+            run = Run(mesh, patch, create(), threads, best_by, guard, points, history, precision)
+            reason = run.to_the_end(max_sweeps, target.sure if target.angle is None else None, callback)
+            after = look(run.best, topology, target, rows)
+            if after.beats(before):
+                points, corners = run.best, topology.near[after.missed]
+            if not len(after.missed):
+                return points, NO_PROGRESS if hopeless else TARGET_REACHED, history
+            if reason not in (NO_PROGRESS, TARGET_REACHED):  # stopped from outside, or at the most sweeps
+                return points, reason, history
+            if run.sweeps >= max_sweeps:
+                return points, MAX_SWEEPS, history
+            idle = idle + 1 if len(after.missed) > FEWER * len(before.missed) else 0
+            if idle == IDLE:
+                break
+    except KeyboardInterrupt:  # in a round itself the run has caught it
+        return points, INTERRUPTED, history
     return points, NO_PROGRESS, history
 
 

@@ -190,6 +190,21 @@ class Topology:
         return self.near_colours >= 0
 
     @cached_property
+    def near_ringed(self) -> Flags:
+        """(N,) by places in memory: which nodes have a ring: the free ones, and those held since (``holding``)."""
+        return np.diff(self.near_start) > 0
+
+    def with_rings_of_free_nodes(self) -> Topology:
+        """The same, in which a node has a ring only if it is free."""
+        free = self.near_free
+        if (self.near_ringed == free).all():
+            return self
+        degree = np.diff(self.near_start)
+        start = np.zeros_like(self.near_start)
+        np.cumsum(np.where(free, degree, 0), out=start[1:])
+        return replace(self, near_start=start, near_ring=self.near_ring[np.repeat(free, degree)])
+
+    @cached_property
     def changeable(self) -> tuple[Ints, NDArray[np.int8]]:
         """The rows of near and near_turn that have a free node."""
         rows = connectivity.touching(self.near, self.near_free)

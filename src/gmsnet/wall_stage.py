@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from gmsnet.mesh import Mesh
 from gmsnet.methods.sized import banded
-from gmsnet.run import Run, Sweep
+from gmsnet.run import MAX_SWEEPS, NO_PROGRESS, Run, Sweep
 from gmsnet.topology import Topology, planar_points
 
 Floats = NDArray[np.float64]
 
 SWEEPS = 20  # at most
+STAGE = "near walls, areas kept"
 ELSEWHERE = "not near a wall"
 
 
@@ -33,6 +34,9 @@ def improve_near_walls(
     """
     zone = topology.holding(~kept, ELSEWHERE)
     smoother = banded(planar_points(mesh)[topology.memory], kept[topology.memory])
+    smoother.stage = STAGE
     run = Run(mesh, zone, smoother, threads, best_by, guard, points=points, history=history)
     stop_reason = run.to_the_end(min(run.sweeps + SWEEPS, max_sweeps), None, callback)
+    if stop_reason == MAX_SWEEPS and run.sweeps < max_sweeps:
+        stop_reason = NO_PROGRESS  # of the stage's own sweeps
     return run.best, stop_reason, run.history

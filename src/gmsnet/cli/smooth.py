@@ -38,7 +38,9 @@ def smooth(
     ] = "auto",
     variant: Annotated[str | None, typer.Option(help="A variant of the method; see 'gmsnet methods'.")] = None,
     objective: Annotated[str | None, typer.Option(help="What 'optimize' minimises; see 'gmsnet methods'.")] = None,
-    max_sweeps: Annotated[int, typer.Option(min=0, help="Visit each node at most this often.")] = 100,
+    max_sweeps: Annotated[
+        int, typer.Option(min=0, help="Make at most so many sweeps (mending inverted cells comes before).")
+    ] = 100,
     target_quality: Annotated[
         float | None,
         typer.Option(

@@ -17,7 +17,10 @@ from gmsnet.cli import output, report
 from gmsnet.cli.target import shown
 from gmsnet.engine import SmoothResult, Sweep
 from gmsnet.mesh import Mesh
+from gmsnet.preserve import LAYER
 from gmsnet.targets import Target
+
+UNKNOWN = "not mended, or untangling was off"
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,11 +106,13 @@ class Outcome:
         rows = np.flatnonzero(after.valid <= 0)
         why = {cell.cell: cell.reason for cell in self.result.unmended}
         first = [
-            f"cell {cell} at {' '.join(f'{value:.6g}' for value in centre)}: {why.get(cell, 'not mended')}"
+            f"cell {cell} at {' '.join(f'{value:.6g}' for value in centre)}: {why.get(cell, UNKNOWN)}"
             for cell, centre in zip(after.cell[rows].tolist(), after.centre[rows].tolist(), strict=True)
         ][: report.NAMED]
         more = f"; and {len(rows) - len(first):,} more" if len(rows) > len(first) else ""
-        return f"{report.amount(len(rows), 'cell')} (numbers from 0): {'; '.join(first)}{more}"
+        hint = "; stretched layers are held: --preserve none lets them move" if LAYER in self.result.held else ""
+        cells = report.amount(len(rows), "cell")
+        return f"{cells} (numbers from 0): {'; '.join(first)}{more}{hint}"
 
     @cached_property
     def worst(self) -> list[dict[str, Any]]:

@@ -90,13 +90,13 @@ def derive(local, n, power, sums):
                 c, e = q * (c2 + c4 * square), c2 + e4 * square
                 u *= c
                 tx, ty = u * wx, u * wy
-                mx, my = e * gx + tx, e * gy + ty
+                ex, ey = e * (gx * gx), e * (gy * gy)
                 sums[VALUE * LANES + lane] += square * (two + four * square)
                 sums[GX * LANES + lane] += c * gx
                 sums[GY * LANES + lane] += c * gy
-                sums[XX * LANES + lane] += gx * (mx + tx)
-                sums[XY * LANES + lane] += gx * my + tx * gy
-                sums[YY * LANES + lane] += gy * (my + ty)
+                sums[XX * LANES + lane] += ex + gx * (tx + tx)
+                sums[XY * LANES + lane] += e * (gx * gy) + (gx * ty + tx * gy)
+                sums[YY * LANES + lane] += ey + gy * (ty + ty)
                 sums[ROUND * LANES + lane] += u
                 sums[LEAST * LANES + lane] = min(sums[LEAST * LANES + lane], d)
 

@@ -13,8 +13,9 @@ in float64, and as written. A move is allowed if after it each triangle of the s
 - where the level is WORST or STAR, is certified above its floor.
 
 VALID knows no floors. WORST has one for the mesh: the least of an upper bound of D/L over the triangles that have a
-free node. STAR has one for each free node, the least over its own triangles; a triangle's floor is the largest of its
-free nodes'. Floors are taken at the start of a sweep. docs/guarantees.md proves what follows.
+free node. STAR has one for each node with a ring, the least over those of its triangles that have a free node; a
+triangle's floor is the largest of its nodes'. Floors are taken at the start of a sweep. What follows is proven in
+docs/guarantees.md.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ class Guard(NamedTuple):
     """What a sweep must keep. unit, grain, single: see Precision.
 
     level: VALID, WORST or STAR. floor: of D/L for the whole mesh, −∞ unless the level is WORST. floors: (N,) for each
-    node in memory order, −∞ where it is held, at the level STAR; else empty.
+    node in memory order, −∞ where it has no ring, at the level STAR; else empty.
     """
 
     unit: float
@@ -166,10 +167,10 @@ def ratio_of(points, a, b, c, unit, grain):
 
 
 @kernel
-def star_floors(points, triangles, turn, free, unit, grain, floors):
-    """For each free node the least ``most_of`` over its triangles; −∞ for the others."""
+def star_floors(points, triangles, turn, ringed, unit, grain, floors):
+    """For each node with a ring the least ``most_of`` over its triangles; −∞ for the others."""
     for i in range(len(floors)):
-        floors[i] = np.inf if free[i] else -np.inf
+        floors[i] = np.inf if ringed[i] else -np.inf
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ratio = ratio_of(points, b, a, c, unit, grain) if turn[t] < 0 else ratio_of(points, a, b, c, unit, grain)

@@ -180,9 +180,9 @@ def clear(tx, ty, ring, n, lane, delta, floor):
 def allowed(tx, ty, x, ring, n, lane, delta, work):
     """May the free node of one lane move to (tx, ty)? The scalar form of the rule, which also knows inverted cells.
 
-    Rows of work: reads those from FLOORS on; 5 and 6 are overwritten.
+    Rows of work: reads those from FLOORS on; KEPT's are overwritten.
     """
-    was, now = work[5 * LANES : 5 * LANES + 6], work[6 * LANES : 6 * LANES + 6]
+    was, now = work[KEPT * LANES : KEPT * LANES + 6], work[(KEPT + 1) * LANES : (KEPT + 1) * LANES + 6]
     was[4], was[5], now[4], now[5] = x[lane], x[LANES + lane], tx, ty
     for j in range(n):
         a = 2 * (n - 1 if j == 0 else j - 1) * LANES + lane
@@ -259,11 +259,11 @@ def halve_abreast(x, ring, n, shift, single, work):
             size = work[SIZE * LANES + lane] * share
             work[TARGET * LANES + lane] = x[lane] + size * shift[lane]
             work[(TARGET + 1) * LANES + lane] = x[LANES + lane] + size * shift[LANES + lane]
-        if refused == 0:
-            return
         if single:
             for lane in range(TARGET * LANES, (TARGET + 2) * LANES):
                 work[lane] = np.float64(np.float32(work[lane]))
+        if refused == 0:
+            return
         margins_above(ring, n, work)
     for lane in range(LANES):
         allowed_now = work[MARGIN * LANES + lane] > 0.0

@@ -39,7 +39,7 @@ class Field:
             floors = np.empty(len(self.points))
             triangles, turn = self.topology.changeable
             unit, grain, _ = self.precision
-            star_floors(self.points, triangles, turn, self.topology.near_free, unit, grain, floors)
+            star_floors(self.points, triangles, turn, self.topology.near_ringed, unit, grain, floors)
         return Guard(*self.precision, self.level, floor, floors)
 
 

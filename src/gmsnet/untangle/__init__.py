@@ -29,6 +29,7 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     afterwards, and none that stays inverted is worse (in 1/q) than the worst was. The result follows from the arguments
     alone.
     """
+    topology = topology.with_rings_of_free_nodes()
     tangle = Tangle(points, topology, precision)
     before = int(tangle.was_bad.sum())
     if not before:

@@ -2,44 +2,66 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import scipy.spatial
 from numpy.typing import NDArray
 
 from gmsnet.measure import exact_signs
 from gmsnet.topology import Topology
-from gmsnet.untangle.patch import Flags, Floats, Ints
+from gmsnet.untangle.patch import Floats, Ints
 
-CHUNK, MANY = 1_000_000, 20  # pairs of boxes that are compared at a time; at most so many times
+FLAT = 1e-9  # of the largest box: smaller ones count as that large where boxes are sorted by size
 
 
 def near_crossings(points: Floats, edges: Ints, cells: Ints) -> Floats:
     """(k, 2) for each cell the next crossing of some edges (e, 2), at most its size off along either axis; else nan."""
     found = np.full((len(cells), 2), np.nan)
+    if not len(edges) or not len(cells):
+        return found
     low, high = points[cells].min(axis=1), points[cells].max(axis=1)
     middle, reach = (low + high) / 2, 1.5 * (high - low).max(axis=1)
     left, right = points[edges].min(axis=1), points[edges].max(axis=1)
-    near = np.flatnonzero(near_any(middle, reach, left, right))
+    near = np.unique(meeting(middle - reach[:, None], middle + reach[:, None], left, right)[:, 1])
     pairs = near[meeting(left[near], right[near], left[near], right[near])]
-    places = crossings(points, edges[pairs[pairs[:, 0] < pairs[:, 1]]])
+    both = edges[pairs[pairs[:, 0] < pairs[:, 1]]]
+    apart = ~(both[:, 0, :, None] == both[:, 1, None, :]).any(axis=(1, 2))  # edges that share a node do not cross
+    places = crossings(points, both[apart])
     if len(places):
         distance, nearest = scipy.spatial.cKDTree(places).query(middle, p=np.inf)
         found[distance <= reach] = places[nearest[distance <= reach]]
     return found
 
 
-def near_any(middle: Floats, reach: Floats, left: Floats, right: Floats) -> Flags:
-    """Which of some boxes meet any square around (k, 2) of so much (k,) on all sides; or all, for many of both."""
-    if len(left) * len(middle) > MANY * CHUNK:
-        return np.ones(len(left), dtype=bool)
-    out = np.zeros(len(left), dtype=bool)
-    step = max(1, CHUNK // max(1, len(left)))
-    for first in range(0, len(middle), step):
-        low = middle[first : first + step] - reach[first : first + step, None]
-        high = middle[first : first + step] + reach[first : first + step, None]
-        apart = np.any((low[:, None] > right) | (high[:, None] < left), axis=2)
-        out |= np.asarray(~apart).any(axis=0)
-    return out
+def meeting(low: Floats, high: Floats, left: Floats, right: Floats) -> NDArray[np.intp]:
+    """(p, 2) which of some boxes (lower and upper corners, (k, 2)) meet which of others.
+
+    By their middles, those of one size (to a factor of two) with those of one size at a time.
+    """
+    pairs: list[NDArray[np.intp]] = [np.empty((0, 2), dtype=np.intp)]
+    for one, middle, half in by_size(low, high):
+        for other, other_middle, other_half in by_size(left, right):
+            tree = scipy.spatial.cKDTree(other_middle)
+            close = tree.query_ball_point(middle, half + other_half, p=np.inf, return_sorted=True)
+            count = np.fromiter(map(len, close), dtype=np.intp, count=len(close))
+            if count.any():
+                some = np.column_stack([np.repeat(one, count), other[np.concatenate(close).astype(np.intp)]])
+                apart = (low[some[:, 0]] > right[some[:, 1]]) | (high[some[:, 0]] < left[some[:, 1]])
+                pairs.append(some[~apart.any(axis=1)])
+    return np.concatenate(pairs)
+
+
+def by_size(low: Floats, high: Floats) -> Iterator[tuple[NDArray[np.intp], Floats, float]]:
+    """Boxes of about one size: which they are, their middles, and the largest half of a side."""
+    if not len(low):
+        return
+    half = (high - low).max(axis=1) / 2
+    least = max(FLAT * float(half.max()), float(np.finfo(float).tiny))
+    size = np.floor(np.log2(np.maximum(half, least)))
+    for each in np.unique(size):
+        rows = np.flatnonzero(size == each)
+        yield rows, (low[rows] + high[rows]) / 2, float(half[rows].max())
 
 
 def held_edges(topology: Topology) -> tuple[Ints, Ints]:
@@ -49,18 +71,6 @@ def held_edges(topology: Topology) -> tuple[Ints, Ints]:
     edges = np.sort(edges[(topology.near_colours[edges] < 0).all(axis=1)], axis=1)
     every, triangles = np.unique(edges, axis=0, return_counts=True)
     return every[triangles == 1], every
-
-
-def meeting(low: Floats, high: Floats, left: Floats, right: Floats) -> NDArray[np.intp]:
-    """(p, 2) which of some boxes (lower and upper corners, (k, 2)) meet which of others."""
-    pairs: list[NDArray[np.intp]] = [np.empty((0, 2), dtype=np.intp)]
-    step = max(1, CHUNK // max(1, len(left)))
-    for first in range(0, len(low), step):
-        end = first + step
-        apart = np.any((low[first:end, None] > right) | (high[first:end, None] < left), axis=2)
-        one, other = np.nonzero(~apart)
-        pairs.append(np.column_stack([first + one, other]))
-    return np.concatenate(pairs)
 
 
 def crossings(points: Floats, pairs: Ints) -> Floats:

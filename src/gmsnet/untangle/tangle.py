@@ -14,7 +14,7 @@ from gmsnet.untangle.patch import Flags, Floats, Ints, Patch, free_nodes_of, in_
 
 
 class Precision(Protocol):
-    """How exactly coordinates are known (kernels.stars): relative and absolute error, kept as float32 or not."""
+    """How exactly coordinates are known (kernels.guard): relative and absolute error, kept as float32 or not."""
 
     @property
     def unit(self) -> float: ...  # noqa: D102

@@ -36,7 +36,9 @@ def take(tangle: Tangle) -> str:
         if not count:
             break
         first = first or count
-        put_back(tangle, free_nodes_of(topology, violated) & moved(tangle))
+        back = free_nodes_of(topology, violated) & moved(tangle)
+        assert back.any(), "cells are violated of which no node has moved"
+        put_back(tangle, back)
     tangle.look()
     keep_gains(tangle, tangle.before, tangle.was_bad)
     if not tried:
