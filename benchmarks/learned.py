@@ -111,14 +111,11 @@ class Mesh:
         run = Run(self.mesh, self.topology, create(), 1, "shape", "worst")
         chosen, seconds = run.smoother, 0.0
         states = [(0.0, run.best_standing)]
-        chosen.told(run.best_standing)
         for _ in range(sweeps):
             began = time.thread_time()
             chosen.sweep(run.field, alone, lambda: False)
             seconds += time.thread_time() - began
             standing = run._standing(alone)
-            if chosen.looks:
-                chosen.told(standing)
             states.append((seconds, standing))
             if chosen.settled:
                 break
