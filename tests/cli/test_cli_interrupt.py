@@ -26,11 +26,11 @@ def test_ctrl_c_writes_the_best_mesh_so_far(run, square, tmp_path, monkeypatch):
 
     monkeypatch.setattr(Progress, "sweep", stop)
     out = tmp_path / "out.su2"
-    done = run("smooth", square, out)
+    done = run("smooth", square, out, "--method", "gmsnet")
     assert done.code == 0
     assert "2 sweeps" in done.out
     assert engine.INTERRUPTED in done.out
-    expected = gmsnet.smooth(gmsnet.read(square), max_sweeps=2)
+    expected = gmsnet.smooth(gmsnet.read(square), "gmsnet", max_sweeps=2)
     assert gmsnet.read(out).points.tolist() == expected.points.tolist()
 
 
@@ -55,9 +55,9 @@ def test_a_signal_between_sweeps_writes_the_best_mesh_so_far(run, square, tmp_pa
 
     monkeypatch.setattr(Progress, "sweep", interrupted)
     out = tmp_path / "out.su2"
-    document = json.loads(run("smooth", square, out, "--json").out)
+    document = json.loads(run("smooth", square, out, "--method", "gmsnet", "--json").out)
     assert (document["sweeps"], document["stop_reason"]) == (2, engine.INTERRUPTED)
-    expected = gmsnet.smooth(gmsnet.read(square), max_sweeps=2)
+    expected = gmsnet.smooth(gmsnet.read(square), "gmsnet", max_sweeps=2)
     assert gmsnet.read(out).points.tolist() == expected.points.tolist()
     assert signal.getsignal(number) is handler
 

@@ -75,7 +75,8 @@ def all_methods_and_variants_are_in_table_2(quick):
     table = json.loads((quick / "reproduction.json").read_text())["table2"]
     for case, rows in table["rows"].items():
         keys = {row["method"] for row in (*rows, *table["beyond"][case])} - {None}
-        assert {key.split("-")[0] for key in keys} == set(METHODS)
+        assert all(any(key.startswith(name) for name in METHODS) for key in keys)
+        assert all(any(key.startswith(name) for key in keys) for name in METHODS)
         for method in METHODS.values():
             assert all(any(key.startswith(f"{method.name}-{variant}") for key in keys) for variant in method.variants)
         assert [row["label"] for row in rows] == [
