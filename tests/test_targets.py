@@ -105,7 +105,7 @@ def test_patches_against_a_slow_twin():
                 wanted |= {n for row in topology.near if wanted & set(row.tolist()) for n in row.tolist()}
         active = around(topology, chosen, rings)
         assert set(np.flatnonzero(active).tolist()) == {node for node in wanted if topology.near_free[node]}
-        patch, rows = topology.restricted(active, "elsewhere")
+        patch, rows = topology.restricted(active)
         assert patch.changeable[0].tolist() == topology.near[rows].tolist()
         assert set(topology.memory[np.flatnonzero(active)].tolist()) == set(patch.free.tolist())
         assert [bool(set(row.tolist()) & set(np.flatnonzero(active).tolist())) for row in topology.near] == [
@@ -135,11 +135,11 @@ def test_an_interrupt_between_patches_keeps_what_is_done(monkeypatch):
     mesh, rounds = gmsnet.random_mesh(600, seed=1), []
     restricted = Topology.restricted
 
-    def interrupt(self, active, reason):
-        rounds.append(reason)
+    def interrupt(self, active):
+        rounds.append(active)
         if len(rounds) == 2:
             raise KeyboardInterrupt
-        return restricted(self, active, reason)
+        return restricted(self, active)
 
     monkeypatch.setattr(Topology, "restricted", interrupt)
     result = gmsnet.smooth(mesh, target_quality=0.6)

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels import ranking
+from gmsnet.kernels.quality import per_cell
 from gmsnet.measure import QualityReport
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Smoother
@@ -22,7 +24,6 @@ Flags = NDArray[np.bool_]
 RINGS = (1, 2, 4, 8)  # of free nodes that move with the corners of a cell that misses the target
 FEWER, IDLE = 0.9, 2  # a round that leaves more of the cells below the target is idle; so many in a row are the last
 SURE = 1.0 + 1e-12  # times the target: what is above it is so however it is measured
-OUTSIDE = "outside of the patches around cells below the target"
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def reach_target(
     """
     history: list[Sweep] = []
     if report is None:
-        corners = topology.near[look(points, topology, target, np.arange(len(topology.near))).missed]
+        corners = topology.near[look(points, topology, target, np.arange(len(topology.near), dtype=np.int32)).missed]
     else:
         corners = places(topology)[topology.triangles[target.missed(report.shape, report.min_angle)]]
     if not len(corners):
@@ -90,7 +91,7 @@ def reach_target(
             active = around(topology, corners, rings)
             if not active.any():
                 return points, NO_PROGRESS if history else NOTHING_TO_MOVE, history
-            patch, rows = topology.restricted(active, OUTSIDE)
+            patch, rows = topology.restricted(active)
             before = look(points, topology, target, rows)
             run = Run(mesh, patch, create(), threads, best_by, guard, points, history, precision)
             reason = run.to_the_end(max_sweeps, target.sure if target.angle is None else None, callback)
@@ -123,17 +124,15 @@ class Missed:
         return (len(self.missed), -self.least) < (len(other.missed), -other.least)
 
 
-def look(points: Floats, topology: Topology, target: Target, rows: NDArray[Any]) -> Missed:
+def look(points: Floats, topology: Topology, target: Target, rows: Ints) -> Missed:
     """Which of these rows of ``near`` miss the target."""
-    a, b, c = (points[topology.near[rows, k]] for k in range(3))
-    p, q, r = b - a, c - a, c - b
-    area = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
-    lengths = np.maximum((p * p).sum(axis=1) + (q * q).sum(axis=1) + (r * r).sum(axis=1), np.finfo(float).tiny)
-    shape = 2.0 * math.sqrt(3.0) * topology.near_turn[rows] * area / lengths
-    low = np.zeros(len(rows))
+    triangles, turn = topology.near, topology.near_turn
+    shape, low = np.empty(len(rows)), np.zeros(len(rows))
+    ranking.shapes_of(points, triangles, turn, rows, shape)
     if target.angle is not None:
-        largest = np.maximum.reduce([(p * q).sum(axis=1), -(p * r).sum(axis=1), (q * r).sum(axis=1)])
-        low = np.degrees(np.arctan2(np.abs(area), largest))
+        others = np.empty((3, len(rows)))
+        per_cell(points, triangles[rows], turn[rows], low, *others)
+        low = np.degrees(low)
     missed = target.missed(shape / SURE, low / SURE)
     return Missed(rows[missed], float(shape[missed].min(initial=np.inf)))
 

@@ -147,16 +147,16 @@ class Topology:
         held = {**self.held, reason: newly.astype(np.int64)}
         return replace(self, held=held, free=self.free[~chosen[self.free]], near_colours=colours)
 
-    def restricted(self, active: Flags, reason: str) -> tuple[Topology, Ints]:
+    def restricted(self, active: Flags) -> tuple[Topology, Ints]:
         """The same with the active nodes (N,) by places in memory alone free, and only the triangles around them.
 
-        The others are held for this reason. Returns also the rows of those triangles in ``near``.
+        For a while: ``held`` does not tell of the others. Returns also the rows of those triangles in ``near``.
         """
-        held = np.zeros(len(active), dtype=bool)
-        held[self.memory] = ~active
         rows: Ints = connectivity.touching(self.near, active)
         near, turn = self.near[rows], self.near_turn[rows]
-        inner = replace(self.holding(held, reason), near=near, near_turn=turn)
+        free = np.sort(self.memory[np.flatnonzero(active)])
+        colours = np.where(active, self.near_colours, np.int32(-1))
+        inner = replace(self, near=near, near_turn=turn, free=free, near_colours=colours)
         inner.__dict__["changeable"] = near, turn  # all of them
         return inner, rows
 

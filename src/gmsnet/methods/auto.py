@@ -33,7 +33,6 @@ from gmsnet.workers import Share
 
 SMALL = 5000  # free nodes
 SAMPLE = 256  # blocks of cells
-OFTEN = 4  # rounds after which the mesh is measured within a stage
 ALWAYS = 10**9  # sweeps
 RELAXATION = 1.6  # of the Newton steps
 
@@ -42,7 +41,8 @@ class Stage(NamedTuple):
     """name: for the record. create: its smoother. sweeps: how many, unless it has settled before.
 
     first: how many for the first time, if others. rounds: how often it is made at most. gain: what must be to come, in
-    the mean of 1/q, for it to be made once more. looks: whether the mesh is measured after it.
+    the mean of 1/q, for it to be made once more. looks: whether the mesh is measured after it. often:
+    after so many rounds of it, too.
     """
 
     name: str
@@ -52,6 +52,7 @@ class Stage(NamedTuple):
     rounds: int = 1
     gain: float = math.inf
     looks: bool = True
+    often: int = 4
 
 
 def newton(relaxation: float = RELAXATION, *, means: int = 0) -> Barrier:
@@ -75,7 +76,7 @@ POLISH = Stage("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1,
 
 LARGE_PLAN = (NEWTON._replace(looks=False), WORST, MEAN)
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
-PATCH_PLAN = (NEWTON, WORST._replace(sweeps=6))
+PATCH_PLAN = (NEWTON._replace(often=1), WORST._replace(sweeps=6))
 VARIANTS = ("full", "patch")
 
 
@@ -125,7 +126,7 @@ class Auto(Smoother):
             is_first = bool(stage.first and self.rounds == 1)
             self.mean, self.gained = mean, math.inf if is_first else gained
             goes_on = is_first or to_come(before, gained) > stage.gain
-        self.looks = self.rounds % OFTEN == 0 if goes_on else stage.looks
+        self.looks = self.rounds % stage.often == 0 if goes_on else stage.looks
         if not goes_on:
             self._enter(self.at + 1, field)
 
