@@ -16,7 +16,7 @@ from gmsnet.measure import QualityReport
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.run import INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED, Run, Sweep, precision_of
-from gmsnet.topology import Ints, Topology, places
+from gmsnet.topology import Ints, Topology
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -81,7 +81,7 @@ def reach_target(
     if report is None:
         corners = topology.near[look(points, topology, target, np.arange(len(topology.near), dtype=np.int32)).missed]
     else:
-        corners = places(topology)[topology.triangles[target.missed(report.shape, report.min_angle)]]
+        corners = topology.places[topology.triangles[target.missed(report.shape, report.min_angle)]]
     if not len(corners):
         return points, TARGET_REACHED, history
     idle, precision = 0, precision_of(mesh)

@@ -177,12 +177,17 @@ class Topology:
 
         Counter-clockwise, each from its smallest id on.
         """
-        place = _inverse(self.memory)[self.free]
+        place = self.places[self.free]
         degree = np.diff(self.near_start)[place]
         start = np.zeros(len(place) + 1, dtype=np.int32)
         np.cumsum(degree, out=start[1:])
         within = np.arange(start[-1]) - np.repeat(start[:-1], degree)
         return start, self.memory[self.near_ring[np.repeat(self.near_start[place], degree) + within]]
+
+    @cached_property
+    def places(self) -> Ints:
+        """(N,) the place in memory of each node by id."""
+        return _inverse(self.memory)
 
     @cached_property
     def near_free(self) -> Flags:
@@ -214,12 +219,7 @@ class Topology:
     @cached_property
     def colours(self) -> Ints:
         """(N,) colour of each node by id, −1 where held."""
-        return self.near_colours[_inverse(self.memory)]
-
-
-def places(topology: Topology) -> Ints:
-    """(N,) the place in memory of each node by id."""
-    return _inverse(topology.memory)
+        return self.near_colours[self.places]
 
 
 def _inverse(order: Ints) -> Ints:

@@ -95,7 +95,7 @@ class Auto(Smoother):
             self.settled = True
             return
         self.smoother = self.stages[stage].create()
-        if self.stages[stage].rounds > 1:
+        if self.stages[stage].rounds > 1 and not self.stages[stage].first:  # what those gain at first does not count
             self.mean = mean_shape(field)
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
@@ -121,11 +121,12 @@ class Auto(Smoother):
         goes_on = False
         if self.rounds < stage.rounds:
             mean = mean_shape(field)
-            gained, before = mean - self.mean, self.gained
-            # What a stage gains at first is no measure of what it will.
-            is_first = bool(stage.first and self.rounds == 1)
-            self.mean, self.gained = mean, math.inf if is_first else gained
-            goes_on = is_first or to_come(before, gained) > stage.gain
+            if stage.first and self.rounds == 1:
+                goes_on = True
+            else:
+                before, self.gained = self.gained, mean - self.mean
+                goes_on = to_come(before, self.gained) > stage.gain
+            self.mean = mean
         self.looks = self.rounds % stage.often == 0 if goes_on else stage.looks
         if not goes_on:
             self._enter(self.at + 1, field)

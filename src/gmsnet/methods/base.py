@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, Precision, most_ratios, star_floors
+from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, Precision, most_ratios, plain_guard, star_floors
 from gmsnet.kernels.stars import Blocks
 from gmsnet.topology import Topology
 from gmsnet.workers import Share, serial
@@ -32,15 +32,16 @@ class Field:
 
     def guard(self, share: Share) -> Guard:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
-        floor, floors = -math.inf, np.empty(0)
+        guard = plain_guard(self.precision)
         if self.level == WORST:
             floor = self.floor.of(self.points, self.topology, self.precision, share)
-        elif self.level == STAR:
+            return guard._replace(level=WORST, floor=floor)
+        if self.level == STAR:
             floors = np.empty(len(self.points))
             triangles, turn = self.topology.changeable
-            unit, grain, _ = self.precision
-            star_floors(self.points, triangles, turn, self.topology.near_ringed, unit, grain, floors)
-        return Guard(*self.precision, self.level, floor, floors)
+            star_floors(self.points, triangles, turn, self.topology.near_ringed, guard.unit, guard.grain, floors)
+            return guard._replace(level=STAR, floors=floors)
+        return guard
 
 
 class Floor:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gmsnet.kernels.guard import Precision
 from gmsnet.measure import exact_signs
 from gmsnet.topology import Topology
 from gmsnet.untangle.guarded import what_is_left
@@ -10,7 +11,7 @@ from gmsnet.untangle.patch import Floats
 from gmsnet.untangle.reasons import freeze, reasons
 from gmsnet.untangle.result import ALL, NOTHING, PART, Stage, Unmended, Untangled
 from gmsnet.untangle.road import follow
-from gmsnet.untangle.tangle import Precision, Tangle
+from gmsnet.untangle.tangle import Tangle
 from gmsnet.untangle.transaction import give_back, moved, take
 
 __all__ = ["ALL", "NOTHING", "PART", "Stage", "Unmended", "Untangled", "untangle"]
@@ -23,7 +24,7 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     """Moves free nodes until no cell is inverted, or as few as can be; held nodes and what is far off keep their bits.
 
     points: (N, 2) float64 by places in memory (``planar_points(mesh)[topology.memory]``); not changed. topology: of the
-    mesh. precision: how exactly coordinates are known once they are written (kernels.guard.Precision, or a Guard).
+    mesh. precision: how exactly coordinates are known once they are written (kernels.guard).
 
     A cell counts as mended once it is certified: positive as it will be written. No cell that was positive is not so
     afterwards, and none that stays inverted is worse (in 1/q) than the worst was. The result follows from the arguments

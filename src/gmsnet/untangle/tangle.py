@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from gmsnet.kernels import untangle as kernels
+from gmsnet.kernels.guard import Precision
 from gmsnet.measure import exact_signs
 from gmsnet.topology import Topology
 from gmsnet.untangle.patch import Flags, Floats, Ints, Patch, free_nodes_of, in_order
-
-
-class Precision(Protocol):
-    """How exactly coordinates are known (kernels.guard): relative and absolute error, kept as float32 or not."""
-
-    @property
-    def unit(self) -> float: ...  # noqa: D102
-    @property
-    def grain(self) -> float: ...  # noqa: D102
-    @property
-    def single(self) -> bool: ...  # noqa: D102
 
 
 class Tangle:
