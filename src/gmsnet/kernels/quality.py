@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, inlined, kernel
 
 TWO_SQRT3 = 2.0 * math.sqrt(3.0)
 TAN_PI_8 = math.tan(math.pi / 8.0)
@@ -112,6 +112,14 @@ def summarise(points, triangles, turn, first, last, with_aspect, sums):
         total(low, high, shape, aspect, stop - start, sums[number])
 
 
+@inlined
+def shape_of(px, py, qx, qy):
+    """1/q of the triangle (0, p, q)."""
+    rx, ry = qx - px, qy - py
+    lengths = (px * px + py * py) + (qx * qx + qy * qy) + (rx * rx + ry * ry)
+    return TWO_SQRT3 * (px * qy - py * qx) / max(lengths, TINY)
+
+
 @kernel
 def glance(points, triangles, turn, stride):
     """The mean shape over every stride-th block of LANES triangles."""
@@ -123,9 +131,7 @@ def glance(points, triangles, turn, stride):
         for lane in range(LANES):
             px, py = block[lane], block[LANES + lane]
             qx, qy = block[2 * LANES + lane], block[3 * LANES + lane]
-            rx, ry = qx - px, qy - py
-            lengths = px * px + py * py + qx * qx + qy * qy + rx * rx + ry * ry
-            shape[lane] = TWO_SQRT3 * sign[lane] * (px * qy - py * qx) / max(lengths, TINY)
+            shape[lane] = sign[lane] * shape_of(px, py, qx, qy)
         for lane in range(stop - start):
             total_shape += shape[lane]
         count += stop - start

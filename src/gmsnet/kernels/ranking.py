@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, inlined, kernel
-from gmsnet.kernels.quality import TINY, TWO_SQRT3
+from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.quality import shape_of
 
 HALVINGS = 24  # of the interval in which a limit is looked for: single precision has no more
 
@@ -36,14 +36,6 @@ def shapes(points, triangles, turn, first, last, shape):
             row[lane] = shape_of(px, py, qx, qy)
         for lane in range(count):
             shape[start + lane] = turn[start + lane] * row[lane]
-
-
-@inlined
-def shape_of(px, py, qx, qy):
-    """1/q of the triangle (0, p, q)."""
-    rx, ry = qx - px, qy - py
-    lengths = (px * px + py * py) + (qx * qx + qy * qy) + (rx * rx + ry * ry)
-    return TWO_SQRT3 * (px * qy - py * qx) / max(lengths, TINY)
 
 
 @kernel
