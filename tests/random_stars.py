@@ -57,7 +57,8 @@ def proposed(stars, propose, dtype=np.float64):
     propose(local, n, shift) writes the shifts of a block, both arrays of the dtype that the kernel computes in.
     """
     out = np.empty((len(stars), 2))
-    x, work, shift = np.empty(2 * LANES), np.empty(8 * LANES), np.empty(2 * LANES, dtype=dtype)
+    x, work = np.empty(2 * LANES), np.empty(kernels_stars.FLOORS * LANES)
+    shift = np.empty(2 * LANES, dtype=dtype)
     for k, (centre, ring) in enumerate(stars):
         n, lane = len(ring), k % LANES  # every lane takes its turn; all hold the same star
         flat = np.repeat(np.asarray(ring, dtype=float).ravel(), LANES)

@@ -36,6 +36,13 @@ def value(p, ring, place):
     return (((a * a + b * b - a * b).sum(axis=1) / d) ** p).sum() if (d > 0).all() else math.inf
 
 
+def least_surplus(ring, place, floor):
+    """The least D − floor·L of the star's triangles."""
+    a, b = np.roll(ring, 1, axis=0) - place, ring - place
+    d, sides = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * a + b * b + (a - b) ** 2).sum(axis=1)
+    return (d - floor * sides).min()
+
+
 def step(p, ring, place):
     """The step, before over-relaxation and safeguards, and its factor on Newton's."""
     f, g, h = at(p, ring, place)
@@ -111,12 +118,12 @@ def test_derivatives_and_step(p, degree):
         local = local_of(ring, place, float)
         kernels.derive(local, degree, power, sums)
         kernels.propose(sums, 1.0, power.ratio, shift)
-        kernels.judge(local, degree, power, shift, sums)
+        kernels.judge(local, degree, power, shift, 0.1, sums)
         rows = sums.reshape(kernels.SUMS, LANES)
         assert (rows == rows[:, :1]).all()  # all lanes hold the same star
         f, g, h = at(p, ring, place)
         even = 2 * rows[kernels.ROUND, 0]
-        xx, xy, yy = rows[[kernels.XX, kernels.XY, kernels.YY], 0]
+        xx, xy, yy = rows[[kernels.XX, kernels.XY, kernels.YY], 0] * (2, 1, 2)
         assert rows[kernels.VALUE, 0] == pytest.approx(f, rel=1e-12)
         np.testing.assert_allclose(-rows[[kernels.GX, kernels.GY], 0], g, rtol=1e-10, atol=1e-10 * np.abs(h).max())
         np.testing.assert_allclose([[xx + even, xy], [xy, yy + even]], h, rtol=1e-10, atol=1e-11 * np.abs(h).max())
@@ -126,6 +133,7 @@ def test_derivatives_and_step(p, degree):
         there = place + shift[[0, LANES]]
         least = naive_objectives.least_area(ring, there)
         assert rows[kernels.LEAST_AFTER, 0] == pytest.approx(least, rel=1e-9, abs=1e-12)
+        assert rows[kernels.SURPLUS, 0] == pytest.approx(least_surplus(ring, there, 0.1), rel=1e-5, abs=1e-5)
         if least > 0:
             assert rows[kernels.AFTER, 0] == pytest.approx(value(p, ring, there), rel=1e-10)
         found = barrier_star.derivatives(*place, np.repeat(ring.ravel(), LANES), degree, 3, power)

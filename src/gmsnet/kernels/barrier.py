@@ -25,38 +25,83 @@ import numpy as np
 from gmsnet.kernels import stars
 from gmsnet.kernels.barrier_star import FAR, MOST, descend
 from gmsnet.kernels.compile import LANES, inlined, kernel
-from gmsnet.kernels.stars import REACH, SIZE
+from gmsnet.kernels.guard import STAR
+from gmsnet.kernels.stars import EXTENT, MARGIN, REACH, SIZE
 
 SMALL = 1e-5  # of F: a fall that float32 may not see; the step is then so short that it is Newton's to rounding
 
 FLAT = 300.0  # mean Q of a star: D of a triangle is off by a few times 2⁻²⁴·Q in float32
 
-# Rows of a block's sums: F, −∇F, the Hessian without its isotropic part, Σ c/D, the least D; after the step F, the
-# least D, gᵀH⁻¹g, and whether to do it over.
-VALUE, GX, GY, XX, XY, YY, ROUND, LEAST, AFTER, LEAST_AFTER, FALL, REDO = range(12)
-SUMS = 12
+WIDER = 1.0 + 2.0**-20  # so that what float32 has rounded is an upper bound
+NARROWEST = 0.25  # row WIDTH is at least this, so that what underflows does not matter; the first spoke has 0.5 or more
+ROUNDING = 2.0**-24  # of float32
+
+# Rows of a block's sums: F, −∇F, the Hessian without its isotropic part (of xx and yy the half), Σ c/D, the least D;
+# after the step F, the least D, the least surplus above the guard's floor; gᵀH⁻¹g, whether to do the star over; the
+# ring's largest component, and δ.
+VALUE, GX, GY, XX, XY, YY, ROUND, LEAST, AFTER, LEAST_AFTER, SURPLUS, FALL, REDO, WIDTH, DOUBT = range(15)
+SUMS = 15
 
 
 @kernel
-def relate(x, ring, n, work, local):
+def gather(points, blocks, block, n, pairs):
+    """Coordinates of the stars of a block in pairs, the centres and then the ring, in rows of 2·LANES.
+
+    A pair is loaded and stored at once; stars.gather, which takes them apart, needs twice the time. So that is called
+    for the few blocks that have to be looked at in float64.
+    """
+    gather_row(points, blocks.centre[block * LANES : (block + 1) * LANES], pairs)
+    offset = blocks.offset[block]
+    for j in range(n):
+        nodes = blocks.rings[offset + j * LANES : offset + (j + 1) * LANES]
+        gather_row(points, nodes, pairs[2 * (j + 1) * LANES : 2 * (j + 2) * LANES])
+
+
+@inlined
+def gather_row(points, nodes, row):
+    """x and y of a node, and so on."""
+    for lane in range(LANES):
+        i = np.uint32(nodes[lane])
+        x, y = points[i, 0], points[i, 1]
+        row[2 * lane] = x
+        row[2 * lane + 1] = y
+
+
+@kernel
+def relate(pairs, n, guard, x, work, flat, local, sums):
     """Ring minus centre over a length of the star, in the type of ``local``; see stars.localise.
 
     As there, but for the length, which is that of the first spoke (the sum of its components' sizes), so that it takes
-    one pass: to row SIZE of work; the largest absolute coordinate to row REACH.
+    one pass: to row SIZE of work. To rows EXTENT and REACH go upper bounds of the ring's largest component, from the
+    centre and as such; to row WIDTH of sums the former, to row DOUBT δ without the target's part, both over SIZE.
+    The centres go to x, as in stars.gather. flat: (2·LANES,) to work in.
     """
+    real = sums.dtype.type
+    centre, inverse, spoke = pairs[: 2 * LANES], work[EXTENT * LANES : (EXTENT + 2) * LANES], pairs[2 * LANES :]
     for lane in range(LANES):
-        size = abs(ring[lane] - x[lane]) + abs(ring[LANES + lane] - x[LANES + lane])
-        work[SIZE * LANES + lane] = size if size > 0.0 else 1.0
-        work[REACH * LANES + lane] = max(abs(x[lane]), abs(x[LANES + lane]))
-        work[4 * LANES + lane] = 1.0 / work[SIZE * LANES + lane]
+        x[lane], x[LANES + lane] = centre[2 * lane], centre[2 * lane + 1]
+        size = abs(spoke[2 * lane] - x[lane]) + abs(spoke[2 * lane + 1] - x[LANES + lane])
+        size = size if size > 0.0 else 1.0
+        work[SIZE * LANES + lane] = size
+        inverse[2 * lane] = 1.0 / size
+        inverse[2 * lane + 1] = inverse[2 * lane]
+        sums[WIDTH * LANES + lane] = real(NARROWEST)
     for j in range(n):
-        p = ring[2 * j * LANES : 2 * (j + 1) * LANES]
+        p = pairs[2 * (j + 1) * LANES : 2 * (j + 2) * LANES]
         q = local[2 * j * LANES : 2 * (j + 1) * LANES]
+        for k in range(2 * LANES):
+            flat[k] = real((p[k] - centre[k]) * inverse[k])
         for lane in range(LANES):
-            px, py = p[lane], p[LANES + lane]
-            q[lane] = (px - x[lane]) * work[4 * LANES + lane]
-            q[LANES + lane] = (py - x[LANES + lane]) * work[4 * LANES + lane]
-            work[REACH * LANES + lane] = max(work[REACH * LANES + lane], max(abs(px), abs(py)))
+            qx, qy = flat[2 * lane], flat[2 * lane + 1]
+            q[lane], q[LANES + lane] = qx, qy
+            sums[WIDTH * LANES + lane] = max(sums[WIDTH * LANES + lane], max(abs(qx), abs(qy)))
+    unit, grain = guard.unit, guard.grain
+    for lane in range(LANES):
+        reach, size = max(abs(x[lane]), abs(x[LANES + lane])), work[SIZE * LANES + lane]
+        sums[DOUBT * LANES + lane] = WIDER * (unit * reach + grain) / size
+        extent = WIDER * size * sums[WIDTH * LANES + lane]
+        work[EXTENT * LANES + lane] = extent
+        work[REACH * LANES + lane] = reach + extent
 
 
 @kernel
@@ -77,26 +122,25 @@ def derive(local, n, power, sums):
                 sums[VALUE * LANES + lane] += q
                 sums[GX * LANES + lane] += gx
                 sums[GY * LANES + lane] += gy
-                sums[XX * LANES + lane] += gx * (tx + tx)
+                sums[XX * LANES + lane] += gx * tx
                 sums[XY * LANES + lane] += gx * ty + tx * gy
-                sums[YY * LANES + lane] += gy * (ty + ty)
+                sums[YY * LANES + lane] += gy * ty
                 sums[ROUND * LANES + lane] += u
                 sums[LEAST * LANES + lane] = min(sums[LEAST * LANES + lane], d)
         else:
-            c2, c4, e4 = real(2.0) * two, real(4.0) * four, real(12.0) * four
+            c2, c4, e2, e4 = real(2.0) * two, real(4.0) * four, two, real(6.0) * four
             for lane in range(LANES):
                 q, d, u, wx, wy, gx, gy = triangle(lane, r, s)
                 square = q * q
-                c, e = q * (c2 + c4 * square), c2 + e4 * square
+                c, e = q * (c2 + c4 * square), e2 + e4 * square
                 u *= c
                 tx, ty = u * wx, u * wy
-                ex, ey = e * (gx * gx), e * (gy * gy)
                 sums[VALUE * LANES + lane] += square * (two + four * square)
                 sums[GX * LANES + lane] += c * gx
                 sums[GY * LANES + lane] += c * gy
-                sums[XX * LANES + lane] += ex + gx * (tx + tx)
-                sums[XY * LANES + lane] += e * (gx * gy) + (gx * ty + tx * gy)
-                sums[YY * LANES + lane] += ey + gy * (ty + ty)
+                sums[XX * LANES + lane] += e * (gx * gx) + gx * tx
+                sums[XY * LANES + lane] += (e + e) * (gx * gy) + (gx * ty + tx * gy)
+                sums[YY * LANES + lane] += e * (gy * gy) + gy * ty
                 sums[ROUND * LANES + lane] += u
                 sums[LEAST * LANES + lane] = min(sums[LEAST * LANES + lane], d)
 
@@ -120,7 +164,8 @@ def propose(sums, relaxation, ratio, step):
     for lane in range(LANES):
         gx, gy = sums[GX * LANES + lane], sums[GY * LANES + lane]
         even = twice * sums[ROUND * LANES + lane]
-        xx, xy, yy = sums[XX * LANES + lane] + even, sums[XY * LANES + lane], sums[YY * LANES + lane] + even
+        xx, yy = twice * sums[XX * LANES + lane] + even, twice * sums[YY * LANES + lane] + even
+        xy = sums[XY * LANES + lane]
         inverse = unity / (xx * yy - xy * xy)
         dx = (yy * gx - xy * gy) * inverse
         dy = (xx * gy - xy * gx) * inverse
@@ -133,12 +178,13 @@ def propose(sums, relaxation, ratio, step):
 
 
 @kernel
-def judge(local, n, power, step, sums):
-    """F and the least D after the step: rows AFTER and LEAST_AFTER."""
+def judge(local, n, power, step, floor, sums):
+    """F, the least D and the least surplus D − floor·L after the step: rows AFTER, LEAST_AFTER and SURPLUS."""
     real = sums.dtype.type
-    one, two, four, unity = real(power.one), real(power.two), real(power.four), real(1.0)
+    two, four, unity, simple = real(power.two), real(power.four), real(1.0), power.one > 0.0
+    twice = real(2.0 * WIDER * floor)
     sums[AFTER * LANES : LEAST_AFTER * LANES] = 0.0
-    sums[LEAST_AFTER * LANES : (LEAST_AFTER + 1) * LANES] = np.inf
+    sums[LEAST_AFTER * LANES : FALL * LANES] = np.inf
     for j in range(n):
         i = n - 1 if j == 0 else j - 1
         r = local[2 * i * LANES : 2 * (i + 1) * LANES]
@@ -147,9 +193,14 @@ def judge(local, n, power, step, sums):
             ax, ay = r[lane] - step[lane], r[LANES + lane] - step[LANES + lane]
             bx, by = s[lane] - step[lane], s[LANES + lane] - step[LANES + lane]
             d = ax * by - ay * bx
-            q = ((bx * bx + by * by) + (ay * (ay - by) - ax * (bx - ax))) * (unity / d)
-            sums[AFTER * LANES + lane] += q * (one + q * (two + four * (q * q)))
+            half = (bx * bx + by * by) + (ay * (ay - by) - ax * (bx - ax))
+            surplus = d - twice * half
+            q = half * (unity / d)
+            value = q if simple else q * q * (two + four * (q * q))
+            sums[AFTER * LANES + lane] += value
             sums[LEAST_AFTER * LANES + lane] = min(sums[LEAST_AFTER * LANES + lane], d)
+            least = sums[SURPLUS * LANES + lane]
+            sums[SURPLUS * LANES + lane] = surplus if not surplus >= least else least
 
 
 @kernel
@@ -176,19 +227,42 @@ def settle(sums, most, step, mean, mean_sums, with_mean):
             step[lane] = mean[lane] if taken else step[lane]
             step[LANES + lane] = mean[LANES + lane] if taken else step[LANES + lane]
             sums[REDO * LANES + lane] = no if taken else sums[REDO * LANES + lane]
+            surplus, of_mean = sums[SURPLUS * LANES + lane], mean_sums[SURPLUS * LANES + lane]
+            sums[SURPLUS * LANES + lane] = of_mean if taken else surplus
 
 
 @kernel
 def refine(x, ring, n, count, work, power, sums, step, shift):
-    """The shifts to be committed, in float64 over row SIZE of work: the lanes' steps, or what ``descend`` finds."""
-    for k in range(2 * LANES):
-        shift[k] = step[k]
-    if sums[REDO * LANES : (REDO + 1) * LANES].max() > 0.0:
-        for lane in range(count):
-            if sums[REDO * LANES + lane] > 0.0:
-                dx, dy = descend(x[lane], x[LANES + lane], ring, n, lane, power)
-                shift[lane] = dx / work[SIZE * LANES + lane]
-                shift[LANES + lane] = dy / work[SIZE * LANES + lane]
+    """The shifts of the lanes that are to be done over, as ``descend`` finds them."""
+    for lane in range(count):
+        if sums[REDO * LANES + lane] > 0.0:
+            dx, dy = descend(x[lane], x[LANES + lane], ring, n, lane, power)
+            shift[lane] = dx / work[SIZE * LANES + lane]
+            shift[LANES + lane] = dy / work[SIZE * LANES + lane]
+
+
+@kernel
+def certify(sums, step, unit, work):
+    """Row MARGIN of work: positive where all triangles are certified above the guard's floor after the step.
+
+    In units of SIZE let m be the largest component of ring and step, and δ the uncertainty of a coordinate. After the
+    step a component is off by at most e = 4(2⁻²⁴·m + δ): by two roundings to float32, of m and of 2m, and by that of
+    the target and of the written coordinates. As in guard.surplus_bound, with components of at most 2m, that makes
+    22·m·e + 6e² + 104·2⁻²⁴·m² of a surplus at most, which is less than 256·m·(2⁻²⁴·m + δ), or more than any surplus.
+
+    Returns how many are not.
+    """
+    real = sums.dtype.type
+    rounding, unit, scale, zero = real(ROUNDING), real(unit), real(256.0), real(0.0)
+    doubtful = 0
+    for lane in range(LANES):
+        m = max(sums[WIDTH * LANES + lane], max(abs(step[lane]), abs(step[LANES + lane])))
+        doubt = scale * m * ((rounding + unit) * m + sums[DOUBT * LANES + lane])
+        certain = sums[SURPLUS * LANES + lane] - doubt
+        certain = certain if sums[REDO * LANES + lane] == zero else zero
+        work[MARGIN * LANES + lane] = certain
+        doubtful += not certain > zero
+    return doubtful
 
 
 @kernel
@@ -212,23 +286,33 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
     only.
     """
     x, ring, work, counts = stars.room(blocks.most)
+    pairs, flat = np.empty(2 * (blocks.most + 1) * LANES), np.empty(2 * LANES, dtype=np.float32)
     local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
     sums, mean_sums = np.empty(SUMS * LANES, dtype=np.float32), np.empty(SUMS * LANES, dtype=np.float32)
     step, mean = np.empty(2 * LANES, dtype=np.float32), np.empty(2 * LANES, dtype=np.float32)
     shift = np.empty(2 * LANES)
+    floor, star = max(guard.floor, 0.0), guard.level == STAR
     most = FLAT * (power.one + FLAT * (power.two + power.four * (FLAT * FLAT)))
     for block in range(first, last):
-        n = blocks.degree[block]
-        stars.gather(points, blocks, block, n, x, ring)
-        relate(x, ring, n, work, local)
+        n, count = blocks.degree[block], blocks.filled[block]
+        gather(points, blocks, block, n, pairs)
+        relate(pairs, n, guard, x, work, flat, local, sums)
         derive(local, n, power, sums)
         propose(sums, relaxation, power.ratio, step)
-        judge(local, n, power, step, sums)
+        judge(local, n, power, step, floor, sums)
         if stretch > 0.0:
             average(local, n, stretch, mean)
-            judge(local, n, power, mean, mean_sums)
+            judge(local, n, power, mean, floor, mean_sums)
         settle(sums, most * n, step, mean, mean_sums, stretch > 0.0)
-        refine(x, ring, n, blocks.filled[block], work, power, sums, step, shift)
-        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
+        for k in range(2 * LANES):
+            shift[k] = step[k]
+        if certify(sums, step, guard.unit, work) or star:
+            stars.gather(points, blocks, block, n, x, ring)
+            refine(x, ring, n, count, work, power, sums, step, shift)
+        if star:
+            stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
+        else:
+            stars.aim(x, work, shift, guard.single)
+            stars.store(points, blocks, block, x, ring, work, shift, guard, counts)
     for k in range(len(tally)):
         tally[k] += counts[k]

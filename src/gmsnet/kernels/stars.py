@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.compile import LANES, kernel
-from gmsnet.kernels.guard import STAR, permitted, surplus_above, surplus_above_zero
+from gmsnet.kernels.guard import STAR, permitted, plain_surplus, surplus_above, surplus_bound
 
 HALVINGS, FEW_HALVINGS = 20, 6
 MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
 COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
 # Rows of a block's work array; TARGET and KEPT have two, FLOORS n.
-SIZE, REACH, TARGET, MARGIN, SHARE, KEPT, FLOORS = 0, 1, 2, 4, 5, 6, 8
+SIZE, REACH, TARGET, MARGIN, SHARE, KEPT, EXTENT, BOUND, FLOORS = 0, 1, 2, 4, 5, 6, 8, 9, 10
 
 
 class Blocks(NamedTuple):
@@ -40,7 +40,7 @@ class Blocks(NamedTuple):
 
 @kernel
 def room(most):
-    """The arrays that a sweep works in: x, ring, work (8 + most rows) and counts, for stars of up to so many nodes."""
+    """The arrays that a sweep works in: x, ring, work (10 + most rows) and counts, for stars of up to so many nodes."""
     return (
         np.empty(2 * LANES),
         np.empty(2 * most * LANES),
@@ -81,8 +81,8 @@ def localise(x, ring, n, work, local):
     """Ring minus centre over the size of the star, in the type of ``local``.
 
     This is the paper's normalisation: one factor d = max(Δx, Δy), the larger side of the bounding box of the n + 1
-    nodes, the free node at the origin. d goes to row SIZE of ``work`` (rows of LANES), the largest absolute coordinate
-    of the star to row REACH.
+    nodes, the free node at the origin. d goes to the rows SIZE and EXTENT of ``work`` (rows of LANES), the largest
+    absolute coordinate of the star to row REACH. (EXTENT: no component of the ring minus the centre is larger.)
     """
     for lane in range(LANES):  # rows 4 to 7: left, right, bottom, top
         work[4 * LANES + lane] = work[5 * LANES + lane] = x[lane]
@@ -98,7 +98,7 @@ def localise(x, ring, n, work, local):
         left, right = work[4 * LANES + lane], work[5 * LANES + lane]
         bottom, top = work[6 * LANES + lane], work[7 * LANES + lane]
         size = max(right - left, top - bottom)
-        work[SIZE * LANES + lane] = size
+        work[SIZE * LANES + lane] = work[EXTENT * LANES + lane] = size
         work[REACH * LANES + lane] = max(max(-left, right), max(-bottom, top))
         work[4 * LANES + lane] = 1.0 / size if size > 0.0 else 0.0
     for j in range(n):
@@ -110,23 +110,27 @@ def localise(x, ring, n, work, local):
 
 
 @kernel
-def margins(ring, n, work):
-    """For each lane the least certified surplus of a triangle with the free node at its target; positive: allowed.
+def margins(ring, n, floor, work):
+    """For each lane the least certified surplus D − φL of a triangle with its node at its target; positive: allowed.
 
-    Rows of work: reads TARGET and the one after it, and REACH, which holds the uncertainty δ; writes MARGIN.
+    floor: φ of all triangles, not negative. Rows of work: reads TARGET and the one after it, and BOUND, the
+    error bound of a star's surpluses (``bound``); writes MARGIN.
     """
     for lane in range(LANES):
         work[MARGIN * LANES + lane] = np.inf
+    twice = 2.0 * floor
     for j in range(n):
         i = n - 1 if j == 0 else j - 1
         p = ring[2 * i * LANES : 2 * (i + 1) * LANES]
         q = ring[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
             tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
-            delta, least = work[REACH * LANES + lane], work[MARGIN * LANES + lane]
-            surplus = surplus_above_zero(p[lane] - tx, p[LANES + lane] - ty, q[lane] - tx, q[LANES + lane] - ty, delta)
+            surplus = plain_surplus(p[lane] - tx, p[LANES + lane] - ty, q[lane] - tx, q[LANES + lane] - ty, twice)
             # A target that is not finite makes every surplus NaN or −∞, and no comparison with it holds.
+            least = work[MARGIN * LANES + lane]
             work[MARGIN * LANES + lane] = surplus if not surplus >= least else least
+    for lane in range(LANES):
+        work[MARGIN * LANES + lane] -= work[BOUND * LANES + lane]
 
 
 @kernel
@@ -140,10 +144,12 @@ def margins_above(ring, n, work):
         q = ring[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
             tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
-            delta, least = work[REACH * LANES + lane], work[MARGIN * LANES + lane]
-            px, py, qx, qy = p[lane] - tx, p[LANES + lane] - ty, q[lane] - tx, q[LANES + lane] - ty
-            surplus = surplus_above(px, py, qx, qy, delta, max(work[(FLOORS + j) * LANES + lane], 0.0))
+            twice = 2.0 * max(work[(FLOORS + j) * LANES + lane], 0.0)
+            surplus = plain_surplus(p[lane] - tx, p[LANES + lane] - ty, q[lane] - tx, q[LANES + lane] - ty, twice)
+            least = work[MARGIN * LANES + lane]
             work[MARGIN * LANES + lane] = surplus if not surplus >= least else least
+    for lane in range(LANES):
+        work[MARGIN * LANES + lane] -= work[BOUND * LANES + lane]
 
 
 @kernel
@@ -200,42 +206,71 @@ def commit(points, blocks, block, x, ring, work, shift, guard, tally):
 
     work: rows of LANES as ``localise`` leaves them; shift: (2·LANES,) over the star's size.
     """
-    n, count, centre = blocks.degree[block], blocks.filled[block], blocks.centre
-    single = guard.single
+    aim(x, work, shift, guard.single)
+    bound(x, work, guard)
+    if guard.level == STAR:
+        gather_floors(blocks, block, guard, work)
+        margins_above(ring, blocks.degree[block], work)
+        halve_abreast(x, ring, blocks.degree[block], shift, guard.single, work)
+    else:
+        margins(ring, blocks.degree[block], max(guard.floor, 0.0), work)
+    store(points, blocks, block, x, ring, work, shift, guard, tally)
+
+
+@kernel
+def aim(x, work, shift, single):
+    """The targets: the free nodes plus size·shift."""
     for lane in range(LANES):
-        tx = x[lane] + work[SIZE * LANES + lane] * shift[lane]
-        ty = x[LANES + lane] + work[SIZE * LANES + lane] * shift[LANES + lane]
-        work[TARGET * LANES + lane] = tx
-        work[(TARGET + 1) * LANES + lane] = ty
+        work[TARGET * LANES + lane] = x[lane] + work[SIZE * LANES + lane] * shift[lane]
+        work[(TARGET + 1) * LANES + lane] = x[LANES + lane] + work[SIZE * LANES + lane] * shift[LANES + lane]
     if single:
         for lane in range(TARGET * LANES, (TARGET + 2) * LANES):
             work[lane] = np.float64(np.float32(work[lane]))
+
+
+@kernel
+def bound(x, work, guard):
+    """By how much the surpluses of each lane's star may be off, to row BOUND. See ``localise`` for REACH and EXTENT."""
     unit, grain = guard.unit, guard.grain
     for lane in range(LANES):
-        target = max(abs(work[TARGET * LANES + lane]), abs(work[(TARGET + 1) * LANES + lane]))
-        work[REACH * LANES + lane] = unit * max(work[REACH * LANES + lane], target) + grain
-    known = guard.level == STAR or guard.floor > 0.0
-    if known:
-        gather_floors(blocks, block, guard, work)
-        margins_above(ring, n, work)
-    else:
-        margins(ring, n, work)
-    if guard.level == STAR:
-        halve_abreast(x, ring, n, shift, single, work)
+        tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
+        delta = unit * max(work[REACH * LANES + lane], max(abs(tx), abs(ty))) + grain
+        extent = work[EXTENT * LANES + lane] + max(abs(tx - x[lane]), abs(ty - x[LANES + lane]))
+        work[BOUND * LANES + lane] = surplus_bound(extent, delta)
+
+
+@kernel
+def store(points, blocks, block, x, ring, work, shift, guard, tally):
+    """Moves the free nodes whose row MARGIN is positive to their targets, and tries the others one by one."""
+    n, count, star = blocks.degree[block], blocks.filled[block], guard.level == STAR
+    centre = blocks.centre[block * LANES : (block + 1) * LANES]
+    refused, moved = 0, 0
+    for lane in range(LANES):
+        refused += not work[MARGIN * LANES + lane] > 0.0
     for lane in range(count):
-        i = centre[block * LANES + lane]
+        tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
+        taken = work[MARGIN * LANES + lane] > 0.0
+        moved += taken & ((tx != x[lane]) | (ty != x[LANES + lane]))
+    tally[MOVED] += moved
+    if star:
+        for lane in range(count):
+            tally[TRUNCATED] += (work[MARGIN * LANES + lane] > 0.0) & (work[SHARE * LANES + lane] < 1.0)
+    if refused == 0:
+        for lane in range(count):
+            i = np.uint32(centre[lane])
+            points[i, 0] = work[TARGET * LANES + lane]
+            points[i, 1] = work[(TARGET + 1) * LANES + lane]
+        return
+    if not star:
+        gather_floors(blocks, block, guard, work)
+    for lane in range(count):
+        i = centre[lane]
         if work[MARGIN * LANES + lane] > 0.0:
-            tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
-            tally[MOVED] += tx != x[lane] or ty != x[LANES + lane]
-            tally[TRUNCATED] += guard.level == STAR and work[SHARE * LANES + lane] < 1.0
-            points[i, 0] = tx
-            points[i, 1] = ty
-        elif work[MARGIN * LANES + lane] == -np.inf and guard.level == STAR:
+            points[i, 0] = work[TARGET * LANES + lane]
+            points[i, 1] = work[(TARGET + 1) * LANES + lane]
+        elif star and work[MARGIN * LANES + lane] == -np.inf:
             tally[DROPPED] += 1
         else:
-            if not known:
-                gather_floors(blocks, block, guard, work)
-                known = True
             truncate(points, i, x, ring, n, lane, work, shift, guard, tally)
 
 
@@ -272,7 +307,7 @@ def halve_abreast(x, ring, n, shift, single, work):
         work[(KEPT + 1) * LANES + lane] = work[(TARGET + 1) * LANES + lane]
         work[TARGET * LANES + lane] = x[lane]
         work[(TARGET + 1) * LANES + lane] = x[LANES + lane]
-    margins(ring, n, work)  # of the stars as they are
+    margins(ring, n, 0.0, work)  # of the stars as they are
     for lane in range(LANES):
         margin = -np.inf if work[MARGIN * LANES + lane] > 0.0 else 0.0
         work[MARGIN * LANES + lane] = 1.0 if work[SHARE * LANES + lane] > 0.0 else margin
@@ -287,7 +322,7 @@ def truncate(points, i, x, ring, n, lane, work, shift, guard, tally):
     Below a floor a triangle comes by its first-order change, so that more than FEW_HALVINGS hardly ever help.
     """
     single, halvings = guard.single, HALVINGS if guard.floor <= 0.0 else FEW_HALVINGS
-    size, delta = work[SIZE * LANES + lane], work[REACH * LANES + lane]
+    size = work[SIZE * LANES + lane]
     dx = size * shift[lane]
     dy = size * shift[LANES + lane]
     if not (np.isfinite(dx) and np.isfinite(dy)):
@@ -300,6 +335,7 @@ def truncate(points, i, x, ring, n, lane, work, shift, guard, tally):
             tx, ty = np.float64(np.float32(tx)), np.float64(np.float32(ty))
         if tx == x[lane] and ty == x[LANES + lane]:
             break
+        delta = guard.unit * max(work[REACH * LANES + lane], max(abs(tx), abs(ty))) + guard.grain
         # Above a positive floor no triangle is inverted; what was inverted is for the whole rule to judge.
         if (
             clear(tx, ty, ring, n, lane, delta, guard.floor)

@@ -32,7 +32,7 @@ from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
 from gmsnet.workers import Share
 
 SMALL = 5000  # free nodes
-SAMPLE = 256  # blocks of cells
+SAMPLE = 64  # blocks of cells
 ALWAYS = 10**9  # sweeps
 RELAXATION = 1.6  # of the Newton steps
 

@@ -49,7 +49,7 @@ class Floor:
 
     Which blocks of triangles hold the worst changes slowly. Therefore all are looked at only every LOOKS-th time, and
     between only those that were the worst then, one in SHARE. A floor that is too high by that holds a few stars back
-    until the next look at all.
+    until the next look at all. A method that knows the worst cells can name them instead (``watch``).
     """
 
     LOOKS, SHARE, FEWEST = 4, 16, 64
@@ -57,6 +57,11 @@ class Floor:
     def __init__(self) -> None:
         self.asked = 0
         self.blocks = np.empty(0, dtype=np.int32)
+
+    def watch(self, cells: NDArray[np.int32]) -> None:
+        """From now on looks at the blocks of these cells (rows of ``Topology.changeable``), the worst being known."""
+        self.blocks = np.unique(cells // LANES)
+        self.asked = 1
 
     def of(self, points: NDArray[np.float64], topology: Topology, precision: Precision, share: Share) -> float:
         """An upper bound of the least D/L of the triangles with a free node, as the points are now."""

@@ -46,6 +46,7 @@ CYCLES = (
     Cycle(0.0003, 7, 12),
 )
 LAST = (Cycle(0.0003, 7, 16), Cycle(0.0003, 8, 16))
+WATCHED = 64  # cells that are looked at for the floor
 GAIN = 1e-4  # in the least 1/q: less is none
 
 
@@ -77,7 +78,10 @@ class WorstFirst(Smoother):
 
 
 def candidates(field: Field, share: Share) -> NDArray[np.int32]:
-    """The worst cells, by their place among those that can change: at least the share CANDIDATES of them."""
+    """The worst cells, by their place among those that can change: at least the share CANDIDATES of them.
+
+    The floor of the guard is told of the worst of these.
+    """
     triangles, turn = field.topology.changeable
     shape = np.empty(len(triangles), dtype=np.float32)
 
@@ -87,6 +91,8 @@ def candidates(field: Field, share: Share) -> NDArray[np.int32]:
     share(look, 0, -(-len(triangles) // LANES))
     wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * len(triangles)))
     cells: NDArray[np.int32] = ranking.worst(shape, wanted)
+    few = min(WATCHED, len(cells)) - 1
+    field.floor.watch(cells[np.argpartition(shape[cells], few)[: few + 1]])
     return cells
 
 
