@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import plain_guard
-from gmsnet.kernels.stars import Blocks
 
 
 def block_of(stars):

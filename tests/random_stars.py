@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gmsnet.kernels import block
 from gmsnet.kernels import gmsnet as kernels_gmsnet
 from gmsnet.kernels import gmsnet2 as kernels_gmsnet2
 from gmsnet.kernels import nn as kernels_nn
@@ -57,14 +58,13 @@ def proposed(stars, propose, dtype=np.float64):
     propose(local, n, shift) writes the shifts of a block, both arrays of the dtype that the kernel computes in.
     """
     out = np.empty((len(stars), 2))
-    x, work = np.empty(2 * LANES), np.empty(kernels_stars.FLOORS * LANES)
+    work = np.empty(block.FLOORS * LANES)
     shift = np.empty(2 * LANES, dtype=dtype)
     for k, (centre, ring) in enumerate(stars):
         n, lane = len(ring), k % LANES  # every lane takes its turn; all hold the same star
-        flat = np.repeat(np.asarray(ring, dtype=float).ravel(), LANES)
+        pairs = np.vstack([centre, ring]).astype(float).repeat(LANES, axis=0).ravel()
         local = np.empty(2 * n * LANES, dtype=dtype)
-        x[:LANES], x[LANES:] = centre
-        kernels_stars.localise(x, flat, n, work, local)
+        kernels_stars.localise(pairs, n, work, local)
         propose(local, n, shift)
         out[k] = work[lane] * shift[[lane, LANES + lane]].astype(np.float64)
     return out

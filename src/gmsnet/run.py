@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from gmsnet.arguments import ASPECT
 from gmsnet.kernels import quality as kernels
+from gmsnet.kernels.block import MOVED
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import LEVELS, Precision
-from gmsnet.kernels.stars import MOVED
 from gmsnet.measure import QualityReport, measure
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Field, Smoother, Tally

@@ -24,15 +24,15 @@ def shares_of(points, topology, kept, shifts):
     """What is left of the shift (N, 2; over the stars' sizes) of each free node, all others where they are."""
     blocks = topology.stars.blocks
     given = bands.Bands(points.copy(), kept, WIDTH)
-    x, ring, work, _ = stars.room(blocks.most)
+    room = stars.room_for(blocks.most)
     local, shift = np.empty(2 * blocks.most * LANES), np.empty(2 * LANES)
     left, size = np.full((len(points), 2), np.nan), np.full(len(points), np.nan)
     for block in range(len(blocks.degree)):
-        stars.fetch(points, blocks, block, x, ring, work, local)
+        stars.fetch(points, blocks, block, room, local)
         centre = blocks.centre[block * LANES : (block + 1) * LANES]
         shift[:] = shifts[centre].T.ravel()
-        bands.shorten(given, blocks, block, x, ring, work[:LANES], shift)
-        left[centre], size[centre] = shift.reshape(2, LANES).T, work[:LANES]
+        bands.shorten(given, blocks, block, room.star, room.work[:LANES], shift)
+        left[centre], size[centre] = shift.reshape(2, LANES).T, room.work[:LANES]
     return left, size
 
 
@@ -66,14 +66,14 @@ def test_what_is_outside_of_its_band_may_go_back_only():
     start = planar_points(mesh)[topology.memory]
     place = int(np.flatnonzero(topology.memory == 0)[0])
     blocks = topology.stars.blocks
-    x, ring, work, _ = stars.room(blocks.most)
+    room = stars.room_for(blocks.most)
     local = np.empty(2 * blocks.most * LANES)
     now = start.copy()
     now[place] = [-0.2, -0.2]
-    stars.fetch(now, blocks, 0, x, ring, work, local)
+    stars.fetch(now, blocks, 0, room, local)
     for direction, share in ((-0.01, 0.0), (0.01, 1.0)):
         shift = np.full(2 * LANES, direction)
-        bands.shorten(bands.Bands(start, np.ones(4, dtype=bool), WIDTH), blocks, 0, x, ring, work[:LANES], shift)
+        bands.shorten(bands.Bands(start, np.ones(4, dtype=bool), WIDTH), blocks, 0, room.star, room.work[:LANES], shift)
         assert shift[0] == share * direction
 
 

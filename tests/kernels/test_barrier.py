@@ -136,7 +136,8 @@ def test_derivatives_and_step(p, degree):
         assert rows[kernels.SURPLUS, 0] == pytest.approx(least_surplus(ring, there, 0.1), rel=1e-5, abs=1e-5)
         if least > 0:
             assert rows[kernels.AFTER, 0] == pytest.approx(value(p, ring, there), rel=1e-10)
-        found = barrier_star.derivatives(*place, np.repeat(ring.ravel(), LANES), degree, 3, power)
+        pairs = np.vstack([place, ring]).repeat(LANES, axis=0).ravel()
+        found = barrier_star.derivatives(*place, pairs, degree, 3, power)
         np.testing.assert_allclose(found[0], f, rtol=1e-12)
         np.testing.assert_allclose([found[3], found[4], found[5]], h[[0, 0, 1], [0, 1, 1]], rtol=1e-10, atol=1e-9)
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_stars import star
 
-from gmsnet.kernels import barrier
+from gmsnet.kernels import barrier, block, certificate
 from gmsnet.kernels import stars as kernels
 from gmsnet.kernels.barrier_star import Power
 from gmsnet.kernels.compile import LANES
@@ -49,47 +49,61 @@ def read_least(place, ring):
     return min(ratios)
 
 
-def in_float64(place, ring, shift, guard):
-    """Margin and target by kernels.stars; the shift is over the star's size."""
-    n, x, work = len(ring), np.repeat(place, LANES), np.zeros((kernels.FLOORS + len(ring)) * LANES)
-    flat, local = np.repeat(ring.ravel(), LANES), np.empty(2 * n * LANES)
-    kernels.localise(x, flat, n, work, local)
-    kernels.aim(x, work, np.repeat(shift, LANES), guard.single)
-    kernels.bound(x, work, guard)
-    kernels.margins(flat, n, max(guard.floor, 0.0), work)
+def from_shifts(place, ring, shift, guard):
+    """Margin and target by certificate.certify; the shift is over the star's size."""
+    n, pairs, work = *block_of(place, ring), np.zeros((block.FLOORS + len(ring)) * LANES)
+    local, sums, shifts = np.empty(2 * n * LANES), np.empty(2 * LANES, dtype=np.float32), np.repeat(shift, LANES)
+    kernels.localise(pairs, n, work, local)
+    kernels.aim(work, shifts, guard.single)
+    certificate.certify(local, n, shifts, max(guard.floor, 0.0), guard.unit, guard.grain, work, sums)
     return results(work)
 
 
-def in_float32(place, ring, shift, guard):
+def from_coordinates(place, ring, shift, guard):
+    """The same by certificate.certify_stars."""
+    n, pairs, work = *block_of(place, ring), np.zeros((block.FLOORS + len(ring)) * LANES)
+    kernels.localise(pairs, n, work, np.empty(2 * n * LANES))
+    kernels.aim(work, np.repeat(shift, LANES), guard.single)
+    work[block.FLOORS * LANES :] = guard.floor
+    certificate.certify_stars(pairs, n, 1.0, guard.unit, guard.grain, work)
+    return results(work)
+
+
+def from_sums(place, ring, shift, guard):
     """Margin and target by kernels.barrier; the shift is over the star's size."""
-    n, x, work = len(ring), np.empty(2 * LANES), np.zeros((kernels.FLOORS + len(ring)) * LANES)
-    pairs = np.vstack([place, ring]).repeat(LANES, axis=0).ravel()
+    n, pairs, work = *block_of(place, ring), np.zeros((block.FLOORS + len(ring)) * LANES)
     local, flat = np.empty(2 * n * LANES, dtype=np.float32), np.empty(2 * LANES, dtype=np.float32)
     sums = np.zeros(barrier.SUMS * LANES, dtype=np.float32)
-    barrier.relate(pairs, n, guard, x, work, flat, local, sums)
+    barrier.relate(pairs, n, guard, work, flat, local, sums)
     step = np.repeat(shift, LANES).astype(np.float32)
     barrier.judge(local, n, Power.of(1), step, max(guard.floor, 0.0), sums)
     doubtful = barrier.certify(sums, step, guard.unit, work)
-    assert doubtful == (~(work[kernels.MARGIN * LANES :][:LANES] > 0)).sum()
-    kernels.aim(x, work, step.astype(float), guard.single)
+    assert doubtful == (~(work[block.MARGIN * LANES :][:LANES] > 0)).sum()
+    kernels.aim(work, step.astype(float), guard.single)
     return results(work)
 
 
+def block_of(place, ring):
+    """Degree, and the star in all lanes."""
+    return len(ring), np.vstack([place, ring]).repeat(LANES, axis=0).ravel()
+
+
 def results(work):
-    rows = work[: kernels.FLOORS * LANES].reshape(-1, LANES)
-    rows = rows[[kernels.MARGIN, kernels.TARGET, kernels.TARGET + 1]]
-    np.testing.assert_array_equal(rows, rows[:, :1].repeat(LANES, axis=1))  # one star in all lanes
-    return rows[0, 0], rows[1:, 0]
+    margin = work[block.MARGIN * LANES :][:LANES]
+    target = work[block.TARGET * LANES :][: 2 * LANES].reshape(2, LANES)
+    np.testing.assert_array_equal(margin, margin[0])  # one star in all lanes
+    np.testing.assert_array_equal(target, target[:, :1].repeat(LANES, axis=1))
+    return margin[0], target[:, 0]
 
 
-@pytest.mark.parametrize("certificate", [in_float64, in_float32])
+@pytest.mark.parametrize("certify", [from_shifts, from_coordinates, from_sums])
 @given(
     seed=st.integers(0, 2**32 - 1), degree=st.integers(3, 9), scale=st.sampled_from([2.0**-40, 1e-3, 1.0]),
     offset=st.sampled_from([0.0, 1.0, 1e5]), digits=st.integers(2, 12), above=st.booleans(), single=st.booleans(),
     squeeze=st.sampled_from([1.0, 1e-2, 1e-5]),
 )  # fmt: skip
 @settings(max_examples=300)
-def test_what_is_certified_is_so(certificate, seed, degree, scale, offset, digits, above, single, squeeze):
+def test_what_is_certified_is_so(certify, seed, degree, scale, offset, digits, above, single, squeeze):
     """The floor lies just below, or just above, what the star has at the target."""
     rng = np.random.default_rng(seed)
     centre, ring = star(rng, degree)
@@ -98,10 +112,10 @@ def test_what_is_certified_is_so(certificate, seed, degree, scale, offset, digit
     if single:
         place, ring = (v.astype(np.float32).astype(float) for v in (place, ring))
     shift = 10.0 ** rng.uniform(-4, 0) * rng.normal(size=2) * (1.0, squeeze)
-    _, target = certificate(place, ring, shift, guard)
+    _, target = certify(place, ring, shift, guard)
     least = exact_least(target, ring) if np.ptp(np.vstack([target, ring]), axis=0).all() else Fraction(0)
     floor = float(least * (1 + (1 if above else -1) * Fraction(1, 10**digits)))
-    margin, again = certificate(place, ring, shift, guard._replace(floor=floor))
+    margin, again = certify(place, ring, shift, guard._replace(floor=floor))
     np.testing.assert_array_equal(again, target)
     if margin > 0:
         for read_place, read_ring in readings(rng, target, ring, guard):
@@ -110,23 +124,23 @@ def test_what_is_certified_is_so(certificate, seed, degree, scale, offset, digit
             ) > max(Fraction(floor), 0)
 
 
-@pytest.mark.parametrize("certificate", [in_float64, in_float32])
-def test_a_sound_star_is_certified(certificate):
+@pytest.mark.parametrize("certify", [from_shifts, from_coordinates, from_sums])
+def test_a_sound_star_is_certified(certify):
     """With room to the floor, whatever the scale: the slow way is for the few."""
     angle = np.pi / 3 * np.arange(6)
     for scale in (2.0**-60, 1e-3, 1.0):
         ring = scale * np.column_stack([np.cos(angle), np.sin(angle)])
         for floor in (-np.inf, 0.0, 0.2, 0.28):
             guard = plain_guard()._replace(level=WORST, floor=floor)
-            margin, _ = certificate(np.zeros(2), ring, np.array([0.01, 0.0]), guard)
+            margin, _ = certify(np.zeros(2), ring, np.array([0.01, 0.0]), guard)
             assert margin > 0
-        margin, _ = certificate(np.zeros(2), ring, np.array([0.01, 0.0]), guard._replace(floor=0.28867))
+        margin, _ = certify(np.zeros(2), ring, np.array([0.01, 0.0]), guard._replace(floor=0.28867))
         assert not margin > 0
 
 
-@pytest.mark.parametrize("certificate", [in_float64, in_float32])
+@pytest.mark.parametrize("certify", [from_shifts, from_coordinates, from_sums])
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e30])
-def test_what_is_no_number_is_not_certified(certificate, bad):
+def test_what_is_no_number_is_not_certified(certify, bad):
     centre, ring = star(np.random.default_rng(0), 6)
-    margin, _ = certificate(np.asarray(centre, dtype=float), ring, np.array([bad, 0.0]), plain_guard())
+    margin, _ = certify(np.asarray(centre, dtype=float), ring, np.array([bad, 0.0]), plain_guard())
     assert not margin > 0

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_stars import star
 
+from gmsnet.kernels import block
 from gmsnet.kernels import stars as kernels
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import Precision, plain_guard
@@ -24,16 +25,14 @@ def commit(stars_, shifts, unit=U64, single=False):
     lanes = np.minimum(np.arange(LANES), count - 1)
     centre = lanes.astype(np.int32)
     rings = np.concatenate([count + lanes * degree + j for j in range(degree)]).astype(np.int32)
-    x, ring, work = np.empty(2 * LANES), np.empty(2 * degree * LANES), np.empty((kernels.FLOORS + degree) * LANES)
+    room = kernels.room_for(degree)
     local = np.empty(2 * degree * LANES, dtype=np.float32)
     one = np.zeros(1, dtype=np.int64), np.array([degree], dtype=np.int32), np.array([count], dtype=np.int32)
-    blocks = kernels.Blocks(centre, rings, *one, degree)
-    assert kernels.fetch(points, blocks, 0, x, ring, work, local) == degree
-    work[:LANES] = 1.0  # so that shifts are in the coordinates of the mesh
-    shift = np.zeros(2 * LANES, dtype=np.float32)
-    shift[:LANES], shift[LANES:] = np.asarray(shifts)[lanes].T
+    blocks = block.Blocks(centre, rings, *one, degree)
+    assert kernels.fetch(points, blocks, 0, room, local) == degree
+    shift = (np.asarray(shifts, dtype=float)[lanes].T / room.work[:LANES]).ravel()  # over the sizes of the stars
     tally = np.zeros(3, dtype=np.int64)
-    kernels.commit(points, blocks, 0, x, ring, work, shift, plain_guard(Precision(unit, 0.0, single)), tally)
+    kernels.commit(points, blocks, 0, room, local, shift, plain_guard(Precision(unit, 0.0, single)), tally)
     return points[:count], tally
 
 
@@ -63,8 +62,8 @@ def test_no_valid_cell_becomes_invalid_and_inverted_ones_only_get_better(seed, d
                 assert after[i] > 0
             else:
                 assert after[i] > 0 or area(now, ring, i) >= area(centre, ring, i)
-    assert tally[kernels.MOVED] == elsewhere
-    assert tally[kernels.MOVED] + tally[kernels.DROPPED] == 20
+    assert tally[block.MOVED] == elsewhere
+    assert tally[block.MOVED] + tally[block.DROPPED] == 20
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from one_block import block_of
 from random_stars import star
 
+from gmsnet.kernels import block, truncation
 from gmsnet.kernels import stars as kernels_stars
 from gmsnet.kernels import worst_first as kernels
 from gmsnet.kernels import worst_first_cycles as cycles
@@ -115,12 +116,12 @@ def test_the_guard_is_that_of_blocks(level, single):
         shifts = rng.choice([0.1, 1.0, 5.0], LANES)[:, None] * rng.normal(size=(LANES, 2))
         targets = points[:LANES] + shifts
 
-        x, ring, work, tally = kernels_stars.room(degree)
+        shared, tally = kernels_stars.room_for(degree), np.zeros(3, dtype=int)
         local = np.empty(2 * degree * LANES)
         one, other = points.copy(), points.copy()
-        kernels_stars.fetch(one, blocks, 0, x, ring, work, local)
-        work[:LANES] = 1.0
-        kernels_stars.commit(one, blocks, 0, x, ring, work, shifts.T.ravel().copy(), guard, tally)
+        kernels_stars.fetch(one, blocks, 0, shared, local)
+        over_sizes = (shifts.T / shared.work[:LANES]).ravel()
+        kernels_stars.commit(one, blocks, 0, shared, local, over_sizes, guard, tally)
 
         start = np.minimum(np.arange(len(points) + 1), LANES).astype(np.int32) * degree
         around = blocks.rings.reshape(degree, LANES).T.ravel().copy()
@@ -130,12 +131,12 @@ def test_the_guard_is_that_of_blocks(level, single):
             tx, ty, halvings = kernels.way_there(room, n, *points[i], *targets[i], unit, 0.0, single)
             # In blocks fewer halvings are made where floors refuse a shift.
             given_up = halvings == kernels.HALVINGS or (
-                halvings >= kernels_stars.FEW_HALVINGS and (one[i] == points[i]).all()
+                halvings >= truncation.FEW_HALVINGS and (one[i] == points[i]).all()
             )
             other[i] = points[i] if given_up else (tx, ty)
             counts += not given_up, given_up
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-15)  # the target is a sum in one, a difference in both
-        assert counts.tolist() == [tally[kernels_stars.MOVED], tally[kernels_stars.DROPPED]]
+        assert counts.tolist() == [tally[block.MOVED], tally[block.DROPPED]]
         moved.append(counts[0])
     assert 0 < sum(moved) < 4 * LANES
 

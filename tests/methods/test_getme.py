@@ -11,8 +11,8 @@ import gmsnet
 from gmsnet import CellBlock, Mesh
 from gmsnet.generate import disturb
 from gmsnet.kernels import getme as kernels
+from gmsnet.kernels.block import DROPPED, MOVED
 from gmsnet.kernels.guard import Precision, plain_guard
-from gmsnet.kernels.stars import DROPPED, MOVED
 from gmsnet.methods import getme
 from gmsnet.methods.base import Field
 from gmsnet.paper import plain_getme

@@ -57,11 +57,11 @@ def propose(local, n, shift):
 @kernel
 def sweep(points, blocks, first, last, guard, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
-    x, ring, work, counts = stars.room(blocks.most)
+    room = stars.room_for(blocks.most)
     local, shift = np.empty(2 * blocks.most * LANES), np.empty(2 * LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, x, ring, work, local)
+        n = stars.fetch(points, blocks, block, room, local)
         propose(local, n, shift)
-        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
+        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
     for k in range(len(tally)):
-        tally[k] += counts[k]
+        tally[k] += room.counts[k]

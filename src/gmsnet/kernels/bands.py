@@ -33,10 +33,10 @@ def no_bands() -> Bands:
 
 
 @kernel
-def shorten(bands, blocks, block, x, ring, sizes, shift):
+def shorten(bands, blocks, block, star, sizes, shift):
     """Shortens the shifts (2·LANES, over the stars' sizes) of a block so that they end inside all bands.
 
-    x, ring: as ``stars.gather`` leaves them; sizes: (LANES,).
+    star: as ``block.gather`` leaves it; sizes: (LANES,).
     """
     n, offset = blocks.degree[block], blocks.offset[block]
     for lane in range(LANES):
@@ -48,12 +48,9 @@ def shorten(bands, blocks, block, x, ring, sizes, shift):
         for j in range(n):
             i = n - 1 if j == 0 else j - 1
             a, b = blocks.rings[offset + i * LANES + lane], blocks.rings[offset + j * LANES + lane]
-            p, q = 2 * i * LANES + lane, 2 * j * LANES + lane
-            left, right = ring[p] - x[lane], ring[p + LANES] - x[LANES + lane]
-            share = min(
-                share,
-                share_inside(bands, c, a, b, left, right, ring[q] - x[lane], ring[q + LANES] - x[LANES + lane], dx, dy),
-            )
+            x, y, p, q = star[2 * lane], star[2 * lane + 1], 2 * ((i + 1) * LANES + lane), 2 * ((j + 1) * LANES + lane)
+            px, py, qx, qy = star[p] - x, star[p + 1] - y, star[q] - x, star[q + 1] - y
+            share = min(share, share_inside(bands, c, a, b, px, py, qx, qy, dx, dy))
         shift[lane] *= share
         shift[LANES + lane] *= share
 

@@ -24,17 +24,15 @@ import numpy as np
 
 from gmsnet.kernels import stars
 from gmsnet.kernels.barrier_star import FAR, MOST, descend
+from gmsnet.kernels.block import MARGIN, PAIRS, REACH, SIZE, gather, ring_row
+from gmsnet.kernels.certificate import COARSE, NARROWEST, WIDER, doubt
 from gmsnet.kernels.compile import LANES, inlined, kernel
 from gmsnet.kernels.guard import STAR
-from gmsnet.kernels.stars import EXTENT, MARGIN, REACH, SIZE
 
 SMALL = 1e-5  # of F: a fall that float32 may not see; the step is then so short that it is Newton's to rounding
 
 FLAT = 300.0  # mean Q of a star: D of a triangle is off by a few times 2⁻²⁴·Q in float32
 
-WIDER = 1.0 + 2.0**-20  # so that what float32 has rounded is an upper bound
-NARROWEST = 0.25  # row WIDTH is at least this, so that what underflows does not matter; the first spoke has 0.5 or more
-ROUNDING = 2.0**-24  # of float32
 
 # Rows of a block's sums: F, −∇F, the Hessian without its isotropic part (of xx and yy the half), Σ c/D, the least D;
 # after the step F, the least D, the least surplus above the guard's floor; gᵀH⁻¹g, whether to do the star over; the
@@ -44,64 +42,35 @@ SUMS = 15
 
 
 @kernel
-def gather(points, blocks, block, n, pairs):
-    """Coordinates of the stars of a block in pairs, the centres and then the ring, in rows of 2·LANES.
-
-    A pair is loaded and stored at once; stars.gather, which takes them apart, needs twice the time. So that is called
-    for the few blocks that have to be looked at in float64.
-    """
-    gather_row(points, blocks.centre[block * LANES : (block + 1) * LANES], pairs)
-    offset = blocks.offset[block]
-    for j in range(n):
-        nodes = blocks.rings[offset + j * LANES : offset + (j + 1) * LANES]
-        gather_row(points, nodes, pairs[2 * (j + 1) * LANES : 2 * (j + 2) * LANES])
-
-
-@inlined
-def gather_row(points, nodes, row):
-    """x and y of a node, and so on."""
-    for lane in range(LANES):
-        i = np.uint32(nodes[lane])
-        x, y = points[i, 0], points[i, 1]
-        row[2 * lane] = x
-        row[2 * lane + 1] = y
-
-
-@kernel
-def relate(pairs, n, guard, x, work, flat, local, sums):
+def relate(star, n, guard, work, flat, local, sums):
     """Ring minus centre over a length of the star, in the type of ``local``; see stars.localise.
 
     As there, but for the length, which is that of the first spoke (the sum of its components' sizes), so that it takes
-    one pass: to row SIZE of work. To rows EXTENT and REACH go upper bounds of the ring's largest component, from the
-    centre and as such; to row WIDTH of sums the former, to row DOUBT δ without the target's part, both over SIZE.
-    The centres go to x, as in stars.gather. flat: (2·LANES,) to work in.
+    one pass. To row REACH goes an upper bound of the largest coordinate; to row WIDTH of sums the ring's largest
+    component, to row DOUBT δ without the target's part, both over SIZE. flat: (2·LANES,) to work in.
     """
-    real = sums.dtype.type
-    centre, inverse, spoke = pairs[: 2 * LANES], work[EXTENT * LANES : (EXTENT + 2) * LANES], pairs[2 * LANES :]
+    spoke = ring_row(star, 0)
     for lane in range(LANES):
-        x[lane], x[LANES + lane] = centre[2 * lane], centre[2 * lane + 1]
-        size = abs(spoke[2 * lane] - x[lane]) + abs(spoke[2 * lane + 1] - x[LANES + lane])
+        size = abs(spoke[2 * lane] - star[2 * lane]) + abs(spoke[2 * lane + 1] - star[2 * lane + 1])
         size = size if size > 0.0 else 1.0
         work[SIZE * LANES + lane] = size
-        inverse[2 * lane] = 1.0 / size
-        inverse[2 * lane + 1] = inverse[2 * lane]
-        sums[WIDTH * LANES + lane] = real(NARROWEST)
+        work[PAIRS * LANES + 2 * lane] = work[PAIRS * LANES + 2 * lane + 1] = 1.0 / size
+        sums[WIDTH * LANES + lane] = NARROWEST
     for j in range(n):
-        p = pairs[2 * (j + 1) * LANES : 2 * (j + 2) * LANES]
+        p = ring_row(star, j)
         q = local[2 * j * LANES : 2 * (j + 1) * LANES]
         for k in range(2 * LANES):
-            flat[k] = real((p[k] - centre[k]) * inverse[k])
+            flat[k] = (p[k] - star[k]) * work[PAIRS * LANES + k]
         for lane in range(LANES):
             qx, qy = flat[2 * lane], flat[2 * lane + 1]
             q[lane], q[LANES + lane] = qx, qy
             sums[WIDTH * LANES + lane] = max(sums[WIDTH * LANES + lane], max(abs(qx), abs(qy)))
+    stars.take_centres(star, work)
     unit, grain = guard.unit, guard.grain
     for lane in range(LANES):
-        reach, size = max(abs(x[lane]), abs(x[LANES + lane])), work[SIZE * LANES + lane]
+        reach, size = max(abs(star[2 * lane]), abs(star[2 * lane + 1])), work[SIZE * LANES + lane]
         sums[DOUBT * LANES + lane] = WIDER * (unit * reach + grain) / size
-        extent = WIDER * size * sums[WIDTH * LANES + lane]
-        work[EXTENT * LANES + lane] = extent
-        work[REACH * LANES + lane] = reach + extent
+        work[REACH * LANES + lane] = reach + WIDER * size * sums[WIDTH * LANES + lane]
 
 
 @kernel
@@ -232,11 +201,11 @@ def settle(sums, most, step, mean, mean_sums, with_mean):
 
 
 @kernel
-def refine(x, ring, n, count, work, power, sums, step, shift):
+def refine(star, n, count, work, power, sums, shift):
     """The shifts of the lanes that are to be done over, as ``descend`` finds them."""
     for lane in range(count):
         if sums[REDO * LANES + lane] > 0.0:
-            dx, dy = descend(x[lane], x[LANES + lane], ring, n, lane, power)
+            dx, dy = descend(star, n, lane, power)
             shift[lane] = dx / work[SIZE * LANES + lane]
             shift[LANES + lane] = dy / work[SIZE * LANES + lane]
 
@@ -245,23 +214,17 @@ def refine(x, ring, n, count, work, power, sums, step, shift):
 def certify(sums, step, unit, work):
     """Row MARGIN of work: positive where all triangles are certified above the guard's floor after the step.
 
-    In units of SIZE let m be the largest component of ring and step, and δ the uncertainty of a coordinate. After the
-    step a component is off by at most e = 4(2⁻²⁴·m + δ): by two roundings to float32, of m and of 2m, and by that of
-    the target and of the written coordinates. As in guard.surplus_bound, with components of at most 2m, that makes
-    22·m·e + 6e² + 104·2⁻²⁴·m² of a surplus at most, which is less than 256·m·(2⁻²⁴·m + δ), or more than any surplus.
-
-    Returns how many are not.
+    As certificate.certify, but from what ``judge`` has found. Returns how many are not.
     """
     real = sums.dtype.type
-    rounding, unit, scale, zero = real(ROUNDING), real(unit), real(256.0), real(0.0)
+    unit, zero = real(unit), real(0.0)
     doubtful = 0
     for lane in range(LANES):
         m = max(sums[WIDTH * LANES + lane], max(abs(step[lane]), abs(step[LANES + lane])))
-        doubt = scale * m * ((rounding + unit) * m + sums[DOUBT * LANES + lane])
-        certain = sums[SURPLUS * LANES + lane] - doubt
-        certain = certain if sums[REDO * LANES + lane] == zero else zero
+        certain = sums[SURPLUS * LANES + lane] - doubt(m, sums[DOUBT * LANES + lane] + unit * m, COARSE)
+        certain = certain if sums[REDO * LANES + lane] == zero else 0.0
         work[MARGIN * LANES + lane] = certain
-        doubtful += not certain > zero
+        doubtful += not certain > 0.0
     return doubtful
 
 
@@ -285,18 +248,15 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
     stretch: that many times the way to the mean of the ring is taken instead of a step where F falls by it; 0: steps
     only.
     """
-    x, ring, work, counts = stars.room(blocks.most)
-    pairs, flat = np.empty(2 * (blocks.most + 1) * LANES), np.empty(2 * LANES, dtype=np.float32)
-    local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
+    room, local = stars.room_for(blocks.most), np.empty(2 * blocks.most * LANES, dtype=np.float32)
     sums, mean_sums = np.empty(SUMS * LANES, dtype=np.float32), np.empty(SUMS * LANES, dtype=np.float32)
     step, mean = np.empty(2 * LANES, dtype=np.float32), np.empty(2 * LANES, dtype=np.float32)
-    shift = np.empty(2 * LANES)
-    floor, star = max(guard.floor, 0.0), guard.level == STAR
-    most = FLAT * (power.one + FLAT * (power.two + power.four * (FLAT * FLAT)))
+    star, work, shift = room.star, room.work, np.empty(2 * LANES)
+    floor, most = max(guard.floor, 0.0), FLAT * (power.one + FLAT * (power.two + power.four * (FLAT * FLAT)))
     for block in range(first, last):
         n, count = blocks.degree[block], blocks.filled[block]
-        gather(points, blocks, block, n, pairs)
-        relate(pairs, n, guard, x, work, flat, local, sums)
+        gather(points, blocks, block, n, star)
+        relate(star, n, guard, work, room.sums, local, sums)
         derive(local, n, power, sums)
         propose(sums, relaxation, power.ratio, step)
         judge(local, n, power, step, floor, sums)
@@ -306,13 +266,13 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
         settle(sums, most * n, step, mean, mean_sums, stretch > 0.0)
         for k in range(2 * LANES):
             shift[k] = step[k]
-        if certify(sums, step, guard.unit, work) or star:
-            stars.gather(points, blocks, block, n, x, ring)
-            refine(x, ring, n, count, work, power, sums, step, shift)
-        if star:
-            stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
-        else:
-            stars.aim(x, work, shift, guard.single)
-            stars.store(points, blocks, block, x, ring, work, shift, guard, counts)
+        doubtful = certify(sums, step, guard.unit, work)
+        if doubtful:
+            refine(star, n, count, work, power, sums, shift)
+        if guard.level == STAR:
+            stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
+            continue
+        stars.aim(work, shift, guard.single)
+        stars.store(points, blocks, block, room, shift, guard, room.counts)
     for k in range(len(tally)):
-        tally[k] += counts[k]
+        tally[k] += room.counts[k]

@@ -29,14 +29,14 @@ class Power(NamedTuple):
 
 
 @kernel
-def derivatives(x, y, ring, n, lane, power):
+def derivatives(x, y, star, n, lane, power):
     """One star in float64 with its free node at (x, y): F, −∇F, the Hessian (xx, xy, yy), the least D."""
     value, gx, gy, xx, xy, yy, even, least = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.inf
-    a = 2 * (n - 1) * LANES + lane
-    ax, ay = ring[a] - x, ring[a + LANES] - y
+    a = 2 * (n * LANES + lane)
+    ax, ay = star[a] - x, star[a + 1] - y
     for j in range(n):
-        b = 2 * j * LANES + lane
-        bx, by = ring[b] - x, ring[b + LANES] - y
+        b = 2 * ((j + 1) * LANES + lane)
+        bx, by = star[b] - x, star[b + 1] - y
         wx, wy = ay - by, bx - ax
         d = ax * by - ay * bx
         least = min(least, d)
@@ -61,14 +61,14 @@ def derivatives(x, y, ring, n, lane, power):
 
 
 @kernel
-def value_at(x, y, ring, n, lane, power):
+def value_at(x, y, star, n, lane, power):
     """F of one star with its free node at (x, y), infinite where a triangle is not positive."""
     value = 0.0
-    a = 2 * (n - 1) * LANES + lane
-    ax, ay = ring[a] - x, ring[a + LANES] - y
+    a = 2 * (n * LANES + lane)
+    ax, ay = star[a] - x, star[a + 1] - y
     for j in range(n):
-        b = 2 * j * LANES + lane
-        bx, by = ring[b] - x, ring[b + LANES] - y
+        b = 2 * ((j + 1) * LANES + lane)
+        bx, by = star[b] - x, star[b + 1] - y
         d = ax * by - ay * bx
         if not d > 0.0:
             return np.inf
@@ -90,25 +90,25 @@ def newton_step(gx, gy, xx, xy, yy):
 
 
 @kernel
-def descend(x, y, ring, n, lane, power):
+def descend(star, n, lane, power):
     """The shift of one star from (x, y): steps, halved until F falls, on and on
     until a whole one leaves it above FAR of what it was.
 
     No shift where nothing is gained; that to the mean of the ring where a triangle is not positive.
     """
-    dx, dy = 0.0, 0.0
+    x, y, dx, dy = star[2 * lane], star[2 * lane + 1], 0.0, 0.0
     for number in range(STEPS):
-        value, gx, gy, xx, xy, yy, least = derivatives(x + dx, y + dy, ring, n, lane, power)
+        value, gx, gy, xx, xy, yy, least = derivatives(x + dx, y + dy, star, n, lane, power)
         if number == 0 and not least > 0.0:
             for j in range(n):
-                dx += ring[2 * j * LANES + lane] - x
-                dy += ring[(2 * j + 1) * LANES + lane] - y
+                dx += star[2 * ((j + 1) * LANES + lane)] - x
+                dy += star[2 * ((j + 1) * LANES + lane) + 1] - y
             return dx / n, dy / n
         sx, sy = newton_step(gx, gy, xx, xy, yy)
         share = 1.0 / max(1.0 - power.ratio * (gx * sx + gy * sy) / value, 1.0 / MOST)
         after, whole = np.inf, True
         for _ in range(HALVINGS):
-            after = value_at(x + dx + share * sx, y + dy + share * sy, ring, n, lane, power)
+            after = value_at(x + dx + share * sx, y + dy + share * sy, star, n, lane, power)
             if after < value:
                 break
             share *= 0.5

@@ -56,14 +56,14 @@ def sweep(points, blocks, first, last, guard, circum, tally):
 
     circum: with circumcentres, else with centroids.
     """
-    x, ring, work, counts = stars.room(blocks.most)
+    room = stars.room_for(blocks.most)
     local, row, shift = np.empty(2 * blocks.most * LANES), np.empty(LANES), np.empty(2 * LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, x, ring, work, local)
+        n = stars.fetch(points, blocks, block, room, local)
         if circum:
             circumcentres(local, n, row, shift)
         else:
             centroids(local, n, row, shift)
-        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
+        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
     for k in range(len(tally)):
-        tally[k] += counts[k]
+        tally[k] += room.counts[k]

@@ -28,11 +28,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.block import DROPPED, MOVED
 from gmsnet.kernels.compile import kernel
 from gmsnet.kernels.guard import STAR, permitted
 from gmsnet.kernels.heap import build, update
 from gmsnet.kernels.quality import TINY, TWO_SQRT3
-from gmsnet.kernels.stars import DROPPED, MOVED
 
 INVALID, SUCCESS, REPEATED = 1e-4, 1e-3, 1e-5  # penalties: added, taken off (down to 0 at most), and added
 LAST, STUCK = 0, 1  # in ``memory``: the element that was transformed last (−1: none), and whether it was put back

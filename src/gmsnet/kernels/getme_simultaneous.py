@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels import stars
+from gmsnet.kernels.block import SIZE
 from gmsnet.kernels.compile import LANES, kernel
 from gmsnet.kernels.getme import shape, transformed
-from gmsnet.kernels.stars import SIZE
 
 
 @kernel
@@ -46,24 +46,26 @@ def mean_shifts(local, n, transformation, weights, shift):
 @kernel
 def plan(points, blocks, first, last, transformation, shifts):
     """The shifts (blocks, 2·LANES) of the stars in the blocks first…last; nothing moves."""
-    x, ring, work, _ = stars.room(blocks.most)
+    room = stars.room_for(blocks.most)
     local, weights = np.empty(2 * blocks.most * LANES), np.empty(LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, x, ring, work, local)
+        n = stars.fetch(points, blocks, block, room, local)
         mean_shifts(local, n, transformation, weights, shifts[block])
         for lane in range(LANES):
-            shifts[block, lane] *= work[SIZE * LANES + lane]
-            shifts[block, LANES + lane] *= work[SIZE * LANES + lane]
+            shifts[block, lane] *= room.work[SIZE * LANES + lane]
+            shifts[block, LANES + lane] *= room.work[SIZE * LANES + lane]
 
 
 @kernel
 def carry_out(points, blocks, first, last, guard, shifts, tally):
     """The guard moves the stars in the blocks first…last, of one colour, by their planned shifts."""
-    x, ring, work, counts = stars.room(blocks.most)
-    local = np.empty(2 * blocks.most * LANES)
+    room = stars.room_for(blocks.most)
+    local, shift = np.empty(2 * blocks.most * LANES), np.empty(2 * LANES)
     for block in range(first, last):
-        stars.fetch(points, blocks, block, x, ring, work, local)
-        work[SIZE * LANES : (SIZE + 1) * LANES] = 1.0  # the shifts are absolute: the ring has moved since
-        stars.commit(points, blocks, block, x, ring, work, shifts[block], guard, counts)
+        stars.fetch(points, blocks, block, room, local)
+        for lane in range(LANES):  # the shifts are absolute: the ring has moved since
+            shift[lane] = shifts[block, lane] / room.work[SIZE * LANES + lane]
+            shift[LANES + lane] = shifts[block, LANES + lane] / room.work[SIZE * LANES + lane]
+        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
     for k in range(len(tally)):
-        tally[k] += counts[k]
+        tally[k] += room.counts[k]

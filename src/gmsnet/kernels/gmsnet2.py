@@ -276,13 +276,13 @@ def conclude(local, n, mean, out, shift):
 @kernel
 def sweep(points, blocks, first, last, guard, network, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
-    x, ring, space, counts = stars.room(blocks.most)
+    block_room = stars.room_for(blocks.most)
     local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
     shift = np.empty(2 * LANES, dtype=np.float32)
     work = room(network, blocks.most)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, x, ring, space, local)
+        n = stars.fetch(points, blocks, block, block_room, local)
         propose(local, n, network, work, shift)
-        stars.commit(points, blocks, block, x, ring, space, shift, guard, counts)
+        stars.commit(points, blocks, block, block_room, local, shift, guard, block_room.counts)
     for k in range(len(tally)):
-        tally[k] += counts[k]
+        tally[k] += block_room.counts[k]

@@ -99,24 +99,6 @@ def surplus_above(px, py, qx, qy, delta, floor):
 
 
 @inlined
-def plain_surplus(px, py, qx, qy, twice):
-    """D − φL of the triangle (0, p, q), 2φ given, as computed: see ``surplus_bound``."""
-    half = (qx * qx + qy * qy) + (py * (py - qy) - px * (qx - px))
-    return (px * qy - py * qx) - twice * half
-
-
-@inlined
-def surplus_bound(extent, delta):
-    """By how much ``plain_surplus`` may be off, whatever φ is, with components of p and q of at most ``extent``.
-
-    A component is off by e = u·extent + 2δ. D changes by 4·extent·e + 2e² with that, and by 4u·extent² for its own
-    rounding; L/2 by 12·extent·e + 6e² and 22u·extent²; 2φ is at most 1/√3; the difference rounds by 9u·extent². That is
-    less than 37u·extent² + 22·extent·δ + 44δ² in all.
-    """
-    return 64.0 * (extent + delta) * (UNIT * extent + delta) + UNDERFLOW
-
-
-@inlined
 def most_of(px, py, qx, qy, delta):
     """The most that D/L of the triangle (0, p, q) can be in exact arithmetic; LARGEST where nothing is certain."""
     left = px * qy
@@ -172,7 +154,12 @@ def most_ratios(points, triangles, turn, blocks, unit, grain, first, last, least
             ratio[lane] = most_of(
                 px if forth else qx, py if forth else qy, qx if forth else px, qy if forth else py, unit * reach + grain
             )
-        least[number] = ratio.min()
+        width = LANES
+        while width > 1:  # in halves, which go abreast, where one after the other would not
+            width //= 2
+            for lane in range(width):
+                ratio[lane] = min(ratio[lane], ratio[width + lane])
+        least[number] = ratio[0]
 
 
 @inlined

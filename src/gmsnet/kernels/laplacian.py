@@ -25,8 +25,9 @@ def mean(local, n, shift):
         p = local[2 * j * LANES : 2 * (j + 1) * LANES]
         for k in range(2 * LANES):
             shift[k] += p[k]
+    factor = 1.0 / n
     for k in range(2 * LANES):
-        shift[k] /= n
+        shift[k] *= factor
 
 
 @kernel
@@ -125,11 +126,11 @@ def propose(local, n, variant, row, shift):
 @kernel
 def sweep(points, blocks, first, last, guard, variant, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
-    x, ring, work, counts = stars.room(blocks.most)
+    room = stars.room_for(blocks.most)
     local, row, shift = np.empty(2 * blocks.most * LANES), np.empty(3 * LANES), np.empty(2 * LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, x, ring, work, local)
+        n = stars.fetch(points, blocks, block, room, local)
         propose(local, n, variant, row, shift)
-        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
+        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
     for k in range(len(tally)):
-        tally[k] += counts[k]
+        tally[k] += room.counts[k]

@@ -139,13 +139,13 @@ def propose(objective, local, n, state, out, hessian, shift, other):
 @kernel
 def sweep(points, blocks, first, last, guard, objective, tally):
     """Smooths the blocks first…last (of one colour) once. tally: (3,), added to."""
-    x, ring, work, counts = stars.room(blocks.most)
+    room = stars.room_for(blocks.most)
     local = np.empty(2 * blocks.most * LANES)
     shift, other = np.empty(2 * LANES), np.empty(2 * LANES)
     state, out, hessian = np.empty(STATE * LANES), np.empty(OUT * LANES), np.empty(3 * LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, x, ring, work, local)
+        n = stars.fetch(points, blocks, block, room, local)
         propose(objective, local, n, state, out, hessian, shift, other)
-        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
+        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
     for k in range(len(tally)):
-        tally[k] += counts[k]
+        tally[k] += room.counts[k]

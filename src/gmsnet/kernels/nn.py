@@ -130,12 +130,12 @@ def room(table):
 @kernel
 def sweep(points, blocks, begin, end, guard, table, weights, tally):
     """Smooths the blocks begin…end (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
-    x, ring, work, counts = stars.room(blocks.most)
+    block_room = stars.room_for(blocks.most)
     local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
     box, inputs, first, second, shift = room(table)
     for block in range(begin, end):
-        n = stars.fetch(points, blocks, block, x, ring, work, local)
+        n = stars.fetch(points, blocks, block, block_room, local)
         propose(local, n, table, weights, box, inputs, first, second, shift)
-        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
+        stars.commit(points, blocks, block, block_room, local, shift, guard, block_room.counts)
     for k in range(len(tally)):
-        tally[k] += counts[k]
+        tally[k] += block_room.counts[k]

@@ -24,6 +24,7 @@ import math
 import numpy as np
 
 from gmsnet.kernels import bands, stars
+from gmsnet.kernels.block import SIZE
 from gmsnet.kernels.compile import LANES, inlined, kernel
 from gmsnet.kernels.objectives import aspect_squared
 
@@ -177,15 +178,15 @@ def sweep(points, blocks, areas, weight, kept, first, last, guard, tally):
 
     areas: as ``targets`` leaves them. kept: bands.Bands that no shift leaves.
     """
-    x, ring, work, counts = stars.room(blocks.most)
+    room = stars.room_for(blocks.most)
     local, wanted = np.empty(2 * blocks.most * LANES), np.empty(blocks.most * LANES)
     state, shift = np.empty(STATE * LANES), np.empty(2 * LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, x, ring, work, local)
-        offset = blocks.offset[block]
+        n = stars.fetch(points, blocks, block, room, local)
+        offset, sizes = blocks.offset[block], room.work[SIZE * LANES : (SIZE + 1) * LANES]
         for j in range(n):
             for lane in range(LANES):
-                size = work[stars.SIZE * LANES + lane]
+                size = sizes[lane]
                 wanted[j * LANES + lane] = areas[offset + j * LANES + lane] / (size * size)
         descend(local, n, wanted, weight, state)
         for lane in range(LANES):
@@ -197,7 +198,7 @@ def sweep(points, blocks, areas, weight, kept, first, last, guard, tally):
                     shift[lane] += local[2 * j * LANES + lane] / n
                     shift[LANES + lane] += local[(2 * j + 1) * LANES + lane] / n
         if len(kept.kept):
-            bands.shorten(kept, blocks, block, x, ring, work[stars.SIZE * LANES : (stars.SIZE + 1) * LANES], shift)
-        stars.commit(points, blocks, block, x, ring, work, shift, guard, counts)
+            bands.shorten(kept, blocks, block, room.star, sizes, shift)
+        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
     for k in range(len(tally)):
-        tally[k] += counts[k]
+        tally[k] += room.counts[k]

@@ -17,7 +17,7 @@ import numpy as np
 from gmsnet.kernels.barrier_star import newton_step
 from gmsnet.kernels.compile import inlined, kernel
 from gmsnet.kernels.guard import STAR, permitted, surplus_above, surplus_above_zero
-from gmsnet.kernels.stars import HALVINGS
+from gmsnet.kernels.truncation import HALVINGS
 
 MOST = 50.0  # times a Newton step: the longest one
 STEPS, FAR = 8, 0.8  # of a visit, at most: on while a step brings F below FAR of what it was
@@ -186,7 +186,7 @@ def allowed(star, n, x, y, tx, ty, delta):
 
 @kernel
 def way_there(star, n, x, y, tx, ty, unit, grain, single):
-    """How far (x, y) may go to (tx, ty): the halved shift that the guard allows (kernels.stars), and how often it was.
+    """How far (x, y) may go to (tx, ty): the halved shift that the guard allows (kernels.truncation), how often halved.
 
     No shift and HALVINGS if none is allowed.
     """

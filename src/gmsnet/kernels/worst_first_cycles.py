@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from gmsnet.kernels.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.compile import kernel
 from gmsnet.kernels.ranking import free_nodes, shapes_of
-from gmsnet.kernels.stars import DROPPED, HALVINGS, MOVED, TRUNCATED
+from gmsnet.kernels.truncation import HALVINGS
 from gmsnet.kernels.worst_first import descend, gather, way_there
 
 STILL = 1e-8  # of a spoke's square: a move of less leaves a star be

@@ -22,9 +22,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from gmsnet.kernels.block import MOVED
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.quality import glance
-from gmsnet.kernels.stars import MOVED
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field, Method, Smoother, Tally
 from gmsnet.methods.optimize import Newton

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels import barrier as kernels
 from gmsnet.kernels.barrier_star import Power
+from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.guard import Guard
-from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Field, Method, StarSmoother, Tally
 from gmsnet.workers import Share
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, Precision, most_ratios, plain_guard, star_floors
-from gmsnet.kernels.stars import Blocks
 from gmsnet.topology import Topology
 from gmsnet.workers import Share, serial
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import cvt as kernels
+from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.guard import Guard
-from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels import getme as kernels
 from gmsnet.kernels import getme_simultaneous
+from gmsnet.kernels.block import MOVED
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.getme import Elements, Queue, Transformation
-from gmsnet.kernels.stars import MOVED
 from gmsnet.methods.base import Field, Method, Options, Smoother, Tally
 from gmsnet.topology import Topology
 from gmsnet.workers import Share

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from gmsnet import weights
 from gmsnet.kernels import gmsnet as kernels
+from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.guard import Guard
-from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 

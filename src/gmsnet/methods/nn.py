@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from gmsnet import weights
 from gmsnet.kernels import nn as kernels
+from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.guard import Guard
-from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Method, StarSmoother, Tally
 from gmsnet.weights.shapes import NN_HIDDEN
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import adam, newton, objectives
+from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.guard import LARGEST, Guard
-from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Method, Options, StarSmoother, Tally
 
 

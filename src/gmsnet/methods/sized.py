@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels import sized as kernels
 from gmsnet.kernels.bands import Bands, no_bands
+from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.guard import Guard
-from gmsnet.kernels.stars import Blocks
 from gmsnet.methods.base import Field, Method, StarSmoother, Tally
 from gmsnet.topology import Topology
 from gmsnet.workers import Share

@@ -1,0 +1,80 @@
+"""A block of stars: LANES of one colour and degree n, and the arrays that one is worked on in.
+
+Coordinates stand as [node][lane][axis], flat, the free nodes first and then the rings: a pair is loaded and stored at
+once. Stars of one colour share no cell.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.compile import LANES, inlined, kernel
+
+MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
+COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
+# Rows of a block's work array. CENTRE, TARGET and KEPT have two, one an axis; PAIRS four, two [lane][axis]; FLOORS n.
+SIZE, REACH, CENTRE, TARGET, MARGIN, SHARE, KEPT, PAIRS, FLOORS = 0, 1, 2, 4, 6, 7, 8, 10, 14
+SURPLUS, WIDTH = range(2)  # rows of what a certificate is made of
+
+
+class Blocks(NamedTuple):
+    """The free nodes with their rings in blocks of LANES of one colour and degree (see kernels.layout.blocks).
+
+    filled: how many of the lanes hold stars of their own. most: the largest degree.
+    """
+
+    centre: NDArray[np.int32]
+    rings: NDArray[np.int32]
+    offset: NDArray[np.int64]
+    degree: NDArray[np.int32]
+    filled: NDArray[np.int32]
+    most: int
+
+
+class Room(NamedTuple):
+    """The arrays that a sweep works in. star: coordinates. work: rows of LANES. sums: for a certificate."""
+
+    star: NDArray[np.float64]
+    work: NDArray[np.float64]
+    sums: NDArray[np.float32]
+    counts: NDArray[np.int64]
+
+
+@kernel
+def room_for(most):
+    """For stars of up to so many nodes."""
+    return Room(
+        np.empty(2 * (1 + most) * LANES),
+        np.empty((FLOORS + most) * LANES),
+        np.empty(2 * LANES, dtype=np.float32),
+        np.zeros(COUNTERS, dtype=np.int64),
+    )
+
+
+@kernel
+def gather(points, blocks, block, n, star):
+    """Coordinates of the stars of a block, as they stand now."""
+    gather_row(points, blocks.centre[block * LANES : (block + 1) * LANES], star[: 2 * LANES])
+    offset = blocks.offset[block]
+    for j in range(n):
+        nodes = blocks.rings[offset + j * LANES : offset + (j + 1) * LANES]
+        gather_row(points, nodes, ring_row(star, j))
+
+
+@inlined
+def gather_row(points, nodes, row):
+    """x and y of a node, and so on."""
+    for lane in range(LANES):
+        i = np.uint32(nodes[lane])  # an index that may be negative is looked at twice
+        x, y = points[i, 0], points[i, 1]
+        row[2 * lane] = x
+        row[2 * lane + 1] = y
+
+
+@inlined
+def ring_row(star, j):
+    """The j-th ring nodes, [lane][axis]."""
+    return star[2 * (j + 1) * LANES : 2 * (j + 2) * LANES]
