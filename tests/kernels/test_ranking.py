@@ -53,3 +53,11 @@ def test_free_nodes_by_colour():
     np.testing.assert_array_equal(np.sort(nodes), wanted[colours[wanted] >= 0])
     assert (np.diff(colours[nodes]) >= 0).all()
     assert not seen.any()
+
+
+@given(values=st.lists(st.sampled_from([-1.0, 0.0, 0.5, 1.0]) | st.floats(-1, 1), min_size=1), data=st.data())
+def test_the_smallest_are_as_sorting_says(values, data):
+    rank = data.draw(st.integers(0, len(values) - 1))
+    before = np.array(values)
+    assert ranking.smallest(before, rank) == sorted(values)[rank]
+    np.testing.assert_array_equal(before, values)

@@ -117,7 +117,8 @@ def allowed(tx, ty, star, n, lane, delta, work):
         a = 2 * ((n if j == 0 else j) * LANES + lane)
         b = 2 * ((j + 1) * LANES + lane)
         was[0], was[1], was[2], was[3] = star[a], star[a + 1], star[b], star[b + 1]
-        now[:4] = was[:4]
+        for k in range(4):  # an assignment of slices would take seconds to compile
+            now[k] = was[k]
         if not permitted(was, now, delta, work[(FLOORS + j) * LANES + lane]):
             return False
     return True

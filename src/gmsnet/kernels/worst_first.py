@@ -178,7 +178,8 @@ def allowed(star, n, x, y, tx, ty, delta):
     for j in range(n):
         i = n - 1 if j == 0 else j - 1
         was[0], was[1], was[2], was[3] = star[2 * i], star[2 * i + 1], star[2 * j], star[2 * j + 1]
-        now[:4] = was[:4]
+        for k in range(4):  # an assignment of slices would take seconds to compile
+            now[k] = was[k]
         if not permitted(was, now, delta, star[2 * n + j]):
             return False
     return True

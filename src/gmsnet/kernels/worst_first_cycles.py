@@ -8,7 +8,7 @@ import numpy as np
 
 from gmsnet.kernels.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.compile import kernel
-from gmsnet.kernels.ranking import free_nodes, shapes_of
+from gmsnet.kernels.ranking import free_nodes, shapes_of, smallest
 from gmsnet.kernels.truncation import HALVINGS
 from gmsnet.kernels.worst_first import descend, gather, way_there
 
@@ -28,7 +28,7 @@ def cycles(points, triangles, turn, cells, colours, colours_most, start, around,
     before = shape.min()
     for c in range(len(plan)):
         wanted = min(plan[c, 0], len(cells))
-        limit = np.partition(shape, wanted - 1)[wanted - 1]
+        limit = smallest(shape, wanted - 1)
         scale = max(shape.min(), LEAST) / math.sqrt(3.0)
         nodes = free_nodes(triangles, cells, shape, limit, colours, colours_most, mark)
         visit(points, nodes, start, around, guard, plan[c, 1], plan[c, 2], scale, mark, tally)
