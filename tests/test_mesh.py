@@ -229,3 +229,16 @@ def test_memory_that_may_change_is_copied():
 
 def test_blocks_may_come_from_a_generator():
     assert len(full(cells=(b for b in [block()])).cells) == 1
+
+
+def test_other_points_change_nothing_else():
+    mesh = full(points=np.column_stack([POINTS, np.zeros(4)]))
+    assert mesh.plane == (0, 1)
+    other = mesh.with_points(mesh.points[:, [2, 0, 1]])
+    assert other.plane == (1, 2)
+    assert mesh.plane == (0, 1)
+    assert {name: value for name, value in vars(other).items() if name not in ("points", "plane")} == {
+        name: value for name, value in vars(mesh).items() if name not in ("points", "plane")
+    }
+    with pytest.raises(InputError, match=r"node 2 .* not finite"):
+        mesh.with_points(np.where(np.arange(4)[:, None] == 2, np.nan, mesh.points))

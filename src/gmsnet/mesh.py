@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Protocol
@@ -101,11 +102,7 @@ class Mesh:
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        points = float64_rows(coordinates(self.points))
-        finite = np.isfinite(points).all(axis=1)
-        if not finite.all():
-            bad = int(np.flatnonzero(~finite)[0])
-            raise InputError(f"node {bad} (counted from 0) has a coordinate that is not finite: {points[bad].tolist()}")
+        points = _finite(self.points)
         cells = _blocks(self.cells)
         for block in cells:
             if block.nodes.size and (block.nodes.min() < 0 or block.nodes.max() >= len(points)):
@@ -140,7 +137,10 @@ class Mesh:
         """The same mesh with other coordinates (same shape as ``points``)."""
         if np.shape(points) != self.points.shape:
             raise InputError(f"new points must have the shape {self.points.shape}, got {np.shape(points)}")
-        return replace(self, points=points)
+        made = copy(self)  # all else has been checked
+        made.__dict__.pop("plane", None)
+        object.__setattr__(made, "points", _finite(points))
+        return made
 
     @cached_property
     def plane(self) -> tuple[int, int] | None:
@@ -180,6 +180,14 @@ class Mesh:
 def in_words(nodes: int) -> str:
     """Which nodes a mesh of so many has."""
     return f"the nodes 0 to {nodes - 1}" if nodes else "no nodes"
+
+
+def _finite(points: Any) -> NDArray[np.float64]:
+    array = float64_rows(coordinates(points))
+    if not np.isfinite(array).all():
+        bad = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise InputError(f"node {bad} (counted from 0) has a coordinate that is not finite: {array[bad].tolist()}")
+    return array
 
 
 def _blocks(cells: Any) -> tuple[CellBlock, ...]:

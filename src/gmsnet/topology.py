@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -247,18 +248,52 @@ def _first_reason(reasons: dict[str, Flags]) -> dict[str, NDArray[np.int64]]:
     return held
 
 
-def planar_points(mesh: Mesh) -> NDArray[np.float64]:
+class Flat(Protocol):
+    """Points in a plane: a Mesh, or what is kept of one. See there."""
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(N × 2 or N × 3) coordinates."""
+        ...
+
+    @property
+    def plane(self) -> tuple[int, int] | None:
+        """The two axes."""
+        ...
+
+    @property
+    def single(self) -> bool:
+        """Are they in single precision?"""
+        ...
+
+
+def planar_points(mesh: Flat) -> NDArray[np.float64]:
     """The points in the plane of the mesh (N, 2), divided by 2 to the power of ``scale_exponent``, which is exact.
 
     The largest coordinate is then near 1, so that products of tiny or huge ones neither under- nor overflow. Of a mesh
     that is not planar, the first two coordinates.
     """
-    points = np.ascontiguousarray(mesh.points[:, mesh.plane or (0, 1)])
     exponent = scale_exponent(mesh)
-    return np.ldexp(points, -exponent) if exponent else points
+    if abs(exponent) < 1000:
+        return np.ascontiguousarray(_in_plane(mesh) * 2.0**-exponent)
+    return np.ldexp(_in_plane(mesh), -exponent)
 
 
-def scale_exponent(mesh: Mesh) -> int:
+def near_points(mesh: Flat, topology: Topology) -> NDArray[np.float64]:
+    """The same by places in memory."""
+    return np.take(planar_points(mesh), topology.memory, axis=0)
+
+
+def scale_exponent(mesh: Flat) -> int:
     """The power of two by which ``planar_points`` divides: none in single precision, where nothing can overflow."""
-    largest = float(np.abs(mesh.points[:, mesh.plane or (0, 1)]).max(initial=0.0))
-    return int(np.frexp(largest)[1]) if largest > 0.0 and not mesh.single else 0
+    if mesh.single:
+        return 0
+    points = _in_plane(mesh)
+    largest = max(-float(points.min(initial=0.0)), float(points.max(initial=0.0)))
+    return int(np.frexp(largest)[1])
+
+
+def _in_plane(mesh: Flat) -> NDArray[np.float64]:
+    """(N, 2) view."""
+    first, second = mesh.plane or (0, 1)
+    return mesh.points[:, first : second + 1 : second - first]
