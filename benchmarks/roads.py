@@ -18,9 +18,8 @@ from machine import describe
 from sweeps import averaging_matrix
 
 import gmsnet
-from gmsnet.kernels import quality
-from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import LEVELS, Precision
+from gmsnet.measure import totals_of
 from gmsnet.methods import smoother
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field
@@ -75,7 +74,6 @@ class Case:
         self.topology = Topology.of(mesh)
         self.start = planar_points(mesh)[self.topology.memory]
         self.matrix = averaging_matrix(self.topology)
-        self.sums = np.empty((-(-len(self.topology.near) // LANES), quality.SUMS))
 
     def unit(self):
         began = time.thread_time()
@@ -83,9 +81,7 @@ class Case:
         return time.thread_time() - began
 
     def standing(self, points):
-        near, turn = self.topology.near, self.topology.near_turn
-        quality.summarise(points, near, turn, 0, len(self.sums), False, self.sums)
-        return Standing.of(self.sums, len(near), "shape")
+        return Standing.of(totals_of(points, self.topology.near, self.topology.near_turn), "shape")
 
     def travel(self, road, level):
         """Seconds of each stage, and how the mesh stands after it."""

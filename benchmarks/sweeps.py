@@ -20,9 +20,8 @@ import scipy.sparse
 from machine import describe
 
 import gmsnet
-from gmsnet.kernels import quality as measures
-from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import Precision
+from gmsnet.measure import totals_of
 from gmsnet.methods import METHODS, Field, smoother
 from gmsnet.topology import Topology, planar_points
 from gmsnet.workers import workers
@@ -52,11 +51,10 @@ def measure(nodes, threads, repeats):
     stars = topology.stars
     points = planar_points(mesh)[topology.memory]
     matrix = averaging_matrix(topology)
-    sums = np.empty((-(-len(topology.near) // LANES), measures.SUMS))
     jobs = {
         "L": lambda: matrix @ points,
         "set-up": lambda: Topology.of(mesh).stars,
-        "measures": lambda: measures.summarise(points, topology.near, topology.near_turn, 0, len(sums), False, sums),
+        "measures": lambda: totals_of(points, topology.near, topology.near_turn),
     }
     stack = ExitStack()
     for name, method in METHODS.items():

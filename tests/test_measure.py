@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 import gmsnet
 from gmsnet import CellBlock, Mesh
-from gmsnet.measure import exact_signs, measure
+from gmsnet.measure import exact_signs, measure, percentile, totals_of
+from gmsnet.topology import Topology, near_points
 
 
 def triangles_mesh(points, triangles, **kwargs):
@@ -35,6 +36,111 @@ def test_every_measure_equals_its_twin():
         # A triangle that shares no edge is a part of its own, and its own area is the positive one.
         assert report.shape[t] == pytest.approx(abs(shape), rel=1e-12)
         assert report.aspect[t] == pytest.approx(abs(aspect), rel=1e-12)
+
+
+def true_measures(mpmath, a, b, c):
+    """Smallest and largest angle, 1/q, 1/q_V to 50 digits, and the ratio of the longest to the shortest side."""
+    corners = [[mpmath.mpf(float(v)) for v in p] for p in (a, b, c)]
+    (ax, ay), (bx, by), (cx, cy) = corners
+    double = abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
+    angles, sides = [], []
+    for k in range(3):
+        (px, py), (qx, qy), (rx, ry) = (corners[(k + m) % 3] for m in range(3))
+        dot = (qx - px) * (rx - px) + (qy - py) * (ry - py)
+        angles.append(mpmath.degrees(mpmath.atan2(double, dot)))
+        sides.append(mpmath.sqrt((qx - px) ** 2 + (qy - py) ** 2))
+    shape = 2 * mpmath.sqrt(3) * double / sum(side**2 for side in sides)
+    aspect = 2 * mpmath.sqrt(3) * double / (max(sides) * sum(sides))
+    return min(angles), max(angles), shape, aspect, float(max(sides) / min(sides))
+
+
+@pytest.mark.parametrize("kind", ["any", "thin at b and c", "thin at a and b", "flat", "far from the origin"])
+def test_measures_err_by_few_units_in_the_last_place(kind):
+    """Of 180° and of 1, times the ratio of the sides: so far the rounding of the area alone may turn an angle."""
+    mpmath = pytest.importorskip("mpmath")
+    rng = np.random.default_rng(1)
+    count = 300
+    corners, small = rng.normal(size=(count, 3, 2)), 10.0 ** rng.uniform(-8, 0, (count, 1))
+    if kind == "thin at b and c":
+        corners[:, 2] = corners[:, 1] + corners[:, 2] * small
+    elif kind == "thin at a and b":
+        corners[:, 1] = corners[:, 0] + corners[:, 1] * small
+    elif kind == "flat":
+        corners[:, :, 1] *= small
+    elif kind == "far from the origin":
+        corners = 1e-3 * corners + rng.normal(size=(count, 1, 2))
+    report = measure(triangles_mesh(corners.reshape(-1, 2), np.arange(3 * count).reshape(-1, 3)))
+    with mpmath.workdps(50):
+        for t in range(count):
+            low, high, shape, aspect, ratio = true_measures(mpmath, *corners[t])
+            assert abs(report.min_angle[t] - low) <= 1.5e-14 * ratio
+            assert abs(report.max_angle[t] - high) <= 3e-14 * ratio
+            assert abs(report.shape[t] - shape) <= 5e-16 * ratio
+            assert abs(report.aspect[t] - aspect) <= 5e-16 * ratio
+
+
+def test_round_angles_are_exact():
+    root = math.sqrt(3.0)
+    points = np.array([[0, 0], [1, 0], [0, 1], [2, 0], [0.5, root / 2], [1.5, root / 2], [0, 0.5]])
+    report = measure(triangles_mesh(points, [[0, 1, 2], [0, 1, 3], [0, 1, 4], [0, 1, 5], [0, 3, 6]]))
+    assert report.max_angle[[0, 1, 4]].tolist() == [90.0, 180.0, 90.0]
+    assert report.min_angle[[0, 1]].tolist() == [45.0, 0.0]
+    # The coordinates of the others are rounded themselves.
+    np.testing.assert_allclose(report.max_angle[[2, 3]], [60.0, 120.0], rtol=0, atol=1.5e-14)
+    np.testing.assert_allclose(report.min_angle[[2, 3]], [60.0, 30.0], rtol=0, atol=1.5e-14)
+
+
+@pytest.mark.parametrize("count", [1, 2, 63, 64, 65, 500])
+def test_the_totals_are_those_of_the_columns(count):
+    points, triangles = soup(np.random.default_rng(count), count)
+    report = measure(triangles_mesh(points, triangles))
+    totals = report.totals
+    for name, column in (("low", report.min_angle), ("high", report.max_angle), ("shape", report.shape),
+                         ("aspect", report.aspect)):  # fmt: skip
+        assert getattr(totals, f"{name}_mean") == math.fsum(column) / count
+    assert totals.low_min == report.min_angle.min()
+    assert totals.high_max == report.max_angle.max()
+    assert totals.shape_min == report.shape.min()
+    assert totals.aspect_min == report.aspect.min()
+
+
+def test_the_order_of_nodes_and_triangles_does_not_change_a_bit_of_the_totals():
+    mesh = gmsnet.random_mesh(3000, seed=7)
+    triangles = Topology.of(mesh).triangles
+    one = measure(triangles_mesh(mesh.points, triangles))
+    rng = np.random.default_rng(0)
+    order = rng.permutation(len(mesh.points))
+    other = measure(triangles_mesh(mesh.points[order], np.argsort(order)[rng.permutation(triangles)]))
+    assert one.totals == other.totals
+    assert (one.qhat, one.qhat_aspect) == (other.qhat, other.qhat_aspect)
+
+
+def test_how_the_work_is_shared_out_does_not_change_a_bit_of_the_totals():
+    mesh = gmsnet.random_mesh(3000, seed=7)
+    topology = Topology.of(mesh)
+    given = near_points(mesh, topology), topology.near, topology.near_turn
+
+    def parts(ends):
+        return lambda work, first, last: [work(a, b) for a, b in zip([first, *ends], [*ends, last], strict=True)]
+
+    whole = totals_of(*given)
+    for ends in ([1], [17, 40], [40, 41, 42, 90]):
+        assert totals_of(*given, parts(ends)) == whole
+
+
+def test_what_is_changed_later_does_not_change_a_report():
+    mesh = gmsnet.random_mesh(200, seed=1)
+    points, triangles = mesh.points.copy(), np.array(Topology.of(mesh).triangles)
+    report, result = gmsnet.quality((points, triangles)), gmsnet.smooth((points, triangles))
+    wanted = [measure(mesh), measure(mesh.with_points(result.points))]
+    points += 5.0 * np.random.default_rng(0).random(points.shape)
+    result.points[:] = 0.0
+    result.mesh[0][:] = 0.0
+    triangles[:] = 0
+    for made, known in ((report, wanted[0]), (result.before, wanted[0]), (result.after, wanted[1])):
+        for name in ("min_angle", "max_angle", "shape", "aspect", "centre", "valid"):
+            np.testing.assert_array_equal(getattr(made, name), getattr(known, name))
+        assert made.summary() == known.summary()
 
 
 def test_it_equals_vtk():
@@ -119,6 +225,23 @@ def test_the_summary_counts():
     assert summary["shape"]["below_0.3"] == int((report.shape < 0.3).sum())
     assert summary["max_angle"]["above_150"] == int((report.max_angle > 150).sum())
     assert summary["triangles"] == len(report.cell)
+
+
+@given(st.integers(1, 60), st.integers(1, 99), st.integers(0, 2**32 - 1))
+def test_percentiles(count, percent, seed):
+    values = np.random.default_rng(seed).normal(size=count).round(1)
+    assert percentile(values, percent) == pytest.approx(np.percentile(values, percent), rel=1e-14, abs=1e-15)
+
+
+def test_the_worst_are_told_in_the_order_of_the_file_where_they_are_alike():
+    x, y = np.meshgrid(np.arange(8.0), np.arange(8.0) ** 1.2)
+    node = np.arange(64).reshape(8, 8)
+    halves = [(node[:-1, :-1], node[:-1, 1:], node[1:, 1:]), (node[:-1, :-1], node[1:, 1:], node[1:, :-1])]
+    triangles = np.concatenate([np.stack(half, axis=-1).reshape(-1, 3) for half in halves])
+    report = measure(triangles_mesh(np.column_stack([x.ravel(), y.ravel()]), triangles))
+    wanted = np.argsort(report.shape, kind="stable").tolist()
+    for count in (0, 1, 5, 20, len(triangles), 1000):
+        assert report.worst(count).tolist() == wanted[:count]
 
 
 def test_a_mesh_without_triangles_has_an_empty_report():

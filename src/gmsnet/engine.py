@@ -29,9 +29,10 @@ from gmsnet.run import NOTHING_TO_MOVE as NOTHING_TO_MOVE
 from gmsnet.run import TARGET_REACHED as TARGET_REACHED
 from gmsnet.run import Run, outcome, precision_of, rank_by
 from gmsnet.run import Sweep as Sweep
+from gmsnet.standing import Standing
 from gmsnet.tangles import UnmendedCell, beside, mended, still_inverted
 from gmsnet.targets import Target, reach_target
-from gmsnet.topology import Topology, planar_points
+from gmsnet.topology import Topology, near_points
 from gmsnet.wall_stage import improve_near_walls
 from gmsnet.workers import available_threads
 
@@ -124,9 +125,9 @@ def smooth(
     given, restore = to_mesh(mesh)
     refuse_unless_planar(given)
     topology = Topology.of(given, fixed_mask(given, fixed))
-    before = measure(given, topology)
+    start = given_points = near_points(given, topology)
+    before = measure(given, topology, start)
     protection = protected(given, topology, preserve, fix_layers)
-    start = planar_points(given)[topology.memory]
     reasons: dict[tuple[int, ...], str] = {}
     untangling: list[str] = []
     if untangle and before.inverted:
@@ -146,7 +147,8 @@ def smooth(
             report=None if before.inverted else before, **options,
         )  # fmt: skip
     else:
-        run = Run(given, topology, chosen, points=start, **options)
+        standing = Standing.of(before.totals, best_by) if start is given_points else None
+        run = Run(given, topology, chosen, points=start, standing=standing, **options)
         stop_reason = run.to_the_end(max_sweeps, None, callback)
         best, history = run.best, run.history
         if protection.kept is not None and stop_reason in (NO_PROGRESS, NOTHING_TO_MOVE):
@@ -161,10 +163,10 @@ def smooth(
 
     rank = target.rank if target else rank_by(best_by)
     try:
-        points, moved, after = outcome(given, topology, best, before, rank)
+        points, moved, after = outcome(given, topology, best, before, rank, given_points)
     except KeyboardInterrupt:  # nothing is lost by finishing what takes less than a sweep
         stop_reason = INTERRUPTED
-        points, moved, after = outcome(given, topology, best, before, rank)
+        points, moved, after = outcome(given, topology, best, before, rank, given_points)
     return SmoothResult(
         mesh=restore(points),
         points=points.copy(),

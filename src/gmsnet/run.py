@@ -11,16 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.arguments import ASPECT
-from gmsnet.kernels import quality as kernels
+from gmsnet.kernels.back import put_back
 from gmsnet.kernels.block import MOVED
-from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import LEVELS, Precision
-from gmsnet.measure import QualityReport, measure
+from gmsnet.measure import QualityReport, measure, totals_of
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Field, Smoother, Tally
 from gmsnet.standing import Standing
-from gmsnet.topology import Topology, planar_points, scale_exponent
-from gmsnet.workers import Share, workers
+from gmsnet.topology import Topology, near_points, scale_exponent
+from gmsnet.workers import Share, serial, workers
 
 Floats = NDArray[np.float64]
 
@@ -58,15 +57,16 @@ class Run:
     """The state of one run: coordinates in memory order, the best so far, and the record.
 
     points: to start from, in memory order (default: the mesh's own). history: to go on with. precision: of
-    the mesh, where it is known.
+    the mesh, where it is known; standing: of those points, where it is.
     """
 
     def __init__(
         self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str, guard: str,
         points: Floats | None = None, history: list[Sweep] | None = None, precision: Precision | None = None,
+        standing: Standing | None = None,
     ) -> None:  # fmt: skip
         self.topology, self.smoother, self.best_by = topology, smoother, best_by
-        start = planar_points(mesh)[topology.memory] if points is None else points
+        start = near_points(mesh, topology) if points is None else points
         self.field = Field(start.copy(), topology, precision or precision_of(mesh), LEVELS.index(guard))
         self.threads = threads
         self.history: list[Sweep] = [] if history is None else history
@@ -74,8 +74,7 @@ class Run:
         self.first = len(self.history)
         self.tally: Tally = np.zeros(3, dtype=np.int64)  # since the last look
         self.stages: dict[str, None] = {}  # since the last look, in their order
-        self.sums = np.empty((-(-len(topology.near) // LANES), kernels.SUMS))
-        self.best, self.best_standing = start, self._standing()
+        self.best, self.best_standing = start, standing or self._standing()
 
     def to_the_end(self, max_sweeps: int, target: float | None, callback: Callable[[Sweep], bool | None] | None) -> str:
         """Sweeps until a stop rule says why to stop. target: the least 1/q of a cell that is enough."""
@@ -129,18 +128,10 @@ class Run:
             self.best, self.best_standing = self.field.points.copy(), standing
         return better
 
-    def _standing(self, share: Share | None = None) -> Standing:
+    def _standing(self, share: Share = serial) -> Standing:
         """The sums over all triangles of the coordinates as they are."""
-        triangles, turn = self.topology.near, self.topology.near_turn
-
-        def add(first: int, last: int) -> None:
-            kernels.summarise(self.field.points, triangles, turn, first, last, self.best_by == ASPECT, self.sums)
-
-        if share is None:
-            add(0, len(self.sums))
-        else:
-            share(add, 0, len(self.sums))
-        return Standing.of(self.sums, len(triangles), self.best_by)
+        totals = totals_of(self.field.points, self.topology.near, self.topology.near_turn, share)
+        return Standing.of(totals, self.best_by)
 
     def _stalled(self) -> bool:
         """Has nothing been gained for PATIENCE looks?"""
@@ -161,26 +152,35 @@ def precision_of(mesh: Mesh) -> Precision:
 
 
 def outcome(
-    mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any]
-) -> tuple[Floats, NDArray[np.bool_], QualityReport]:
+    mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
+    start: Floats | None = None,
+) -> tuple[Floats, NDArray[np.bool_], QualityReport]:  # fmt: skip
     """Points (N, dim), which of them moved, and their measures; those of the input if the quick sums misjudged them.
 
     best: (N, 2) in memory order. All nodes that it does not move keep their very bits. rank: of two meshes that of the
-    lesser rank is the better.
+    lesser rank is the better. start: ``near_points`` of the mesh, where they are known.
     """
-    elsewhere = (best != planar_points(mesh)[topology.memory]).any(axis=1)
-    moved = np.zeros(len(mesh.points), dtype=bool)
-    if elsewhere.any():
-        ids, plane = topology.memory[elsewhere], mesh.plane
-        assert plane is not None
-        points = mesh.points.copy()
-        points[np.ix_(ids, plane)] = np.ldexp(best[elsewhere], scale_exponent(mesh))
-        moved[ids] = True
-        after = measure(mesh.with_points(points), topology)
+    start = near_points(mesh, topology) if start is None else start
+    plane, factors = mesh.plane, _factors(scale_exponent(mesh))
+    assert plane is not None
+    points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
+    count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)
+    if count:
+        points.flags.writeable = False  # so that the mesh need not copy them
+        after = measure(mesh.with_points(points), topology, best if exact else None)
         if rank(after) <= rank(before):
             return points, moved, after
         moved[:] = False
     return mesh.points, moved, before
+
+
+def _factors(exponent: int) -> tuple[float, float]:
+    """Two normal powers of two by which to multiply one after the other for 2 to the power of the exponent.
+
+    The first one is 1 unless the exponent is too large or too small for a single float.
+    """
+    most = max(min(exponent, 1000), -1000)
+    return 2.0 ** (exponent - most), 2.0**most
 
 
 def rank_by(best_by: str) -> Callable[[QualityReport], Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import ranking
-from gmsnet.kernels.quality import per_cell
+from gmsnet.kernels.quality import LOW, per_cell
 from gmsnet.measure import QualityReport
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Smoother
@@ -130,9 +130,9 @@ def look(points: Floats, topology: Topology, target: Target, rows: Ints) -> Miss
     shape, low = np.empty(len(rows)), np.zeros(len(rows))
     ranking.shapes_of(points, triangles, turn, rows, shape)
     if target.angle is not None:
-        others = np.empty((3, len(rows)))
-        per_cell(points, triangles[rows], turn[rows], low, *others)
-        low = np.degrees(low)
+        columns = np.empty((4, len(rows)))
+        per_cell(points, triangles[rows], turn[rows], columns)
+        low = columns[LOW]
     missed = target.missed(shape / SURE, low / SURE)
     return Missed(rows[missed], float(shape[missed].min(initial=np.inf)))
 

@@ -62,11 +62,11 @@ def near_walls(mesh: Mesh, topology: Topology) -> Flags:
             chosen[rows] = True
     if rough is not None and chosen.any():
         kept[triangles[chosen]] = True
-        low, high, shape, aspect = (np.empty(len(triangles)) for _ in range(4))
-        quality.per_cell(points, triangles, topology.turn, low, high, shape, aspect)
+        columns = np.empty((4, len(triangles)))
+        quality.per_cell(points, triangles, topology.turn, columns)
         free = np.zeros(len(kept), dtype=bool)
         free[topology.free] = True
-        damaged = chosen & ((rough > ROUGH) | (shape < SOUND)) & free[triangles].any(axis=1)
+        damaged = chosen & ((rough > ROUGH) | (columns[quality.SHAPE] < SOUND)) & free[triangles].any(axis=1)
         kept[triangles[damaged]] = False
     return kept
 
