@@ -127,7 +127,7 @@ def smooth(
     topology = Topology.of(given, fixed_mask(given, fixed))
     start = given_points = near_points(given, topology)
     before = measure(given, topology, start)
-    protection = protected(given, topology, preserve, fix_layers)
+    protection = protected(given, topology, preserve, fix_layers, start)
     reasons: dict[tuple[int, ...], str] = {}
     untangling: list[str] = []
     if untangle and before.inverted:

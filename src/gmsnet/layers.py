@@ -18,21 +18,19 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
 from numpy.typing import NDArray
 
-from gmsnet.kernels import stretch
+from gmsnet.kernels import connectivity, stretch
+from gmsnet.kernels.pieces import pieces, surroundings
 from gmsnet.mesh import Mesh
+from gmsnet.survey import FEW, MOST, SEED, Survey
 from gmsnet.topology import Topology, planar_points
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 
-MOST = math.log(4.0)  # a larger stretch counts as this one where means are formed
-SEED = math.log(2.8)  # the stretch of the mean over two rings from which cells are stretched on purpose
 REACH = math.log(2.5)  # the mean stretch of a star to which a layer extends; right triangles with legs 1 and 2 have it
 ALIKE = math.log(1.8)  # the same of the mean of v, if in little: the halves of squares have 1.73
-FEW = 4  # cells: nodes of fewer weigh less
 FEWEST = 6  # nodes above SEED that hang together
 RINGS = 4  # how far a layer extends beyond those, in edges
 EVEN = 0.2  # of the mean area of a star: the least of its areas where a layer goes around a corner
@@ -73,67 +71,64 @@ class Layers:
         )
 
 
-def stretched_layers(mesh: Mesh, topology: Topology) -> Layers:
+def stretched_layers(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> Layers:
     """The layers of a planar mesh, as it is now. topology: of this mesh; which nodes it holds has no influence.
 
-    The result does not depend on the order of nodes and cells, nor on where the mesh lies and how large it is.
+    The result does not depend on the order of nodes and cells, nor on where the mesh lies and how large it is. survey:
+    of this mesh, where it is known.
     """
     triangles, turn = topology.near, topology.near_turn
-    points = planar_points(mesh)[topology.memory]
-    count = len(points)
+    count = len(topology.memory)
     nothing = Layers(np.zeros(count, dtype=bool), np.zeros(len(triangles), dtype=bool), 1.0, 1.0, 0)
     if not len(triangles) or topology.plane is None:
         return nothing
-    cells, number = np.empty((len(triangles), stretch.COLUMNS)), np.empty(count, dtype=np.int32)
-    stretch.per_cell(points, triangles, turn, MOST, cells)
-    seeds = _coherent(triangles, cells, _rim(topology), number)
-    if not seeds.any():
+    survey = survey or Survey.of(mesh, topology)
+    layer = _seeds(survey, topology)
+    if not layer.any():
         return nothing
+    cells, number = np.empty((len(triangles), stretch.COLUMNS)), np.empty(count, dtype=np.int32)
+    stretch.per_cell(survey.points, triangles, turn, MOST, cells)
     means = np.empty((count, stretch.COLUMNS))
     stretch.to_nodes(triangles, np.zeros(count, dtype=bool), 1, cells, means, number)
     alike = np.hypot(means[:, stretch.ALONG], means[:, stretch.ACROSS]) >= ALIKE
     least = np.full(count, np.inf)
     np.minimum.at(least, triangles.ravel(), np.repeat(cells[:, stretch.AREA], 3))
     even = least >= EVEN * means[:, stretch.AREA]
-    layer = _grown(triangles, seeds, alike | (even & (means[:, stretch.LENGTH] >= REACH)))
-    if not layer.any():
-        return nothing
+    candidates = alike | (even & (means[:, stretch.LENGTH] >= REACH))
+    for _ in range(RINGS):
+        touched = np.zeros(count, dtype=bool)
+        touched[triangles[connectivity.touching(triangles, layer)]] = True
+        layer |= touched & candidates
     held = np.empty(count, dtype=bool)
     held[topology.memory] = layer
     return _layers(mesh, topology, held)
 
 
-def _rim(topology: Topology) -> Flags:
-    """(N,) by places in memory: nodes of the boundary and of interfaces."""
-    ids = [topology.held.get(reason, ()) for reason in ("boundary", "interface between regions")]
-    flags = np.zeros(len(topology.memory), dtype=bool)
-    flags[np.concatenate(ids).astype(np.int64)] = True
-    return flags[topology.memory]
+def _seeds(survey: Survey, topology: Topology) -> Flags:
+    """(N,) by places in memory: nodes that hang together, FEWEST or more, of which the mean over two rings is SEED.
+
+    The mean of v, or more; cells with a node of the boundary or of an interface do not count.
+    """
+    seeds = np.zeros(len(survey.rim), dtype=bool)
+    if not survey.suspects.any():
+        return seeds
+    rows, corners, nodes = surroundings(topology.near, survey.suspects)
+    cells = np.empty((len(rows), stretch.COLUMNS))
+    stretch.per_cell(survey.points[nodes], corners, topology.near_turn[rows], MOST, cells)
+    strong = _coherent(corners, cells, survey.rim[nodes] > 0) & survey.suspects[nodes]
+    piece = pieces(corners, strong)
+    seeds[nodes[strong & (np.bincount(piece[strong], minlength=len(nodes)) >= FEWEST)[piece]]] = True
+    return seeds
 
 
-def _coherent(triangles: NDArray[np.int32], cells: Floats, rim: Flags, number: NDArray[np.int32]) -> Flags:
+def _coherent(triangles: NDArray[np.int32], cells: Floats, rim: Flags) -> Flags:
     """(N,) where the mean of v over two rings is SEED or longer; cells with a node of the rim do not count."""
-    nodes, around = np.empty((len(rim), 2)), np.empty((len(triangles), 2))
+    nodes, around, number = np.empty((len(rim), 2)), np.empty((len(triangles), 2)), np.empty(len(rim), dtype=np.int32)
     stretch.to_nodes(triangles, rim, FEW, cells, nodes, number)
     # A corner of a cell that counts has a cell that counts, so no mean is formed with the zeros of nodes without one.
     stretch.to_cells(triangles, nodes, around)
     stretch.to_nodes(triangles, rim, FEW, around, nodes, number)
     return np.asarray((nodes**2).sum(axis=1) >= SEED**2)
-
-
-def _grown(triangles: NDArray[np.int32], seeds: Flags, candidates: Flags) -> Flags:
-    """(N,) pieces of FEWEST seeds or more, and the candidates up to RINGS edges away from them, over candidates."""
-    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    nodes = len(seeds)
-    inside = edges[seeds[edges].all(axis=1)]
-    graph = scipy.sparse.coo_matrix((np.ones(len(inside), dtype=bool), inside.T), shape=(nodes, nodes))
-    pieces, piece = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    layer = np.asarray(seeds & (np.bincount(piece[seeds], minlength=pieces) >= FEWEST)[piece])
-    for _ in range(RINGS if layer.any() else 0):
-        touched = layer.copy()
-        touched[edges[layer[edges].any(axis=1)]] = True
-        layer |= touched & candidates
-    return layer
 
 
 def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers:
@@ -142,8 +137,10 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers:
     cells, number = np.empty((len(triangles), stretch.COLUMNS)), np.empty(len(layer), dtype=np.int32)
     points = planar_points(mesh)
     stretch.per_cell(points, triangles, topology.turn, math.inf, cells)
-    chosen: Flags = np.asarray(layer[triangles].all(axis=1))
-    chosen |= _next_row(triangles, layer, chosen, cells)
+    corners = np.take(layer.astype(np.int8), triangles)
+    count = corners[:, 0] + corners[:, 1] + corners[:, 2]  # of a cell's corners that are in a layer
+    chosen: Flags = np.asarray(count == 3)
+    chosen[_next_row(triangles, layer, count, cells)] = True
     damaged = chosen & (cells[:, stretch.AREA] <= BROKEN * _area_around(triangles, cells, number))
     nodes = np.zeros(len(layer), dtype=bool)
     nodes[triangles[chosen]] = True
@@ -152,20 +149,27 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers:
     return Layers(nodes, chosen, float(np.median(lengths)), float(lengths.max()), int(damaged.sum()))
 
 
-def _next_row(triangles: NDArray[np.int32], layer: Flags, inside: Flags, cells: Floats) -> Flags:
-    """(T,) stretched cells that have an edge, and about the area, in common with a cell of a layer."""
-    rim = np.flatnonzero((layer[triangles].sum(axis=1) == 2) & (cells[:, stretch.LENGTH] >= ALIKE))
+def _next_row(triangles: NDArray[np.int32], layer: Flags, count: NDArray[np.int8], cells: Floats) -> NDArray[np.int64]:
+    """Rows of stretched cells that have an edge, and about the area, in common with a cell of a layer.
+
+    count: (T,) how many corners of each cell are in a layer.
+    """
+    rim = np.flatnonzero((count == 2) & (cells[:, stretch.LENGTH] >= ALIKE))
     own = triangles[rim][layer[triangles[rim]]].reshape(-1, 2)
+    beside = np.zeros(len(layer), dtype=bool)
+    beside[own] = True
+    inside = connectivity.touching(triangles, beside)
+    inside = inside[count[inside] == 3]
+    if not len(inside):
+        return rim[:0]
     edges = triangles[inside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     key, known = (e.min(axis=1).astype(np.int64) * len(layer) + e.max(axis=1) for e in (own, edges))
     order = np.argsort(known, kind="stable")
-    place = np.minimum(np.searchsorted(known[order], key), max(len(known) - 1, 0))
-    next_row = np.zeros(len(triangles), dtype=bool)
-    if len(known):
-        across = np.repeat(np.abs(cells[inside, stretch.AREA]), 3)[order][place]
-        size = np.abs(cells[rim, stretch.AREA])
-        next_row[rim] = (known[order][place] == key) & (size <= NEXT * across) & (across <= NEXT * size)
-    return next_row
+    place = np.minimum(np.searchsorted(known[order], key), len(known) - 1)
+    across = np.repeat(np.abs(cells[inside, stretch.AREA]), 3)[order][place]
+    size = np.abs(cells[rim, stretch.AREA])
+    alike = (known[order][place] == key) & (size <= NEXT * across) & (across <= NEXT * size)
+    return np.asarray(rim[alike])
 
 
 def _area_around(triangles: NDArray[np.int32], cells: Floats, number: NDArray[np.int32]) -> Floats:

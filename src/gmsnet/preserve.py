@@ -13,11 +13,13 @@ from gmsnet.errors import InputError
 from gmsnet.layers import stretched_layers
 from gmsnet.mesh import Mesh
 from gmsnet.methods.sized import BAND
+from gmsnet.survey import Survey
 from gmsnet.targets import Target
 from gmsnet.topology import Topology
 from gmsnet.walls import near_walls
 
 Flags = NDArray[np.bool_]
+Floats = NDArray[np.float64]
 
 LAYER, WALL = "stretched layer", "refined near a wall"
 
@@ -56,14 +58,17 @@ class Protection:
         return Protection(self.base, [*self.notes, note], layers, kept)
 
 
-def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool) -> Protection:
+def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, near: Floats) -> Protection:
     """What of a mesh is protected: stretched layers, unless ``preserve`` is "none" and fix_layers is false, and the
     areas of cells next to walls that the mesh is refined towards, unless ``preserve`` is "none".
+
+    near: ``near_points(mesh, topology)``.
     """
     notes: list[str] = []
     if not len(topology.free):
         return Protection(topology, notes)
-    found = stretched_layers(mesh, topology)
+    survey = Survey.of(mesh, topology, near)
+    found = stretched_layers(mesh, topology, survey)
     layers = found.nodes if found and (fix_layers or preserve != NONE) else None
     protection = Protection(topology, notes, layers)
     if layers is not None:
@@ -75,14 +80,15 @@ def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool) -
         notes.append("fix_layers: no stretched layers were found, so none are held")
     if preserve != SHAPE:
         return protection
-    near = Protection(topology, notes, layers, near_walls(mesh, protection.outer))
-    if WALL not in near.topology.held:
+    kept = near_walls(mesh, protection.outer, survey)
+    walled = Protection(topology, notes, layers, kept)
+    if not kept.any() or WALL not in walled.topology.held:
         return protection
     notes.append(
-        f"the mesh is refined towards its walls: the {len(near.topology.held[WALL]):,} nodes next to them move only as "
-        f"far as the areas of their cells stay within {BAND:.0%} (preserve={preserve!r})"
+        f"the mesh is refined towards its walls: the {len(walled.topology.held[WALL]):,} nodes next to them move only "
+        f"as far as the areas of their cells stay within {BAND:.0%} (preserve={preserve!r})"
     )
-    return near
+    return walled
 
 
 def _amount(count: int) -> str:

@@ -9,14 +9,14 @@ within a band, unless they are damaged; their shapes are improved as far as the 
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError, cKDTree
-from scipy.spatial.distance import pdist
 
 from gmsnet.kernels import quality
+from gmsnet.kernels.pieces import pieces
+from gmsnet.kernels.survey import BOUNDARY
 from gmsnet.mesh import Mesh
-from gmsnet.topology import Topology, planar_points
+from gmsnet.survey import Survey
+from gmsnet.topology import Ints, Topology
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -30,48 +30,48 @@ SOUND = 0.5  # the least 1/q of a cell
 CANDIDATES = 8  # edges of the wall, by their middles, among which the nearest is looked for
 
 
-def near_walls(mesh: Mesh, topology: Topology) -> Flags:
+def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> Flags:
     """(N,) by node id: the corners of cells of a planar mesh that keep their areas.
 
     topology: of this mesh, with what is stretched on purpose held: cells that cannot change are not looked at for
     damage. The cells are those whose middle lies within NEAR of a wall's diameter from it (a wall is a piece of the
     boundary that hangs together), provided that the mesh is refined towards that wall and has not been disturbed there;
     but for the neighbours of damaged cells. Most cells near a refined wall are at most REFINED of the mesh's mean size,
-    and so small that at least one row of them is near.
+    and so small that at least one row of them is near. survey: of this mesh, where it is known.
     """
-    triangles = topology.triangles
+    triangles = topology.near
     kept = np.zeros(len(topology.memory), dtype=bool)
     if topology.plane is None or not len(triangles):
         return kept
-    points = planar_points(mesh)
-    double = _double(points, triangles)
-    largest = REFINED * float(_edge(double.mean()))
-    rough: Floats | None = None
-    chosen = np.zeros(len(triangles), dtype=bool)
-    for wall, cells in _walls(topology):
-        near = NEAR * _diameter(points[np.unique(wall)])
-        most = min(largest, near)
-        if not most > 0.0 or (_edge(double[cells]) <= most).mean() < MOST:
+    survey = survey or Survey.of(mesh, topology)
+    points = survey.points
+    largest = REFINED * float(_edge(survey.double))
+    chosen, rough = np.zeros(len(triangles), dtype=bool), None
+    for wall, cells in _walls(triangles, survey):
+        size = _edge(_double(points, triangles[cells]))
+        if (size <= largest).mean() < MOST:
             continue
-        rows = _rows_near(points, triangles, points[wall], near)
-        if not rows.size or (_edge(double[rows]) <= most).mean() < MOST:
+        close = NEAR * _diameter(points[np.unique(wall)])
+        most = min(largest, close)
+        if not most > 0.0 or (size <= most).mean() < MOST:
             continue
-        if rough is None:
-            rough = _roughness(triangles, double, len(points))
+        rows = _rows_near(points, triangles, points[wall], close)
+        if not rows.size or (_edge(_double(points, triangles[rows])) <= most).mean() < MOST:
+            continue
+        rough = _roughness(triangles, _double(points, triangles), len(points)) if rough is None else rough
         if np.median(rough[rows]) <= CALM:
             chosen[rows] = True
     if rough is not None and chosen.any():
-        kept[triangles[chosen]] = True
-        columns = np.empty((4, len(triangles)))
-        quality.per_cell(points, triangles, topology.turn, columns)
-        free = np.zeros(len(kept), dtype=bool)
-        free[topology.free] = True
-        damaged = chosen & ((rough > ROUGH) | (columns[quality.SHAPE] < SOUND)) & free[triangles].any(axis=1)
-        kept[triangles[damaged]] = False
+        rows = np.flatnonzero(chosen)
+        corners, columns = triangles[rows], np.empty((4, len(rows)))
+        quality.per_cell(points, corners, topology.near_turn[rows], columns)
+        damaged = (rough[rows] > ROUGH) | (columns[quality.SHAPE] < SOUND)
+        kept[topology.memory[corners]] = True
+        kept[topology.memory[corners[damaged & topology.near_free[corners].any(axis=1)]]] = False
     return kept
 
 
-def _roughness(triangles: NDArray[np.int32], double: Floats, nodes: int) -> Floats:
+def _roughness(triangles: Ints, double: Floats, nodes: int) -> Floats:
     """(T,) how far areas lie from the mean of their neighbours' (in logarithms), around the corners of each cell.
 
     A steady growth from row to row cancels in it.
@@ -92,36 +92,35 @@ def _roughness(triangles: NDArray[np.int32], double: Floats, nodes: int) -> Floa
     return np.asarray(around[triangles].mean(axis=1))
 
 
-def _double(points: Floats, triangles: NDArray[np.int32]) -> Floats:
+def _double(points: Floats, triangles: Ints) -> Floats:
     """(T,) twice the area."""
     (ax, bx, cx), (ay, by, cy) = (points[:, axis][triangles].T for axis in range(2))
     return np.asarray(np.abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)))
 
 
-def _edge(double: Floats) -> Floats:
+def _edge(double: Floats | float) -> Floats:
     """The edges of equilateral triangles of such areas."""
     return np.asarray(np.sqrt(double * (2.0 / np.sqrt(3.0))))
 
 
-def _walls(topology: Topology) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+def _walls(triangles: Ints, survey: Survey) -> list[tuple[Ints, Ints]]:
     """The boundary edges (k, 2) of each piece of the boundary that hangs together, and the row of the cell at each."""
-    nodes = len(topology.memory)
-    rim = np.zeros(nodes, dtype=bool)
-    rim[topology.held.get("boundary", np.empty(0, dtype=np.int64))] = True
-    rows = np.flatnonzero(rim[topology.triangles].sum(axis=1) >= 2)
-    edges = np.sort(topology.triangles[rows][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
-    key, place, count = np.unique(edges[:, 0] * nodes + edges[:, 1], return_index=True, return_counts=True)
-    # An edge that leads away from the boundary may have one cell among these rows, too.
-    outer = place[(count == 1) & rim[np.column_stack(np.divmod(key, nodes))].all(axis=1)]
-    ends, cells = edges[outer], rows[outer // 3]
-    graph = scipy.sparse.coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(nodes, nodes))
-    piece = scipy.sparse.csgraph.connected_components(graph, directed=False)[1][ends[:, 0]]
+    boundary = (survey.rim & BOUNDARY) > 0
+    edges = triangles[survey.beside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    outer = np.flatnonzero(boundary[edges].all(axis=1))
+    ends = np.sort(edges[outer], axis=1)
+    key = ends[:, 0].astype(np.int64) * len(boundary) + ends[:, 1]
+    # An edge between two of these nodes that is not on the boundary has both of its cells among these rows.
+    _, place, count = np.unique(key, return_index=True, return_counts=True)
+    once = place[count == 1]
+    ends, cells = ends[once], survey.beside[outer[once] // 3]
+    piece = pieces(ends, boundary)[ends[:, 0]]
     order = np.argsort(piece, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
     return [(ends[part], cells[part]) for part in parts if len(part)]
 
 
-def _rows_near(points: Floats, triangles: NDArray[np.int32], wall: Floats, near: float) -> NDArray[np.int64]:
+def _rows_near(points: Floats, triangles: Ints, wall: Floats, near: float) -> NDArray[np.int64]:
     """The triangles whose middles lie within ``near`` of a wall with the edges (k, 2, 2)."""
     middle = np.column_stack([points[:, axis][triangles].mean(axis=1) for axis in range(2)])
     low, high = wall.min(axis=(0, 1)) - near, wall.max(axis=(0, 1)) + near
@@ -131,6 +130,9 @@ def _rows_near(points: Floats, triangles: NDArray[np.int32], wall: Floats, near:
 
 def _diameter(points: Floats) -> float:
     """The largest distance between two of the points."""
+    from scipy.spatial import ConvexHull, QhullError
+    from scipy.spatial.distance import pdist
+
     try:
         points = points[ConvexHull(points).vertices]
     except QhullError:  # all in one line
@@ -141,6 +143,8 @@ def _diameter(points: Floats) -> float:
 
 def _distance(points: Floats, ends: Floats, near: float) -> Floats:
     """(n,) distance from a wall with the edges (k, 2, 2); ∞ where it is certainly larger than ``near``."""
+    from scipy.spatial import cKDTree
+
     out = np.full(len(points), np.inf)
     start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
     reach = near + 0.5 * float(np.linalg.norm(along, axis=1).max())

@@ -14,11 +14,26 @@ from __future__ import annotations
 
 import math
 
-from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.compile import inlined, kernel
 
 ALONG, ACROSS, LENGTH, AREA = range(4)  # columns of a cell: v, |v| = log s, and D (of the sign of the triangle)
 COLUMNS = 4
 TINY = 1e-300
+
+
+@inlined
+def stretch(ax, ay, bx, by):
+    """Of the triangle (0, a, b): d (cos 2φ, sin 2φ), d itself, s², and D."""
+    ex, ey = bx - ax, by - ay
+    xx = ax * ax + bx * bx + ex * ex
+    yy = ay * ay + by * by + ey * ey
+    along, across = xx - yy, 2.0 * (ax * ay + bx * by + ex * ey)
+    double = ax * by - ay * bx
+    part = math.sqrt(along * along + across * across)
+    total = xx + yy + part
+    # s² = total² / (total · (tr M − d)) = total² / 12 D²
+    square = max(total * total, TINY) / max(12.0 * double * double, TINY)
+    return along, across, part, square, double
 
 
 @kernel
@@ -29,18 +44,11 @@ def per_cell(points, triangles, turn, most, cells):
     """
     for t in range(len(triangles)):
         i, j, k = triangles[t]
-        ax, ay = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
-        bx, by = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1]
-        ex, ey = bx - ax, by - ay
-        xx = ax * ax + bx * bx + ex * ex
-        yy = ay * ay + by * by + ey * ey
-        along, across = xx - yy, 2.0 * (ax * ay + bx * by + ex * ey)
-        double = ax * by - ay * bx
-        part = math.sqrt(along * along + across * across)
-        total = xx + yy + part
-        # s² = total² / (total · (tr M − d)) = total² / 12 D²
-        length = 0.5 * math.log(max(total * total, TINY) / max(12.0 * double * double, TINY))
-        length = max(min(length, most), 0.0)
+        along, across, part, square, double = stretch(
+            points[j, 0] - points[i, 0], points[j, 1] - points[i, 1],
+            points[k, 0] - points[i, 0], points[k, 1] - points[i, 1],
+        )  # fmt: skip
+        length = max(min(0.5 * math.log(square), most), 0.0)
         share = length / max(part, TINY)
         cells[t, ALONG] = share * along
         cells[t, ACROSS] = share * across
