@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -96,7 +97,9 @@ class Run:
                         return TARGET_REACHED
                     if settled or self.smoother.settled or self._stalled():
                         return NO_PROGRESS
-        except KeyboardInterrupt:  # the best mesh so far is whole: it is a copy
+        except KeyboardInterrupt:  # what was made since the last look counts, too: the guard allows each move by itself
+            with suppress(KeyboardInterrupt):
+                self._keep_if_best(self._standing())
             return INTERRUPTED
         return MAX_SWEEPS
 

@@ -68,13 +68,13 @@ def worst_first(more: int) -> WorstFirst:
 
 NEWTON = Stage("Newton on q", lambda: newton(means=1), 2, first=3, rounds=40, gain=0.006)
 WORST = Stage("worst first", lambda: worst_first(3), 1)
-MEAN = Stage("Newton on q, worst kept", newton, 2, rounds=10, gain=0.002)
+MEAN = Stage("Newton on q, worst kept", newton, 1, rounds=10, gain=0.002)
 SHORT = WORST._replace(create=lambda: worst_first(0))
 LONG = Stage("Newton on q, to its end", lambda: newton(1.85, means=1), 4, first=4, rounds=20, gain=0.00005)
 ABOVE = Stage("MetricLoss, above 1/q = 0.4", lambda: Newton("metric", floor=0.4), 1, rounds=8, gain=0.0003)
 POLISH = Stage("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1, rounds=8, gain=0.0003)
 
-LARGE_PLAN = (NEWTON._replace(looks=False), WORST, MEAN)
+LARGE_PLAN = (NEWTON._replace(looks=False), WORST._replace(looks=False), MEAN)
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 PATCH_PLAN = (NEWTON._replace(often=1), WORST._replace(sweeps=6))
 VARIANTS = ("full", "patch")
