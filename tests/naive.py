@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from fractions import Fraction
 
@@ -64,6 +65,27 @@ def held_nodes(nodes, triangles, regions, others=(), lines=()) -> set[int]:
         if reached != ring or not two or len(ring) < 3 or any(len(link) != 2 for link in links):
             held.add(v)
     return held
+
+
+def colours(free, rings) -> dict[int, int]:
+    """Node → the first colour that none of its free neighbours of smaller id has. rings: free node → its neighbours."""
+    found: dict[int, int] = {}
+    for v in sorted(free):
+        taken = {found[u] for u in rings[v] if u in found}
+        found[v] = next(c for c in itertools.count() if c not in taken)
+    return found
+
+
+def morton_order(points) -> list[int]:
+    """Ids along a Morton curve over a grid of 2¹⁶ × 2¹⁶: bit by bit, the bit of y before that of x."""
+    low, extent = points.min(axis=0), float(np.ptp(points, axis=0).max())
+    scale = 65535.0 / extent if extent > 0.0 else 0.0
+
+    def key(i):
+        x, y = (int(c) for c in (points[i] - low) * scale)
+        return "".join(a + b for a, b in zip(f"{y:016b}", f"{x:016b}", strict=True)), i
+
+    return sorted(range(len(points)), key=key)
 
 
 def gmsnet_shift(centre, ring, tensors):

@@ -7,7 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
-from gmsnet import CellBlock, Mesh
+import gmsnet
+from gmsnet import CellBlock, Mesh, available_memory, faces
+from gmsnet.errors import InputError
 from gmsnet.topology import Topology
 
 
@@ -47,8 +49,9 @@ def check_against_twin(mesh, topology, others=(), lines=()):
         assert around[0] == min(around)
         for a, b in zip(around, around[1:] + around[:1], strict=True):
             assert (v, a, b) in rotated
-        colours = topology.colours
-        assert all(colours[v] != colours[u] for u in around)
+    rings = {v: ring[start[i] : start[i + 1]].tolist() for i, v in enumerate(topology.free.tolist())}
+    colours = naive.colours(free, rings)
+    assert topology.colours.tolist() == [colours.get(v, -1) for v in range(len(mesh.points))]
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(4, 60), st.integers(1, 3))
@@ -65,6 +68,109 @@ def test_random_triangulations_with_holes_regions_and_mixed_winding(seed, nodes,
         triangles = np.vstack([triangles, [[0, 0, 1]]])  # a cell that names a node twice
     mesh = mesh_of(points, triangles, rng.integers(regions, size=len(triangles)))
     check_against_twin(mesh, Topology.of(mesh))
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(5, 40))
+@settings(max_examples=80, deadline=None)
+def test_triangles_among_polygons_lines_and_nonsense(seed, nodes):
+    rng = np.random.default_rng(seed)
+    points = rng.random((nodes, 2))
+    triangles = Delaunay(points).simplices
+    if rng.random() < 0.3:
+        triangles = np.vstack([triangles, rng.integers(nodes, size=(rng.integers(1, 4), 3))])  # any three nodes
+    triangles = np.array([np.roll(t[:: rng.choice([1, -1])], rng.integers(3)) for t in triangles])
+    extra = [
+        CellBlock(kind, cells := rng.integers(nodes, size=(rng.integers(2), size)), np.zeros(len(cells), dtype=int))
+        for kind, size in (("quad", 4), ("polygon", 5), ("triangle6", 6), ("line", 2), ("vertex", 1))
+    ]
+    others = [c for block in extra[:2] for c in block.nodes.tolist()]
+    others += [c[:3] for c in extra[2].nodes.tolist()]
+    lines = [c for block in extra[2:] for c in block.nodes.tolist()]
+    mesh = mesh_of(points, triangles, rng.integers(2, size=len(triangles)), extra)
+    topology = Topology.of(mesh)
+    check_against_twin(mesh, topology, others, lines)
+    assert topology.triangles.tolist() == triangles.tolist() + [c[:3] for c in extra[2].nodes.tolist()]
+    before = len(triangles) + sum(len(block.nodes) for block in extra[:2])
+    assert topology.cell.tolist() == [*range(len(triangles)), *range(before, before + len(extra[2].nodes))]
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(4, 60))
+@settings(max_examples=80, deadline=None)
+def test_parts_are_wound_alike_with_positive_area(seed, nodes):
+    rng = np.random.default_rng(seed)
+    points = rng.random((nodes, 2))
+    triangles = Delaunay(points).simplices
+    triangles = triangles[rng.random(len(triangles)) < rng.choice([1.0, 0.9, 0.5])]
+    if rng.random() < 0.5:  # else of whatever winding Delaunay gives, or all of the other
+        triangles = np.array([t[:: rng.choice([1, -1])] for t in triangles])
+    triangles = triangles.reshape(-1, 3)[:, :: rng.choice([1, -1])]
+    if nodes >= 5 and rng.random() < 0.2:
+        triangles = np.vstack([triangles, [(i, (i + 1) % 5, (i + 2) % 5) for i in range(5)]])
+    topology = Topology.of(mesh_of(points, triangles))
+    turned = [t[:: int(turn)] for t, turn in zip(triangles.tolist(), topology.turn, strict=True)]
+    edges = {}
+    for f, t in enumerate(turned):
+        for a, b in zip(t, t[1:] + t[:1], strict=True):
+            edges.setdefault(frozenset((a, b)), []).append((f, a))
+    pairs = [both for both in edges.values() if len(both) == 2]
+    part = list(range(len(turned)))
+    for _ in part:
+        for (f, _a), (g, _b) in pairs:
+            part[f] = part[g] = min(part[f], part[g])
+    torn = {part[f] for (f, a), (g, b) in pairs if a == b}
+    unwound = {v for f, t in enumerate(turned) if part[f] in torn for v in t}
+    held = topology.held
+    counted = {v for name in ("boundary", "non-manifold edge") for v in held.get(name, np.empty(0, int)).tolist()}
+    assert set(held.get("part that cannot be wound consistently", np.empty(0, int)).tolist()) == unwound - counted
+    area = dict.fromkeys(part, 0.0)
+    for f, (a, b, c) in enumerate(turned):
+        area[part[f]] += np.linalg.det([points[b] - points[a], points[c] - points[a]])
+    # Two faces one on the other have no area together, and no positive side.
+    assert all(area[p] > -1e-15 for p in area if p not in torn)
+
+
+def test_where_corners_are_many_rings_begin_at_int64(monkeypatch):
+    """The switch lies at 2³¹ corners; here at 100."""
+    mesh = gmsnet.random_mesh(300, seed=2)
+    corners = mesh.cells[0].nodes
+    mixed = mesh_of(mesh.points, np.where(np.arange(len(corners))[:, None] % 3, corners, corners[:, ::-1]))
+    quads = mesh_of(mesh.points, corners[2:], extra=(CellBlock("quad", np.array([[0, 1, 2, 3]]), np.zeros(1, int)),))
+    narrow = [(Topology.of(each), gmsnet.smooth(each, "laplacian", max_sweeps=2)) for each in (mesh, mixed, quads)]
+    monkeypatch.setattr(faces, "NARROW", 100)
+    for (one, smoothed), each in zip(narrow, (mesh, mixed, quads), strict=True):
+        two = Topology.of(each)
+        assert (one.near_start.dtype, two.near_start.dtype) == (np.int32, np.int64)
+        assert two.near_ring.dtype == two.near.dtype == np.int32
+        for name in ("near_start", "near_ring", "near_colours", "turn", "free", "memory", "near"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+        for mine, other in zip(one.patches, two.patches, strict=True):
+            np.testing.assert_array_equal(mine, other)
+        for mine, other in zip(one.stars.blocks, two.stars.blocks, strict=True):
+            np.testing.assert_array_equal(mine, other)
+        np.testing.assert_array_equal(smoothed.points, gmsnet.smooth(each, "laplacian", max_sweeps=2).points)
+
+
+def test_more_nodes_or_cells_than_int32_can_number_are_refused(monkeypatch):
+    """The limit is 2³¹ − 1; here less."""
+    points, triangles = wheel(6)
+    mesh = mesh_of(points, triangles)
+    monkeypatch.setattr(faces, "MOST", 6)
+    with pytest.raises(InputError, match="the mesh has 7 nodes: gmsnet can number at most 6"):
+        Topology.of(mesh)
+    more = mesh_of(points[:6], np.repeat(triangles[:1], 7, axis=0))
+    with pytest.raises(InputError, match="the mesh has 7 cells: gmsnet can number at most 6"):
+        Topology.of(more)
+
+
+def test_a_mesh_too_large_for_the_memory_at_hand_is_refused(monkeypatch):
+    mesh = mesh_of(*wheel(6))
+    monkeypatch.setattr(available_memory, "ALWAYS_FREE", 0)
+    monkeypatch.setattr(available_memory, "available", lambda: 10_000)
+    assert Topology.of(mesh).free.tolist() == [0]
+    with pytest.raises(InputError, match=r"^smoothing 1,128 nodes needs about 0.000677 GB of memory, but only 1e-05"):
+        gmsnet.smooth(gmsnet.random_mesh(1000, seed=0))
+    with pytest.raises(InputError, match=r"^the connectivity of 1,128 nodes needs about 0.00024\d GB of memory"):
+        gmsnet.quality(gmsnet.random_mesh(1000, seed=0))
 
 
 @pytest.mark.parametrize("degree", [3, 4, 7, 64, 65, 100, 1000])
@@ -92,7 +198,6 @@ def test_two_wheels_that_touch_in_a_node_are_two_parts_and_wound_each_for_itself
     second[second == 7 + 4] = 1  # the rightmost node of the one is the leftmost of the other: a bow-tie
     mesh = mesh_of(points, np.vstack([triangles, second[:, ::-1]]))
     topology = Topology.of(mesh)
-    assert topology.parts == 2
     assert topology.turn.tolist() == [1] * 6 + [-1] * 6
     assert topology.free.tolist() == [0, 7]
     assert topology.held["not used by any cell"].tolist() == [11]
@@ -181,6 +286,9 @@ def test_blocks_hold_every_star_once():
             for lane, place in enumerate(places):
                 wanted = topology.near_ring[topology.near_start[place] : topology.near_start[place + 1]]
                 assert block[:, lane].tolist() == wanted.tolist()
+            last = blocks.filled[b] - 1
+            assert (blocks.centre[64 * b + last : 64 * (b + 1)] == blocks.centre[64 * b + last]).all()
+            assert (block[:, last:] == block[:, [last]]).all()
     assert sorted(seen) == topology.free.tolist()
 
 

@@ -153,23 +153,25 @@ def _mesh(
     array = coordinates(points)
     cell_data, node_sets = cell_data or {}, dict(node_sets or {})
     counts = [len(nodes) for _, nodes in blocks]
-    dimension = np.repeat([DIMENSION.get(kind, 3) for kind, _ in blocks], counts).astype(np.int64)
-    physical = cell_data.get("gmsh:physical")
-    region = np.zeros(len(dimension), dtype=np.int64)
+    region = np.zeros(sum(counts), dtype=np.int64)
     region_names: dict[tuple[int, int], str] = {}
-    for dim in np.unique(dimension).tolist():
-        of_dim = np.flatnonzero(dimension == dim)
-        fields = [values[of_dim] for name, values in cell_data.items() if names_a_region(name)]
-        # The outline of a named set of faces is a shape that the user has drawn, as much as the one of a region.
-        fields += [np.isin(of_dim, cells) for cells in (cell_sets or {}).values()] if dim == 2 else []
-        region[of_dim] = combined(fields, len(of_dim))
-        for name, (named_dim, tag) in (names or {}).items():
-            if physical is not None and named_dim == dim:
-                tagged = of_dim[np.ravel(physical[of_dim]) == tag]
-                region_names.update({(dim, number): name for number in np.unique(region[tagged]).tolist()})
+    if cell_data or cell_sets:
+        dimension = np.repeat([DIMENSION.get(kind, 3) for kind, _ in blocks], counts).astype(np.int64)
+        physical = cell_data.get("gmsh:physical")
+        for dim in np.unique(dimension).tolist():
+            of_dim = np.flatnonzero(dimension == dim)
+            fields = [values[of_dim] for name, values in cell_data.items() if names_a_region(name)]
+            # The outline of a named set of faces is a shape that the user has drawn, as much as the one of a region.
+            fields += [np.isin(of_dim, cells) for cells in (cell_sets or {}).values()] if dim == 2 else []
+            region[of_dim] = combined(fields, len(of_dim))
+            for name, (named_dim, tag) in (names or {}).items():
+                if physical is not None and named_dim == dim:
+                    tagged = of_dim[np.ravel(physical[of_dim]) == tag]
+                    region_names.update({(dim, number): name for number in np.unique(region[tagged]).tolist()})
+    region.flags.writeable = False  # so that it need not be copied
     breaks = np.cumsum(counts)[:-1].tolist()
     for name, ids in (cell_sets or {}).items():
-        parts = np.split(np.isin(np.arange(len(dimension)), ids), breaks)
+        parts = np.split(np.isin(np.arange(len(region)), ids), breaks)
         nodes = [nodes[part].ravel() for (_, nodes), part in zip(blocks, parts, strict=True)]
         node_sets[name] = np.unique(np.concatenate([node_sets.get(name, np.zeros(0, dtype=np.int64)), *nodes]))
     cells = tuple(

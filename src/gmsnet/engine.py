@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gmsnet.adapters import to_mesh
 from gmsnet.arguments import check_arguments
+from gmsnet.available_memory import refuse_unless_free
 from gmsnet.errors import InputError
 from gmsnet.fixed import fixed_mask
 from gmsnet.limits import Limits, limits
@@ -37,6 +38,8 @@ from gmsnet.wall_stage import improve_near_walls
 from gmsnet.workers import available_threads
 
 Floats = NDArray[np.float64]
+
+BYTES_PER_NODE = 600  # that a call takes at most beside the mesh, measured with ``auto`` on a mesh of triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +116,7 @@ def smooth(
     best_by: which 1/q enters the q̂ that says which mesh is the best: "shape" (1/q) or "aspect" (1/q_V, with which
     the paper's tables are formed).
 
-    Raises InputError for what cannot be used, before anything is moved.
+    Raises InputError for what cannot be used, and where memory does not suffice, before anything is moved.
     """
     began = time.perf_counter()
     create = check_options(
@@ -124,6 +127,7 @@ def smooth(
     target, chosen = Target(target_quality, target_angle), create()
     given, restore = to_mesh(mesh)
     refuse_unless_planar(given)
+    refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     topology = Topology.of(given, fixed_mask(given, fixed))
     start = given_points = near_points(given, topology)
     before = measure(given, topology, start)

@@ -105,7 +105,8 @@ class Mesh:
         points = _finite(self.points)
         cells = _blocks(self.cells)
         for block in cells:
-            if block.nodes.size and (block.nodes.min() < 0 or block.nodes.max() >= len(points)):
+            # Seen as unsigned numbers, negative ones are larger than any node.
+            if block.nodes.size and block.nodes.view(np.uint64).max() >= len(points):
                 wrong = ((block.nodes < 0) | (block.nodes >= len(points))).any(axis=1)
                 row = int(np.flatnonzero(wrong)[0])
                 raise InputError(
@@ -149,6 +150,8 @@ class Mesh:
         Constant means: up to 1e-9 of the largest extent, over the nodes that cells use.
         """
         if self.points.shape[1] == 2:
+            return (0, 1)
+        if (self.points[:, 2] == self.points[:1, 2]).all():  # quickly told: so it is in most files
             return (0, 1)
         used = np.zeros(len(self.points), dtype=bool)
         for block in self.cells:

@@ -150,7 +150,7 @@ def around(topology: Topology, triangles: Ints, rings: int) -> Flags:
     return active
 
 
-def spans(start: Ints, chosen: NDArray[Any]) -> NDArray[np.int64]:
+def spans(start: NDArray[Any], chosen: NDArray[Any]) -> NDArray[np.int64]:
     """The places of the chosen rows of a CSR array, one after the other."""
     count = (start[chosen + 1] - start[chosen]).astype(np.int64)
     end = np.cumsum(count)

@@ -1,12 +1,12 @@
 """What follows from a mesh's connectivity: winding, boundary, interfaces, which nodes are held and why, the patches.
 
 Built once per connectivity. Coordinates enter in two places only: which of the two sides of a part is up (its larger
-area is the positive one), and the memory order of the nodes, which does not influence results.
+area is the positive one), and the memory order of nodes and triangles. On that no ring and no colour depends, but what
+looks at some of the cells, or adds over all of them, takes them in that order.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
@@ -14,16 +14,19 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.faces import SMOOTHED, Faces
+from gmsnet.available_memory import refuse_unless_free
+from gmsnet.faces import Faces, Offsets, check_size
+from gmsnet.fans import closed_fans
+from gmsnet.held import MOST_NEIGHBOURS, known_marks, sorted_out
 from gmsnet.kernels import connectivity, layout
-from gmsnet.kernels.stars import Blocks
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.kernels.block import Blocks
+from gmsnet.kernels.compile import LANES
+from gmsnet.mesh import Mesh
 
 Ints = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 
-NO_AREA = 1e-9  # of the sum of its faces' areas: the area of such a part (a closed surface pressed flat) is noise
-MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would no longer fit any cache
+PER_NODE, PER_CORNER = 90, 22  # bytes that the set-up takes at most, measured; 222 a node where all are triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +49,7 @@ class Topology:
     plane: the two axes of a planar mesh, else None. triangles: (T, 3) corner nodes of all cells with three corners, in
     file order (six-node triangles by their corners); cell: (T,) the index of each among all cells of the mesh; turn:
     (T,) int8, −1 where it has to be read backwards for all of its part to be wound alike with positive area.
-    parts: how many pieces the faces form over shared edges. held: reason → node ids, the first reason that applies.
+    held: reason → node ids, the first reason that applies.
     free: (F,) ids of the nodes that may move, ascending.
     memory: (N,) node ids in memory order. In that order, by places in memory: near (T, 3) and near_turn (T,), the
     triangles; rings, each from its smallest id on, their CSR start (N + 1) and the colours (N,), of which no two free
@@ -57,86 +60,51 @@ class Topology:
     triangles: Ints
     cell: NDArray[np.int64]
     turn: NDArray[np.int8]
-    parts: int
     held: dict[str, NDArray[np.int64]]
     free: Ints
     memory: Ints
     near: Ints
     near_turn: NDArray[np.int8]
-    near_start: Ints
+    near_start: Offsets
     near_ring: Ints
     near_colours: Ints
 
     @classmethod
     def of(cls, mesh: Mesh, fixed: Flags | None = None) -> Topology:
-        """The topology of a mesh; ``fixed`` (N,) bool holds further nodes ("fixed by the user")."""
-        nodes = len(mesh.points)
+        """The topology of a mesh; ``fixed`` (N,) bool holds further nodes ("fixed by the user").
+
+        Raises InputError for more nodes or faces than int32 can number, and where memory does not suffice.
+        """
+        nodes, corners = len(mesh.points), check_size(mesh)
+        refuse_unless_free(nodes * PER_NODE + corners * PER_CORNER, f"the connectivity of {nodes:,} nodes")
         planar = planar_points(mesh)
-        memory = layout.morton_order(planar)
-        position = _inverse(memory)
+        memory, position = _memory_order(planar)
         written = Faces.of(mesh)
         faces = written.renumbered(position)
-        first, corner = faces.first, faces.corner
-        face, head = connectivity.half_edges(first, corner)
-        twin = connectivity.match(corner, head, nodes)
-        part, turn, consistent = connectivity.wind(first, corner, twin, face)
-        if mesh.plane is not None:
-            area, extent = connectivity.part_areas(planar[memory], first, corner, part, turn, len(consistent))
-            if (area < 0).any():
-                turn = np.where(area[part] < 0, -turn, turn).astype(np.int8)
-            flat = np.abs(area) <= NO_AREA * extent
-        else:
-            flat = np.zeros(len(consistent), dtype=bool)
-
-        boundary, interface, crowded, unwound, sideless = (np.zeros(nodes, dtype=bool) for _ in range(5))
-        connectivity.mark_edges(corner, head, twin, face, faces.region, boundary, interface, crowded)
-        if not consistent.all():
-            unwound[corner[~consistent[part][face]]] = True
-        if flat.any():
-            sideless[corner[flat[part][face]]] = True
-        unused = ~_used_by(mesh, lambda block: True)
-        reasons = {
-            "not used by any cell": unused,
-            "boundary": boundary[position],
-            "interface between regions": interface[position],
-            "node of a line or vertex cell": _used_by(mesh, lambda block: block.dimension < 2),
-            "node of a cell that is not smoothed": _used_by(
-                mesh, lambda block: block.dimension > 1 and block.kind not in SMOOTHED
-            ),
-            "non-manifold edge": crowded[position],
-            "part that cannot be wound consistently": unwound[position],
-            "part of zero area, which has no positive side": sideless[position],
-            "fixed by the user": np.zeros(nodes, dtype=bool) if fixed is None else fixed,
-        }
-        candidate = ~np.logical_or.reduce(list(reasons.values()))
-        state, start, ring = connectivity.walk_fans(
-            first, corner, head, twin, face, turn, faces.smoothable, candidate[memory], nodes
-        )
-        connectivity.turn_rings(start, ring, memory)
-        hub = (np.diff(start) > MOST_NEIGHBOURS)[position]
-        fan = candidate & (state != connectivity.FREE)[position]
-        reasons |= {"star is not one closed fan": fan, f"more than {MOST_NEIGHBOURS} neighbours": hub}
-        is_free = candidate & ~fan & ~hub
-        free = np.flatnonzero(is_free).astype(np.int32)
-        whole, near = faces.triangles()
+        marks = known_marks(mesh, fixed, position)
+        points = None if mesh.plane is None else planar.take(memory, axis=0)
+        near_turn, start, ring = closed_fans(faces, points, marks, memory, MOST_NEIGHBOURS)
+        held, free, places = sorted_out(marks, position)
         three, triangles = written.triangles()
-        back = np.empty(len(written), dtype=np.int8)
-        back[faces.origin] = turn
+        whole, near = faces.triangles()
+        turn = near_turn
+        if (turn != turn[:1]).any():
+            turn = np.empty_like(near_turn)
+            turn[faces.origin] = near_turn
         return cls(
             plane=mesh.plane,
             triangles=triangles,
             cell=written.cell[three],
-            turn=back[three],
-            parts=len(consistent),
-            held=_first_reason(reasons),
+            turn=turn[three],
+            held=held,
             free=free,
             memory=memory,
             near=near,
-            near_turn=turn[whole],
+            near_turn=near_turn[whole],
             near_start=start,
-            near_ring=ring,
+            near_ring=ring[: start[-1]],
             # In the order of the node ids, so that colours follow from the connectivity alone.
-            near_colours=connectivity.colour(position[free], start, ring, is_free[memory]),
+            near_colours=_colours(places, start, ring),
         )
 
     def holding(self, chosen: Flags, reason: str) -> Topology:
@@ -154,7 +122,7 @@ class Topology:
         For a while: ``held`` does not tell of the others. Returns also the rows of those triangles in ``near``.
         """
         rows: Ints = connectivity.touching(self.near, active)
-        near, turn = self.near[rows], self.near_turn[rows]
+        near, turn = self.near.take(rows, axis=0), self.near_turn.take(rows)
         free = np.sort(self.memory[np.flatnonzero(active)])
         colours = np.where(active, self.near_colours, np.int32(-1))
         inner = replace(self, near=near, near_turn=turn, free=free, near_colours=colours)
@@ -164,23 +132,33 @@ class Topology:
     @cached_property
     def stars(self) -> Stars:
         """The patches in the order in which they are smoothed."""
-        free = np.flatnonzero(self.near_colours >= 0).astype(np.int32)
-        most = int(np.diff(self.near_start)[free].max(initial=0))
-        colours = int(self.near_colours.max(initial=-1)) + 1
-        centre, rings, offset, degree, filled, first = layout.blocks(
-            free, self.near_start, self.near_ring, self.near_colours, most, colours
-        )
-        return Stars(Blocks(centre, rings, offset, degree, filled, most), first)
+        free = np.flatnonzero(self.near_free).astype(np.int32)
+        degrees = np.diff(self.near_start).take(free)
+        most, colours = int(degrees.max(initial=0)), int(self.near_colours.max(initial=-1)) + 1
+        kind = self.near_colours.take(free) * (most + 1) + degrees  # first all of the first colour, by degree
+        stars = np.bincount(kind, minlength=colours * (most + 1))
+        number = -(-stars // LANES)
+        end = np.cumsum(number)
+        degree = np.repeat(np.tile(np.arange(most + 1, dtype=np.int32), colours), number)
+        filled = np.full(len(degree), LANES, dtype=np.int32)
+        filled[end[stars > 0] - 1] = (stars - (number - 1) * LANES)[stars > 0]
+        offset = np.zeros(len(degree) + 1, dtype=np.int64)
+        np.cumsum(LANES * degree, out=offset[1:])
+        centre, rings = np.empty(len(degree) * LANES, dtype=np.int32), np.empty(offset[-1], dtype=np.int32)
+        seat = (end - number) * LANES
+        layout.fill_blocks(free, self.near_start, self.near_ring, kind, seat, filled, offset, centre, rings)
+        first = np.concatenate([[0], end[most :: most + 1]]).astype(np.int32)
+        return Stars(Blocks(centre, rings, offset[:-1], degree, filled, most), first)
 
     @cached_property
-    def patches(self) -> tuple[Ints, Ints]:
+    def patches(self) -> tuple[Offsets, Ints]:
         """The rings of the free nodes by node ids: start (F + 1) and ring, row i of node free[i].
 
         Counter-clockwise, each from its smallest id on.
         """
         place = self.places[self.free]
         degree = np.diff(self.near_start)[place]
-        start = np.zeros(len(place) + 1, dtype=np.int32)
+        start = np.zeros(len(place) + 1, dtype=self.near_start.dtype)
         np.cumsum(degree, out=start[1:])
         within = np.arange(start[-1]) - np.repeat(start[:-1], degree)
         return start, self.memory[self.near_ring[np.repeat(self.near_start[place], degree) + within]]
@@ -214,8 +192,9 @@ class Topology:
     def changeable(self) -> tuple[Ints, NDArray[np.int8]]:
         """The rows of near and near_turn that have a free node."""
         rows = connectivity.touching(self.near, self.near_free)
-        every = len(rows) == len(self.near)
-        return (self.near, self.near_turn) if every else (self.near[rows], self.near_turn[rows])
+        if len(rows) == len(self.near):
+            return self.near, self.near_turn
+        return self.near.take(rows, axis=0), self.near_turn.take(rows)
 
     @cached_property
     def colours(self) -> Ints:
@@ -229,23 +208,22 @@ def _inverse(order: Ints) -> Ints:
     return place
 
 
-def _used_by(mesh: Mesh, chosen: Callable[[CellBlock], bool]) -> Flags:
-    flags = np.zeros(len(mesh.points), dtype=bool)
-    for block in mesh.cells:
-        if chosen(block):
-            flags[block.nodes] = True
-    return flags
+def _memory_order(points: NDArray[np.float64]) -> tuple[Ints, Ints]:
+    """The ids in memory order, and the place of each."""
+    nodes = len(points)
+    memory, position = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
+    keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
+    layout.morton_order(points, keys, other, memory, position)
+    return memory, position
 
 
-def _first_reason(reasons: dict[str, Flags]) -> dict[str, NDArray[np.int64]]:
-    """Reason → ids, each node under the first reason that applies to it; reasons without nodes are left out."""
-    held: dict[str, NDArray[np.int64]] = {}
-    taken = np.zeros(len(next(iter(reasons.values()))), dtype=bool)
-    for reason, flags in reasons.items():
-        if (ids := np.flatnonzero(flags & ~taken)).size:
-            held[reason] = ids
-        taken |= flags
-    return held
+def _colours(places: Ints, start: Offsets, ring: Ints) -> Ints:
+    """(N,) by places in memory: greedy colours of the free nodes, in the order of ``places``; −1 for all others."""
+    colours = np.zeros(len(start) - 1, dtype=np.int32)
+    if not connectivity.colour(places, start, ring, colours):
+        colours[:] = -1
+        connectivity.colour_many(places, start, ring, colours)
+    return colours
 
 
 class Flat(Protocol):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gmsnet.mesh import Mesh
 from gmsnet.methods.sized import banded
 from gmsnet.run import MAX_SWEEPS, NO_PROGRESS, Run, Sweep
-from gmsnet.topology import Topology, planar_points
+from gmsnet.topology import Topology, near_points
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def improve_near_walls(
     Returns the new points, why it ended, and the record.
     """
     zone = topology.holding(~kept, ELSEWHERE)
-    smoother = banded(planar_points(mesh)[topology.memory], kept[topology.memory])
+    smoother = banded(near_points(mesh, topology), kept[topology.memory])
     smoother.stage = STAGE
     run = Run(mesh, zone, smoother, threads, best_by, guard, points=points, history=history)
     stop_reason = run.to_the_end(min(run.sweeps + SWEEPS, max_sweeps), None, callback)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 import gmsnet
 from gmsnet.errors import InputError
@@ -16,7 +18,9 @@ def test_rows_around_an_airfoil(layers, aspect, around):
     mesh = layered_mesh(layers, aspect, around)
     report, topology = gmsnet.quality(mesh), Topology.of(mesh)
     assert report.inverted == 0
-    assert topology.parts == 1
+    edges = topology.triangles[:, [[0, 1], [1, 2]]].reshape(-1, 2).T
+    graph = coo_matrix((np.ones(edges.shape[1]), edges), shape=(len(mesh.points),) * 2)
+    assert connected_components(graph, directed=False)[0] == 1
     assert (topology.turn == 1).all()
     lines = mesh.cells[1].nodes
     assert sorted(topology.held["boundary"].tolist()) == sorted(set(lines.ravel().tolist()))

@@ -21,7 +21,7 @@ SURPLUS, WIDTH = range(2)  # rows of what a certificate is made of
 
 
 class Blocks(NamedTuple):
-    """The free nodes with their rings in blocks of LANES of one colour and degree (see kernels.layout.blocks).
+    """The free nodes with their rings in blocks of LANES of one colour and degree (see kernels.layout.fill_blocks).
 
     filled: how many of the lanes hold stars of their own. most: the largest degree.
     """

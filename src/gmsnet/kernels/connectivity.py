@@ -1,7 +1,11 @@
-"""Which faces meet at which edges, how to wind them alike, and the closed fan around a node.
+"""The closed fan of faces around each node, what keeps a node from having one, and colours.
 
-Faces are polygons in CSR form: face f has the corners corner[first[f] : first[f + 1]]. The half-edge h leaves
-corner[h] for the next corner of its face. All arrays are int32 unless said otherwise.
+Faces are polygons in CSR form: face f has the corners corner[first[f] : first[f + 1]]; ``first`` is None where all are
+triangles. A corner is a face seen from one of its nodes: the face goes on to the node *after*, and comes from the node
+*before*. The marks of a node are the bits below; a node without any is free.
+
+Where time counts, what indexes an array is made unsigned: for signed numbers it is asked each time whether they count
+from the end.
 """
 
 from __future__ import annotations
@@ -9,23 +13,17 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.layout import span
 
-ALONE = -1  # the half-edge has no partner: a boundary edge
-CROWDED = -2  # three or more faces meet at the edge
+# Why a node is held, in the order in which reasons count.
+UNUSED, BOUNDARY, INTERFACE, LINE, FOREIGN, CROWDED, UNWOUND, SIDELESS, CHOSEN, TORN, HUB = (1 << k for k in range(11))
 
-FREE, UNUSED, MIXED, OPEN, BROKEN = range(5)  # what the walk around a node finds
-
-
-@kernel
-def half_edges(first, corner):
-    """Face and head (the corner it points to) of each half-edge."""
-    face = np.empty(len(corner), dtype=np.int32)
-    head = np.empty(len(corner), dtype=np.int32)
-    for f in range(len(first) - 1):
-        for h in range(first[f], first[f + 1]):
-            face[h] = f
-            head[h] = corner[h + 1] if h + 1 < first[f + 1] else corner[first[f]]
-    return face, head
+WIDTH = 8  # neighbours: also of nodes with fewer, loops make so many rounds, so that processors foresee their end
+AHEAD = 256  # nodes whose corners are listed at a time
+HALF, LAST = 0xFFFFFFFF, 2**63 - 1
+COLOURS = 30  # that fit into one int32 as bits
+EXPONENT = np.full(37, -1)  # by the remainder by 37, which no two of the powers of two below 2³² share
+EXPONENT[[2**c % 37 for c in range(COLOURS + 1)]] = range(COLOURS + 1)
 
 
 @kernel
@@ -41,219 +39,192 @@ def touching(triangles, chosen):
 
 
 @kernel
-def counting_order(key, size):
-    """The stable order that sorts ``key`` (values 0…size−1), and where each value starts (size + 1)."""
-    start = np.zeros(size + 1, dtype=np.int32)
-    for k in key:
-        start[k + 1] += 1
-    for k in range(size):
-        start[k + 1] += start[k]
-    order = np.empty(len(key), dtype=np.int32)
-    at = start[:-1].copy()
-    for i in range(len(key)):
-        order[at[key[i]]] = i
-        at[key[i]] += 1
-    return order, start
+def walk_fans(first, corner, turn, region, begin, identity, hub, marks, start, ring):
+    """The ring of each node that has a closed fan and no mark; the marks that follow from the faces around a node.
 
+    turn: (F,) int8; faces of turn −1 are read backwards. region: (F,) int64, or none (0,) where all are the same.
+    begin: (N + 1,), the faces whose lowest node is v are begin[v] … begin[v + 1] − 1. identity: (N,) the id of each
+    node. marks: (N,) uint16; those are added that are known here: UNUSED, BOUNDARY, INTERFACE, CROWDED, TORN, and HUB
+    where there are more than ``hub`` neighbours (whose ring is kept). Writes the rings in CSR form: start (N + 1,), and
+    ring, with room for as many as corners and WIDTH more: the nodes around, in the sense in which the faces are read,
+    from the smallest id on. Returns whether all edges of two faces are read in both directions, as they must be.
 
-@kernel
-def match(corner, head, nodes):
-    """twin: the partner of each half-edge over its edge, ALONE, or CROWDED. Linear in the half-edges."""
-    low = np.minimum(corner, head)
-    by_low, start = counting_order(low, nodes)
-    ends = np.empty(len(corner), dtype=np.int32)  # the other end, in the order of by_low
-    for k in range(len(by_low)):
-        h = by_low[k]
-        ends[k] = max(corner[h], head[h])
-    twin = np.full(len(corner), ALONE, dtype=np.int32)
-    seen = np.full(nodes, -1, dtype=np.int32)  # other end → where its first half-edge stands in by_low
-    for node in range(nodes):
-        for k in range(start[node], start[node + 1]):
-            first = seen[ends[k]]
-            if first < start[node]:
-                seen[ends[k]] = k
+    Corners are listed at their nodes some nodes ahead, and forgotten once the node has been visited. As near nodes are
+    near in memory, few are listed at a time, and stay in the cache.
+    """
+    nodes = len(identity)
+    link = np.zeros(nodes + 1, dtype=np.int64)  # of the node at hand ≪ 32 | the node that follows this one around it
+    lists = np.zeros(nodes, dtype=np.int64)  # the first corner listed at a node ≪ 32 | how many
+    # Of each corner listed: the node after ≪ 32 | the node before; its face (where regions differ); the next one of its
+    # list. Number 0 is none. The first ``left`` of ``unused`` are not in use.
+    pair, face = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int32)
+    later, unused, left = np.zeros(1, dtype=np.int32), np.zeros(1, dtype=np.int32), 0
+    others = np.empty(AHEAD, dtype=np.int64)  # nodes without a closed fan
+    end, agrees = np.int64(0), True
+    for ahead in range(0, nodes, AHEAD):
+        until = min(ahead + AHEAD, nodes)
+        here, there = np.int64(begin[ahead]), np.int64(begin[until])
+        new = span(first, there)[0] - span(first, here)[0]
+        if left < new:
+            size, more = len(pair), max(len(pair), new)
+            pair, face, later = longer(pair, more), longer(face, more), longer(later, more)
+            unused = longer(unused, more)
+            for number in range(size, size + more):
+                unused[left] = number
+                left += 1
+        for f in range(here, there):
+            low, count = span(first, f)
+            for k in range(count):
+                after = np.int64(corner[np.uint64(low + (k + 1 if k + 1 < count else 0))])
+                before = np.int64(corner[np.uint64(low + (k - 1 if k > 0 else count - 1))])
+                if turn[f] < 0:
+                    after, before = before, after
+                left -= 1
+                node, at = np.uint64(corner[np.uint64(low + k)]), np.int64(unused[np.uint64(left)])
+                pair[np.uint64(at)] = after << 32 | before
+                if len(region):
+                    face[np.uint64(at)] = f
+                listed = lists[node]
+                later[np.uint64(at)] = listed >> 32
+                lists[node] = at << 32 | (listed & HALF) + 1
+        found = 0
+        for v in range(ahead, until):
+            start[v] = end
+            at, count = lists[v] >> 32, lists[v] & HALF
+            if count == 0:
+                if not marks[v] & (LINE | FOREIGN):
+                    marks[v] |= UNUSED
                 continue
-            h, other = by_low[k], by_low[first]
-            if twin[other] == ALONE:
-                twin[other] = h
-                twin[h] = other
-            else:  # a third face: all at this edge are crowded
-                if twin[other] >= 0:
-                    twin[twin[other]] = CROWDED
-                twin[other] = CROWDED
-                twin[h] = CROWDED
-    return twin
-
-
-@kernel
-def wind(first, corner, twin, face):
-    """Flood over the edges that join two faces: part of each face, its turn (int8 ±1) and whether its part agrees.
-
-    Faces whose turn is −1 are to be read backwards; consistent (bool per part) says whether that settles all edges.
-    """
-    faces = len(first) - 1
-    part = np.full(faces, -1, dtype=np.int32)
-    turn = np.ones(faces, dtype=np.int8)
-    consistent = np.ones(faces, dtype=np.bool_)
-    queue = np.empty(faces, dtype=np.int32)
-    parts = 0
-    for seed in range(faces):
-        if part[seed] >= 0:
-            continue
-        part[seed] = parts
-        queue[0] = seed
-        size = 1
-        while size:
-            size -= 1
-            f = queue[size]
-            for h in range(first[f], first[f + 1]):
-                other = twin[h]
-                if other < 0:
-                    continue
-                g = face[other]
-                wanted = -turn[f] if corner[h] == corner[other] else turn[f]
-                if part[g] < 0:
-                    part[g] = parts
-                    turn[g] = wanted
-                    queue[size] = g
-                    size += 1
-                elif turn[g] != wanted:
-                    consistent[parts] = False
-        parts += 1
-    return part, turn, consistent[:parts]
-
-
-@kernel
-def part_areas(points, first, corner, part, turn, parts):
-    """Signed area of each part, its faces read with their turns, and the sum of their absolute areas (float64)."""
-    area = np.zeros(parts)
-    extent = np.zeros(parts)
-    for f in range(len(first) - 1):
-        a = first[f]
-        x, y = points[corner[a], 0], points[corner[a], 1]
-        twice = 0.0
-        for h in range(a + 1, first[f + 1] - 1):
-            b, c = corner[h], corner[h + 1]
-            twice += (points[b, 0] - x) * (points[c, 1] - y) - (points[b, 1] - y) * (points[c, 0] - x)
-        area[part[f]] += 0.5 * twice * turn[f]
-        extent[part[f]] += 0.5 * abs(twice)
-    return area, extent
-
-
-@kernel
-def mark_edges(corner, head, twin, face, region, boundary, interface, crowded):
-    """Sets the flags (bool per node) of the nodes of boundary edges, of edges between regions, of crowded edges."""
-    for h in range(len(corner)):
-        if twin[h] == ALONE:
-            boundary[corner[h]] = boundary[head[h]] = True
-        elif twin[h] == CROWDED:
-            crowded[corner[h]] = crowded[head[h]] = True
-        elif region[face[h]] != region[face[twin[h]]]:
-            interface[corner[h]] = interface[head[h]] = True
-
-
-@kernel
-def walk_fans(first, corner, head, twin, face, turn, smoothable, candidate, nodes):
-    """The ring of each candidate node, counter-clockwise once faces are read with their turns.
-
-    smoothable: bool per face; candidate: bool per node. Returns (state per node, int8: FREE, UNUSED, MIXED: in a face
-    that is not smoothable, OPEN: the fan has a gap, BROKEN: not one closed fan of three faces or more), (start, ring):
-    the rings of the FREE nodes in CSR form.
-    """
-    by_node, at = counting_order(corner, nodes)
-    state = np.full(nodes, UNUSED, dtype=np.int8)
-    start = np.zeros(nodes + 1, dtype=np.int32)
-    ring = np.empty(len(corner), dtype=np.int32)
-    end = 0
-    for node in range(nodes):
-        start[node] = end
-        degree = at[node + 1] - at[node]
-        if degree == 0:
-            continue
-        state[node] = FREE
-        for k in range(at[node], at[node + 1]):
-            if not smoothable[face[by_node[k]]]:
-                state[node] = MIXED
-        if state[node] != FREE or not candidate[node]:
-            continue
-        outgoing = by_node[at[node]]
-        steps = 0
-        while True:
-            # Of the triangle at hand: its half-edge from the node, the one towards it, and the corner first met.
-            f = face[outgoing]
-            incoming = outgoing - 1 if outgoing > first[f] else first[f + 1] - 1
-            forward = turn[f] > 0
-            ring[end + steps] = head[outgoing] if forward else corner[incoming]
-            steps += 1
-            across = twin[incoming] if forward else twin[outgoing]
-            if across < 0:
-                state[node] = OPEN
-                break
-            outgoing = across if corner[across] == node else next_half_edge(across, first, face)
-            if outgoing == by_node[at[node]]:
-                break
-            if steps == degree:
-                state[node] = BROKEN
-                break
-        if state[node] == FREE and (steps != degree or degree < 3):
-            state[node] = BROKEN
-        if state[node] == FREE:
-            end += degree
+            least = LAST
+            for k in range(max(count, WIDTH)):
+                counts = k < count
+                both = pair[np.uint64(at)]
+                after = both >> 32
+                link[np.uint64(after if counts else nodes)] = np.int64(v) << 32 | both & HALF
+                own = np.int64(identity[np.uint64(after)]) << 32 | after
+                least = min(least, own if counts else LAST)
+                unused[np.uint64(left)] = at
+                left += counts
+                at = np.int64(later[np.uint64(at)])
+            foremost = least & HALF
+            around, sound = foremost, 0
+            for k in range(max(count, WIDTH)):
+                ring[np.uint64(end + k)] = around
+                following = link[np.uint64(around)]
+                around = following & HALF
+                # A closed fan: all links are of this node, and they come back at the last step, no sooner.
+                sound += (k < count) & (following >> 32 == v) & ((around == foremost) == (k == count - 1))
+            if sound != count or count < 3:
+                others[found] = v
+                found += 1
+                continue
+            if len(region):
+                at = lists[v] >> 32
+                own = region[face[at]]
+                for _ in range(count):
+                    if region[face[at]] != own:
+                        marks[v] |= INTERFACE
+                    at = np.int64(later[at])
+            if not marks[v]:
+                end += count
+                if count > hub:
+                    marks[v] |= HUB
+        for k in range(found):  # what they have listed is still there
+            v = others[k]
+            mark, both_ways = look_at_edges(v, lists[v], pair, face, later, region, link)
+            marks[v] |= mark
+            agrees &= both_ways
+            if not marks[v]:
+                marks[v] |= TORN
     start[nodes] = end
-    return state, start, ring[:end].copy()
+    return agrees
 
 
 @kernel
-def next_half_edge(h, first, face):
-    """The half-edge after h in its face."""
-    f = face[h]
-    return h + 1 if h + 1 < first[f + 1] else first[f]
+def longer(values, more):
+    """An array with so many zeros more."""
+    new = np.zeros(len(values) + more, dtype=values.dtype)
+    for k in range(len(values)):
+        new[k] = values[k]
+    return new
 
 
 @kernel
-def turn_rings(start, ring, identity):
-    """Turns each ring (CSR, in place) until it begins at its node of smallest identity."""
-    most = 0
-    for v in range(len(start) - 1):
-        most = max(most, start[v + 1] - start[v])
-    front = np.empty(most, dtype=ring.dtype)
-    for v in range(len(start) - 1):
-        first, end = start[v], start[v + 1]
-        if first == end:
-            continue
-        at, least = first, identity[ring[first]]
-        for k in range(first + 1, end):
-            other = identity[ring[k]]
-            if other < least:
-                at, least = k, other
-        turned = at - first
-        for k in range(turned):
-            front[k] = ring[first + k]
-        for k in range(end - at):
-            ring[first + k] = ring[at + k]
-        for k in range(turned):
-            ring[end - turned + k] = front[k]
+def look_at_edges(v, listed, pair, face, later, region, link):
+    """BOUNDARY, CROWDED, INTERFACE for node v as its edges are, and whether edges of two faces are read both ways.
 
-
-@kernel
-def colour(free, start, ring, is_free):
-    """Greedy first-fit colours (int32 per node, −1 where held): no two free nodes of one ring share a colour.
-
-    free: ids of the free nodes, in whose order colours are given; start, ring: CSR by node; is_free: bool per node.
+    Linear in its corners: see ``walk_fans``. link: here of the node at hand ≪ 32 | the number of the edge.
     """
-    nodes = len(is_free)
+    head, count = listed >> 32, listed & HALF
+    faces, balance = np.zeros(2 * count, dtype=np.int64), np.zeros(2 * count, dtype=np.int64)
+    own, differ = np.zeros(2 * count, dtype=np.int64), np.zeros(2 * count, dtype=np.bool_)
+    at = head
+    for _ in range(count):
+        link[pair[at] >> 32] = link[pair[at] & HALF] = -1 << 32
+        at = np.int64(later[at])
+    edges, at = 0, head
+    for _ in range(count):
+        here = region[face[at]] if len(region) else 0
+        for way in (1, -1):
+            other = pair[at] >> 32 if way > 0 else pair[at] & HALF
+            if other == v and way < 0:  # a face that names a node twice running: the edge has been seen as it left
+                continue
+            if link[other] >> 32 != v:
+                link[other] = np.int64(v) << 32 | edges
+                own[edges] = here
+                edges += 1
+            e = link[other] & HALF
+            differ[e] |= own[e] != here
+            faces[e] += 1
+            balance[e] += way
+        at = np.int64(later[at])
+    found, both_ways = 0, True
+    for e in range(edges):
+        if faces[e] == 1:
+            found |= BOUNDARY
+        elif faces[e] > 2:
+            found |= CROWDED
+        else:
+            both_ways &= balance[e] == 0
+            if differ[e]:
+                found |= INTERFACE
+    return found, both_ways
+
+
+@kernel
+def colour(places, start, ring, colours):
+    """Greedy first-fit colours in the order of ``places`` (of the free nodes): no two of one ring share a colour.
+
+    start, ring: CSR by places, ring with WIDTH more. colours: (N,) int32 zeros. Where COLOURS suffice, they become the
+    colours, −1 where no free node is, and True is returned.
+    """
+    suffice = True
+    for i in range(len(places)):  # in these rounds 1 ≪ colour; 0: none yet
+        v = places[i]
+        low, count = np.int64(start[v]), np.int64(start[v + 1]) - np.int64(start[v])
+        taken = np.int32(0)
+        for k in range(max(count, WIDTH)):
+            other = colours[np.uint64(ring[np.uint64(low + k)])]
+            taken |= other if k < count else np.int32(0)
+        suffice &= taken < (1 << COLOURS) - 1
+        colours[v] = ~taken & (taken + 1)
+    for v in range(len(colours)):
+        colours[v] = EXPONENT[colours[v] % 37]
+    return suffice
+
+
+@kernel
+def colour_many(places, start, ring, colours):
+    """The same for any number of colours. colours: (N,) int32, −1 before."""
     most = 0
-    for v in free:
+    for v in places:
         most = max(most, start[v + 1] - start[v])
-    colours = np.full(nodes, -1, dtype=np.int32)
-    taken = np.full(most + 2, -1, dtype=np.int64)
-    for v in free:
+    taken = np.full(most + 1, -1, dtype=np.int64)
+    for v in places:
         for k in range(start[v], start[v + 1]):
-            other = ring[k]
-            if is_free[other] and colours[other] >= 0:
-                taken[colours[other]] = v
+            if colours[ring[k]] >= 0:
+                taken[colours[ring[k]]] = v
         c = 0
         while taken[c] == v:
             c += 1
         colours[v] = c
-    return colours

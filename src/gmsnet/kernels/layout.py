@@ -1,11 +1,15 @@
-"""The order in memory: near nodes near each other, and stars of one colour and degree in blocks of LANES."""
+"""The order in memory: near nodes near each other, and stars of one colour and degree in blocks of LANES.
+
+Large arrays are made by the callers: NumPy gets them in large pages, which are several times as fast to touch first.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, kernel
-from gmsnet.kernels.connectivity import counting_order
+from gmsnet.kernels.compile import LANES, inlined, kernel
+
+BITS = 11  # of the 32 along the curve, by which points are sorted at a time
 
 
 @kernel
@@ -18,94 +22,107 @@ def spread(x):
 
 
 @kernel
-def morton_order(points):
-    """Ids (int32) of the points (N, 2) along a Morton curve over a grid of 2¹⁶ × 2¹⁶, by two stable counting passes."""
+def morton_order(points, keys, other, memory, position):
+    """Orders the points (N, 2) along a Morton curve over a grid of 2¹⁶ × 2¹⁶; those of one square by their ids.
+
+    Writes memory (N,), the ids in that order, and position (N,), the place of each id in it. keys, other: (N,) int64,
+    to work with.
+    """
     n = len(points)
-    lower = np.empty(n, dtype=np.int32)
-    upper = np.empty(n, dtype=np.int32)
-    if n == 0:
-        return lower
     left, right, bottom, top = np.inf, -np.inf, np.inf, -np.inf
     for i in range(n):
         left, right = min(left, points[i, 0]), max(right, points[i, 0])
         bottom, top = min(bottom, points[i, 1]), max(top, points[i, 1])
     extent = max(right - left, top - bottom)
     scale = 65535.0 / extent if extent > 0.0 else 0.0
+    mask = (1 << BITS) - 1
+    at = np.zeros((3, mask + 1), dtype=np.int64)  # by digit, the last one first: where the next key goes
     for i in range(n):
-        code = spread(np.int64((points[i, 0] - left) * scale)) | (
-            spread(np.int64((points[i, 1] - bottom) * scale)) << 1
-        )
-        lower[i] = code & 0xFFFF
-        upper[i] = code >> 16
-    order, _ = counting_order(lower, 65536)
+        x, y = np.int64((points[i, 0] - left) * scale), np.int64((points[i, 1] - bottom) * scale)
+        code = spread(x) | spread(y) << 1
+        keys[i] = code << 31 | i
+        at[0, code & mask] += 1
+        at[1, code >> BITS & mask] += 1
+        at[2, code >> 2 * BITS] += 1
+    for digit in range(3):
+        end = 0
+        for k in range(mask + 1):
+            end, at[digit, k] = end + at[digit, k], end
+        for i in range(n):
+            k = keys[i] >> 31 + digit * BITS & mask
+            other[at[digit, k]] = keys[i]
+            at[digit, k] += 1
+        keys, other = other, keys
     for i in range(n):
-        lower[i] = upper[order[i]]
-    second, _ = counting_order(lower, 65536)
-    for i in range(n):
-        upper[i] = order[second[i]]
-    return upper
+        node = keys[i] & 0x7FFFFFFF
+        memory[i] = node
+        position[node] = i
+
+
+@inlined
+def span(first, face):
+    """Where the corners of a face begin, and how many it has. first: CSR, or None where all faces are triangles."""
+    if first is None:
+        return 3 * face, 3
+    return np.int64(first[face]), np.int64(first[face + 1]) - np.int64(first[face])
 
 
 @kernel
-def order_faces(first, corner, position):
-    """Faces by the lowest place of their nodes in memory: the order; first and corner in that order and by place."""
-    faces = len(first) - 1
-    lowest = np.empty(faces, dtype=np.int32)
-    for f in range(faces):
-        least = position[corner[first[f]]] if first[f] < first[f + 1] else 0
-        for h in range(first[f] + 1, first[f + 1]):
-            least = min(least, position[corner[h]])
-        lowest[f] = least
-    order, _ = counting_order(lowest, len(position))
-    new_first = np.zeros(faces + 1, dtype=np.int32)
-    new_corner = np.empty_like(corner)
-    end = 0
-    for k in range(faces):
-        f = order[k]
-        for h in range(first[f], first[f + 1]):
-            new_corner[end] = position[corner[h]]
-            end += 1
-        new_first[k + 1] = end
-    return order, new_first, new_corner
+def order_faces(first, corner, position, start, place, order):
+    """Orders faces (CSR, by node ids) by the lowest place of their nodes in memory, else as they are.
 
-
-@kernel
-def blocks(free, start, ring, colours, degrees_most, colours_most):
-    """Stars in blocks of LANES of one colour and degree, in memory order within each colour and degree.
-
-    All nodes by their places in memory. free: (F,) ascending; start, ring: their rings in CSR form; colours: (N,).
-    Returns centre (blocks·LANES,) and rings (flat), offset (blocks,) of each block's rings, degree, count
-    (stars in the block; the lanes left over repeat the last one), first (colours + 1) block of each colour.
-    A block's rings stand as [ring node][lane].
+    position: (N,). start: (N + 2,) zeros; its first N + 1 become where the faces of each lowest place begin. Writes
+    place, the corners by their places in memory, and order (F,).
     """
-    stars = len(free)
-    key = np.empty(stars, dtype=np.int32)
-    for i in range(stars):
+    most = len(position) - 1
+    for f in range(len(order)):
+        low, count = span(first, f)
+        lowest = most
+        for k in range(count):
+            at = position[np.uint64(corner[np.uint64(low + k)])]
+            place[np.uint64(low + k)] = at
+            lowest = min(lowest, np.int64(at))
+        start[np.uint64(lowest + 2)] += 1
+    for k in range(2, len(start)):
+        start[k] += start[k - 1]
+    for f in range(len(order)):
+        low, count = span(first, f)
+        lowest = most
+        for k in range(count):
+            lowest = min(lowest, np.int64(place[np.uint64(low + k)]))
+        at = start[np.uint64(lowest + 1)]
+        start[np.uint64(lowest + 1)] = at + 1
+        order[np.uint64(at)] = f
+
+
+@kernel
+def take_faces(first, corner, order, new_first, new_corner):
+    """Writes the corners of faces (CSR) in another order of the faces; new_first: where each is to begin, or None."""
+    for i in range(len(order)):
+        low, count = span(first, np.int64(order[i]))
+        to, _ = span(new_first, i)
+        for k in range(count):
+            new_corner[np.uint64(to + k)] = corner[np.uint64(low + k)]
+
+
+@kernel
+def fill_blocks(free, start, ring, kind, seat, filled, offset, centre, rings):
+    """Writes the stars of the free nodes (by places, ascending) into blocks of LANES stars of one kind.
+
+    start, ring: CSR by places. kind: (F,) of each star. seat: lane, from the first block on, of the first star of each
+    kind; counted up here. filled: (blocks,) the stars in each; the lanes left over repeat the last one. offset:
+    (blocks + 1,) where in ``rings`` the rings of each block begin, as [ring node][lane].
+    """
+    for i in range(len(free)):
         v = free[i]
-        key[i] = colours[v] * (degrees_most + 1) + start[v + 1] - start[v]
-    order, group = counting_order(key, (degrees_most + 1) * colours_most)
-    number, length = 0, 0
-    for g in range(len(group) - 1):
-        some = (group[g + 1] - group[g] + LANES - 1) // LANES
-        number += some
-        length += some * LANES * (g % (degrees_most + 1))
-    centre = np.empty(number * LANES, dtype=np.int32)
-    rings = np.empty(length, dtype=np.int32)
-    offset = np.empty(number, dtype=np.int64)
-    degree = np.empty(number, dtype=np.int32)
-    count = np.empty(number, dtype=np.int32)
-    first = np.zeros(colours_most + 1, dtype=np.int32)
-    b, end = 0, 0
-    for g in range(len(group) - 1):
-        n = g % (degrees_most + 1)
-        for at in range(group[g], group[g + 1], LANES):
-            offset[b], degree[b], count[b] = end, n, min(LANES, group[g + 1] - at)
-            for lane in range(LANES):
-                v = free[order[at + min(lane, count[b] - 1)]]
-                centre[b * LANES + lane] = v
-                for j in range(n):
-                    rings[end + j * LANES + lane] = ring[start[v] + j]
-            end += n * LANES
-            b += 1
-        first[g // (degrees_most + 1) + 1] = b
-    return centre, rings, offset, degree, count, first
+        lane = seat[kind[i]]
+        seat[kind[i]] = lane + 1
+        centre[lane] = v
+        to = offset[lane // LANES] + lane % LANES
+        for j in range(start[v + 1] - start[v]):
+            rings[to + j * LANES] = ring[start[v] + j]
+    for b in range(len(filled)):
+        for lane in range(filled[b], LANES):
+            centre[b * LANES + lane] = centre[b * LANES + filled[b] - 1]
+            for row in range(offset[b], offset[b + 1], LANES):
+                rings[row + lane] = rings[row + filled[b] - 1]
