@@ -10,6 +10,8 @@ from __future__ import annotations
 from peers.peer import AVERAGING, OURS, QUALITY, Peer
 
 SWEEPS = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50)
+NEWTON = (3, 5, 7, 10, 15, 20, 25, 30, 40, 60)
+TMOP = {"linear_iterations": 100, "adaptive": 2, "tolerance": 1e-10}
 
 PEERS = [
     Peer("SciPy matrix", AVERAGING, "scipy_matrix:Laplacian", ("scipy",), SWEEPS, "sweeps", "BSD",
@@ -34,10 +36,10 @@ PEERS = [
          {"noinsert": 1, "noswap": 1, "nosurf": 1, "nofem": 1}),
     Peer("Netgen", QUALITY, "netgen_smoothing:Smoothing", ("netgen-mesher",), (1, 2, 3, 5, 10, 20), "steps", "LGPL-2.1",
          {"elsizeweight": 0.0}, most_nodes=2e5, note='optimize2d="m"; the weight of the size spoils mean and minimum'),
-    Peer("MFEM TMOP 2", QUALITY, "mfem_tmop:Tmop", ("mfem",), (3, 5, 7, 10, 20, 50, 100), "Newton steps", "BSD",
-         {"metric": 2, "linear_iterations": 20, "tolerance": 1e-10}, most_nodes=2e5, note="metric 2: q − 1"),
-    Peer("MFEM TMOP 58", QUALITY, "mfem_tmop:Tmop", ("mfem",), (3, 5, 7, 10, 20, 50, 100), "Newton steps", "BSD",
-         {"metric": 58, "linear_iterations": 20, "tolerance": 1e-10}, most_nodes=2e5, note="metric 58: 4q(q − 1)"),
+    Peer("MFEM TMOP 2", QUALITY, "mfem_tmop:Tmop", ("mfem",), NEWTON, "Newton steps", "BSD",
+         {"metric": 2, **TMOP}, most_nodes=2e5, note="metric 2: q − 1"),
+    Peer("MFEM TMOP 58", QUALITY, "mfem_tmop:Tmop", ("mfem",), NEWTON, "Newton steps", "BSD",
+         {"metric": 58, **TMOP}, most_nodes=2e5, note="metric 58: 4q(q − 1)"),
     Peer("L-BFGS on q²", QUALITY, "whole_mesh:Lbfgs", ("numba",), (10, 20, 50, 100, 200, 500, 20_000), "iterations",
          "MIT", {"power": 2}, most_nodes=2e5, note="all nodes at once; our own, compiled: benchmarks/barrier.py"),
     Peer("paper: smart Laplacian", QUALITY, "paper_python:Python", ("numpy",), (1, 2, 3, 5, 10), "sweeps", "MIT",
