@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -50,16 +50,17 @@ def save(figure: Any, path: Path) -> Path:
     return path
 
 
-def legend(figure: Any, axes: Any) -> None:
+def legend(figure: Any, panels: Iterable[Any]) -> None:
     """One column to the right of the picture, a class after the other."""
-    lines = {line.get_label(): line for line in axes.get_lines()}
+    lines = {line.get_label(): line for axes in panels for line in axes.get_lines()}
+    from matplotlib.lines import Line2D
+
     handles, labels, titles = [], [], []
     for title, kind in (("gmsnet.smooth", OURS), ("Driven by quality", QUALITY), ("Averaging, no check", AVERAGING)):
         named = [peer.name for peer in (*OWN, *PEERS) if peer.kind == kind and peer.name in lines]
         if named:
-            (blank,) = axes.plot([], [], " ")
             titles.append(len(labels))
-            handles += [blank, *(lines[name] for name in named)]
+            handles += [Line2D([], [], linestyle=""), *(lines[name] for name in named)]
             labels += [title, *(name.removeprefix("gmsnet ") for name in named)]
     beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
     texts = figure.legend(handles, labels, fontsize=8, frameon=False, **beside).get_texts()
@@ -80,7 +81,7 @@ def quality_over_time(name: str, mesh: Mapping[str, Any], folder: Path) -> Path 
             levels = [level for level in record["levels"] if level["figures"] is not None]
             values = [level["figures"][key] for level in levels]
             axes.plot([level["seconds"] for level in levels], values, label=peer.name, **style(peer))
-        axes.annotate(f"input: {mesh['input'][key]:.3f}", (0.98, 0.03), xycoords="axes fraction", ha="right",
+        axes.annotate(f"input: {mesh['input'][key]:.3g}", (0.98, 0.03), xycoords="axes fraction", ha="right",
                       fontsize=8, color=GREY)  # fmt: skip
         axes.set_xscale("log")
         axes.set_xlabel("seconds of one processor, set-up included")
@@ -90,7 +91,7 @@ def quality_over_time(name: str, mesh: Mapping[str, Any], folder: Path) -> Path 
     panels[0].set_ylim(bottom=best - NEAR * (best - mesh["input"][MEAN]))
     panels[1].set_ylim(bottom=max(LOWEST, panels[1].get_ylim()[0]))
     figure.suptitle(f"Quality over time: {name.split('/')[0]}, {mesh['nodes']:,} nodes", fontsize=11)
-    legend(figure, panels[0])
+    legend(figure, panels)
     path = save(figure, folder / f"quality-{name.replace(' ', '-').replace('/', '-')}.png")
     plt.close(figure)
     return path
@@ -174,7 +175,7 @@ def cost_over_size(document: Document, folder: Path) -> Path | None:
     import matplotlib.pyplot as plt
 
     kinds: dict[str, list[Mapping[str, Any]]] = {}
-    for name, mesh in sorted(document["meshes"].items(), key=lambda item: item[1]["nodes"]):
+    for name, mesh in document["meshes"].items():
         kinds.setdefault(name.split("/")[0], []).append(mesh)
     if not any(len(meshes) > 1 for meshes in kinds.values()):
         return None
@@ -182,7 +183,7 @@ def cost_over_size(document: Document, folder: Path) -> Path | None:
     for axes, (kind, meshes) in zip(panels[0], kinds.items(), strict=True):
         for peer in (*PEERS, *OWN):
             found = [(mesh["nodes"], own_cost(mesh["tools"].get(peer.name), mesh)) for mesh in meshes]
-            found = [(nodes, cost) for nodes, cost in found if cost is not None]
+            found = sorted((nodes, cost) for nodes, cost in found if cost is not None)
             if found:
                 axes.plot(*zip(*found, strict=True), label=peer.name, **style(peer))
         axes.set_xscale("log")
@@ -191,7 +192,7 @@ def cost_over_size(document: Document, folder: Path) -> Path | None:
         axes.set_title(kind, fontsize=10)
         axes.grid(alpha=0.25)
     panels[0][0].set_ylabel("ns per node to 99 % of its own final mean 1/q")
-    legend(figure, panels[0][0])
+    legend(figure, panels[0])
     path = save(figure, folder / "size.png")
     plt.close(figure)
     return path
