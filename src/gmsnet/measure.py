@@ -108,7 +108,8 @@ class Triangles:
 
     def centres(self) -> Floats:
         """(T, dim) the mean of the corners of each."""
-        a, b, c = (np.take(self.points, corner, axis=0) / 3.0 for corner in self.corners.T)
+        third = self.points / 3.0  # before the sum, lest that overflow
+        a, b, c = (np.take(third, corner, axis=0) for corner in self.corners.T)
         return np.asarray(a + b + c)
 
 
@@ -122,12 +123,12 @@ class QualityReport:
     Verdict's aspect ratio, which the paper's tables fit. Both carry the sign of S after neighbours have been wound
     alike; on a surface that is not planar they are unsigned. valid: (T,) int8, the exact sign of S in float64.
 
-    ``inverted`` and q̂ are known from the beginning. The columns are made when one of them is first asked for, of the
-    coordinates that were measured.
+    ``inverted`` and q̂ are known from the beginning, and so are the totals: means and extremes, None where there are no
+    triangles. The columns are made when one of them is first asked for, of the triangles as they were measured.
     """
 
     cell: NDArray[np.int64]
-    totals: Totals | None = field(repr=False)  # None without triangles
+    totals: Totals | None = field(repr=False)
     triangles: Triangles = field(repr=False)
     signs: NDArray[np.int8] | None = field(repr=False)  # None where all are certainly positive
 
