@@ -48,7 +48,7 @@ def check(source: Path, target: Path) -> None:
     assert after.source is not None
     spliced = before.source.splice(after.points)
     main_suffix = next(iter(spliced))
-    assert spliced[main_suffix] == target.with_suffix(main_suffix).read_bytes()
+    assert bytes(spliced[main_suffix]) == target.with_suffix(main_suffix).read_bytes()
     if source.suffix != ".stl":  # an STL file has no node numbers of its own
         moved = (before.points != after.points).any(axis=1)
         assert not moved[np.concatenate([[-1], *Topology.of(before).held.values()]).astype(int)[1:]].any()

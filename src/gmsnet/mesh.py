@@ -35,8 +35,8 @@ class Source(Protocol):
         """Its name in the table of formats."""
         ...
 
-    def splice(self, points: NDArray[np.float64]) -> Mapping[str, bytes]:
-        """The files (suffix → bytes) with the coordinates of ``points`` (N×dim) where they differ from the file's."""
+    def splice(self, points: NDArray[np.float64]) -> Mapping[str, Iterable[bytes | memoryview]]:
+        """The files (suffix → pieces) with the coordinates of ``points`` (N×dim) where they differ from the file's."""
         ...
 
 

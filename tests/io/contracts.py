@@ -10,8 +10,9 @@ import pytest
 from damage import facts, read_or_refuse
 
 from gmsnet.errors import FormatError
-from gmsnet.io.document import Parsed
-from gmsnet.io.splice import BinarySlots, TextSlots
+from gmsnet.io.document import Parsed, Written
+from gmsnet.io.pieces import Pieces
+from gmsnet.io.splice import BinarySlots, Slots, TextSlots
 from gmsnet.mesh import Mesh
 
 
@@ -42,26 +43,36 @@ def moved_points(parsed: Parsed, seed: int = 0) -> np.ndarray:
 def check_splice(reader: ModuleType, data: bytes, seed: int = 0) -> bytes:
     """Equal points give the same file; other points the same file but for their coordinates. Returns the latter."""
     parsed = read(reader, data)
-    assert parsed.slots.replace(data, parsed.points, parsed.points.copy()) == data
+    assert spliced(parsed.slots, data, parsed.points, parsed.points.copy()) == data
     new = moved_points(parsed, seed)
-    out = parsed.slots.replace(data, parsed.points, new)
+    out = spliced(parsed.slots, data, parsed.points, new)
     again = read(reader, out)
     assert facts(again)[1:] == facts(parsed)[1:]
     assert np.array_equal(again.points, new)
     if isinstance(parsed.slots, TextSlots):
         assert isinstance(again.slots, TextSlots)
         assert _without(out, again.slots) == _without(data, parsed.slots)
-        still = (new == parsed.points)[parsed.slots.node][:, : parsed.slots.starts.shape[1]]
+        node = slice(None) if parsed.slots.node is None else parsed.slots.node
+        still = (new == parsed.points)[node, : parsed.slots.starts.shape[1]]
         assert _tokens(out, again.slots, still) == _tokens(data, parsed.slots, still)
     elif isinstance(parsed.slots, BinarySlots):
         changed = np.zeros(len(data), dtype=bool)
         size = np.dtype(parsed.slots.dtype).itemsize
-        changed[parsed.slots.offsets.ravel()[:, None] + np.arange(size)] = True
+        changed[np.array(parsed.slots.places)[:, None] + np.arange(size)] = True
         same = np.frombuffer(data, np.uint8) == np.frombuffer(out, np.uint8)
         assert same[~changed].all()
-    back = again.slots.replace(out, new, parsed.points)
-    assert facts(read(reader, back)) == facts(parsed)
+    assert facts(read(reader, spliced(again.slots, out, new, parsed.points))) == facts(parsed)
     return out
+
+
+def spliced(slots: Slots, data: bytes, old: np.ndarray, new: np.ndarray) -> bytes:
+    """The file with new points in the places of the old ones."""
+    return bytes(Pieces(lambda: slots.replace(data, old, new)))
+
+
+def contents(written: Written) -> dict[str, bytes]:
+    """Suffix → bytes of each file."""
+    return {suffix: bytes(pieces) for suffix, pieces in written.files.items()}
 
 
 def _without(data: bytes, slots: TextSlots) -> bytes:
@@ -99,7 +110,7 @@ def refused(reader: ModuleType, data: bytes, match: str, memory: int = 20_000_00
 def check_conversion(writer: ModuleType, mesh: Mesh) -> tuple[Mesh, list[str]]:
     """The mesh as it reads back from the format, its coordinates unchanged, and what was lost."""
     written = writer.write(mesh)
-    (data,) = written.files.values()
+    (data,) = contents(written).values()
     check_splice(writer, data)
     back = mesh_of(read(writer, data))
     used = np.unique(np.concatenate([b.nodes.ravel() for b in back.cells]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from types import ModuleType
 
@@ -11,7 +12,6 @@ from hypothesis import strategies as st
 
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.document import Parsed
-from gmsnet.io.text import blank
 from gmsnet.mesh import CellBlock, Mesh
 
 # For tests that read a file hundreds of times for one example: to shrink a failure would take minutes.
@@ -73,7 +73,7 @@ def read_or_refuse(reader: ModuleType, files: Mapping[str, bytes]) -> Parsed | N
 
 def last_word(data: bytes, comments: bytes) -> int:
     """Where the last word begins that is in no comment (a regular expression)."""
-    text = blank(data, comments).rstrip()
+    text = re.sub(comments, lambda match: b" " * len(match[0]), data).rstrip()
     return len(text) - len(text.split()[-1])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from contracts import contents, spliced
 from damage import (
     ENDS,
     FEW,
@@ -72,7 +73,7 @@ def test_every_spelling_reads_the_same(case: tuple[bytes, dict[str, list[list[in
     assert [row for b in parsed.cells for row in b.nodes.tolist()] == expected["faces"]
     points = parsed.points.copy()
     points[1, :2] += 0.125
-    again = parsed.slots.replace(data, parsed.points, points)
+    again = spliced(parsed.slots, data, parsed.points, points)
     assert off.read({".off": again}).points.tolist() == points.tolist()
     assert facts(off.read({".off": again}))[1:] == facts(parsed)[1:]
 
@@ -128,7 +129,7 @@ def test_conversion_names_what_is_lost(dim: int) -> None:
         "OFF cannot hold line cells: 8 were left out (markers 'bottom wall', 'top')",
         "OFF cannot hold cell regions: 2 regions were merged",
     ]
-    parsed = off.read(written.files)
+    parsed = off.read(contents(written))
     assert parsed.points[:, :dim].tobytes() == mesh.points.tobytes()
     assert cells_of(parsed, "triangle") == cells_of(mesh, "triangle")
     with pytest.raises(FormatError, match="this mesh has none"):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import pyvista
 import vtk
-from contracts import check_all_cuts_refused, check_conversion, check_splice, moved_points, read, refused
+from contracts import check_all_cuts_refused, check_conversion, check_splice, contents, moved_points, read, refused
 from damage import ENDS, GAPS, NUMBERS, cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -229,6 +229,6 @@ def test_cells_that_are_no_faces_are_refused(kind: str) -> None:
 
 def test_vtk_reads_what_is_written(tmp_path: Path) -> None:
     mesh = triangle_grid(3)
-    points, poly = points_by_vtk(vtk.vtkPLYReader(), ply.write(mesh).files[".ply"], tmp_path / "a.ply")
+    points, poly = points_by_vtk(vtk.vtkPLYReader(), contents(ply.write(mesh))[".ply"], tmp_path / "a.ply")
     assert np.array_equal(points[:, :2], mesh.points.astype(np.float32))
     assert poly.GetNumberOfPolys() == len(mesh.cells[0].nodes)

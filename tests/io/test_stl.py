@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import pyvista
 import vtk
-from contracts import check_all_cuts_refused, check_conversion, check_splice, moved_points, read, refused
+from contracts import check_all_cuts_refused, check_conversion, check_splice, contents, moved_points, read, refused
 from damage import ENDS, GAPS, NUMBERS, damaged, facts, read_or_refuse, regions_of, triangle_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -63,7 +63,7 @@ def test_equal_means_equal_as_decimals() -> None:
 
 def test_every_copy_of_a_corner_moves() -> None:
     mesh = triangle_grid(3, 3)
-    for data in (stl.write(mesh).files[".stl"], binary_stl(mesh.points[mesh.cells[0].nodes])):
+    for data in (contents(stl.write(mesh))[".stl"], binary_stl(mesh.points[mesh.cells[0].nodes])):
         parsed = read(stl, data)
         assert len(parsed.points) == len(mesh.points)
         assert parsed.slots.node.tolist() == parsed.cells[0].nodes.ravel().tolist()  # type: ignore[attr-defined]
@@ -165,7 +165,7 @@ def test_one_long_word_does_not_widen_all_others() -> None:
 @settings(max_examples=200)
 def test_damage_is_refused_in_words(data: st.DataObject) -> None:
     mesh = triangle_grid(1, 3)
-    originals = [PLAIN, binary_stl(mesh.points[mesh.cells[0].nodes]), stl.write(mesh).files[".stl"]]
+    originals = [PLAIN, binary_stl(mesh.points[mesh.cells[0].nodes]), contents(stl.write(mesh))[".stl"]]
     read_or_refuse(stl, {".stl": data.draw(st.sampled_from(originals).flatmap(damaged))})
 
 
@@ -213,7 +213,7 @@ def test_what_stl_loses_is_named() -> None:
     lost = stl.write(mesh).lost
     for words in ("no node numbers", "point data: 't'", "cell data: 'c'", "1 was left out", "same place"):
         assert [text for text in lost if words in text], words
-    assert stl.write(mesh).files[".stl"].startswith(b"solid mesh\nfacet normal 0.0 0.0 1.0\n")
+    assert contents(stl.write(mesh))[".stl"].startswith(b"solid mesh\nfacet normal 0.0 0.0 1.0\n")
 
 
 def test_cells_that_are_no_triangles_are_refused() -> None:

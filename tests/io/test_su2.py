@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from contracts import contents, spliced
 from damage import (
     ENDS,
     FEW,
@@ -112,7 +113,7 @@ def test_every_spelling_reads_the_same(case: tuple[bytes, dict[str, object]]) ->
     assert found == expected["markers"]
     points = parsed.points.copy()
     points[1] += 1.25
-    again = parsed.slots.replace(data, parsed.points, points)
+    again = spliced(parsed.slots, data, parsed.points, points)
     assert su2.read({".su2": again}).points.tolist() == points.tolist()
     assert facts(su2.read({".su2": again}))[1:] == facts(parsed)[1:]
 
@@ -191,7 +192,7 @@ def test_conversion_keeps_markers_and_names_what_is_lost() -> None:
     mesh = triangle_grid()
     written = su2.write(mesh)
     assert written.lost == ["SU2 cannot hold cell regions: 2 regions were merged"]
-    parsed = su2.read(written.files)
+    parsed = su2.read(contents(written))
     assert parsed.points.tobytes() == mesh.points.tobytes()
     assert cells_of(parsed, "triangle") == cells_of(mesh, "triangle")
     assert parsed.region_names == {(1, 1): "bottom_wall", (1, 2): "top"}
@@ -207,7 +208,7 @@ def test_conversion_names_the_third_coordinate_and_data() -> None:
         "SU2 has two coordinates: y = 5.0 was left out",
         "SU2 cannot hold point data: 'p' was left out",
     ]
-    assert su2.read(written.files).points.tolist() == mesh.points.tolist()
+    assert su2.read(contents(written)).points.tolist() == mesh.points.tolist()
     curved = points.copy()
     curved[3] += 0.5
     with pytest.raises(FormatError, match="SU2 holds meshes in the plane only"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from contracts import contents, spliced
 from damage import (
     ENDS,
     FEW,
@@ -98,7 +99,7 @@ def test_every_spelling_reads_the_same(case: tuple[dict[str, bytes], dict[str, l
     assert cells_of(parsed, "vertex") == expected["marked"]
     points = parsed.points.copy()
     points[2] += 0.125
-    again = {**files, ".node": parsed.slots.replace(files[".node"], parsed.points, points)}
+    again = {**files, ".node": spliced(parsed.slots, files[".node"], parsed.points, points)}
     assert triangle.read(again).points.tolist() == points.tolist()
     assert facts(triangle.read(again))[1:] == facts(parsed)[1:]
 
@@ -172,20 +173,22 @@ def test_conversion_keeps_regions_and_names_what_is_lost() -> None:
         "Triangle numbers its markers: the names 'bottom wall' (1), 'top' (2) were left out",
         "Triangle numbers its regions and markers: the names 'steel' (3), 'air' (7) were left out",
     ]
-    parsed = triangle.read(written.files)
+    parsed = triangle.read(contents(written))
     assert parsed.points.tobytes() == mesh.points[:, :2].tobytes()
     assert cells_of(parsed, "triangle") == cells_of(mesh, "triangle")
     assert regions_of(parsed, "triangle") == regions_of(mesh, "triangle")
     assert cells_of(parsed, "vertex") == [[n] for n in sorted({n for line in cells_of(mesh, "line") for n in line})]
-    assert triangle.write(Mesh(parsed.points, tuple(parsed.cells), point_data=parsed.point_data)).files == written.files
+    assert contents(triangle.write(Mesh(parsed.points, tuple(parsed.cells), point_data=parsed.point_data))) == contents(
+        written
+    )
 
 
 def test_conversion_of_six_node_triangles() -> None:
     points = np.array([[0, 0], [2, 0], [0, 2], [1, 0], [1, 1], [0, 1]], dtype=float)
     mesh = Mesh(points, (CellBlock("triangle6", [[0, 1, 2, 3, 4, 5]], [0]),))
     written = triangle.write(mesh)
-    assert written.files[".ele"] == b"1 6 1\n1 1 2 3 5 6 4 0\n"  # the side opposite the first corner comes first
-    assert cells_of(triangle.read(written.files), "triangle6") == [[0, 1, 2, 3, 4, 5]]
+    assert contents(written)[".ele"] == b"1 6 1\n1 1 2 3 5 6 4 0\n"  # the side opposite the first corner comes first
+    assert cells_of(triangle.read(contents(written)), "triangle6") == [[0, 1, 2, 3, 4, 5]]
     with pytest.raises(FormatError, match="three-node and six-node"):
         triangle.write(Mesh(points, (*mesh.cells, CellBlock("triangle", [[0, 1, 2]], [0]))))
     with pytest.raises(FormatError, match="Triangle cannot hold cells of type 'quad'"):
@@ -196,7 +199,7 @@ def test_markers_that_clash_are_numbered_anew() -> None:
     mesh = triangle_grid()
     clash = CellBlock("vertex", [[12], [13]], [1, 0])
     written = triangle.write(Mesh(mesh.points, (*mesh.cells, clash), mesh.region_names))
-    parsed = triangle.read(written.files)
+    parsed = triangle.read(contents(written))
     held = {n for line in cells_of(mesh, "line") for n in line} | {12, 13}
     assert cells_of(parsed, "vertex") == [[n] for n in sorted(held)]
     assert len(set(parsed.point_data["triangle:marker"].tolist())) == 5

@@ -9,7 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import vtk
-from contracts import check_all_cuts_refused, check_conversion, check_splice, mesh_of, moved_points, read, refused
+from contracts import (
+    check_all_cuts_refused,
+    check_conversion,
+    check_splice,
+    contents,
+    mesh_of,
+    moved_points,
+    read,
+    refused,
+)
 from damage import ENDS, GAPS, NUMBERS, cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -80,7 +89,7 @@ def test_binary_files_cut_anywhere_are_refused(polygonal: bool, tmp_path: Path) 
 
 
 def test_a_text_cut_anywhere_keeps_its_mesh_or_is_refused() -> None:
-    data = vtk_format.write(mixed_mesh(2)).files[".vtk"]
+    data = contents(vtk_format.write(mixed_mesh(2)))[".vtk"]
     whole = read(vtk_format, data)
     first = data.index(b"POINT_DATA")
     check_all_cuts_refused(vtk_format, data, len(data[:first].rstrip()) - 1, most=10_000)

@@ -7,15 +7,16 @@ import os
 import secrets
 import stat
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from gmsnet.errors import InputError
+from gmsnet.io.pieces import Piece
 from gmsnet.io.streams import is_special
 
 
-def replace_files(files: Mapping[str, bytes]) -> None:
-    """Writes files (path → bytes): each new content goes to a temporary file beside its target, reaches the disk, and
-    only when all of them have done so are the targets replaced.
+def replace_files(files: Mapping[str, bytes | Iterable[Piece]]) -> None:
+    """Writes files (path → bytes, or pieces made as they are written): each new content goes to a temporary file beside
+    its target, reaches the disk, and only when all of them have done so are the targets replaced.
 
     A link is followed, an existing file keeps its permissions. What is no regular file (a pipe, a device) is written
     straight. Raises InputError where a target cannot be written, BrokenPipeError where nobody reads a pipe any more;
@@ -23,17 +24,19 @@ def replace_files(files: Mapping[str, bytes]) -> None:
     """
     temporary: list[tuple[str, str]] = []
     try:
-        for path, data in files.items():
+        for path, contents in files.items():
+            pieces = [contents] if isinstance(contents, bytes) else contents
             try:
                 _check(path)
                 if is_special(path):
                     with open(path, "wb") as stream:
-                        stream.write(data)
+                        for piece in pieces:
+                            stream.write(piece)
                 else:
                     target = os.path.realpath(path)
                     name = os.path.join(os.path.dirname(target), f".gmsnet-{secrets.token_hex(6)}.tmp")
                     temporary.append((name, target))
-                    _write(name, target, data)
+                    _write(name, target, pieces)
             except BrokenPipeError:  # no fault of the user's
                 raise
             except OSError as error:
@@ -91,7 +94,7 @@ def _check(path: str) -> None:
         raise InputError(f"{path}: the folder {folder} is write-protected")
 
 
-def _write(name: str, target: str, data: bytes) -> None:
+def _write(name: str, target: str, pieces: Iterable[Piece]) -> None:
     """A new file with the permissions and owner of the target, if that exists, on the disk when this returns.
 
     Until it has them nobody else may open it: the target may be private.
@@ -99,7 +102,8 @@ def _write(name: str, target: str, data: bytes) -> None:
     mode = 0o600 if os.path.exists(target) else 0o666  # less what the umask or the folder takes away
     descriptor = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), mode)
     with os.fdopen(descriptor, "wb") as stream:
-        stream.write(data)
+        for piece in pieces:
+            stream.write(piece)
         stream.flush()
         if os.path.exists(target):
             old = os.stat(target)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io.cells import cell_blocks
-from gmsnet.io.words import ranges
+from gmsnet.io.cells import Small, cell_blocks, distinct
+from gmsnet.io.places import ranges
 from gmsnet.mesh import NODES, CellBlock
 
 
@@ -26,19 +26,19 @@ class Kind(NamedTuple):
 
 def table_blocks(
     kinds: Mapping[int, Kind],
-    codes: NDArray[np.int64],
-    first: NDArray[np.int64],
+    codes: Small,
+    sizes: Small,
     nodes: NDArray[np.int64],
     regions: NDArray[np.int64],
     fields: Mapping[str, NDArray[Any]],
 ) -> tuple[list[CellBlock], dict[str, tuple[NDArray[Any], ...]]]:
     """Blocks as ``cell_blocks`` makes them, and cell data (name → (n, …)) cut likewise.
 
-    Cell k has the type ``kinds[codes[k]]`` and the nodes first[k] to first[k + 1] - 1 of ``nodes``. Raises FormatError
-    naming a cell with a number of nodes that its type does not have.
+    Cell k has the type ``kinds[codes[k]]`` and ``sizes[k]`` nodes, which follow those of the cell before it in
+    ``nodes``. Raises FormatError naming a cell with a number of nodes that its type does not have.
     """
-    sizes = np.diff(first)
-    for code in np.unique(codes).tolist():
+    present = distinct(codes)
+    for code in present:
         expected = NODES.get(kinds[code].name)
         if expected is None:
             continue
@@ -47,34 +47,33 @@ def table_blocks(
             found, name = int(sizes[wrong[0]]), kinds[code].name
             raise FormatError(f"cell {wrong[0]} (counted from 0) is a {name} with {found} nodes instead of {expected}")
     names = {code: kind.name for code, kind in kinds.items()}
-    for code in np.unique(codes).tolist():
+    for code in present:
         if (place := kinds[code].order) is not None:
-            chosen = first[:-1][codes == code][:, None] + np.arange(len(place))
+            first = np.cumsum(sizes, dtype=np.int64) - sizes
+            chosen = first[codes == code][:, None] + np.arange(len(place))
             nodes = nodes.copy()
             nodes[chosen] = nodes[chosen[:, place]]
-    cells, order = cell_blocks(codes, names, sizes, nodes, first[:-1], regions)
+    cells, order = cell_blocks(codes, names, sizes, nodes, regions)
     cuts = np.cumsum([len(block.nodes) for block in cells])[:-1]
     return cells, {name: tuple(np.split(array[order], cuts)) for name, array in fields.items()}
 
 
 def check_range(nodes: NDArray[np.int64], count: int, fail: Callable[[int, str], NoReturn]) -> None:
     """``nodes`` (counted from 0) must name one of ``count`` points; ``fail(index, message)`` blames the first other."""
-    wrong = np.flatnonzero((nodes < 0) | (nodes >= count))
-    if wrong.size:
-        k = int(wrong[0])
+    if len(nodes) and not 0 <= nodes.min() <= nodes.max() < count:
+        k = int(np.argmax((nodes < 0) | (nodes >= count)))
         known = f"the nodes are 0 to {count - 1}" if count else "the file has no nodes"
         fail(k, f"a cell names the node {nodes[k]}, but {known}")
 
 
 def split_cells(
-    first: NDArray[np.int64], nodes: NDArray[np.int64], pieces: NDArray[np.int64], piece_size: NDArray[np.int64]
+    sizes: NDArray[np.int64], nodes: NDArray[np.int64], pieces: NDArray[np.int64], piece_size: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Cells cut into ``pieces[k]`` cells of ``piece_size[k]`` nodes, each one node further than the last.
 
-    This makes lines of a polyline and vertices of a set of them. Returns the cell that each piece is of, and ``first``
+    This makes lines of a polyline and vertices of a set of them. Returns the cell that each piece is of, and ``sizes``
     and ``nodes`` of the pieces.
     """
     owner = np.repeat(np.arange(len(pieces)), pieces)
-    sizes = piece_size[owner]
-    starts = ranges(first[:-1], pieces)
-    return owner, np.concatenate([[0], np.cumsum(sizes)]), nodes[ranges(starts, sizes)]
+    starts = ranges(np.cumsum(sizes) - sizes, pieces)
+    return owner, piece_size[owner], nodes[ranges(starts, piece_size[owner])]

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
+from gmsnet.io.cells import distinct
+from gmsnet.io.pieces import Piece
+from gmsnet.kernels import text as kernels
+from gmsnet.kernels.decimals import WIDEST
 from gmsnet.mesh import CellBlock, Mesh
+
+_PIECE = 1 << 20  # bytes that are made at once
 
 
 def in_plane(mesh: Mesh, title: str) -> tuple[NDArray[np.float64], list[str]]:
@@ -96,8 +102,7 @@ def lost_regions(mesh: Mesh, title: str, dimension: int = 2) -> list[str]:
 
 def regions_of(cells: Iterable[CellBlock], dimension: int) -> list[int]:
     """The region numbers of all cells of one dimension, ascending."""
-    parts = [np.unique(b.regions) for b in cells if b.dimension == dimension]
-    return np.unique(np.concatenate(parts)).tolist() if parts else []
+    return sorted({region for block in cells if block.dimension == dimension for region in distinct(block.regions)})
 
 
 def marker_name(mesh: Mesh, dimension: int, region: int) -> str:
@@ -110,23 +115,38 @@ def marker_names(mesh: Mesh, dimension: int) -> list[str]:
     return [repr(marker_name(mesh, dimension, region)) for region in regions_of(mesh.cells, dimension)]
 
 
-def decimals(values: NDArray[np.float64]) -> list[str]:
-    """Rows (N × k) as text: the shortest decimals that read back as the same float64, separated by a blank."""
-    return _rows(values, "%r")
+def rows(template: bytes, *columns: NDArray[Any]) -> Iterator[Piece]:
+    """The template for each row of the columns, a number in the place of each ``%``, some rows at a time.
+
+    columns: (n,) or (n, k) whole numbers or floats; these as the shortest decimals that read back the same.
+    """
+    words = template.split(b"%")
+    text, cuts = np.frombuffer(b"".join(words), dtype=np.uint8), np.cumsum([len(word) for word in words])
+    tables = [column if column.ndim == 2 else column[:, None] for column in columns]
+    known = {"f": kernels.FLOAT, "u": kernels.UNSIGNED}
+    kinds = np.repeat([known.get(table.dtype.kind, kernels.SIGNED) for table in tables], [t.shape[1] for t in tables])
+    width = len(text) + WIDEST * len(kinds)
+    step = max(1, _PIECE // width)
+    out = np.empty(step * width, dtype=np.uint8)
+    for k in range(0, len(tables[0]), step):
+        parts = [_printable(table[k : k + step]) for table in tables]
+        none = np.empty((len(parts[0]), 0), dtype=np.int64)
+        whole = np.column_stack([none, *(part for part in parts if part.dtype.kind != "f")])
+        real = np.column_stack([none.astype(np.float64), *(part for part in parts if part.dtype.kind == "f")])
+        length = kernels.print_rows(text, cuts, kinds, whole, real, out)
+        yield out.data[:length]
 
 
-def integers(values: NDArray[np.int64]) -> list[str]:
-    """Rows (N × k) of integers as text."""
-    return _rows(values, "%d")
+def _printable(column: NDArray[Any]) -> NDArray[Any]:
+    """Numbers as int64 or float64 with the same decimals."""
+    if column.dtype == np.float32:  # the shortest decimal of the one type has few enough digits to be that of the other
+        return column.astype(str).astype(np.float64)
+    return column if column.dtype.kind == "f" else column.astype(np.int64)
 
 
-def _rows(values: NDArray[Any], form: str) -> list[str]:
-    """One format for many rows at once is several times as fast as one call for each."""
-    lines: list[str] = []
-    for part in np.array_split(values, len(values) // 4096 + 1):
-        template = "\n".join([" ".join([form] * part.shape[1])] * len(part))
-        lines += (template % tuple(part.ravel().tolist())).split("\n") if len(part) else []
-    return lines
+def row_of(count: int) -> bytes:
+    """The template of a row of so many numbers and nothing else."""
+    return b" ".join([b"%"] * count) + b"\n"
 
 
 def were(count: int) -> str:

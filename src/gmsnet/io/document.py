@@ -9,6 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.io.mapped import Data
+from gmsnet.io.pieces import Pieces
 from gmsnet.io.splice import Slots
 from gmsnet.mesh import CellBlock, Mesh
 
@@ -28,9 +30,12 @@ class Parsed:
 
 @dataclass(frozen=True)
 class Written:
-    """The files of a converted mesh (suffix → bytes), and what the format could not hold, in words."""
+    """The files of a converted mesh by suffix, and what the format could not hold, in words.
 
-    files: Mapping[str, bytes]
+    The files are made when they are asked for, so that a mesh can be checked for what a format can hold at no cost.
+    """
+
+    files: Mapping[str, Pieces]
     lost: list[str] = field(default_factory=list)
 
 
@@ -43,7 +48,7 @@ class Format(Protocol):
     name: str
     suffixes: tuple[str, ...]
 
-    def read(self, files: Mapping[str, bytes]) -> Parsed:
+    def read(self, files: Mapping[str, Data]) -> Parsed:
         """The facts of the file(s), suffix → bytes. Raises FormatError naming the line (or byte) and the mend."""
         ...
 

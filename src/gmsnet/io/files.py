@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.atomic import reason, refuse_folder, replace_files
+from gmsnet.io.cells import sealed
 from gmsnet.io.document import Parsed
 from gmsnet.io.formats import FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
+from gmsnet.io.mapped import Data, load
+from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import FileSource
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_input, standard_output
 from gmsnet.mesh import Mesh
@@ -39,7 +42,7 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
         raise FormatError(f"{shown}: {error}") from None
 
 
-def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, bytes]]:
+def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, Data]]:
     """The format and the bytes of each file of the mesh by suffix."""
     stream = name in STANDARD_INPUT or is_special(name)
     refuse_folder(name)
@@ -60,12 +63,9 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, b
     return entry, {suffix: _bytes(_beside(name, suffix)) for suffix in entry.suffixes}
 
 
-def _bytes(name: str) -> bytes:
+def _bytes(name: str) -> Data:
     try:
-        if name in STANDARD_INPUT:
-            return standard_input().read()
-        with open(name, "rb") as stream:
-            return stream.read()
+        return standard_input().read() if name in STANDARD_INPUT else load(name)
     except FileNotFoundError:
         raise InputError(f"{name}: there is no such file") from None
     except IsADirectoryError:
@@ -84,13 +84,13 @@ def _beside(name: str, suffix: str) -> str:
     return stem + (suffix.upper() if given.isupper() else suffix)
 
 
-def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, bytes]) -> Mesh:
+def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data]) -> Mesh:
     if not len(parsed.points):
         raise FormatError("the file holds no points")
     if not any(len(block.nodes) for block in parsed.cells):
         raise FormatError("the file holds no cells")
     mesh = Mesh(
-        parsed.points,
+        sealed(parsed.points),
         tuple(parsed.cells),
         parsed.region_names,
         parsed.point_data,
@@ -124,22 +124,39 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     source = mesh.source
     lost: list[str] = []
     try:
-        if isinstance(source, FileSource) and source.format == entry.key and source.fits(mesh):
-            files: Mapping[str, bytes] = source.splice(mesh.points)
+        if isinstance(source, FileSource) and source.format == entry.key and source.fits(mesh) and source.intact():
+            files = source.splice(mesh.points)
         else:
             written = entry.load().write(mesh)
-            files, lost = written.files, written.lost
+            files, lost = dict(written.files), written.lost
+            if isinstance(source, FileSource) and not source.intact():
+                lost = [*lost, _CHANGED]
     except MemoryError:
-        raise InputError(f"{shown}: there is not enough memory to write this mesh") from None
+        raise _no_memory(shown) from None
     except InputError as error:
         raise FormatError(f"{shown}: {error}") from None
+    pieces = {suffix: _with_memory(shown, part) for suffix, part in files.items()}
     if name in STANDARD_OUTPUT:
-        _to_standard_output(*files.values())
+        _to_standard_output(*pieces.values())
     elif len(files) > 1:
-        replace_files({_beside(name, suffix): data for suffix, data in files.items()})
+        replace_files({_beside(name, suffix): part for suffix, part in pieces.items()})
     else:
-        replace_files(dict.fromkeys([name], *files.values()))
+        replace_files(dict.fromkeys([name], *pieces.values()))
     return lost
+
+
+_CHANGED = "the file that was read has changed since: what gmsnet does not know of it was left out"
+
+
+def _with_memory(shown: str, pieces: Pieces) -> Iterator[Piece]:
+    try:
+        yield from pieces
+    except MemoryError:
+        raise _no_memory(shown) from None
+
+
+def _no_memory(shown: str) -> InputError:
+    return InputError(f"{shown}: there is not enough memory to write this mesh")
 
 
 def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
@@ -165,10 +182,11 @@ def files_of(name: str, entry: Entry) -> list[str]:
     return [name] if len(entry.suffixes) == 1 else [_beside(name, suffix) for suffix in entry.suffixes]
 
 
-def _to_standard_output(data: bytes) -> None:
+def _to_standard_output(pieces: Iterable[Piece]) -> None:
     stream = standard_output()
     try:
-        stream.write(data)
+        for piece in pieces:
+            stream.write(piece)
         stream.flush()
     except BrokenPipeError:  # nobody reads any more: no fault of the user's
         raise

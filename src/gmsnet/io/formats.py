@@ -9,6 +9,7 @@ from typing import cast
 
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.document import Format
+from gmsnet.io.mapped import Data
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ def format_of_suffix(path: str, suffix: str, option: str = "--format", reading: 
     raise InputError(f"{path}: {what}; known are {known()}; or name the format with {option}")
 
 
-def sniff(data: bytes) -> str | None:
+def sniff(data: Data) -> str | None:
     """The name of the format that the first bytes show, None where they do not."""
     head = data[:HEAD].removeprefix(b"\xef\xbb\xbf")
     for key, (comment, sign) in SIGNS.items():
@@ -116,7 +117,7 @@ def sniff(data: bytes) -> str | None:
     return None
 
 
-def check_contents(data: bytes, key: str) -> None:
+def check_contents(data: Data, key: str) -> None:
     """Raises FormatError where a file is empty, is no mesh at all, or shows another format than ``key``."""
     if not re.search(rb"\S", data):
         raise FormatError("the file is empty")

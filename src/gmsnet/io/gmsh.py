@@ -8,7 +8,7 @@ nodes, elements and physical groups are kept as they are.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,11 @@ from gmsnet.errors import FormatError
 from gmsnet.io import convert
 from gmsnet.io import gmsh_sections as sections
 from gmsnet.io.cell_table import table_blocks
+from gmsnet.io.cells import distinct, first_repeated, places_of
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.gmsh_sections import KINDS, Contents, Elements, Nodes, Source
+from gmsnet.io.mapped import Data
+from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.mesh import Mesh
 
 name = "Gmsh"
@@ -26,10 +29,11 @@ suffixes = (".msh",)
 
 CODES = {kind.name: code for code, kind in KINDS.items()}
 _HEAD = re.compile(rb"\s*\$MeshFormat\s+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*(?:\r\n?|\n)")
+_BEGIN = 4096  # bytes, white space and what an old file begins with
 _NAME = re.compile(rb'\s*([0-3])\s+(-?\d{1,18})\s+"([^"\r\n]*)"')
 
 
-def read(files: Mapping[str, bytes]) -> Parsed:
+def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
     data = files[".msh"]
     source, old = _open(data)
@@ -52,10 +56,10 @@ def read(files: Mapping[str, bytes]) -> Parsed:
 _READERS = (b"$PhysicalNames", b"$Entities", b"$PartitionedEntities", b"$Nodes", b"$Elements")
 
 
-def _open(data: bytes) -> tuple[Source, bool]:
+def _open(data: Data) -> tuple[Source, bool]:
     """The file behind its first section, and whether its version is 2.2."""
     head = _HEAD.match(data)
-    if head is None and not data.lstrip().startswith(b"$NOD"):
+    if head is None and not data[:_BEGIN].lstrip().startswith(b"$NOD"):
         raise FormatError("line 1: not a Gmsh file: it must start with $MeshFormat, the version, 0 or 1, and 8")
     version = head[1].decode("latin-1") if head else "1"
     if head is None or version not in ("2.2", "4.1"):
@@ -123,33 +127,29 @@ def _physical_names(source: Source, found: Contents) -> None:
 
 
 def _assemble(found: Contents, nodes: Nodes, elements: Elements) -> Parsed:
-    order = np.argsort(nodes.tags, kind="stable")
-    tags = nodes.tags[order]
-    if (twice := np.flatnonzero(np.diff(tags) == 0)).size:
-        k = int(order[twice[0] + 1])
-        nodes.words.fail(int(nodes.tags_at[k]), f"the node {nodes.tags[k]} is given twice")
-    place = np.searchsorted(tags, elements.nodes)
-    known = (place < len(tags)) & (np.append(tags, 0)[place] == elements.nodes)
-    if not known.all():
-        k = int(np.argmin(known))
-        elements.words.fail(
-            int(elements.at[k]), f"an element names the node {elements.nodes[k]}, which is not in $Nodes"
-        )
+    twice = first_repeated(nodes.tags)
+    if twice >= 0:
+        nodes.words.fail(nodes.tags_at[twice], f"the node {nodes.tags[twice]} is given twice")
+    place, unknown = places_of(nodes.tags, elements.nodes)
+    if unknown >= 0:
+        where, named = int(elements.at[unknown]), elements.nodes[unknown]
+        elements.words.fail(where, f"an element names the node {named}, which is not in $Nodes")
     names = dict(found.names)
     regions = elements.physical
     if regions is None:
         regions = _regions(found, elements, names)
-    cells, _ = table_blocks(KINDS, elements.codes, elements.first, order[place], regions, {})
+    cells, _ = table_blocks(KINDS, elements.codes, elements.sizes, place, regions, {})
     for block in cells:  # a negative tag means: the same group, turned round
         for region in np.unique(block.regions[block.regions < 0]).tolist():
             if (block.dimension, -region) in names:
                 names.setdefault((block.dimension, region), names[block.dimension, -region])
-    return Parsed(nodes.points, cells, nodes.words.slots(nodes.at, "f8"), names)
+    return Parsed(nodes.points, cells, nodes.slots, names)
 
 
 def _regions(found: Contents, elements: Elements, names: dict[tuple[int, int], str]) -> NDArray[np.int64]:
     """The physical tag of each element of version 4.1; each combination of several gets a number and a name."""
     assert elements.entity is not None
+    assert elements.number is not None
     entities, which = np.unique(elements.entity, axis=0, return_inverse=True)
     groups = [found.physical.get((dim, tag), ()) for dim, tag in entities.tolist()]
     tags = [abs(tag) for group in found.physical.values() for tag in group] + [abs(tag) for _, tag in names]
@@ -160,7 +160,7 @@ def _regions(found: Contents, elements: Elements, names: dict[tuple[int, int], s
             parts = [names.get((dim, abs(tag)), str(tag)) for tag in group]
             names[dim, number[group]] = " + ".join(parts)
     numbers = [number.get(group, group[0] if group else 0) for group in groups]
-    return np.array(numbers, dtype=np.int64)[which.reshape(-1)]
+    return np.repeat(np.array(numbers, dtype=np.int64)[which.reshape(-1)], elements.number)
 
 
 def write(mesh: Mesh) -> Written:
@@ -172,32 +172,38 @@ def write(mesh: Mesh) -> Written:
     physical, renumbered = _physical_tags(groups)
     if renumbered:
         lost.append(f"{name} cannot hold these region numbers, they got others: {', '.join(map(str, renumbered))}")
+    return Written({".msh": Pieces(lambda: _text(mesh, points, groups, physical))}, lost)
+
+
+def _text(
+    mesh: Mesh, points: NDArray[np.float64], groups: _Groups, physical: Mapping[tuple[int, int], int]
+) -> Iterator[Piece]:
     entities = {group: k + 1 for k, group in enumerate(groups)}
     named = [(dim, region) for dim, region in groups if (dim, region) in mesh.region_names and physical[dim, region]]
-    text = ["$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"]
+    yield b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
     if named:
         lines = [f'{dim} {physical[dim, r]} "{_plain(mesh.region_names[dim, r])}"\n' for dim, r in named]
-        text += [f"$PhysicalNames\n{len(lines)}\n", *lines, "$EndPhysicalNames\n"]
-    text.append(_entities_text(points, groups, physical, entities))
+        yield "".join([f"$PhysicalNames\n{len(lines)}\n", *lines, "$EndPhysicalNames\n"]).encode()
+    yield from _entities_text(points, groups, physical, entities)
     top = max((dim for dim, _ in groups), default=0)
     home = next((tag for (dim, _), tag in entities.items() if dim == top), 1)
     count = len(points)
-    text.append(f"$Nodes\n1 {count} {min(1, count)} {count}\n{top} {home} 0 {count}\n")
-    text += [f"{k}\n" for k in range(1, count + 1)]
-    text += [f"{row}\n" for row in convert.decimals(points)]
-    text.append("$EndNodes\n")
-    blocks = []
-    done = 0
-    for (dim, region), tag in entities.items():
-        for kind, nodes in groups[dim, region].items():
-            head = f"{dim} {tag} {CODES[kind]} {len(nodes)}\n"
-            place = KINDS[CODES[kind]].order
-            inverse = slice(None) if place is None else np.argsort(place)
-            numbered = np.column_stack([np.arange(done + 1, done + 1 + len(nodes)), nodes[:, inverse] + 1])
-            blocks.append(head + "".join(f"{row}\n" for row in convert.integers(numbered)))
-            done += len(nodes)
-    text += [f"$Elements\n{len(blocks)} {done} {min(1, done)} {done}\n", *blocks, "$EndElements\n"]
-    return Written({".msh": "".join(text).encode()}, lost)
+    yield f"$Nodes\n1 {count} {min(1, count)} {count}\n{top} {home} 0 {count}\n".encode()
+    yield from convert.rows(b"%\n", np.arange(1, count + 1))
+    yield from convert.rows(b"% % %\n", points)
+    yield b"$EndNodes\n"
+    blocks = [(key, kind, nodes) for key in entities for kind, nodes in groups[key].items()]
+    total = sum(len(nodes) for _, _, nodes in blocks)
+    yield f"$Elements\n{len(blocks)} {total} {min(1, total)} {total}\n".encode()
+    done = 1
+    for key, kind, nodes in blocks:
+        yield f"{key[0]} {entities[key]} {CODES[kind]} {len(nodes)}\n".encode()
+        place = KINDS[CODES[kind]].order
+        nodes = nodes if place is None else nodes[:, np.argsort(place)]
+        yield from convert.rows(
+            convert.row_of(1 + nodes.shape[1]), np.arange(done, done := done + len(nodes)), nodes + 1
+        )
+    yield b"$EndElements\n"
 
 
 _Groups = dict[tuple[int, int], dict[str, NDArray[np.int64]]]  # (dimension, region) → kind → nodes of its cells
@@ -206,7 +212,7 @@ _Groups = dict[tuple[int, int], dict[str, NDArray[np.int64]]]  # (dimension, reg
 def _groups(mesh: Mesh) -> _Groups:
     found: dict[tuple[int, int], dict[str, list[NDArray[np.int64]]]] = {}
     for block in mesh.cells:
-        for region in np.unique(block.regions).tolist():
+        for region in distinct(block.regions):
             kinds = found.setdefault((block.dimension, region), {})
             kinds.setdefault(block.kind, []).append(block.nodes[block.regions == region])
     return {key: {kind: np.concatenate(parts) for kind, parts in found[key].items()} for key in sorted(found)}
@@ -225,17 +231,21 @@ def _entities_text(
     groups: _Groups,
     physical: Mapping[tuple[int, int], int],
     entities: Mapping[tuple[int, int], int],
-) -> str:
+) -> Iterator[Piece]:
     counts = [sum(dim == k for dim, _ in groups) for k in range(4)]
-    lines = [f"$Entities\n{' '.join(map(str, counts))}\n"]
+    yield f"$Entities\n{' '.join(map(str, counts))}\n".encode()
     for (dim, region), kinds in groups.items():
-        used = points[np.concatenate([nodes.ravel() for nodes in kinds.values()])]
-        corners = [used[0]] if dim == 0 else [used.min(axis=0), used.max(axis=0)]
-        box = " ".join(convert.decimals(np.array(corners).reshape(1, -1)))
+        chosen = np.zeros(len(points), dtype=bool)
+        for nodes in kinds.values():
+            chosen[nodes] = True
+        used = points[chosen]
+        one = points[next(iter(kinds.values())).flat[0]]
+        corners = [one] if dim == 0 else [used.min(axis=0), used.max(axis=0)]
+        box = " ".join(map(repr, np.concatenate(corners).tolist()))
         tag = physical[dim, region]
         group = f"1 {tag}" if tag else "0"
-        lines.append(f"{entities[dim, region]} {box} {group}{' 0' * (dim > 0)}\n")
-    return "".join(lines) + "$EndEntities\n"
+        yield f"{entities[dim, region]} {box} {group}{' 0' * (dim > 0)}\n".encode()
+    yield b"$EndEntities\n"
 
 
 def _plain(text: str) -> str:

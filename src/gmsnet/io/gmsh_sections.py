@@ -9,14 +9,19 @@ from __future__ import annotations
 import re
 import struct
 from dataclasses import dataclass, field
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.io.cell_table import Kind
-from gmsnet.io.text import fail, scan_rows
-from gmsnet.io.words import Addresses, ByteWords, TextWords, Words, fail_at, ranges
+from gmsnet.io.cells import joined
+from gmsnet.io.mapped import Data
+from gmsnet.io.places import Addresses, Lattice, Places, chained, lists, pick, shifted
+from gmsnet.io.splice import Slots
+from gmsnet.io.text import Text, fail
+from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
+from gmsnet.kernels import text as kernels
 from gmsnet.mesh import NODES
 
 # Gmsh's types of elements: the name, the number of nodes and, where Gmsh's order differs, the places of Mesh's nodes.
@@ -27,33 +32,41 @@ KINDS = {
     17: Kind("hexahedron20", (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)), 21: Kind("triangle10"),
     26: Kind("line4"),
 }  # fmt: skip
+SIZES = np.array([NODES[KINDS[code].name] if code in KINDS else 0 for code in range(max(KINDS) + 1)], dtype=np.int8)
+
+_TOGETHER = 1 << 20  # numbers of elements that are looked at together
 
 
 @dataclass
 class Elements:
-    """Elements one after another. entity: (n, 2) dimension and tag of the entity of each (of version 4.1).
+    """Elements one after another. nodes: tags, those of an element behind those of the one before; at: their addresses.
 
-    physical: (n,) the physical tag of each (of version 2.2). nodes: tags, element k having first[k] to first[k+1] - 1;
-    at: the address of each.
+    entity: (blocks, 2) dimension and tag of the entity of each block, and number: (blocks,) of its elements (of version
+    4.1). physical: (n,) the physical tag of each (of version 2.2).
     """
 
-    codes: NDArray[np.int64]
-    first: NDArray[np.int64]
+    codes: NDArray[np.int8]
     nodes: NDArray[np.int64]
     at: Addresses
     words: Words
     entity: NDArray[np.int64] | None = None
+    number: NDArray[np.int64] | None = None
     physical: NDArray[np.int64] | None = None
+
+    @property
+    def sizes(self) -> NDArray[np.int8]:
+        """(n,) the number of nodes of each."""
+        return SIZES[self.codes]
 
 
 @dataclass
 class Nodes:
-    """Nodes one after another: their tags, coordinates, and where both stand."""
+    """Nodes one after another: their tags and where these stand, coordinates, and the slots of these."""
 
     tags: NDArray[np.int64]
-    points: NDArray[np.float64]
     tags_at: Addresses
-    at: Addresses
+    points: NDArray[np.float64]
+    slots: Slots
     words: Words
 
 
@@ -70,7 +83,7 @@ class Contents:
 class Source:
     """A Gmsh file. at: the byte that reading goes on from; order: of a binary file, empty for a text."""
 
-    def __init__(self, data: bytes, at: int, order: str) -> None:
+    def __init__(self, data: Data, at: int, order: str) -> None:
         self.data, self.at, self.order = data, at, order
 
     def fail(self, offset: int, message: str) -> NoReturn:
@@ -100,9 +113,10 @@ class Source:
         stop = self.data.find(b"$End" + title, self.at)
         if stop < 0:
             self.fail(len(self.data), f"$End{show(title)} is missing: the file is cut off")
-        rows = scan_rows(self.data, self.at, None, stop)
+        text = Text(self.data, stop=stop)
+        starts, _ = text.tokens(self.at)
         self.at = stop
-        return TextWords(self.data, rows.spans)
+        return TextWords(text, starts)
 
     def close(self, title: bytes, words: Words) -> None:
         """The section must end where its counts say."""
@@ -122,7 +136,8 @@ def show(title: bytes) -> str:
 
 def ints(words: Words, count: int, kind: str = "i4") -> list[int]:
     """The next integers."""
-    return words.values(words.take(count, kind), kind).tolist()  # type: ignore[no-any-return]
+    found: list[int] = words.values(words.take(count, kind), kind).tolist()
+    return found
 
 
 def counts(words: Words, count: int, kind: str = "u8") -> list[int]:
@@ -165,113 +180,111 @@ def entities(words: Words, partitioned: bool) -> dict[tuple[int, int], tuple[int
 
 def nodes_old(words: Words, count: int) -> Nodes:
     """Nodes of version 2.2: rows of a tag and three coordinates."""
-    start, unit = skip(words, (count, "i4"), (3 * count, "f8")), words.size("f8")
-    tags_at = start + (words.size("i4") + 3 * unit) * np.arange(count, dtype=np.int64)
-    return _nodes(words, tags_at, "i4", tags_at[:, None] + words.size("i4") + unit * np.arange(3))
+    start, tag, unit = skip(words, (count, "i4"), (3 * count, "f8")), words.size("i4"), words.size("f8")
+    row = tag + 3 * unit
+    at = Places(Lattice(start, count, row, (tag, tag + unit, tag + 2 * unit)))
+    return _nodes(words, Places(Lattice(start, count, row)), "i4", at)
 
 
 def nodes_new(words: Words) -> Nodes:
     """Nodes of version 4.1: blocks of tags and then of coordinates, which u, v, w may follow."""
     blocks, total, _, _ = counts(words, 4)
-    heads = []
+    tag, unit = words.size("u8"), words.size("f8")
+    tags, points = [], []
     for _ in range(blocks):
         dimension, _, parametric = ints(words, 3)
         if not 0 <= dimension <= 3 or parametric not in (0, 1):
             words.fail(words.at, f"a block of nodes has the dimension {dimension} and parametric {parametric}")
         (count,) = counts(words, 1)
         width = 3 + dimension * parametric
-        heads.append((count, skip(words, (count, "u8")), skip(words, (count * width, "f8")), width))
-    number, tags, points, widths = np.array(heads, dtype=np.int64).reshape(-1, 4).T
-    if number.sum() != total:
-        words.fail(words.at, f"$Nodes announces {total} nodes, but its blocks have {number.sum()}")
-    unit = words.size("f8")
-    rows = np.repeat(points, number) + _rank(number) * np.repeat(widths, number) * unit
-    return _nodes(words, ranges(tags, number, words.size("u8")), "u8", rows[:, None] + unit * np.arange(3))
+        tags.append(Lattice(skip(words, (count, "u8")), count, tag))
+        points.append(Lattice(skip(words, (count * width, "f8")), count, width * unit, (0, unit, 2 * unit)))
+    if (found := sum(lattice.rows for lattice in tags)) != total:
+        words.fail(words.at, f"$Nodes announces {total} nodes, but its blocks have {found}")
+    return _nodes(words, Places(*tags), "u8", Places(*points))
 
 
-def _nodes(words: Words, tags_at: Addresses, kind: str, at: Addresses) -> Nodes:
+def _nodes(words: Words, tags_at: Places, kind: str, at: Places) -> Nodes:
     tags = words.values(tags_at, kind)
-    return Nodes(tags, words.values(at, "f8"), tags_at, at, words)
+    return Nodes(tags, tags_at, *words.coordinates(at, "f8"), words)
 
 
 def elements_new(words: Words) -> Elements:
     """Elements of version 4.1: blocks of one entity and type, rows of a tag and the nodes."""
     blocks, total, _, _ = counts(words, 4)
-    heads = []
+    unit = words.size("u8")
+    heads, places = [], []
     for _ in range(blocks):
         at = words.at
         dimension, tag, code = ints(words, 3)
         (count,) = counts(words, 1)
         size = node_count(words, at, code)
-        heads.append((dimension, tag, code, count, size, skip(words, (count * (1 + size), "u8"))))
-    dimensions, entities, codes, number, counted, start = np.array(heads, dtype=np.int64).reshape(-1, 6).T
+        start = skip(words, (count * (1 + size), "u8"))
+        heads.append((dimension, tag, code, count))
+        places.append(Lattice(start, count, (1 + size) * unit, tuple(unit * k for k in range(1, 1 + size))))
+    dimensions, tags, codes, number = np.array(heads, dtype=np.int64).reshape(-1, 4).T
     if number.sum() != total:
         words.fail(words.at, f"$Elements announces {total} elements, but its blocks have {number.sum()}")
-    sizes = np.repeat(counted, number)
-    rows = np.repeat(start, number) + words.size("u8") * (1 + _rank(number) * (1 + sizes))
-    entity = np.stack([np.repeat(dimensions, number), np.repeat(entities, number)], axis=1)
-    return _elements(words, np.repeat(codes, number), sizes, rows, "u8", entity=entity)
+    at_nodes = Places(*places)
+    nodes = words.values(at_nodes, "u8")
+    entity = np.stack([dimensions, tags], axis=1)
+    return Elements(np.repeat(codes.astype(np.int8), number), nodes, at_nodes, words, entity=entity, number=number)
 
 
 def elements_old(words: Words, total: int) -> Elements:
     """Elements of version 2.2: in a text rows of tag, type, number of tags, tags, nodes; in a binary file blocks."""
-    heads = _walk_bytes(words, total) if isinstance(words, ByteWords) else _walk_text(words, total)
-    codes, tag_counts, starts = heads
-    known = np.array([NODES[KINDS[code].name] if code in KINDS else 0 for code in range(max(KINDS) + 1)])
-    unit = words.size("i4")
-    rows = starts + unit * tag_counts
-    physical = np.zeros(len(codes), dtype=np.int64)
-    tagged = tag_counts > 0
-    physical[tagged] = words.values(starts[tagged], "i4")
-    return _elements(words, codes, known[codes], rows, "i4", physical=physical)
+    if isinstance(words, ByteWords):
+        return _elements_of_bytes(words, total)
+    codes, physical, nodes, places, found, most = [], [], [], list[Addresses](), 0, _TOGETHER
+    while found < total:
+        start = words.at
+        values = words.values(Places(Lattice(start, min(most, words.end - start), 1)), "i4")
+        room = min(total - found, len(values) // 3)
+        code, first = np.empty(room, dtype=np.int8), np.empty(room, dtype=np.int64)
+        count, end = kernels.walk(values, 0, 3, 1, 2, SIZES, code, first)
+        if not count:
+            if start + len(values) == words.end:
+                _blame(words, values, found, total)
+            most *= 2  # one element with so many tags
+            continue
+        code, first = code[:count], first[:count]
+        tags, sizes = values[first + 2], SIZES[code].astype(np.int64)
+        at = lists(first, 3 + tags + sizes, 3 + tags, sizes)
+        codes.append(code)
+        physical.append(np.where(tags > 0, values[np.minimum(first + 3, len(values) - 1)], 0))
+        nodes.append(pick(values, at))
+        places.append(shifted(at, start))
+        words.at, found = start + end, found + count
+    return Elements(joined(codes, np.int8), joined(nodes), chained(places), words, physical=joined(physical))
 
 
-def _walk_text(words: Words, total: int) -> tuple[NDArray[np.int64], ...]:
-    """(types, numbers of tags, addresses of the first tag) of all elements."""
-    start = words.at
-    values = words.values(np.arange(start, words.end), "i4").tolist()
-    heads, at = [], 0
-    for k in range(total):
-        if at + 3 > len(values):
-            words.fail(words.end, f"$Elements ends after {k} of {total} elements")
-        code, tags = values[at + 1], values[at + 2]
-        size = node_count(words, start + at, code)
-        if tags < 0 or at + 3 + tags + size > len(values):
-            words.fail(start + at, f"the element that begins here has {tags} tags and {size} nodes: it is cut off")
-        heads.append((code, tags, start + at + 3))
-        at += 3 + tags + size
-    words.at = start + at
-    code, tags, starts = np.array(heads, dtype=np.int64).reshape(-1, 3).T
-    return code, tags, starts
+def _blame(words: Words, values: NDArray[np.int64], found: int, total: int) -> NoReturn:
+    """Raises FormatError for the element that begins with ``values``, ``found`` of ``total`` being before it."""
+    if len(values) < 3:
+        words.fail(words.end, f"$Elements ends after {found} of {total} elements")
+    code, tags = values[1:3].tolist()
+    size = node_count(words, words.at, code)
+    words.fail(words.at, f"the element that begins here has {tags} tags and {size} nodes: it is cut off")
 
 
-def _walk_bytes(words: ByteWords, total: int) -> tuple[NDArray[np.int64], ...]:
-    """The same in a binary file, where blocks of elements with one type and number of tags have a head each."""
-    head, heads, done = struct.Struct(words.order + "3i"), [], 0
+def _elements_of_bytes(words: ByteWords, total: int) -> Elements:
+    """Elements of version 2.2 in a binary file: blocks with one type and number of tags have a head each."""
+    head, codes, physical, places, done = struct.Struct(words.order + "3i"), [], [], [], 0
     while done < total:
         at = skip(words, (3, "i4"))
         code, count, tags = head.unpack_from(words.data, at)
-        width = 1 + tags + node_count(words, at, code)
+        size = node_count(words, at, code)
         if count <= 0 or tags < 0 or done + count > total:
             words.fail(at, f"a block of {count} elements with {tags} tags each cannot be right")
-        heads.append((code, count, tags, skip(words, (count * width, "i4")), width))
+        row = 4 * (1 + tags + size)
+        start = skip(words, (count * row // 4, "i4"))
+        codes.append(np.full(count, code, dtype=np.int8))
+        physical.append(words.values(Places(Lattice(start + 4, count if tags else 0, row)), "i4"))
+        physical.append(np.zeros(0 if tags else count, dtype=np.int64))
+        places.append(Lattice(start, count, row, tuple(4 * (1 + tags + k) for k in range(size))))
         done += count
-    codes, number, tag_counts, start, widths = np.array(heads, dtype=np.int64).reshape(-1, 5).T
-    starts = np.repeat(start, number) + 4 * (1 + _rank(number) * np.repeat(widths, number))
-    return np.repeat(codes, number), np.repeat(tag_counts, number), starts
-
-
-def _rank(number: NDArray[np.int64]) -> NDArray[np.int64]:
-    """0, 1, 2, … within each block of ``number[k]`` rows."""
-    return ranges(np.zeros(len(number), dtype=np.int64), number)
-
-
-def _elements(
-    words: Words, codes: NDArray[np.int64], sizes: NDArray[np.int64], rows: Addresses, kind: str, **regions: Any
-) -> Elements:
-    at = ranges(rows, sizes, words.size(kind))
-    first = np.concatenate([[0], np.cumsum(sizes)])
-    return Elements(codes, first, words.values(at, kind), at, words, **regions)
+    at_nodes = Places(*places)
+    return Elements(joined(codes, np.int8), words.values(at_nodes, "i4"), at_nodes, words, physical=joined(physical))
 
 
 def node_count(words: Words, at: int, code: int) -> int:

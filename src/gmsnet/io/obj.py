@@ -5,155 +5,192 @@ The region of a cell is its material (``usemtl``) together with its group (``g``
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.io import convert
-from gmsnet.io.cells import cell_blocks, check_nodes, polygon_kinds
+from gmsnet.io.cells import cell_blocks, check_nodes, distinct, polygon_kinds
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.mapped import Data
+from gmsnet.io.pieces import Piece, Pieces
+from gmsnet.io.places import ranges
 from gmsnet.io.splice import TextSlots
-from gmsnet.io.text import Rows, Spans, before_slash, blank, fail, gather, scan_rows, to_floats, to_ints, token, word
+from gmsnet.io.text import Rows, Starts, Text
 from gmsnet.mesh import CellBlock, Mesh
 
 name = "OBJ"
 suffixes = (".obj",)
 
 KEYS = (b"v", b"vt", b"vn", b"vp", b"f", b"l", b"p", b"o", b"g", b"s", b"usemtl", b"mtllib")
-FACE, LINE, POINT = 0, 1, 2
-LEAST = {b"f": 3, b"l": 2, b"p": 1}  # nodes
+POINT, GROUP, MATERIAL = (KEYS.index(key) for key in (b"v", b"g", b"usemtl"))
+LEAST = {KEYS.index(b"f"): 3, KEYS.index(b"l"): 2, KEYS.index(b"p"): 1}  # nodes
+FACE, LINE, DOT = LEAST
 KINDS = ("triangle", "quad", "polygon", "line", "vertex")
 
 
-def read(files: Mapping[str, bytes]) -> Parsed:
+def read(files: Mapping[str, Data]) -> Parsed:
     """See Format. Polylines become lines, each ``p`` the vertices it names. The file has no counts: a file that is
     cut exactly between two lines reads without its end.
     """
-    data = files[".obj"]
-    text = blank(data, rb"#[^\r\n]*")
-    rows = scan_rows(text, 0)
+    text = Text(files[".obj"], b"#")
+    rows = text.rows(0)
     _no_broken_lines(text, rows)
-    heads = rows.column(0)
-    keys = gather(text, np.stack([heads[:, 0], np.minimum(heads[:, 1], heads[:, 0] + 8)], axis=1))
-    unknown = np.flatnonzero(~np.isin(keys, KEYS))
-    if unknown.size:
-        k = int(unknown[0])
-        fail(text, rows.where(k), f"a line that starts with {word(text, heads[k])} cannot be read here")
-
-    is_point = keys == b"v"
-    spans = _coordinates(text, rows, is_point)
-    points = to_floats(text, spans)
+    keys = _keys(text, rows)
+    starts = _coordinates(text, rows, keys == POINT)
+    points, ends = text.spans(starts)
     regions, names = _regions(text, rows, keys)
-    cells = _cells(text, rows, keys, np.cumsum(is_point), len(points), regions)
-    used = {(b.dimension, r) for b in cells for r in np.unique(b.regions).tolist()}
+    cells = _cells(text, rows, keys, len(points), regions)
+    used = {(b.dimension, r) for b in cells for r in distinct(b.regions)}
     region_names = {(dim, r): names[r] for dim, r in sorted(used) if names[r]}
-    return Parsed(points, cells, TextSlots(spans[..., 0], spans[..., 1], np.arange(len(points))), region_names)
+    return Parsed(points, cells, TextSlots(starts, ends), region_names)
 
 
-def _no_broken_lines(text: bytes, rows: Rows) -> None:
-    last = rows.spans[rows.first[1:] - 1]
-    broken = np.frombuffer(text, np.uint8)[last[:, 1] - 1] == ord("\\")
-    if broken.any():
-        where = rows.where(int(np.flatnonzero(broken)[0]))
-        fail(text, where, "a line that goes on in the next one (\\) cannot be read: join the two")
+def _no_broken_lines(text: Text, rows: Rows) -> None:
+    last = rows.starts[rows.first[1:] - 1]
+    at = -1
+    while (at := text.data.find(b"\\", at + 1)) >= 0:
+        k = int(np.searchsorted(last, last.dtype.type(at), side="right")) - 1
+        if k >= 0 and text.next(int(last[k])) == (int(last[k]), at + 1):
+            text.fail(rows.where(k), "a line that goes on in the next one (\\) cannot be read: join the two")
 
 
-def _coordinates(text: bytes, rows: Rows, is_point: NDArray[np.bool_]) -> Spans:
-    """(points × 3) spans; a weight, or a colour, may follow the coordinates."""
+def _keys(text: Text, rows: Rows) -> NDArray[np.int8]:
+    """(rows,) the number of the key of each row."""
+    table = np.full(1 << 16, -1, dtype=np.int8)  # of keys of one or two letters
+    for number, key in enumerate(KEYS):
+        if len(key) < 3:
+            table[int.from_bytes(key, "little")] = number
+    keys = np.empty(len(rows), dtype=np.int8)
+    for k, part in rows.parts():
+        heads = part.column(0)
+        first, second, third = text.letters(heads, 3)
+        found = table[np.where(third > 0, 0, first + np.uint16(256) * second)]
+        for row in np.flatnonzero(found < 0).tolist():
+            key = text.token(heads[row])
+            if key not in KEYS:
+                text.fail(part.where(row), f"a line that starts with {text.word(heads[row])} cannot be read here")
+            found[row] = KEYS.index(key)
+        keys[k : k + len(part)] = found
+    return keys
+
+
+def _coordinates(text: Text, rows: Rows, is_point: NDArray[np.bool_]) -> Starts:
+    """(points × 3) tokens; a weight, or a colour, may follow the coordinates."""
     lengths = rows.lengths[is_point] - 1
-    bad = np.flatnonzero(~np.isin(lengths, (3, 4, 6, 7)))
+    bad = np.flatnonzero((lengths != 3) & ~np.isin(lengths, (4, 6, 7)))
     if bad.size:
         where = rows.where(int(np.flatnonzero(is_point)[bad[0]]))
-        fail(text, where, f"three coordinates (and a weight or a colour) were expected, found {lengths[bad[0]]} words")
+        text.fail(where, f"three coordinates (and a weight or a colour) were expected, found {lengths[bad[0]]} words")
     first = rows.first[:-1][is_point]
-    spans: Spans = rows.spans[first[:, None] + np.arange(1, 4)]
     for j in range(4, 8):  # what follows must be numbers as well, or else a line was cut or joined
-        to_floats(text, rows.spans[first[lengths >= j] + j])
-    return spans
+        text.floats(rows.starts[first[lengths >= j] + j])
+    return np.stack([rows.starts[first + j] for j in range(1, 4)], axis=1)
 
 
-def _regions(text: bytes, rows: Rows, keys: NDArray[np.bytes_]) -> tuple[NDArray[np.int64], list[str]]:
+def _regions(text: Text, rows: Rows, keys: NDArray[np.int8]) -> tuple[NDArray[np.int64], list[str]]:
     """The region of each row (material and group that hold there) and the regions' names; 0 has none."""
     state: dict[bytes, str] = {}
     known = {("", ""): 0}
-    changes = np.flatnonzero((keys == b"usemtl") | (keys == b"g"))
+    changes = np.flatnonzero((keys == MATERIAL) | (keys == GROUP))
     numbers = [0]
     for k in changes.tolist():
-        words = [token(text, span) for span in rows.row(k)]
+        words = list(map(text.token, rows.row(k)))
         state[words[0]] = b" ".join(words[1:]).decode("utf-8", "backslashreplace")
         numbers.append(known.setdefault((state.get(b"usemtl", ""), state.get(b"g", "")), len(known)))
-    state_of_row = np.searchsorted(changes, np.arange(len(rows)), side="right")
-    regions: NDArray[np.int64] = np.array(numbers, dtype=np.int64)[state_of_row]
+    regions = np.repeat(np.array(numbers, dtype=np.int64), np.diff([0, *changes.tolist(), len(rows)]))
     return regions, [" / ".join(filter(None, pair)) for pair in known]
 
 
-def _cells(
-    text: bytes,
-    rows: Rows,
-    keys: NDArray[np.bytes_],
-    points_before: NDArray[np.int64],
-    count: int,
-    regions: NDArray[np.int64],
-) -> list[CellBlock]:
-    """Faces, lines and points in the order of the file. A negative number counts back from the last point so far."""
-    sizes = rows.lengths - 1
-    row_type = np.full(len(rows), -1)
-    for kind, key in enumerate(LEAST):
-        row_type[keys == key] = kind
-        short = np.flatnonzero((keys == key) & (sizes < LEAST[key]))
-        if short.size:
-            k = int(short[0])
-            fail(text, rows.where(k), f"'{key.decode()}' takes at least {LEAST[key]} nodes, found {sizes[k]}")
-    of_row = np.repeat(np.arange(len(rows)), rows.lengths)
-    is_node = row_type[of_row] >= 0
-    is_node[rows.first[:-1]] = False
-    chosen = rows.spans[is_node]
-    spans = before_slash(text, chosen)
-    named = to_ints(text, spans)
-    zero = np.flatnonzero(named == 0)
-    if zero.size:
-        fail(text, int(spans[zero[0], 0]), "a node numbered 0: nodes count from 1")
-    nodes = np.where(named > 0, named - 1, named + points_before[of_row[is_node]])
-    bad = np.flatnonzero((named < 0) & (nodes < 0))
-    if bad.size:
-        fail(text, int(spans[bad[0], 0]), f"the node {named[bad[0]]} reaches back before the first point")
-    check_nodes(text, spans, nodes, count, base=1)
+class _Cells(NamedTuple):
+    """Cells one after another: the row that names each, its number of nodes (below zero of lines and points), and the
+    nodes of all.
+    """
 
-    flat = np.zeros(len(rows.spans), dtype=np.int64)
-    flat[is_node] = nodes
-    behind = rows.first[1:][of_row]  # the token behind the row
-    token_type = np.where(is_node, row_type[of_row], -1)
-    starts_line = (token_type == LINE) & (np.arange(len(flat)) + 1 < behind)
-    first = np.concatenate(
-        [rows.first[:-1][row_type == FACE] + 1, np.flatnonzero(starts_line), np.flatnonzero(token_type == POINT)]
-    )
-    faces, lines = int((row_type == FACE).sum()), int(starts_line.sum())
-    size = np.ones(len(first), dtype=np.int64)
-    size[:faces] = sizes[row_type == FACE]
-    size[faces : faces + lines] = 2
-    codes = np.where(np.arange(len(first)) < faces, size, -1 * size)  # lines are -2, points -1
-    kinds = {**polygon_kinds(size[:faces]), -2: "line", -1: "vertex"}
-    order = np.argsort(first)
-    first, size, codes = first[order], size[order], codes[order]
-    return cell_blocks(codes, kinds, size, flat, first, regions[of_row[first]])[0]
+    row: NDArray[np.int64]
+    code: NDArray[np.int32]
+    nodes: NDArray[np.int64]
+
+
+def _cells(text: Text, rows: Rows, keys: NDArray[np.int8], count: int, regions: NDArray[np.int64]) -> list[CellBlock]:
+    """Faces, lines and points in the order of the file."""
+    none, points = np.empty(0, dtype=np.int64), 0
+    codes, nodes, region = [none.astype(np.int32)], [none], [none]
+    for k, part in rows.parts():
+        key = keys[k : k + len(part)]
+        before = points + np.cumsum(key == POINT)  # points so far
+        points = int(before[-1])
+        parts = [_cells_of(text, part, np.flatnonzero(key == kind), kind, before, count) for kind in LEAST]
+        cells = _in_order([cells for cells in parts if len(cells.row)] or parts[:1])
+        codes.append(cells.code)
+        nodes.append(cells.nodes)
+        region.append(regions[cells.row + k])
+    code = np.concatenate(codes)
+    kinds = {**polygon_kinds(code[code > 0]), -2: "line", -1: "vertex"}
+    return cell_blocks(code, kinds, np.abs(code), np.concatenate(nodes), np.concatenate(region))[0]
+
+
+def _cells_of(
+    text: Text, rows: Rows, chosen: NDArray[np.int64], kind: int, before: NDArray[np.int64], count: int
+) -> _Cells:
+    """The cells in rows of one key. A negative number counts back from the last point so far (``before``)."""
+    sizes = (rows.lengths[chosen] - 1).astype(np.int64)
+    if (short := np.flatnonzero(sizes < LEAST[kind])).size:
+        k = int(short[0])
+        what = f"'{KEYS[kind].decode()}' takes at least {LEAST[kind]} nodes, found {sizes[k]}"
+        text.fail(rows.where(int(chosen[k])), what)
+    if len(chosen) == len(rows):
+        starts = rows.inner(rows.starts, 1, sizes)
+    else:
+        starts = rows.starts[ranges(rows.first[chosen] + np.int64(1), sizes)]
+    named = text.integers(starts, slash=True)
+    if (zero := np.flatnonzero(named == 0)).size:
+        text.fail(int(starts[zero[0]]), "a node numbered 0: nodes count from 1")
+    nodes = named - (named > 0)
+    if (named < 0).any():
+        nodes += np.where(named < 0, np.repeat(before[chosen], sizes), 0)
+        if (bad := np.flatnonzero((named < 0) & (nodes < 0))).size:
+            text.fail(int(starts[bad[0]]), f"the node {named[bad[0]]} reaches back before the first point")
+    check_nodes(text, starts, nodes, count, base=1)
+    if kind == FACE:
+        return _Cells(chosen, sizes.astype(np.int32), nodes)
+    width = 2 if kind == LINE else 1  # of the pieces that a polyline, or a set of points, is cut into
+    pieces = sizes - width + 1
+    first = ranges(np.cumsum(sizes) - sizes, pieces)
+    code = np.full(len(first), -width, dtype=np.int32)
+    return _Cells(np.repeat(chosen, pieces), code, nodes[first[:, None] + np.arange(width)].reshape(-1))
+
+
+def _in_order(parts: list[_Cells]) -> _Cells:
+    """The cells of all parts in the order of their rows."""
+    if len(parts) == 1:
+        return parts[0]
+    row, code, nodes = map(np.concatenate, zip(*parts, strict=True))
+    order, size = np.argsort(row, kind="stable"), np.abs(code).astype(np.int64)
+    first = np.cumsum(size) - size
+    return _Cells(row[order], code[order], nodes[ranges(first[order], size[order])])
 
 
 def write(mesh: Mesh) -> Written:
     """See Format. Regions become groups."""
     convert.check_kinds(mesh, name, KINDS)
-    lines = ["v " + row for row in convert.decimals(convert.in_space(mesh))]
+    lost = convert.lost_data(mesh, name, regions=True)
+    return Written({".obj": Pieces(lambda: _text(mesh))}, lost)
+
+
+def _text(mesh: Mesh) -> Iterator[Piece]:
+    yield from convert.rows(b"v % % %\n", convert.in_space(mesh))
     group = ""
     for block in mesh.cells:
-        key = {0: "p ", 1: "l ", 2: "f "}[block.dimension]
-        rows = [key + row for row in convert.integers(block.nodes + 1)]
-        cuts = np.flatnonzero(np.diff(block.regions)) + 1
-        for part in np.split(np.arange(len(rows)), cuts):
-            if len(part):
-                region = int(block.regions[part[0]])
+        row = {0: b"p ", 1: b"l ", 2: b"f "}[block.dimension] + convert.row_of(block.nodes.shape[1])
+        cuts = (np.flatnonzero(np.diff(block.regions)) + 1).tolist()
+        for start, end in zip([0, *cuts], [*cuts, len(block.nodes)], strict=True):
+            if start < end:
+                region = int(block.regions[start])
                 wanted = "g " + " ".join(convert.marker_name(mesh, block.dimension, region).split())
                 if wanted != group and (group or region or (block.dimension, region) in mesh.region_names):
-                    lines.append(wanted)
+                    yield f"{wanted}\n".encode()
                     group = wanted
-                lines += rows[part[0] : part[-1] + 1]
-    return Written({".obj": ("\n".join(lines) + "\n").encode()}, convert.lost_data(mesh, name, regions=True))
+                yield from convert.rows(row, block.nodes[start:end] + 1)

@@ -6,7 +6,7 @@ Other properties that are one number are data; those of faces whose names say so
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,11 @@ from numpy.typing import NDArray
 from gmsnet.errors import FormatError
 from gmsnet.io import convert, ply_header
 from gmsnet.io.cell_table import Kind, check_range, table_blocks
+from gmsnet.io.cells import joined
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.mapped import Data
+from gmsnet.io.pieces import Piece, Pieces
+from gmsnet.io.places import side_by_side
 from gmsnet.io.ply_rows import Column, Table, tables
 from gmsnet.io.text import fail
 from gmsnet.io.words import Words, typed
@@ -31,7 +35,7 @@ TYPE_NAMES = {"i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": 
 TYPE_NAMES |= {"f4": "float", "f8": "double"}
 
 
-def read(files: Mapping[str, bytes]) -> Parsed:
+def read(files: Mapping[str, Data]) -> Parsed:
     """See Format. A property that only faces or only edges have is 0 for the others."""
     data = files[".ply"]
     header = ply_header.parse(data)
@@ -49,24 +53,21 @@ def read(files: Mapping[str, bytes]) -> Parsed:
     if x is None or y is None or z is None or not x.property.kind == y.property.kind == z.property.kind in ("f4", "f8"):
         message = "vertices must have the properties x, y and z, all of type float or all double"
         fail(data, known["vertex"].at, message)
-    places = np.stack([x.at, y.at, z.at], axis=1)
     kind = x.property.kind
-    points = words.values(places, kind)
+    points, slots = words.coordinates(side_by_side(x.at, y.at, z.at), kind)
     parts = [
         (key, _faces if key == "face" else _edges) for key in known if key in ("face", "edge") and known[key].count
     ]
     codes, sizes, nodes = (
-        np.concatenate(arrays)
-        for arrays in zip(*(make(words, found[key], len(points)) for key, make in parts), strict=True)
+        joined(arrays) for arrays in zip(*(make(words, found[key], len(points)) for key, make in parts), strict=True)
     )
     fields = _fields(words, [found[key] for key, _ in parts], [known[key].count for key, _ in parts])
-    first = np.concatenate([[0], np.cumsum(sizes)])
     regions = regions_of(fields.items(), len(codes))
-    cells, cell_data = table_blocks(KINDS, codes, first, nodes, regions, fields)
+    cells, cell_data = table_blocks(KINDS, codes, sizes, nodes, regions, fields)
     point_data = {
         key: _values(words, column) for key, column in vertex.items() if key not in "xyz" and column.sizes is None
     }
-    return Parsed(points, cells, words.slots(places, kind), {}, point_data, cell_data, kind == "f4")
+    return Parsed(points, cells, slots, {}, point_data, cell_data, kind == "f4")
 
 
 _Cells = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]  # codes, sizes, nodes
@@ -77,12 +78,13 @@ def _faces(words: Words, table: Table, count: int) -> _Cells:
     if len(lists) != 1 or lists[0].property.kind[0] == "f":
         raise FormatError("faces must have one list of integers 'vertex_indices'")
     column = lists[0]
-    sizes, places = column.sizes, column.flat(words)
+    sizes = column.sizes
     assert sizes is not None
     if (short := np.flatnonzero(sizes < 3)).size:
-        words.fail(int(column.at[short[0]]), f"face {short[0]} (counted from 0) has {sizes[short[0]]} corners")
-    nodes = words.values(places, column.property.kind)
-    check_range(nodes, count, lambda k, message: words.fail(int(places[k]), message))
+        k = int(short[0])
+        words.fail(int(column.heads[k]), f"face {k} (counted from 0) has {sizes[k]} corners")
+    nodes = words.values(column.at, column.property.kind)
+    check_range(nodes, count, lambda k, message: words.fail(int(column.at[k]), message))
     return np.minimum(sizes, 5), sizes, nodes
 
 
@@ -91,9 +93,8 @@ def _edges(words: Words, table: Table, count: int) -> _Cells:
     columns = [end for end in ends if end is not None and end.sizes is None and end.property.kind[0] != "f"]
     if len(columns) != 2:
         raise FormatError("edges must have the properties vertex1 and vertex2, both integers")
-    places = np.stack([column.at for column in columns], axis=1).ravel()
     nodes = np.stack([words.values(column.at, column.property.kind) for column in columns], axis=1).ravel()
-    check_range(nodes, count, lambda k, message: words.fail(int(places[k]), message))
+    check_range(nodes, count, lambda k, message: words.fail(int(columns[k % 2].at[k // 2]), message))
     rows = len(nodes) // 2
     return np.ones(rows, dtype=np.int64), np.full(rows, 2), nodes
 
@@ -121,32 +122,38 @@ def write(mesh: Mesh) -> Written:
     lost = [*convert.lost_cells(mesh, name, (0,)), *convert.lost_names(mesh, name, (1, 2))]
     lost += convert.lost_data(mesh, name, [*mesh.point_data, *mesh.cell_data])
     points = convert.in_space(mesh)
-    columns = {"x": points[:, 0], "y": points[:, 1], "z": points[:, 2]}
-    columns |= _kept(mesh.point_data, "point", ("x", "y", "z"), lost)
-    head = [f"ply\nformat ascii 1.0\nelement vertex {len(points)}\n", _properties(columns)]
-    body = [_table(columns, [])]
+    columns = _kept(mesh.point_data, "point", ("x", "y", "z"), lost)
     fields = {key: np.concatenate([np.asarray(a) for a in parts]) for key, parts in mesh.cell_data.items() if parts}
     cell_data = _kept(fields, "cell", (*LISTS, "vertex1", "vertex2"), lost)
-    regions = np.concatenate([block.regions for block in mesh.cells]) if mesh.cells else np.empty(0, dtype=np.int64)
+    regions = np.concatenate([np.empty(0, dtype=np.int64), *(block.regions for block in mesh.cells)])
     if not np.array_equal(regions_of(cell_data.items(), len(regions)), regions):
         cell_data = {key: array for key, array in cell_data.items() if not names_a_region(key)}
         cell_data |= _kept({"region": regions}, "cell", (), lost)
-    dimension = np.concatenate([np.full(len(b.nodes), b.dimension) for b in mesh.cells]) if mesh.cells else regions
+    return Written({".ply": Pieces(lambda: _text(mesh, points, columns, cell_data))}, lost)
+
+
+_Columns = dict[str, NDArray[Any]]  # property → one number a row
+
+
+def _text(mesh: Mesh, points: NDArray[np.float64], point_data: _Columns, cell_data: _Columns) -> Iterator[Piece]:
+    faces, edges = ([block.nodes for block in mesh.cells if block.dimension == dim] for dim in (2, 1))
+    head = ["ply", "format ascii 1.0", f"element vertex {len(points)}"]
+    head += ["property double x", "property double y", "property double z", *_properties(point_data)]
+    length = "uchar" if max((nodes.shape[1] for nodes in faces), default=0) < 256 else "int"
+    head += [f"element face {sum(map(len, faces))}", f"property list {length} int vertex_indices"]
+    head += _properties(cell_data)
+    if any(map(len, edges)):
+        head += [f"element edge {sum(map(len, edges))}", "property int vertex1", "property int vertex2"]
+        head += _properties(cell_data)
+    yield ("\n".join([*head, "end_header"]) + "\n").encode("ascii")
+    yield from convert.rows(convert.row_of(3 + len(point_data)), points, *point_data.values())
+    ends = np.cumsum([0, *(len(block.nodes) for block in mesh.cells)]).tolist()
     for dim in (2, 1):
-        rows = [row for block in mesh.cells if block.dimension == dim for row in block.nodes.tolist()]
-        if dim == 1 and not rows:
-            continue
-        chosen = {key: array[dimension == dim] for key, array in cell_data.items()}
-        if dim == 2:
-            length = "uchar" if max(map(len, rows), default=0) < 256 else "int"
-            lines = [" ".join(map(str, [len(row), *row])) for row in rows]
-            head.append(f"element face {len(rows)}\nproperty list {length} int vertex_indices\n")
-        else:
-            lines = [" ".join(map(str, row)) for row in rows]
-            head.append(f"element edge {len(rows)}\nproperty int vertex1\nproperty int vertex2\n")
-        head.append(_properties(chosen))
-        body.append(_table(chosen, lines))
-    return Written({".ply": "".join([*head, "end_header\n", *body]).encode("ascii")}, lost)
+        for block, start, end in zip(mesh.cells, ends, ends[1:], strict=False):
+            if block.dimension == dim:
+                front = b"%d " % block.nodes.shape[1] if dim == 2 else b""
+                data = [array[start:end] for array in cell_data.values()]
+                yield from convert.rows(front + convert.row_of(block.nodes.shape[1] + len(data)), block.nodes, *data)
 
 
 def _kept(data: Mapping[str, NDArray[Any]], place: str, taken: tuple[str, ...], lost: list[str]) -> dict[str, Any]:
@@ -166,11 +173,5 @@ def _kept(data: Mapping[str, NDArray[Any]], place: str, taken: tuple[str, ...], 
     return kept
 
 
-def _properties(columns: Mapping[str, NDArray[Any]]) -> str:
-    return "".join(f"property {TYPE_NAMES[array.dtype.str[1:]]} {key}\n" for key, array in columns.items())
-
-
-def _table(columns: Mapping[str, NDArray[Any]], lines: list[str]) -> str:
-    """Rows of the columns, each behind its line if there are any."""
-    texts = [map(str, array if array.dtype == np.float32 else array.tolist()) for array in columns.values()]
-    return "".join(" ".join(row) + "\n" for row in zip(*([lines] if lines else []), *texts, strict=True))
+def _properties(columns: _Columns) -> list[str]:
+    return [f"property {TYPE_NAMES[array.dtype.str[1:]]} {key}" for key, array in columns.items()]

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, field
 
 from gmsnet.errors import FormatError
+from gmsnet.io.mapped import Data
 from gmsnet.io.text import fail
 
 TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4"}
@@ -44,7 +45,7 @@ class Header:
     end: int
 
 
-def parse(data: bytes) -> Header:
+def parse(data: Data) -> Header:
     """The header of the file. Raises FormatError naming the line that is not one of a PLY header."""
     first = _FIRST.match(data)
     if first is None:
@@ -84,7 +85,7 @@ def parse(data: bytes) -> Header:
     return Header(order, elements, stop + len(first[1]))
 
 
-def _add(data: bytes, at: int, element: Element, new: Property) -> None:
+def _add(data: Data, at: int, element: Element, new: Property) -> None:
     if new.name in [known.name for known in element.properties]:
         fail(data, at, f"the property {new.name[:24]!r} is given twice")
     element.properties.append(new)

@@ -1,26 +1,36 @@
 """Writes new coordinates into the old file: every byte that is not a coordinate of a moved node stays as it was.
 
-A reader tells where the coordinates stand (slots); this module alone replaces them. A node may stand in several
-places (each triangle of an STL file repeats its corners), hence ``node``, the node of each row of slots.
+A reader tells where the coordinates stand (slots); this module alone replaces them, piece by piece. A node may stand in
+several places (each triangle of an STL file repeats its corners), hence ``node``, the node of each row of slots; where
+it is None, row k is node k.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.io.text import replace_numbers
+from gmsnet.io.mapped import Data, changed
+from gmsnet.io.pieces import Piece, Pieces
+from gmsnet.io.places import Lattice, Places
+from gmsnet.io.text import Starts, Text
+from gmsnet.kernels import text as kernels
 from gmsnet.mesh import CellBlock, Mesh
+
+_PIECE = 1 << 20  # bytes that are written at once
+_ROWS = 1 << 15  # of slots that are looked at together
+
+Points = NDArray[np.float64]
 
 
 class Slots(Protocol):
     """Where the coordinates of a file stand."""
 
-    def replace(self, data: bytes, old: NDArray[np.float64], new: NDArray[np.float64]) -> bytes:
+    def replace(self, data: Data, old: Points, new: Points) -> Iterable[Piece]:
         """The file with each coordinate of ``new`` (N×dim) that differs in value from ``old`` written in its slot."""
         ...
 
@@ -29,44 +39,79 @@ class Slots(Protocol):
 class TextSlots:
     """Decimal numbers in a text. starts, ends: (rows × dim) byte span of each; node: (rows,) the node of each row."""
 
-    starts: NDArray[np.int64]
-    ends: NDArray[np.int64]
-    node: NDArray[np.int64]
+    starts: Starts
+    ends: Starts
+    node: NDArray[np.int64] | None = None
 
-    def replace(self, data: bytes, old: NDArray[np.float64], new: NDArray[np.float64]) -> bytes:
+    def replace(self, data: Data, old: Points, new: Points) -> Iterator[Piece]:
         """See Slots. Numbers are written as the shortest decimal that reads back as the same float64."""
-        dim = self.starts.shape[1]
-        changed = (old != new)[self.node][:, :dim]
-        spans = np.stack([self.starts[changed], self.ends[changed]], axis=1)
-        return replace_numbers(data, spans, new[self.node][:, :dim][changed])
+        raw, out, at = Text(data).raw, np.empty(_PIECE, dtype=np.uint8), 0
+        for starts, ends, values in self._moved(old, new):
+            done = 0
+            while done < len(starts):
+                if starts[done] - at > _PIECE // 2:
+                    yield memoryview(data)[at : starts[done]]
+                    at = int(starts[done])
+                count, at, length = kernels.replace_floats(raw, at, starts[done:], ends[done:], values[done:], out)
+                yield out.data[:length]
+                done += count
+        yield memoryview(data)[at:]
+
+    def _moved(self, old: Points, new: Points) -> Iterator[tuple[Starts, Starts, Points]]:
+        """Starts, ends and new values of the slots that change, in the order of the file."""
+        flat = self.starts.reshape(-1)
+        ascending = bool((flat[1:] > flat[:-1]).all())
+        rows, dim = self.starts.shape
+        step = _ROWS if ascending else max(1, rows)
+        differ = old != new
+        for k in range(0, rows, step):
+            some = slice(k, k + step)
+            node = some if self.node is None else self.node[some]
+            moved = differ[node, :dim]
+            starts, ends, values = self.starts[some][moved], self.ends[some][moved], new[node, :dim][moved]
+            order = slice(None) if ascending else np.argsort(starts)
+            yield starts[order], ends[order], values[order]
 
 
 @dataclass(frozen=True)
 class BinarySlots:
-    """Binary floats. offsets: (rows × dim) first byte of each; dtype: '<f4', '>f8', …; node: (rows,) see TextSlots."""
+    """Binary floats. places: of all coordinates, three a row; dtype: '<f4', '>f8', …; node: (rows,) see TextSlots."""
 
-    offsets: NDArray[np.int64]
+    places: Places
     dtype: str
-    node: NDArray[np.int64]
+    node: NDArray[np.int64] | None = None
 
-    def replace(self, data: bytes, old: NDArray[np.float64], new: NDArray[np.float64]) -> bytes:
+    def replace(self, data: Data, old: Points, new: Points) -> Iterator[Piece]:
         """See Slots."""
-        dim = self.offsets.shape[1]
-        changed = (old != new)[self.node][:, :dim]
-        values = new[self.node][:, :dim][changed].astype(self.dtype)
-        width = values.dtype.itemsize
-        array = np.frombuffer(data, dtype=np.uint8).copy()
-        array[self.offsets[changed][:, None] + np.arange(width)] = values.view(np.uint8).reshape(-1, width)
-        return array.tobytes()
+        at, row, size, differ = 0, 0, np.dtype(self.dtype).itemsize, old != new
+        for lattice in self.places.lattices:
+            width = len(lattice.columns) // 3  # rows of slots in one of the lattice
+            for k in range(0, lattice.rows, _ROWS):
+                count = min(_ROWS, lattice.rows - k)
+                some = slice(row, row + count * width)
+                row += count * width
+                node = some if self.node is None else self.node[some]
+                values = new[node].reshape(count, -1)
+                moved = differ[node].reshape(count, -1)
+                start = lattice.start + k * lattice.stride + min(lattice.columns)
+                end = start + (count - 1) * lattice.stride + max(lattice.columns) - min(lattice.columns) + size
+                yield memoryview(data)[at:start]
+                block = bytearray(memoryview(data)[start:end])
+                here = Lattice(-min(lattice.columns), count, lattice.stride)
+                for j, column in enumerate(lattice.columns):
+                    here.column(block, column, self.dtype)[moved[:, j]] = values[moved[:, j], j]
+                yield memoryview(block)
+                at = end
+        yield memoryview(data)[at:]
 
 
 @dataclass(frozen=True)
 class EncodedSlots:
     """Coordinates inside an encoded block (base64, compressed), which a function of the format writes again."""
 
-    rewrite: Callable[[bytes, NDArray[np.float64], NDArray[np.float64]], bytes]
+    rewrite: Callable[[Data, Points, Points], Iterable[Piece]]
 
-    def replace(self, data: bytes, old: NDArray[np.float64], new: NDArray[np.float64]) -> bytes:
+    def replace(self, data: Data, old: Points, new: Points) -> Iterable[Piece]:
         """See Slots."""
         return self.rewrite(data, old, new)
 
@@ -82,11 +127,11 @@ class FileSource:
 
     format: str
     main: str
-    data: bytes
-    points: NDArray[np.float64]
+    data: Data
+    points: Points
     slots: Slots
     cells: tuple[CellBlock, ...] = ()
-    companions: Mapping[str, bytes] = field(default_factory=dict)
+    companions: Mapping[str, Data] = field(default_factory=dict)
     region_names: Mapping[tuple[int, int], str] = field(default_factory=dict)
     point_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
@@ -113,11 +158,21 @@ class FileSource:
             )
         )
 
-    def splice(self, points: NDArray[np.float64]) -> dict[str, bytes]:
-        """Suffix → bytes of each file of the mesh, with the coordinates of ``points`` (N×dim) in their slots."""
+    def intact(self) -> bool:
+        """Whether the bytes are still there: a large file stays on the disk, where others may write into it."""
+        return not any(map(changed, (self.data, *self.companions.values())))
+
+    def splice(self, points: Points) -> dict[str, Pieces]:
+        """Suffix → each file of the mesh, with the coordinates of ``points`` (N×dim) in their slots."""
         same = points.shape == self.points.shape and bool((points == self.points).all())
-        data = self.data if same else self.slots.replace(self.data, self.points, points)
-        return {self.main: data, **self.companions}
+        whole = {suffix: _whole(data) for suffix, data in ((self.main, self.data), *self.companions.items())}
+        if not same:
+            whole[self.main] = Pieces(lambda: self.slots.replace(self.data, self.points, points))
+        return whole
+
+
+def _whole(data: Data) -> Pieces:
+    return Pieces(lambda: [memoryview(data)])
 
 
 def _same_cells(new: tuple[CellBlock, ...], old: tuple[CellBlock, ...]) -> bool:

@@ -15,31 +15,36 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
+from gmsnet.io.cells import distinct, joined, sealed
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.mapped import Data
+from gmsnet.io.pieces import Piece, Pieces
+from gmsnet.io.places import Lattice, Places
 from gmsnet.io.splice import BinarySlots, TextSlots
-from gmsnet.io.text import Spans, fail, gather, scan_rows, to_floats, token
+from gmsnet.io.text import Starts, Text
+from gmsnet.io.words import ByteWords
+from gmsnet.kernels import weld as kernels
 from gmsnet.mesh import CellBlock, Mesh
 
 name = "STL"
 suffixes = (".stl",)
 
 HEAD, RECORD = 84, 50  # bytes in front of the triangles of a binary file, and of each of them
-_VERTEX = ["vertex", "*", "*", "*"]
-_FACET = ["facet", "normal", "*", "*", "*", "outer", "loop", *_VERTEX, *_VERTEX, *_VERTEX, "endloop", "endfacet"]
-_SOLID = re.compile(rb"[sS][oO][lL][iI][dD]\b")
-_REST = re.compile(rb"[^\r\n]*")
-_WIDE = 64  # longer numbers are compared one by one
+_VERTEX = [b"vertex", b"", b"", b""]
+_FACET = [b"facet", b"normal", b"", b"", b"", b"outer", b"loop", *_VERTEX * 3, b"endloop", b"endfacet"]
+_CORNERS = [8, 9, 10, 12, 13, 14, 16, 17, 18]  # where the coordinates are among the words of a facet
+_SOLID = re.compile(rb"(?i)(end)?solid\b([^\r\n]*)")
 _LONG_EXPONENT = re.compile(rb"[eE][+-]?\d{7}")
-_CORNERS = [[8, 9, 10], [12, 13, 14], [16, 17, 18]]  # where the coordinates are among the words of a facet
+_TOGETHER = 1 << 17  # corners that are welded at once
 
 
-def read(files: Mapping[str, bytes]) -> Parsed:
+def read(files: Mapping[str, Data]) -> Parsed:
     """See Format. Nodes are numbered in the order in which they appear first."""
     data = files[".stl"]
     count = int.from_bytes(data[80:HEAD], "little")
     if len(data) > HEAD and len(data) == HEAD + RECORD * count:
         return _binary(data, count)
-    if data.lstrip()[:5].lower() == b"solid":
+    if re.match(rb"(?i)\s*solid", data):
         return _text(data)
     message = f"neither a text STL file, which starts with 'solid', nor a whole binary one: it has {len(data)} bytes"
     if len(data) >= HEAD:
@@ -47,121 +52,134 @@ def read(files: Mapping[str, bytes]) -> Parsed:
     raise FormatError(message)
 
 
-def _binary(data: bytes, count: int) -> Parsed:
-    corner = 12 * np.arange(1, 4)[:, None] + 4 * np.arange(3)  # bytes within a record, behind the normal
-    offsets = (HEAD + RECORD * np.arange(count, dtype=np.int64)[:, None, None] + corner).reshape(-1, 3)
-    records = np.frombuffer(data, dtype=np.dtype([("numbers", "<f4", (4, 3)), ("attribute", "<u2")]), offset=HEAD)
-    points = records["numbers"][:, 1:].reshape(-1, 3).astype(np.float64)
-    wrong = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if wrong.size:
-        raise FormatError(f"byte {offsets[wrong[0], 0]}: a coordinate is not a finite number")
-    node, first = _weld(np.unique(points, return_inverse=True)[1].reshape(-1, 3))
-    cells = [CellBlock("triangle", node.reshape(-1, 3), np.zeros(count, dtype=np.int64))]
-    return Parsed(points[first], cells, BinarySlots(offsets, "<f4", node), single=True)
+def _binary(data: Data, count: int) -> Parsed:
+    columns = tuple(12 * corner + 4 * axis for corner in (1, 2, 3) for axis in range(3))  # behind the normal
+    places = Places(Lattice(HEAD, count, RECORD, columns))
+    weld = Weld(3 * count)
+    for k in range(0, count, _TOGETHER):
+        some = Places(Lattice(HEAD + k * RECORD, min(_TOGETHER, count - k), RECORD, columns))
+        weld.add(ByteWords(data, "<").values(some, "f4").reshape(-1, 3))
+    cells = [CellBlock("triangle", sealed(weld.node).reshape(-1, 3), sealed(np.zeros(count, dtype=np.int64)))]
+    return Parsed(weld.points, cells, BinarySlots(places, "<f4", weld.node), single=True)
 
 
-def _text(data: bytes) -> Parsed:
-    names: dict[tuple[int, int], str] = {}
-    spans: list[Spans] = []
+def _text(data: Data) -> Parsed:
+    text, names = Text(data), dict[tuple[int, int], str]()
+    tokens, _ = text.tokens(0)
+    found: list[Starts] = []
     body, last = -1, 0  # where the facets of the open solid begin, and where the last solid ended
-    for start, is_end, title, stop in _solid_lines(data):
+    for start, is_end, title, stop in _solid_lines(text, tokens):
         if is_end != (body >= 0):
-            fail(data, start, "'endsolid' without 'solid'" if is_end else "the solid before has no 'endsolid'")
+            text.fail(start, "'endsolid' without 'solid'" if is_end else "the solid before has no 'endsolid'")
         if is_end:
-            spans.append(_facets(data, body, start))
+            found.append(
+                _facets(text, tokens[slice(*np.searchsorted(tokens, np.array([body, start], tokens.dtype)))], start)
+            )
             body, last = -1, stop
         else:
             if title:
-                names[2, len(spans) + 1] = title
+                names[2, len(found) + 1] = title
             body = stop
     if body >= 0:
-        fail(data, len(data), "'endsolid' is missing: the file is cut off")
-    if data[last:].strip():
-        fail(data, last + len(data[last:]) - len(data[last:].lstrip()), "unknown words behind the last 'endsolid'")
-    places = np.concatenate(spans)
-    if not len(places):
+        text.fail(len(data), "'endsolid' is missing: the file is cut off")
+    if (behind := text.next(last)) is not None:
+        text.fail(behind[0], "unknown words behind the last 'endsolid'")
+    del tokens
+    region = np.repeat(np.arange(1, len(found) + 1), list(map(len, found)))
+    starts = joined(found).reshape(-1, 3)
+    del found
+    if not len(starts):
         raise FormatError("the file has no triangles: there is nothing to smooth")
-    places = places.reshape(-1, 3, 2)
-    node, first = _weld(_exact(data, places))
-    region = np.repeat(np.arange(1, len(spans) + 1), [len(part) // 9 for part in spans])
-    points = to_floats(data, places[first])
-    slots = TextSlots(places[..., 0], places[..., 1], node)
-    return Parsed(points, [CellBlock("triangle", node.reshape(-1, 3), region)], slots, names)
+    ends, weld = np.empty_like(starts), Weld(len(starts))
+    for k in range(0, len(starts), _TOGETHER):
+        corners, ends[k : k + _TOGETHER] = text.spans(starts[k : k + _TOGETHER])
+        weld.add(corners)
+    points, node = _told_apart(text, starts, ends, weld)
+    cells = [CellBlock("triangle", sealed(node).reshape(-1, 3), sealed(region))]
+    return Parsed(points, cells, TextSlots(starts, ends, node), names)
 
 
-def _solid_lines(data: bytes) -> Iterator[tuple[int, bool, str, int]]:
+def _solid_lines(text: Text, tokens: Starts) -> Iterator[tuple[int, bool, str, int]]:
     """The lines that begin with solid or endsolid: first byte, is it the latter, the name, the byte behind it."""
     at = 0
-    for match in _SOLID.finditer(data):
-        start = match.start()
-        is_end = data[start - 3 : start].lower() == b"end"
-        start -= 3 * is_end
-        edge = start
-        while edge > at and data[edge - 1] in b" \t":
-            edge -= 1
-        if match.start() >= at and (edge == 0 or data[edge - 1] in b"\r\n"):
-            rest = _REST.match(data, match.end())
-            assert rest is not None  # the pattern fits everywhere
-            at = rest.end()
-            yield start, is_end, rest[0].strip().decode("utf-8", "replace"), at
+    for k in range(0, len(tokens), 1 << 20):
+        some = tokens[k : k + (1 << 20)]
+        letters = text.raw[some] | 32
+        some = some[(letters == ord("s")) | (letters == ord("e"))]
+        fourth = text.raw[np.minimum(some + 3, len(text.raw) - 1)] | 32
+        for start in some[(fourth == ord("s")) | (fourth == ord("i"))].tolist():
+            match = _SOLID.match(text.data, start)
+            edge = start
+            while edge > at and text.raw[edge - 1] in b" \t":
+                edge -= 1
+            if match and start >= at and (edge == 0 or text.raw[edge - 1] in b"\r\n"):
+                at = match.end()
+                yield start, match[1] is not None, match[2].strip().decode("utf-8", "replace"), at
 
 
-def _facets(data: bytes, start: int, stop: int) -> Spans:
-    """The spans (triangles × 9, 2) of the coordinates between two bytes, where only whole facets may stand."""
-    spans = scan_rows(data, start, None, stop).spans
+def _facets(text: Text, tokens: Starts, stop: int) -> Starts:
+    """The tokens (triangles × 9) of the coordinates among those of a solid, which must be whole facets."""
     size = len(_FACET)
-    count = len(spans) // size
-    facets = spans[: count * size].reshape(count, size, 2)
-    wrong = np.zeros((count, size), dtype=bool)
-    for k, expected in enumerate(_FACET):
-        if expected != "*":
-            wrong[:, k] = facets[:, k, 1] - facets[:, k, 0] != len(expected)
-            whole = np.flatnonzero(~wrong[:, k])
-            if whole.size:
-                letters = gather(data, facets[whole, k]).view(np.uint8).reshape(len(whole), len(expected))
-                lower = np.frombuffer(expected.encode(), dtype=np.uint8)
-                wrong[whole, k] = (letters | 32 != lower).any(axis=1)  # which makes capitals small
-    if wrong.any():
-        k = int(np.argmax(wrong))
-        found = token(data, spans[k])[:24].decode("ascii", "replace")
-        fail(data, int(spans[k, 0]), f"expected {_FACET[k % size]!r}, found {found!r}")
-    if len(spans) > count * size:
-        fail(data, int(spans[count * size, 0]), "the facet that begins here is not complete")
-    return facets[:, _CORNERS].reshape(-1, 2)
+    count = len(tokens) // size
+    wrong = text.until(stop).mismatch(tokens[: count * size], _FACET)
+    if wrong >= 0:
+        found = text.token(tokens[wrong])[:24].decode("ascii", "replace")
+        text.fail(int(tokens[wrong]), f"expected {_FACET[wrong % size].decode()!r}, found {found!r}")
+    if len(tokens) > count * size:
+        text.fail(int(tokens[count * size]), "the facet that begins here is not complete")
+    return np.stack([tokens[j::size][:count] for j in _CORNERS], axis=1)
 
 
-def _exact(data: bytes, places: Spans) -> NDArray[np.int64]:
-    """(rows, 3) a number for each coordinate, equal exactly where the decimals are equal, and not only as float64."""
-    spans = places.reshape(-1, 2)
-    _, first, value = np.unique(to_floats(data, spans), return_index=True, return_inverse=True)
-    value, long = value.reshape(-1), spans[:, 1] - spans[:, 0] > _WIDE
-    text = np.zeros(len(spans), dtype=f"S{_WIDE}") if long.any() else gather(data, spans)
-    text[~long] = gather(data, spans[~long])
-    same = first[value]
-    ids, new = value.copy(), dict[tuple[int, object], int]()
-    for k in np.flatnonzero(
-        (text != text[same]) | long | long[same]
-    ).tolist():  # equal as float64, spelt in another way
-        mine, other = (_decimal(token(data, spans[j])) for j in (k, same[k]))
-        if mine != other:
-            ids[k] = new.setdefault((int(value[k]), mine), len(first) + len(new))
-    return ids.reshape(-1, 3)
+class Weld:
+    """Nodes of corners that are added in turn. points: (nodes, 3); node: (corners,) the node of each."""
+
+    def __init__(self, count: int) -> None:
+        self.node = np.empty(count, dtype=np.int64)
+        self._points = np.empty((count, 3))
+        self._table = np.full(1 << max(4, (count // 2).bit_length()), kernels.EMPTY, dtype=np.int32)
+        self._corners = self._found = 0
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """The coordinates of the nodes so far, as they are at the first corner of each."""
+        return self._points[: self._found]
+
+    def add(self, corners: NDArray[np.float64]) -> None:
+        """More corners (n, 3), which are finite."""
+        node, at = self.node[self._corners : self._corners + len(corners)], 0
+        self._corners += len(corners)
+        while True:
+            at, self._found = kernels.weld(corners, at, self._found, self._points, self._table, node)
+            if at == len(corners):
+                return
+            self._table = np.full(4 * len(self._table), kernels.EMPTY, dtype=np.int32)
+            again = self.points.copy()
+            kernels.weld(again, 0, 0, self._points, self._table, np.empty(len(again), dtype=np.int64))
+
+
+def _told_apart(text: Text, starts: Starts, ends: Starts, weld: Weld) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points and nodes, where corners are one node only if their decimals are equal, and not only as float64."""
+    points, node = weld.points, weld.node
+    first = np.empty(len(points), dtype=np.int64)
+    first[node[::-1]] = np.arange(len(node) - 1, -1, -1)
+    other = np.empty(len(node), dtype=np.int64)
+    known = dict[tuple[object, ...], int]()
+    for k in other[: kernels.other_spellings(text.raw, starts, ends, points, node, first, other)].tolist():
+        mine, its = (tuple(_decimal(text.token(start)) for start in starts[j]) for j in (k, first[node[k]]))
+        if mine != its:
+            node[k] = known.setdefault((int(node[k]), *mine), len(points) + len(known))
+    if known:
+        _, first, node = np.unique(node, return_index=True, return_inverse=True)
+        rank = np.empty(len(first), dtype=np.int64)
+        rank[np.argsort(first)] = np.arange(len(first))
+        node = rank[node.reshape(-1)]
+        points = text.floats(starts[np.sort(first)])
+    return points, node
 
 
 def _decimal(text: bytes) -> object:
     """The exact value of a number; one with an absurd exponent stands for itself."""
     return text if _LONG_EXPONENT.search(text) else Decimal(text.upper().replace(b"D", b"E").decode("ascii"))
-
-
-def _weld(ids: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(rows,) the node of each row of numbers (rows, 3), equal rows being one node, and the first row of each node."""
-    key = ids[:, 0]
-    for k in (1, 2):
-        key = np.unique(key * (int(ids[:, k].max()) + 1) + ids[:, k], return_inverse=True)[1].reshape(-1)
-    _, first, node = np.unique(key, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), dtype=np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    return rank[node.reshape(-1)], np.sort(first)
 
 
 def write(mesh: Mesh) -> Written:
@@ -171,31 +189,38 @@ def write(mesh: Mesh) -> Written:
     blocks = [block for block in mesh.cells if block.kind == "triangle" and len(block.nodes)]
     if not blocks:
         raise FormatError(f"{name} cannot hold a mesh without triangles")
-    nodes = np.concatenate([block.nodes for block in blocks])
-    regions = np.concatenate([block.regions for block in blocks])
-    known = np.unique(regions)
+    nodes = joined([block.nodes for block in blocks])
+    regions = joined([block.regions for block in blocks])
+    known = distinct(regions)
     lost = [f"{name} has no node numbers: nodes will be counted as triangles name them"]
     lost += [*convert.lost_cells(mesh, name, (0, 1)), *convert.lost_data(mesh, name, regions=True)]
-    if (unused := len(points) - len(np.unique(nodes))) > 0:
+    used = np.zeros(len(points), dtype=bool)
+    used[nodes] = True
+    if unused := int(np.count_nonzero(~used)):
         lost.append(f"{name} cannot hold nodes without a triangle: {unused} {convert.were(unused)} left out")
-    if len(np.unique(points[np.unique(nodes)], axis=0)) < len(np.unique(nodes)):
+    weld = Weld(len(points))
+    weld.add(points[used])
+    if len(weld.points) < len(points) - unused:
         lost.append(f"{name} cannot tell apart nodes at the same place: they were joined")
-    if known.tolist() not in ([0], list(range(1, len(known) + 1))):
+    if known not in ([0], list(range(1, len(known) + 1))):
         lost.append(f"{name} counts its solids from 1: region numbers remain only in the names of the solids")
-    corners = points[nodes]
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.linalg.norm(normals, axis=1)[:, None]
-    normals[~np.isfinite(normals).all(axis=1)] = 0
-    normal_text, point_text = convert.decimals(normals), convert.decimals(points)
-    text = []
-    for region in known.tolist():
-        title = "mesh" if known.tolist() == [0] else " ".join(convert.marker_name(mesh, 2, region).split())
-        text.append(f"solid {title}\n")
-        for k in np.flatnonzero(regions == region).tolist():
-            a, b, c = (point_text[node] for node in nodes[k].tolist())
-            text.append(
-                f"facet normal {normal_text[k]}\nouter loop\nvertex {a}\nvertex {b}\nvertex {c}\nendloop\nendfacet\n"
-            )
-        text.append(f"endsolid {title}\n")
-    return Written({".stl": "".join(text).encode()}, lost)
+    return Written({".stl": Pieces(lambda: _solids(mesh, points, nodes, regions, known))}, lost)
+
+
+def _solids(
+    mesh: Mesh, points: NDArray[np.float64], nodes: NDArray[np.int64], regions: NDArray[np.int64], known: list[int]
+) -> Iterator[Piece]:
+    vertex = b"vertex % % %\n"
+    facet = b"facet normal % % %\nouter loop\n" + 3 * vertex + b"endloop\nendfacet\n"
+    for region in known:
+        title = "mesh" if known == [0] else " ".join(convert.marker_name(mesh, 2, region).split())
+        yield f"solid {title}\n".encode()
+        chosen = np.flatnonzero(regions == region)
+        for k in range(0, len(chosen), _TOGETHER):
+            corners = points[nodes[chosen[k : k + _TOGETHER]]]
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+                normals /= np.linalg.norm(normals, axis=1)[:, None]
+            normals[~np.isfinite(normals).all(axis=1)] = 0
+            yield from convert.rows(facet, normals, corners.reshape(-1, 9))
+        yield f"endsolid {title}\n".encode()

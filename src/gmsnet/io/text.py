@@ -1,204 +1,268 @@
 """Numbers in text files: where the tokens stand, what they are worth, and which line is to blame.
 
-Every position is a byte offset into the file, so that new coordinates can be put in the place of the old ones.
+Every position is a byte offset into the file, so that new coordinates can be put in the place of the old ones. A token
+is known by its first byte; positions are int32 as long as the file allows, because there are many of them.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NoReturn
+from functools import cached_property
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
+from gmsnet.io.mapped import Data
+from gmsnet.io.places import ranges
 from gmsnet.kernels import text as kernels
+from gmsnet.kernels.weld import match_words
 
-Spans = NDArray[np.int64]  # (n, 2): first byte and byte behind the last of each token
+Starts = NDArray[Any]  # int32 or int64: the first byte of each token
 
-_ALL_BLANK = bytes(c if c in b"\r\n" else 32 for c in range(256))
-_WIDE = 64  # longer numbers are converted one by one: one token of a megabyte must not widen all the others
+_BLANKS, _LINE_ENDS = b" \t\v\f", b"\r\n"
+_NOT_FINITE = re.compile(rb"(?i)([+-]?)(nan|inf(?:inity)?)(?:\([a-z]*\))?")
+MOST_NARROW = 2**31 - 1  # bytes of a file whose positions are int32
+MOST_ROWS = 1 << 17  # that are looked at together: what belongs to them stays in the processor's cache
 
 
 @dataclass(frozen=True)
 class Rows:
     """Lines of a text that hold tokens.
 
-    spans: (tokens, 2). first: (rows + 1,), row k has the tokens first[k] to first[k + 1] - 1. end: the byte behind the
+    starts: (tokens,). first: (rows + 1,), row k has the tokens first[k] to first[k + 1] - 1. end: the byte behind the
     last token.
     """
 
-    spans: Spans
-    first: NDArray[np.int64]
+    starts: Starts
+    first: Starts
     end: int
 
     def __len__(self) -> int:
         return len(self.first) - 1
 
     @property
-    def lengths(self) -> NDArray[np.int64]:
+    def lengths(self) -> Starts:
         """(rows,) how many tokens each row has."""
         return np.diff(self.first)
 
-    def row(self, k: int) -> Spans:
-        """The spans of the tokens of row k."""
-        return self.spans[self.first[k] : self.first[k + 1]]
+    def row(self, k: int) -> Starts:
+        """The tokens of row k."""
+        return self.starts[self.first[k] : self.first[k + 1]]
 
-    def column(self, j: int) -> Spans:
-        """(rows, 2) the j-th token of each row; every row must have that many."""
-        return self.spans[self.first[:-1] + j]
+    def column(self, j: int) -> Starts:
+        """(rows,) the j-th token of each row; every row must have that many."""
+        return self.columns(j, 1)[:, 0]
+
+    def columns(self, j: int, count: int) -> Starts:
+        """(rows, count) the tokens of each row from the j-th on; every row must have that many."""
+        tokens: Starts = self.starts[self.first[:-1, None] + np.arange(j, j + count, dtype=self.first.dtype)]
+        return tokens
+
+    def inner(self, of_tokens: NDArray[Any], skip: int, counts: NDArray[Any]) -> NDArray[Any]:
+        """What belongs to the ``counts[k]`` tokens of each row k that follow its first ``skip``, out of what belongs to
+        each token.
+        """
+        if len(self) and (counts == counts[0]).all() and (self.lengths == self.lengths[0]).all():
+            return of_tokens.reshape(len(self), -1)[:, skip : skip + int(counts[0])].reshape(-1)
+        return of_tokens[ranges(self.first[:-1].astype(np.int64) + skip, counts.astype(np.int64))]
 
     def where(self, k: int) -> int:
         """The byte at which row k begins (to name its line)."""
-        return int(self.spans[self.first[k], 0])
+        return int(self.starts[self.first[k]])
+
+    def parts(self) -> Iterator[tuple[int, Rows]]:
+        """The rows in turn, MOST_ROWS at a time, each time with the number of the first of them."""
+        for k in range(0, len(self), MOST_ROWS):
+            first = self.first[k : k + MOST_ROWS + 1]
+            yield k, Rows(self.starts[first[0] : first[-1]], first - first[0], self.end)
 
 
-def scan(data: bytes, start: int, count: int, stop: int | None = None) -> Spans:
-    """The spans (count, 2) of the next ``count`` tokens from byte ``start``, which white space of any kind separates.
+class Text:
+    """A text and its tokens, which white space separates.
 
-    Raises FormatError where the text ends (or reaches ``stop``) before.
+    comment: the byte that begins a comment, which runs to the end of the line. stop: the text ends there. ends: bytes
+    that end a token as a blank does.
     """
-    stop = len(data) if stop is None else stop
-    if count < 0:
-        fail(data, start, f"a count is negative: {count}")
-    room = max(0, (stop - start + 1) // 2)  # no more tokens than that can follow: a false count asks for no memory
-    spans = np.empty((min(count, room), 2), dtype=np.int64)
-    found = int(kernels.find_tokens(_bytes(data), start, stop, spans))
-    if found < count:
-        place = "the file ends: is it cut off?" if stop == len(data) else "the section ends"
-        fail(data, stop, f"expected {count - found} more numbers, {place}")
-    return spans
+
+    def __init__(self, data: Data, comment: bytes = b"", stop: int | None = None, ends: bytes = b"") -> None:
+        self.data, self.comment, self.ends = data, comment, ends
+        self.stop = len(data) if stop is None else stop
+        self._type = np.int32 if len(data) <= MOST_NARROW else np.int64
+        self._kinds = np.full(256, kernels.WORD, dtype=np.uint8)
+        for letters, kind in (
+            (_BLANKS + ends, kernels.BLANK),
+            (_LINE_ENDS, kernels.LINE_END),
+            (comment, kernels.COMMENT),
+        ):
+            self._kinds[list(letters)] = kind
+
+    @cached_property
+    def raw(self) -> NDArray[np.uint8]:
+        """The bytes of the whole file."""
+        raw = np.frombuffer(self.data, dtype=np.uint8)
+        raw.flags.writeable = False  # kernels are compiled once, for arrays that cannot be written
+        return raw
+
+    def until(self, stop: int) -> Text:
+        """The text as if it ended at byte ``stop``."""
+        return Text(self.data, self.comment, stop, self.ends)
+
+    def tokens(self, at: int, count: int | None = None) -> tuple[Starts, int]:
+        """The next ``count`` tokens (None: all) from byte ``at``, and the byte behind the last.
+
+        Raises FormatError where the text ends before.
+        """
+        if count is not None and count < 0:
+            self.fail(at, f"a count is negative: {count}")
+        # No more tokens than there is room for: a false count asks for no memory.
+        most = self._most(at)
+        starts = self._room(most if count is None else min(count, most))
+        _, found, end = kernels.find_rows(self.raw, self._kinds, at, self.stop, self.stop, starts, starts[:0])
+        if count is not None and found < count:
+            self.fail(self.stop, f"expected {count - found} more numbers, {self._ends()}")
+        return starts[:found], end
+
+    def rows(self, at: int, count: int | None = None) -> Rows:
+        """The next ``count`` lines that are not empty (None: all), each with its tokens.
+
+        ``at`` counts as the beginning of a line. Raises FormatError where there are fewer lines.
+        """
+        if count is not None and count < 0:
+            self.fail(at, f"a count is negative: {count}")
+        most = self._most(at)
+        limit = most if count is None else min(count, most)
+        starts, first = self._room(most), self._room(limit + 1)
+        found, tokens, end = kernels.find_rows(self.raw, self._kinds, at, self.stop, limit, starts, first)
+        if count is not None and found < count:
+            self.fail(self.stop, f"expected {count - found} more lines, {self._ends()}")
+        first[found] = tokens
+        return Rows(starts[:tokens], first[: found + 1], end)
+
+    def _most(self, at: int) -> int:
+        return max(0, (self.stop - at + 1) // 2)
+
+    def _room(self, count: int) -> Starts:
+        """Memory that is not touched costs nothing: only as much of it is used as there are tokens."""
+        return np.empty(count, dtype=self._type)
+
+    def _ends(self) -> str:
+        return "the file ends: is it cut off?" if self.stop == len(self.data) else "the section ends"
+
+    def floats(self, starts: Starts) -> NDArray[np.float64]:
+        """The numbers of tokens (any shape), correctly rounded to float64.
+
+        An exponent may be written with E or, as Fortran does, with D. Raises FormatError naming the line where a token
+        is not a plain decimal number (nan, inf, 1_0, 0x1) or too large for float64.
+        """
+        return self.spans(starts)[0]
+
+    def spans(self, starts: Starts) -> tuple[NDArray[np.float64], Starts]:
+        """The numbers of tokens as by ``floats``, and the byte behind each token."""
+        flat = np.ascontiguousarray(starts.reshape(-1), dtype=self._type)
+        values, ends, slow = np.empty(len(flat)), np.empty_like(flat), np.empty_like(flat)
+        bad, left = kernels.parse_floats(self.raw, self._kinds, self.stop, flat, values.view(np.int64), ends, slow)
+        if bad >= 0:
+            found = self.word(flat[bad])
+            self.fail(int(flat[bad]), f"a number was expected, found {found}: write a finite decimal number there")
+        for k in slow[:left].tolist():
+            values[k] = float(self.data[flat[k] : ends[k]].replace(b"D", b"e").replace(b"d", b"e"))
+            if np.isinf(values[k]):
+                self.fail(int(flat[k]), f"the number {self.word(flat[k])} is too large for a float64")
+        return values.reshape(starts.shape), ends.reshape(starts.shape)
+
+    def any_floats(self, starts: Starts) -> NDArray[np.float64]:
+        """Like ``floats`` for data that are no coordinates: nan and inf are values too."""
+        flat = starts.reshape(-1)
+        if not len(flat):
+            return np.empty(starts.shape)
+        first = self.raw[flat]
+        signed = (first == ord("+")) | (first == ord("-"))
+        first = np.where(signed, self.raw[np.minimum(flat + 1, self.stop - 1)], first)
+        special = np.isin(first, np.frombuffer(b"nNiI", dtype=np.uint8))
+        values = np.empty(len(flat))
+        values[~special] = self.floats(flat[~special])
+        for k in np.flatnonzero(special).tolist():
+            match = _NOT_FINITE.fullmatch(self.token(flat[k]))
+            values[k] = float(match[1] + match[2]) if match else self.floats(flat[k])
+        return values.reshape(starts.shape)
+
+    def integers(self, starts: Starts, slash: bool = False) -> NDArray[np.int64]:
+        """The integers of tokens (any shape). slash: those before the first slash of each token (``12/3/4`` → 12).
+
+        Raises FormatError naming the line where a token is not a plain decimal integer of at most 18 digits, or where
+        something but digits, signs and slashes follows the slash.
+        """
+        flat = np.ascontiguousarray(starts.reshape(-1), dtype=self._type)
+        values = np.empty(len(flat), dtype=np.int64)
+        bad = kernels.parse_integers(self.raw, self._kinds, self.stop, flat, slash, values)
+        if bad >= 0:
+            what = "numbers separated by slashes were" if b"/" in self.token(flat[bad]) and slash else "an integer was"
+            self.fail(int(flat[bad]), f"{what} expected, found {self.word(flat[bad])}")
+        return values.reshape(starts.shape)
+
+    def count(self, start: Any, what: str) -> int:
+        """One token as a count, which is not negative. ``what`` names it in the message of FormatError."""
+        value = int(self.integers(np.asarray(start)))
+        if value < 0:
+            self.fail(int(start), f"the number of {what} is negative: {value}")
+        return value
+
+    def next(self, at: int) -> tuple[int, int] | None:
+        """The first byte of the next token and the byte behind it; None where there is none."""
+        one = self._room(1)
+        _, found, end = kernels.find_rows(self.raw, self._kinds, at, self.stop, 1, one, one[:0])
+        return (int(one[0]), end) if found else None
+
+    def token(self, start: Any) -> bytes:
+        """The bytes of one token."""
+        found = self.next(int(start))
+        return self.data[slice(*found)] if found else b""
+
+    def letters(self, starts: Starts, count: int) -> list[NDArray[np.uint8]]:
+        """The first ``count`` bytes of tokens (n,), each as an array (n,); 0 stands where a token is shorter."""
+        found: list[NDArray[np.uint8]] = []
+        inside = np.ones(len(starts), dtype=bool)
+        for k in range(count):
+            letter = self.raw[np.minimum(starts + k, len(self.raw) - 1)]
+            inside &= (starts + k < self.stop) & (self._kinds[letter] == kernels.WORD)
+            found.append(np.where(inside, letter, np.uint8(0)))
+        return found
+
+    def mismatch(self, starts: Starts, pattern: Sequence[bytes]) -> int:
+        """The number of the first token that is not the word of a pattern, which repeats, in capitals or not; or -1.
+
+        pattern: words in lower case; an empty one stands for anything.
+        """
+        words, cuts = np.frombuffer(b"".join(pattern), dtype=np.uint8), np.cumsum([0, *map(len, pattern)])
+        return int(match_words(self.raw, self._kinds, self.stop, starts, words, cuts))
+
+    def word(self, start: Any) -> str:
+        """One token in quotes for a message."""
+        return quoted(self.token(start))
+
+    def fail(self, offset: int, message: str) -> NoReturn:
+        """Raises FormatError with the line of ``offset`` in front (``io.read`` puts the file's name before it)."""
+        fail(self.data, offset, message)
 
 
-def scan_rows(data: bytes, start: int, count: int | None = None, stop: int | None = None) -> Rows:
-    """The next ``count`` lines that are not empty (None: all up to ``stop``), each with its tokens.
-
-    ``start`` counts as the beginning of a line. Raises FormatError where there are fewer lines.
-    """
-    stop = len(data) if stop is None else stop
-    if count is not None and count < 0:
-        fail(data, start, f"a count is negative: {count}")
-    raw, none = _bytes(data), np.empty((0, 2), dtype=np.int64)
-    limit = len(data) if count is None else min(count, len(data))
-    rows, tokens, end = map(int, kernels.find_rows(raw, start, stop, limit, none, none[:, 0]))
-    if count is not None and rows < count:
-        place = "the file ends: is it cut off?" if stop == len(data) else "the section ends"
-        fail(data, stop, f"expected {count - rows} more lines, {place}")
-    spans, first = np.empty((tokens, 2), dtype=np.int64), np.full(rows + 1, tokens, dtype=np.int64)
-    kernels.find_rows(raw, start, stop, limit, spans, first[:rows])
-    return Rows(spans, first, end)
-
-
-def to_floats(data: bytes, spans: Spans) -> NDArray[np.float64]:
-    """The numbers of tokens (any leading shape, last axis the span), correctly rounded to float64.
-
-    An exponent may be written with E or, as Fortran does, with D. Raises FormatError naming the line where a token is
-    not a plain decimal number (nan, inf, 1_0, 0x1) or too large for float64.
-    """
-    shape, spans = spans.shape[:-1], np.ascontiguousarray(spans.reshape(-1, 2))
-    values, state = np.empty(len(spans)), np.empty(len(spans), dtype=np.uint8)
-    kernels.parse_floats(_bytes(data), spans, kernels.POWERS, values, state)
-    bad = np.flatnonzero(state == kernels.BAD)
-    if bad.size:
-        found = word(data, spans[bad[0]])
-        fail(data, int(spans[bad[0], 0]), f"a number was expected, found {found}: write a finite decimal number there")
-    slow = np.flatnonzero(state == kernels.LONG)
-    wide = (spans[slow, 1] - spans[slow, 0]) > _WIDE
-    for k in slow[wide].tolist():
-        values[k] = float(data[spans[k, 0] : spans[k, 1]].replace(b"D", b"e").replace(b"d", b"e"))
-    slow = slow[~wide]
-    if slow.size:
-        text = gather(data, spans[slow])
-        letters = text.view(np.uint8)
-        letters[(letters == ord("d")) | (letters == ord("D"))] = ord("e")
-        values[slow] = text.astype(np.float64)
-    huge = np.flatnonzero(~np.isfinite(values))
-    if huge.size:
-        fail(data, int(spans[huge[0], 0]), f"the number {word(data, spans[huge[0]])} is too large for a float64")
-    return values.reshape(shape)
-
-
-def to_ints(data: bytes, spans: Spans) -> NDArray[np.int64]:
-    """The integers of tokens (any leading shape, last axis the span).
-
-    Raises FormatError naming the line where a token is not a plain decimal integer of at most 18 digits.
-    """
-    shape, spans = spans.shape[:-1], np.ascontiguousarray(spans.reshape(-1, 2))
-    values = np.empty(len(spans), dtype=np.int64)
-    bad = int(kernels.parse_ints(_bytes(data), spans, values))
-    if bad >= 0:
-        fail(data, int(spans[bad, 0]), f"an integer was expected, found {word(data, spans[bad])}")
-    return values.reshape(shape)
-
-
-def to_count(data: bytes, span: Spans, what: str) -> int:
-    """The one token of span (2,) as a count, which is not negative. ``what`` names it in the message of FormatError."""
-    value = int(to_ints(data, span))
-    if value < 0:
-        fail(data, int(span[0]), f"the number of {what} is negative: {value}")
-    return value
-
-
-def gather(data: bytes, spans: Spans) -> NDArray[np.bytes_]:
-    """Tokens (n, 2) as an array of bytes strings of one width, that of the longest."""
-    width = max(1, int((spans[:, 1] - spans[:, 0]).max(initial=1)))
-    out = np.zeros((len(spans), width), dtype=np.uint8)
-    kernels.gather_tokens(_bytes(data), np.ascontiguousarray(spans), out)
-    return out.view(f"S{width}").reshape(-1)
-
-
-def before_slash(data: bytes, spans: Spans) -> Spans:
-    """The part of each token before its first slash (``12/3/4`` → ``12``).
-
-    Raises FormatError naming the line where something but numbers and slashes follows.
-    """
-    cut = np.array(spans, order="C")
-    bad = int(kernels.cut_at_slash(_bytes(data), cut))
-    if bad >= 0:
-        fail(data, int(spans[bad, 0]), f"numbers separated by slashes were expected, found {word(data, spans[bad])}")
-    return cut
-
-
-def token(data: bytes, span: Spans) -> bytes:
-    """The bytes of one token (2,)."""
-    return data[int(span[0]) : int(span[1])]
-
-
-def word(data: bytes, span: Spans) -> str:
-    """One token (2,) in quotes for a message: printable and short, whatever bytes it has."""
-    found = token(data, span)
+def quoted(found: bytes) -> str:
+    """A word for a message: printable and short, whatever bytes it has."""
     text = found[:24].decode("ascii", "backslashreplace")
     return repr(text + "…" * (len(found) > 24)).replace("\\\\", "\\")
 
 
-def line_of(data: bytes, offset: int) -> int:
+def line_of(data: Data, offset: int) -> int:
     """The line (counted from 1) in which a byte stands; LF, CR LF and lone CR end a line."""
-    if b"\r" not in data:
-        return data.count(b"\n", 0, offset) + 1
-    return 1 + len(re.findall(rb"\r\n?|\n", data[:offset]))
+    before = data[:offset]
+    if data.find(b"\r") < 0:
+        return before.count(b"\n") + 1
+    return 1 + len(re.findall(rb"\r\n?|\n", before))
 
 
-def fail(data: bytes, offset: int, message: str) -> NoReturn:
+def fail(data: Data, offset: int, message: str) -> NoReturn:
     """Raises FormatError with the line of ``offset`` in front (the file's name is put before it by ``io.read``)."""
     raise FormatError(f"line {line_of(data, offset)}: {message}")
-
-
-def replace_numbers(data: bytes, spans: Spans, values: NDArray[np.float64]) -> bytes:
-    """A copy with the shortest decimals that read back as ``values`` (n,) in the place of the tokens (n, 2)."""
-    order = np.argsort(spans[:, 0], kind="stable")
-    spans = np.ascontiguousarray(spans[order])
-    text = " ".join(map(repr, values[order].tolist())).encode()
-    words = scan(text, 0, len(values))
-    out = np.empty(len(data) + int((np.diff(words) - np.diff(spans)).sum()), dtype=np.uint8)
-    kernels.replace_spans(_bytes(data), spans, _bytes(text), words, out)
-    return out.tobytes()
-
-
-def blank(data: bytes, pattern: bytes) -> bytes:
-    """A copy in which what matches the regular expression is spaces; line ends stay, and every byte keeps its place."""
-    return re.sub(pattern, lambda match: match[0].translate(_ALL_BLANK), data)
-
-
-def _bytes(data: bytes) -> NDArray[np.uint8]:
-    return np.frombuffer(data, dtype=np.uint8)

@@ -5,7 +5,7 @@ Points are numbered from 0 or from 1, as the first of them says. The first attri
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,12 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
+from gmsnet.io.cells import distinct, first_repeated, places_of, sealed
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.mapped import Data
+from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
-from gmsnet.io.text import Rows, Spans, blank, fail, scan_rows, to_count, to_floats, to_ints
+from gmsnet.io.text import Rows, Text
 from gmsnet.mesh import CellBlock, Mesh
 
 name = "Triangle"
@@ -28,13 +31,11 @@ ATTRIBUTE = "triangle:attribute"  # + its number: further attributes of points a
 TO_SIDES, FROM_SIDES = [0, 1, 2, 5, 3, 4], [0, 1, 2, 4, 5, 3]
 
 
-def read(files: Mapping[str, bytes]) -> Parsed:
+def read(files: Mapping[str, Data]) -> Parsed:
     """See Format. Points with a boundary marker other than 0 become vertex cells with the marker as region."""
-    node = blank(files[".node"], rb"#[^\r\n]*")
-    points, ids, spans, data = _points(node)
+    points, ids, slots, data = _points(Text(files[".node"], b"#"))
     try:
-        ele = blank(files[".ele"], rb"#[^\r\n]*")
-        cells, names, cell_data = _triangles(ele, ids)
+        cells, names, cell_data = _triangles(Text(files[".ele"], b"#"), ids)
     except FormatError as error:
         raise FormatError(f"in the .ele file beside it: {error}") from None
     markers = data.get(MARKER)
@@ -43,80 +44,73 @@ def read(files: Mapping[str, bytes]) -> Parsed:
         cells.append(CellBlock("vertex", marked[:, None], markers[marked]))
         empty = np.zeros(len(marked))
         cell_data = {key: (*arrays, empty) for key, arrays in cell_data.items()}
-    slots = TextSlots(spans[..., 0], spans[..., 1], np.arange(len(points)))
     return Parsed(points, cells, slots, names, data, cell_data)
 
 
-def _header(text: bytes, words: int, what: str) -> tuple[NDArray[np.int64], Rows]:
+def _header(text: Text, words: int, what: str) -> tuple[NDArray[np.int64], Rows]:
     """The numbers of the first line, and the rows of which it announces how many there are; no others may follow."""
-    head = scan_rows(text, 0, 1)
-    if len(head.spans) < words:
-        fail(text, head.where(0), f"the first line must have {words} numbers, found {len(head.spans)}")
-    numbers = to_ints(text, head.spans[:words])
-    for span in head.spans[:words]:
-        to_count(text, span, what)
-    rows = scan_rows(text, head.end, int(numbers[0]))
-    rest = scan_rows(text, rows.end if len(rows) else head.end, None)
+    head = text.rows(0, 1)
+    if len(head.starts) < words:
+        text.fail(head.where(0), f"the first line must have {words} numbers, found {len(head.starts)}")
+    numbers = text.integers(head.starts[:words])
+    for start in head.starts[:words]:
+        text.count(start, what)
+    rows = text.rows(head.end, int(numbers[0]))
+    rest = text.rows(rows.end if len(rows) else head.end)
     if len(rest):
-        fail(text, rest.where(0), f"the file goes on behind the {numbers[0]} {what} that its first line announces")
+        text.fail(rest.where(0), f"the file goes on behind the {numbers[0]} {what} that its first line announces")
     return numbers, rows
 
 
-def _width(text: bytes, rows: Rows, width: int, what: str) -> None:
+def _width(text: Text, rows: Rows, width: int, what: str) -> None:
     short = np.flatnonzero(rows.lengths < width)
     if short.size:
         k = int(short[0])
-        fail(text, rows.where(k), f"{what} takes {width} numbers here, found {rows.lengths[k]}")
+        text.fail(rows.where(k), f"{what} takes {width} numbers here, found {rows.lengths[k]}")
 
 
-def _points(
-    text: bytes,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], Spans, dict[str, NDArray[Any]]]:
-    """Coordinates, numbers of the points, spans of the coordinates, point data."""
+def _points(text: Text) -> tuple[NDArray[np.float64], NDArray[np.int64], TextSlots, dict[str, NDArray[Any]]]:
+    """Coordinates, numbers of the points, slots of the coordinates, point data."""
     (_, dimension, attributes, markers), rows = _header(text, 4, "points")
     if dimension != 2:
-        fail(text, 0, f"the points have {dimension} coordinates: only meshes in the plane (2) can be read")
+        text.fail(0, f"the points have {dimension} coordinates: only meshes in the plane (2) can be read")
     if markers > 1:
-        fail(text, 0, f"{markers} boundary markers a point: there can be 0 or 1")
+        text.fail(0, f"{markers} boundary markers a point: there can be 0 or 1")
     _width(text, rows, 3 + int(attributes) + int(markers), "a point")
     attributes = attributes if len(rows) else 0  # nothing bounds it then
-    ids = to_ints(text, rows.column(0))
-    order = np.argsort(ids, kind="stable")
-    twice = np.flatnonzero(np.diff(ids[order]) == 0)
-    if twice.size:
-        k = int(order[twice[0] + 1])
-        fail(text, rows.where(k), f"the point {ids[k]} is given twice")
-    spans = np.stack([rows.column(1), rows.column(2)], axis=1)
+    ids = text.integers(rows.column(0))
+    if (twice := first_repeated(ids)) >= 0:
+        text.fail(rows.where(twice), f"the point {ids[twice]} is given twice")
     data: dict[str, NDArray[Any]] = {
-        f"{ATTRIBUTE}{k + 1}": to_floats(text, rows.column(3 + k)) for k in range(int(attributes))
+        f"{ATTRIBUTE}{k + 1}": text.floats(rows.column(3 + k)) for k in range(int(attributes))
     }
     if markers:
-        data[MARKER] = to_ints(text, rows.column(3 + int(attributes)))
-    return to_floats(text, spans), ids, spans, data
+        data[MARKER] = text.integers(rows.column(3 + int(attributes)))
+    points, ends = text.spans(starts := rows.columns(1, 2))
+    return points, ids, TextSlots(starts, ends), data
 
 
 def _triangles(
-    text: bytes, ids: NDArray[np.int64]
+    text: Text, ids: NDArray[np.int64]
 ) -> tuple[list[CellBlock], dict[tuple[int, int], str], dict[str, tuple[NDArray[Any], ...]]]:
     (_, size, attributes), rows = _header(text, 3, "triangles")
     if size not in (3, 6):
-        fail(text, 0, f"triangles with {size} nodes: there can be 3 or 6")
+        text.fail(0, f"triangles with {size} nodes: there can be 3 or 6")
     _width(text, rows, 1 + int(size) + int(attributes), "a triangle")
     attributes = attributes if len(rows) else 0  # nothing bounds it then
-    to_ints(text, rows.column(0))
-    spans = np.stack([rows.column(1 + k) for k in range(int(size))], axis=1)
-    named = to_ints(text, spans)
-    order = np.argsort(ids, kind="stable")
-    place = np.searchsorted(ids[order], named).clip(max=max(0, len(ids) - 1))
-    bad = np.flatnonzero((ids[order][place] != named).ravel()) if len(ids) else np.arange(named.size)
-    if bad.size:
+    text.integers(rows.column(0))
+    starts = rows.columns(1, int(size))
+    named = text.integers(starts)
+    place, bad = places_of(ids, named.reshape(-1))
+    if bad >= 0:
         known = f"{ids.min()} to {ids.max()}" if len(ids) else "none"
-        offset = int(spans.reshape(-1, 2)[bad[0], 0])
-        fail(text, offset, f"a triangle names the node {named.ravel()[bad[0]]}, but the nodes are {known}")
-    nodes = order[place] if len(ids) else named
-    values = [to_floats(text, rows.column(1 + int(size) + k)) for k in range(int(attributes))]
+        where, found = int(starts.reshape(-1)[bad]), named.reshape(-1)[bad]
+        text.fail(where, f"a triangle names the node {found}, but the nodes are {known}")
+    nodes = place.reshape(named.shape)
+    values = [text.floats(rows.column(1 + int(size) + k)) for k in range(int(attributes))]
     regions, names = _regions(values[0]) if values else (np.zeros(len(rows), dtype=np.int64), {})
-    block = CellBlock("triangle", nodes, regions) if size == 3 else CellBlock("triangle6", nodes[:, TO_SIDES], regions)
+    kind, nodes = ("triangle", nodes) if size == 3 else ("triangle6", nodes[:, TO_SIDES])
+    block = CellBlock(kind, sealed(nodes), sealed(regions))
     cell_data: dict[str, tuple[NDArray[Any], ...]] = {}
     for k, column in enumerate(values[1:], 2):
         cell_data[f"{ATTRIBUTE}{k}"] = (column,)
@@ -143,27 +137,30 @@ def write(mesh: Mesh) -> Written:
     nodes = np.concatenate([b.nodes[:, FROM_SIDES] if quadratic else b.nodes for b in faces] or [np.empty((0, 3), int)])
     regions = np.concatenate([b.regions for b in faces] or [np.empty(0, int)])
 
-    lines = [f"{len(points)} 2 0 1"]
-    rows = zip(convert.decimals(points), markers.tolist(), strict=True)
-    lines += [f"{k} {row} {marker}" for k, (row, marker) in enumerate(rows, 1)]
-    node = "\n".join(lines) + "\n"
-    cells = np.column_stack([np.arange(1, len(nodes) + 1), nodes + 1, regions])
-    ele = "\n".join([f"{len(nodes)} {nodes.shape[1]} 1", *convert.integers(cells)]) + "\n"
+    def points_text() -> Iterator[Piece]:
+        yield b"%d 2 0 1\n" % len(points)
+        yield from convert.rows(b"% % % %\n", np.arange(1, len(points) + 1), points, markers)
+
+    def cells_text() -> Iterator[Piece]:
+        yield b"%d %d 1\n" % nodes.shape
+        template = convert.row_of(nodes.shape[1] + 2)
+        yield from convert.rows(template, np.arange(1, len(nodes) + 1), nodes + 1, regions)
+
     lost += words + convert.lost_names(mesh, name, (2,)) + convert.lost_data(mesh, name, kept=(MARKER,), regions=True)
-    return Written({".node": node.encode(), ".ele": ele.encode()}, lost)
+    return Written({".node": Pieces(points_text), ".ele": Pieces(cells_text)}, lost)
 
 
 def _markers(mesh: Mesh) -> tuple[NDArray[np.int64], list[str]]:
     """A boundary marker for each point, and what of the line and vertex cells is lost thereby."""
     markers = np.zeros(len(mesh.points), dtype=np.int64)
-    used = sorted({(b.dimension, r) for b in mesh.cells if b.dimension < 2 for r in np.unique(b.regions).tolist()})
+    used = sorted({(b.dimension, r) for b in mesh.cells if b.dimension < 2 for r in distinct(b.regions)})
     plain = len({r for _, r in used}) == len(used) and all(r != 0 for _, r in used)
     number = {pair: pair[1] if plain else k for k, pair in enumerate(used, 1)}
     lines = 0
     for block in mesh.cells:
         if block.dimension < 2:
             lines += len(block.nodes) * (block.dimension == 1)
-            for region in np.unique(block.regions).tolist():
+            for region in distinct(block.regions):
                 markers[block.nodes[block.regions == region]] = number[block.dimension, region]
     lost = []
     if lines:

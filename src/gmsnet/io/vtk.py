@@ -7,7 +7,7 @@ nodes has its length in front; since version 5 there are two arrays, OFFSETS and
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NoReturn
 from urllib.parse import quote
@@ -17,9 +17,14 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
 from gmsnet.io import convert, vtk_cells
+from gmsnet.io.cells import joined
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.mapped import Data
+from gmsnet.io.pieces import Piece, Pieces
+from gmsnet.io.places import Addresses, Lattice, Places, lists, pick
 from gmsnet.io.vtk_stream import TYPES, Array, Line, Stream, field_name, word_of
 from gmsnet.io.words import typed
+from gmsnet.kernels import text as kernels
 from gmsnet.mesh import Mesh
 
 name = "VTK"
@@ -48,11 +53,11 @@ _HEAD = re.compile(
 
 @dataclass(frozen=True)
 class CellLists:
-    """Lists of nodes: list k has the nodes first[k] to first[k + 1] - 1. at: the place of each in the array."""
+    """Lists of nodes. sizes: how many each has; nodes: of all lists in turn; at: their places in the array."""
 
-    first: NDArray[np.int64]
+    sizes: NDArray[np.int64]
     nodes: NDArray[np.int64]
-    at: NDArray[np.int64]
+    at: Addresses
     array: Array
 
 
@@ -67,7 +72,7 @@ class Contents:
     counts: dict[str, tuple[int, Line]] = field(default_factory=dict)
 
 
-def read(files: Mapping[str, bytes]) -> Parsed:
+def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
     data = files[".vtk"]
     head = _HEAD.match(data)
@@ -118,22 +123,22 @@ def _section(stream: Stream, line: Line, found: Contents) -> None:
 
 
 def _lists(stream: Stream, line: Line) -> CellLists:
-    lists, size = (stream.count(line, text) for text in stream.expect(line, f"{line.key} count size"))
+    count, size = (stream.count(line, text) for text in stream.expect(line, f"{line.key} count size"))
     if not stream.next_is(b"OFFSETS"):
         array = stream.array(line, size, "int")
-        return counted_lists(array, lists, line.key)
+        return counted_lists(array, count, line.key)
     offsets, nodes = (
-        stream.array(part, count, stream.expect(part, f"{key} type")[0])
-        for key, count in (("OFFSETS", lists), ("CONNECTIVITY", size))
+        stream.array(part, length, stream.expect(part, f"{key} type")[0])
+        for key, length in (("OFFSETS", count), ("CONNECTIVITY", size))
         for part in [_keyword(stream, key)]
     )
     first = offsets.values()
-    if not lists:
+    if not count:
         first = np.zeros(1, dtype=np.int64)
     wrong = np.flatnonzero(np.diff(first, append=size) < 0)
     if first[0] or first[-1] != size or wrong.size:
         offsets.fail(int(wrong[0]) if wrong.size else 0, f"OFFSETS must rise from 0 to the {size} of CONNECTIVITY")
-    return CellLists(first, nodes.values(), np.arange(size), nodes)
+    return CellLists(np.diff(first), nodes.values(), Places(Lattice(0, size, 1)), nodes)
 
 
 def _keyword(stream: Stream, key: str) -> Line:
@@ -148,23 +153,18 @@ def counted_lists(array: Array, count: int, key: str) -> CellLists:
     numbers = array.values()
     stride = len(numbers) // count if count else 0
     if stride and stride * count == len(numbers) and (numbers[::stride] == stride - 1).all():
-        starts, sizes = np.arange(0, len(numbers), stride), np.full(count, stride - 1)
-    else:
-        found, at, lengths = [], 0, numbers.tolist()
-        for k in range(count):
-            if at >= len(lengths) or lengths[at] < 0 or at + lengths[at] >= len(lengths):
-                array.fail(min(at, len(lengths) - 1), f"list {k} of {key} goes beyond the {len(lengths)} numbers that "
-                                                      "were announced")  # fmt: skip
-            found.append(at)
-            at += 1 + lengths[at]
-        if at != len(lengths):
-            array.fail(at, f"the {count} lists of {key} end before the {len(lengths)} numbers that were announced")
-        starts = np.array(found, dtype=np.int64)
-        sizes = numbers[starts] if count else np.empty(0, dtype=np.int64)
-    at_node = np.ones(len(numbers), dtype=bool)
-    at_node[starts] = False
-    places = np.flatnonzero(at_node)
-    return CellLists(np.concatenate([[0], np.cumsum(sizes)]), numbers[places], places, array)
+        at: Addresses = Places(Lattice(0, count, stride, tuple(range(1, stride))))
+        return CellLists(np.full(count, stride - 1), pick(numbers, at), at, array)
+    none, first = np.empty(0, dtype=np.int8), np.empty(min(count, len(numbers)), dtype=np.int64)
+    found, end = kernels.walk(numbers, 0, 1, -1, 0, none, none, first)
+    if found < count:
+        array.fail(min(end, len(numbers) - 1), f"list {found} of {key} goes beyond the {len(numbers)} numbers that "
+                                               "were announced")  # fmt: skip
+    if end != len(numbers):
+        array.fail(end, f"the {count} lists of {key} end before the {len(numbers)} numbers that were announced")
+    sizes = numbers[first]
+    at = lists(first, sizes + 1, np.ones_like(sizes), sizes)
+    return CellLists(sizes, pick(numbers, at), at, array)
 
 
 def _attribute(stream: Stream, line: Line, count: int) -> list[tuple[str, NDArray[Any]]]:
@@ -229,29 +229,28 @@ def _values(stream: Stream, line: Line, rows: int, width: int, kind: str) -> NDA
 
 def _assemble(stream: Stream, found: Contents, polygonal: bool) -> Parsed:
     keys = list(LISTS) if polygonal else ["CELLS"]
-    lists = {key: found.lists[key] for key in keys if key in found.lists}
-    there = {"POINTS": found.points is not None, "CELLS": polygonal or "CELLS" in lists}
+    parts = {key: found.lists[key] for key in keys if key in found.lists}
+    there = {"POINTS": found.points is not None, "CELLS": polygonal or "CELLS" in parts}
     there["CELL_TYPES"] = polygonal or found.types is not None
     if found.points is None or not all(there.values()):
         raise FormatError(f"{' and '.join(k for k in there if not there[k])} missing: the file is cut off")
     if set(found.lists) - set(keys) or (polygonal and found.types is not None):
         raise FormatError(f"{', '.join(found.lists)}: these lists do not belong into this type of DATASET")
-    none = [np.empty(0, dtype=np.int64)]
-    sizes = np.concatenate(none + [np.diff(part.first) for part in lists.values()])
-    nodes = np.concatenate(none + [part.nodes for part in lists.values()])
+    sizes = joined([part.sizes for part in parts.values()])
+    nodes = joined([part.nodes for part in parts.values()])
     codes = found.types
     if codes is None:
-        codes = np.concatenate(none + [np.full(len(part.first) - 1, LISTS[key]) for key, part in lists.items()])
+        codes = joined([np.full(len(part.sizes), LISTS[key]) for key, part in parts.items()])
     if len(codes) != len(sizes):
         raise FormatError(f"there are {len(sizes)} CELLS, but {len(codes)} CELL_TYPES")
-    points = found.points.values(finite=True).reshape(-1, 3)
+    points, slots = found.points.source.coordinates(found.points.at, found.points.kind)
     for key, expected in (("POINT_DATA", len(points)), ("CELL_DATA", len(codes))):
         if key in found.counts and found.counts[key][0] != expected:
             announced, line = found.counts[key]
             stream.fail(line.start, f"{key} has {announced} rows instead of {expected}")
 
     def blame(index: int, message: str) -> NoReturn:
-        for part in lists.values():
+        for part in parts.values():
             if index < len(part.nodes):
                 part.array.fail(int(part.at[index]), message)
             index -= len(part.nodes)
@@ -259,10 +258,10 @@ def _assemble(stream: Stream, found: Contents, polygonal: bool) -> Parsed:
 
     return vtk_cells.parsed(
         points,
-        found.points.source.slots(found.points.at.reshape(-1, 3), found.points.kind),
+        slots,
         found.points.kind == "f4",
         codes,
-        np.concatenate([[0], np.cumsum(sizes)]),
+        sizes,
         nodes,
         found.fields.get("POINT_DATA", []),
         found.fields.get("CELL_DATA", []),
@@ -272,23 +271,25 @@ def _assemble(stream: Stream, found: Contents, polygonal: bool) -> Parsed:
 
 def write(mesh: Mesh) -> Written:
     """See Format. An unstructured grid of version 4.2 as text, points in double precision."""
-    codes, sizes, nodes = vtk_cells.cells_out(mesh, name)
+    convert.check_kinds(mesh, name, vtk_cells.CODES)
     point_fields, cell_fields, lost = vtk_cells.fields_out(mesh, name)
-    first = np.cumsum(sizes + 1) - sizes - 1
-    lists = np.empty(len(codes) + len(nodes), dtype=np.int64)
-    lists[first] = sizes
-    lists[np.delete(np.arange(len(lists)), first)] = nodes
-    text = [
-        "# vtk DataFile Version 4.2\nmesh\nASCII\nDATASET UNSTRUCTURED_GRID\n",
-        f"POINTS {len(mesh.points)} double\n{vtk_cells.rows_text(convert.in_space(mesh))}",
-        f"CELLS {len(codes)} {len(codes) + len(nodes)}\n{vtk_cells.lines_text(lists)}",
-        f"CELL_TYPES {len(codes)}\n{vtk_cells.lines_text(codes)}",
-    ]
-    for key, count, fields in (("POINT_DATA", len(mesh.points), point_fields), ("CELL_DATA", len(codes), cell_fields)):
+    return Written({".vtk": Pieces(lambda: _text(mesh, point_fields, cell_fields))}, lost)
+
+
+def _text(mesh: Mesh, point_fields: vtk_cells.Fields, cell_fields: vtk_cells.Fields) -> Iterator[Piece]:
+    cells, numbers = sum(len(block.nodes) for block in mesh.cells), sum(block.nodes.size for block in mesh.cells)
+    yield b"# vtk DataFile Version 4.2\nmesh\nASCII\nDATASET UNSTRUCTURED_GRID\n"
+    yield b"POINTS %d double\n" % len(mesh.points)
+    yield from vtk_cells.rows_text(convert.in_space(mesh))
+    yield b"CELLS %d %d\n" % (cells, cells + numbers)
+    yield from vtk_cells.lines_text(np.insert(block.nodes[some], 0, block.nodes.shape[1], axis=1)
+                                    for block, some in vtk_cells.parts(mesh))  # fmt: skip
+    yield b"CELL_TYPES %d\n" % cells
+    yield from vtk_cells.lines_text(vtk_cells.codes(mesh))
+    for key, count, fields in (("POINT_DATA", len(mesh.points), point_fields), ("CELL_DATA", cells, cell_fields)):
         if fields:
-            text.append(f"{key} {count}\nFIELD FieldData {len(fields)}\n")
+            yield f"{key} {count}\nFIELD FieldData {len(fields)}\n".encode("ascii")
         for called, array in fields:
             kind = TYPE_NAMES[array.dtype.str[1:]]
-            text.append(f"{quote(called) or 'field'} {array.shape[1]} {len(array)} {kind}\n")
-            text.append(vtk_cells.rows_text(array))
-    return Written({".vtk": "".join(text).encode("ascii")}, lost)
+            yield f"{quote(called) or 'field'} {array.shape[1]} {len(array)} {kind}\n".encode("ascii")
+            yield from vtk_cells.rows_text(array)

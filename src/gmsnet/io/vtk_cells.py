@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
 from gmsnet.io.cell_table import Kind, check_range, split_cells, table_blocks
+from gmsnet.io.cells import distinct
 from gmsnet.io.document import Parsed
+from gmsnet.io.pieces import Piece
 from gmsnet.io.splice import Slots
-from gmsnet.mesh import Mesh
+from gmsnet.mesh import CellBlock, Mesh
 from gmsnet.region_fields import names_a_region, regions_of
 
 Fields = Sequence[tuple[str, NDArray[Any]]]  # name and values, in the order of the file
@@ -31,6 +33,9 @@ KINDS = {
 
 CODES = {kind.name: code for code, kind in KINDS.items() if kind.order is None and code not in (POLYVERTEX, POLYLINE)}
 
+_TOGETHER = 1 << 16  # cells that are written at once
+_WIDTH = 12  # integers in a line
+
 UNSUPPORTED = {6: "triangle strips", 42: "polyhedra"}  # the others have no name that users know
 
 
@@ -39,34 +44,37 @@ def parsed(
     slots: Slots,
     single: bool,
     codes: NDArray[np.int64],
-    first: NDArray[np.int64],
+    sizes: NDArray[np.int64],
     nodes: NDArray[np.int64],
     point_fields: Fields,
     cell_fields: Fields,
     fail: Callable[[int, str], NoReturn],
 ) -> Parsed:
-    """The facts of a VTK file. codes: (n,) VTK's types; cell k has the nodes first[k] to first[k + 1] - 1 of ``nodes``.
+    """The facts of a VTK file. codes: (n,) VTK's types; sizes: (n,) numbers of nodes; nodes: of all cells in turn.
 
     Raises FormatError where there are no cells, for a type that is not supported and, through
     ``fail(index into nodes, message)``, for a node that does not exist.
     """
     if not len(codes):
         raise FormatError("the file has no cells: there is nothing to smooth")
-    for code in np.unique(codes).tolist():
+    present = distinct(codes)
+    for code in present:
         if code not in KINDS:
             what = UNSUPPORTED.get(code, f"cells of VTK type {code}")
             where = f"cell {int(np.flatnonzero(codes == code)[0])}, counted from 0"
             raise FormatError(f"{what} are not supported ({where}): turn them into simple cells first")
     check_range(nodes, len(points), fail)
-    size = np.diff(first)
-    short = np.flatnonzero(size < np.select([codes == POLYLINE, codes == POLYGON], [2, 3], 1))
-    if short.size:
-        raise FormatError(f"cell {short[0]} (counted from 0) has only {size[short[0]]} nodes")
-    regions, lines, dots = regions_of(cell_fields, len(codes)), codes == POLYLINE, codes == POLYVERTEX
-    if (lines & (size > 2)).any() or (dots & (size > 1)).any():
-        pieces = np.where(lines, size - 1, np.where(dots, size, 1))
-        owner, first, nodes = split_cells(first, nodes, pieces, np.where(lines, 2, np.where(dots, 1, size)))
-        codes, regions, size = codes[owner], regions[owner], np.diff(first)
+    small = codes.astype(np.int8)
+    least = np.ones(128, dtype=np.int8)
+    least[POLYLINE], least[POLYGON] = 2, 3
+    if (short := np.flatnonzero(sizes < least[small])).size:
+        raise FormatError(f"cell {short[0]} (counted from 0) has only {sizes[short[0]]} nodes")
+    regions = regions_of(cell_fields, len(small))
+    if POLYLINE in present or POLYVERTEX in present:
+        lines, dots = small == POLYLINE, small == POLYVERTEX
+        pieces = np.where(lines, sizes - 1, np.where(dots, sizes, 1))
+        owner, sizes, nodes = split_cells(sizes, nodes, pieces, np.where(lines, 2, np.where(dots, 1, sizes)))
+        small, regions = small[owner], regions[owner]
         cell_fields = [(name, array[owner]) for name, array in cell_fields]
     for code, count, kind in (
         (POLYVERTEX, 1, "vertex"),
@@ -74,22 +82,23 @@ def parsed(
         (POLYGON, 3, "triangle"),
         (POLYGON, 4, "quad"),
     ):
-        codes = np.where((codes == code) & (size == count), CODES[kind], codes)
-    cells, cell_data = table_blocks(KINDS, codes, first, nodes, regions, dict(cell_fields))
+        if code in present:
+            small[(small == code) & (sizes == count)] = CODES[kind]
+    cells, cell_data = table_blocks(KINDS, small, sizes, nodes, regions, dict(cell_fields))
     return Parsed(points, cells, slots, {}, dict(point_fields), cell_data, single)
 
 
-def cells_out(mesh: Mesh, title: str) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """(codes, sizes, nodes): VTK's type and number of nodes of each cell, and the nodes of all one after another.
+def parts(mesh: Mesh) -> Iterator[tuple[CellBlock, slice]]:
+    """The cells in turn, some at a time."""
+    for block in mesh.cells:
+        for k in range(0, len(block.nodes), _TOGETHER):
+            yield block, slice(k, k + _TOGETHER)
 
-    Raises FormatError naming a kind of cell that VTK does not have.
-    """
-    convert.check_kinds(mesh, title, CODES)
-    none = [np.empty(0, dtype=np.int64)]
-    codes = [np.full(len(block.nodes), CODES[block.kind]) for block in mesh.cells if len(block.nodes)]
-    sizes = [np.full(len(block.nodes), block.nodes.shape[1]) for block in mesh.cells]
-    nodes = [block.nodes.ravel() for block in mesh.cells]
-    return np.concatenate(none + codes), np.concatenate(none + sizes), np.concatenate(none + nodes)
+
+def codes(mesh: Mesh) -> Iterator[NDArray[np.uint8]]:
+    """VTK's type of each cell, some at a time."""
+    for block, some in parts(mesh):
+        yield np.full(len(block.regions[some]), CODES[block.kind], dtype=np.uint8)
 
 
 def fields_out(mesh: Mesh, title: str) -> tuple[Fields, Fields, list[str]]:
@@ -121,13 +130,18 @@ def fields_out(mesh: Mesh, title: str) -> tuple[Fields, Fields, list[str]]:
     return out[0], out[1], lost
 
 
-def rows_text(array: NDArray[Any]) -> str:
+def rows_text(array: NDArray[Any]) -> Iterator[Piece]:
     """A line for each row (n × m), each number as the shortest text that reads back as the same value of its type."""
-    words = map(str, array.ravel() if array.dtype == np.float32 else array.ravel().tolist())
-    return "".join(" ".join(row) + "\n" for row in zip(*[words] * array.shape[1], strict=True))
+    return convert.rows(convert.row_of(array.shape[1]), array)
 
 
-def lines_text(array: NDArray[Any]) -> str:
-    """Integers (n,) as lines of a few each."""
-    words = list(map(str, array.tolist()))
-    return "".join(" ".join(words[k : k + 12]) + "\n" for k in range(0, len(words), 12))
+def lines_text(arrays: Iterable[NDArray[Any]]) -> Iterator[Piece]:
+    """The integers of all arrays one after another, as lines of a few each."""
+    rest = np.empty(0, dtype=np.int64)
+    for array in arrays:
+        numbers = np.concatenate([rest, array.reshape(-1)])
+        whole = len(numbers) - len(numbers) % _WIDTH
+        yield from convert.rows(convert.row_of(_WIDTH), numbers[:whole].reshape(-1, _WIDTH))
+        rest = numbers[whole:]
+    if len(rest):
+        yield from convert.rows(convert.row_of(len(rest)), rest[None])

@@ -10,8 +10,10 @@ from urllib.parse import unquote_to_bytes
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.io.text import fail, scan, word
-from gmsnet.io.words import Addresses, ByteWords, TextWords, Words, fail_at
+from gmsnet.io.mapped import Data
+from gmsnet.io.places import Places
+from gmsnet.io.text import Text, fail, quoted
+from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 
 TYPES = {
     "unsigned_char": "u1", "char": "i1", "signed_char": "i1", "unsigned_short": "u2", "short": "i2",
@@ -41,7 +43,7 @@ class Array:
     """Numbers of a file: where they stand and of what type they are."""
 
     source: Words
-    at: Addresses
+    at: Places
     kind: str
 
     def values(self, finite: bool = False) -> NDArray[Any]:
@@ -50,13 +52,13 @@ class Array:
 
     def fail(self, index: int, message: str) -> NoReturn:
         """Raises FormatError with the place of one of the numbers."""
-        self.source.fail(int(self.at[index]) if len(self.at) else 0, message)
+        self.source.fail(self.at[index] if len(self.at) else 0, message)
 
 
 class Stream:
     """Reads on from byte ``at``."""
 
-    def __init__(self, data: bytes, at: int, binary: bool) -> None:
+    def __init__(self, data: Data, at: int, binary: bool) -> None:
         self.data, self.at, self.binary = data, at, binary
 
     def fail(self, offset: int, message: str) -> NoReturn:
@@ -106,10 +108,10 @@ class Stream:
             addresses = source.take(count, kind)
             self.at = raw.at
         else:
-            spans = scan(self.data, self.at, count)
-            source = TextWords(self.data, spans)
+            text = Text(self.data)
+            starts, self.at = text.tokens(self.at, count)
+            source = TextWords(text, starts)
             addresses = source.take(count, kind)
-            self.at = int(spans[-1, 1]) if count else self.at
         return Array(source, addresses, kind)
 
     def bits(self, count: int) -> NDArray[np.int64]:
@@ -138,8 +140,7 @@ class Stream:
 
 def word_of(text: str) -> str:
     """A word in quotes for a message: printable and short, whatever bytes it has."""
-    data = text.encode("latin-1", "replace")
-    return word(data, np.array([0, len(data)]))
+    return quoted(text.encode("latin-1", "replace"))
 
 
 def field_name(text: str) -> str:

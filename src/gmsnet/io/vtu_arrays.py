@@ -36,31 +36,30 @@ class Encoding:
 
 @dataclass(frozen=True)
 class Encoded:
-    """An array as it stands in the file.
+    """How an array stands in the file.
 
-    payload: the bytes of its numbers. length: the bytes that it takes in the file. apart: whether the header was
-    encoded in base64 on its own. blocks: of a compressed array, the compressed bytes of each block. head: the first
-    three numbers of its header (blocks, bytes of a block, bytes of the last one).
+    length: the bytes that it takes there. apart: whether the header was encoded in base64 on its own. blocks: of a
+    compressed array, the compressed bytes of each block. head: the first three numbers of its header (blocks, bytes of
+    a block, bytes of the last one).
     """
 
     encoding: Encoding
-    payload: bytes
     length: int
     apart: bool
     blocks: tuple[bytes, ...] = ()
     head: tuple[int, int, int] = (0, 0, 0)
 
-    def written(self, payload: bytes) -> bytes:
-        """The array with other numbers (as many bytes), encoded in the same way; blocks without a change stay."""
+    def written(self, old: bytes | memoryview, new: bytes) -> bytes:
+        """The array with other numbers (as many bytes) in the same encoding; blocks without a change stay."""
         kind = self.encoding.header
         if not self.encoding.compressed:
-            return self._text(np.array([len(payload)], dtype=kind).tobytes(), payload)
+            return self._text(np.array([len(new)], dtype=kind).tobytes(), new)
         size = self.head[1]
         blocks = []
-        for k, old in enumerate(self.blocks):
-            part = payload[k * size : (k + 1) * size]
-            same = part == self.payload[k * size : (k + 1) * size]
-            blocks.append(old if same else zlib.compress(part, _LEVELS[old[1] >> 6]))
+        for k, block in enumerate(self.blocks):
+            part = new[k * size : (k + 1) * size]
+            same = part == old[k * size : (k + 1) * size]
+            blocks.append(block if same else zlib.compress(part, _LEVELS[block[1] >> 6]))
         return self._text(np.array([*self.head, *map(len, blocks)], dtype=kind).tobytes(), b"".join(blocks))
 
     def _text(self, header: bytes, body: bytes) -> bytes:
@@ -71,8 +70,8 @@ class Encoded:
         return base64.b64encode(header + body)
 
 
-def decode(data: memoryview, encoding: Encoding, expected: int) -> Encoded:
-    """The array at the beginning of ``data``, whose numbers must take ``expected`` bytes.
+def decode(data: memoryview, encoding: Encoding, expected: int) -> tuple[Encoded, memoryview]:
+    """The array at the beginning of ``data``, and the bytes of its numbers, which must be ``expected``.
 
     Raises FormatError where it ends early, has another size or cannot be unpacked; no more memory is taken than the
     length of the data allows.
@@ -80,7 +79,7 @@ def decode(data: memoryview, encoding: Encoding, expected: int) -> Encoded:
     return _compressed(data, encoding, expected) if encoding.compressed else _plain(data, encoding, expected)
 
 
-def _plain(data: memoryview, encoding: Encoding, expected: int) -> Encoded:
+def _plain(data: memoryview, encoding: Encoding, expected: int) -> tuple[Encoded, memoryview]:
     width = encoding.width
     head, at = _take(data, 0, width, encoding)
     size = int(np.frombuffer(head, dtype=encoding.header, count=1)[0])
@@ -89,10 +88,10 @@ def _plain(data: memoryview, encoding: Encoding, expected: int) -> Encoded:
     apart = len(head) == width  # else the first group of characters holds bytes of the numbers too
     start, skip = (at, 0) if apart else (0, width)
     both, end = _take(data, start, skip + size, encoding)
-    return Encoded(encoding, both[skip : skip + size], end, apart)
+    return Encoded(encoding, end, apart), both[skip : skip + size]
 
 
-def _compressed(data: memoryview, encoding: Encoding, expected: int) -> Encoded:
+def _compressed(data: memoryview, encoding: Encoding, expected: int) -> tuple[Encoded, memoryview]:
     width = encoding.width
     start, _ = _take(data, 0, 3 * width, encoding)
     count, block_size, last = np.frombuffer(start, dtype=encoding.header, count=3).tolist()
@@ -105,9 +104,9 @@ def _compressed(data: memoryview, encoding: Encoding, expected: int) -> Encoded:
     if stored > len(data) or expected > MOST_INFLATED * stored:
         raise FormatError(f"{expected} bytes cannot come from {stored} compressed bytes")
     body, end = _take(data, at, stored, encoding)
-    parts, blocks, at = [], [], 0
+    payload, filled, blocks, at = np.empty(expected, dtype=np.uint8).data, 0, [], 0
     for k, length in enumerate(lengths):
-        block = body[at : at + length]
+        block = bytes(body[at : at + length])
         at += length
         size = last if last and k == count - 1 else block_size
         unpacker = zlib.decompressobj()
@@ -117,20 +116,21 @@ def _compressed(data: memoryview, encoding: Encoding, expected: int) -> Encoded:
             raise FormatError(f"block {k} cannot be decompressed: {error}") from None
         if len(part) != size or not unpacker.eof or unpacker.unused_data:
             raise FormatError(f"block {k} does not decompress to the {size} bytes that its header announces")
-        parts.append(part)
+        payload[filled : filled + size] = part
+        filled += size
         blocks.append(block)
-    return Encoded(encoding, b"".join(parts), end, True, tuple(blocks), (count, block_size, last))
+    return Encoded(encoding, end, True, tuple(blocks), (count, block_size, last)), payload
 
 
-def _take(data: memoryview, at: int, size: int, encoding: Encoding) -> tuple[bytes, int]:
+def _take(data: memoryview, at: int, size: int, encoding: Encoding) -> tuple[memoryview, int]:
     """At least ``size`` bytes that begin at byte ``at`` of the file (in base64 up to two more), and where they end."""
     length = (size + 2) // 3 * 4 if encoding.base64 else size
-    found = bytes(data[at : at + length])
+    found = data[at : at + length]
     if len(found) < length:
         raise FormatError(f"it ends after {len(found)} of {length} bytes: the file is cut off")
     if encoding.base64:
         try:
-            found = base64.b64decode(found, validate=True)
+            found = memoryview(base64.b64decode(found, validate=True))
         except binascii.Error as error:
             raise FormatError(f"it is not in base64: {error}") from None
         if len(found) < size:

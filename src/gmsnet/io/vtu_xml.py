@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from gmsnet.errors import FormatError
+from gmsnet.io.mapped import Data
 from gmsnet.io.text import fail
 
 SECTIONS = ("PointData", "CellData", "Points", "Cells")
@@ -34,25 +35,34 @@ class DataArray:
 class Document:
     """A VTU file.
 
-    text: its bytes with comments and what arrays contain beside their numbers blanked out, every other byte in place.
-    root, pieces: the attributes of these elements. appended: the encoding of the appended data, and their bytes.
+    hidden: first byte of comments, and of what arrays contain beside their numbers, and the byte behind, in turn. root,
+    pieces: the attributes of these elements. appended: the encoding of the appended data, and their bytes.
     """
 
-    text: bytes
+    data: Data
+    hidden: list[tuple[int, int]] = field(default_factory=list)
     root: dict[str, str] = field(default_factory=dict)
     pieces: list[dict[str, str]] = field(default_factory=list)
     arrays: list[DataArray] = field(default_factory=list)
     appended: tuple[str, int, int] | None = None
+
+    def visible(self, start: int, stop: int) -> list[tuple[int, int]]:
+        """The parts of what stands between two bytes that are not hidden."""
+        found = []
+        for first, end in self.hidden:
+            if start < end and first < stop:
+                found.append((start, first))
+                start = end
+        return [*found, (start, stop)]
 
 
 class _RawDataFollow(Exception):
     """The parser has met the start tag of raw appended data."""
 
 
-def parse(data: bytes) -> Document:
+def parse(data: Data) -> Document:
     """The structure of the file. Raises FormatError where it is not well formed or no VTU file."""
-    start = data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1]
-    if start != b"<":
+    if not re.match(rb"[\xef\xbb\xbf \t\r\n]*<", data):
         raise FormatError("line 1: not an XML file: a VTU file starts with '<VTKFile' or '<?xml'")
     walker = _Walker(data)
     try:
@@ -65,24 +75,18 @@ def parse(data: bytes) -> Document:
         if isinstance(error, FormatError):
             raise
         raise FormatError(f"the XML has an encoding that is not supported, write it as UTF-8: {error}") from None
-    document = walker.document
-    if walker.hidden:
-        text = bytearray(data)
-        for first, end in walker.hidden:
-            text[first:end] = re.sub(rb"[^\r\n]", b" ", data[first:end])
-        document.text = bytes(text)
-    return document
+    walker.document.hidden.sort()
+    return walker.document
 
 
 class _Walker:
     """Follows the parser's events and notes where things stand."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: Data) -> None:
         self.data, self.document = data, Document(data)
         self.path: list[str] = []
         self.tags: list[tuple[int, int]] = []
         self.open: tuple[str, str, dict[str, str], tuple[int, int]] | None = None
-        self.hidden: list[tuple[int, int]] = []
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self.begin
         self.parser.EndElementHandler = self.finish
@@ -101,10 +105,10 @@ class _Walker:
         self.fail("a DOCTYPE is not allowed in a VTU file: remove it")
 
     def comment(self, _: str) -> None:
-        self.hidden.append((self.at, self.data.index(b"-->", self.at) + 3))
+        self.document.hidden.append((self.at, self.data.find(b"-->", self.at) + 3))
 
     def instruction(self, *_: object) -> None:
-        self.hidden.append((self.at, self.data.index(b"?>", self.at) + 2))
+        self.document.hidden.append((self.at, self.data.find(b"?>", self.at) + 2))
 
     def tag(self) -> tuple[int, int]:
         match = _TAG.match(self.data, self.at)
@@ -150,7 +154,7 @@ class _Walker:
             self.open = None
             self.document.arrays.append(DataArray(section, element, attributes, tag, (tag[1], first)))
         elif self.open is not None and self.tags[-1] == self.open[3]:
-            self.hidden.append((tag[0], end))  # a child, and all that it contains
+            self.document.hidden.append((tag[0], end))  # a child, and all that it contains
         elif name == "AppendedData" and self.path == ["VTKFile"] and self.document.appended is not None:
             encoding, _, _ = self.document.appended
             self.document.appended = encoding, self.underscore(tag[1], first), first

@@ -39,6 +39,13 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     return _compiled(function, {"nogil": True, "error_model": "numpy", "forceinline": True})
 
 
+def part(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile for kernels alone to call: what Python needs to call a short function takes longer than the function."""
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+    options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return numba.njit(**options)(function)  # type: ignore[no-any-return]
+
+
 def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Callable[..., Any]:
     try:
         compiled: Callable[..., Any] = numba.njit(cache=True, **options)(function)
