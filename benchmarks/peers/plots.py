@@ -119,10 +119,12 @@ def ahead(document: Document, folder: Path) -> Path | None:
     rows = [peer for peer in PEERS if any(usable(mesh["tools"].get(peer.name)) for _, mesh in chosen)]
     slowest = {peer.name: max(longest(mesh, peer) for _, mesh in chosen) for peer in rows}
     rows.sort(key=lambda peer: (peer.kind == QUALITY, slowest[peer.name]))
-    figure, panels = plt.subplots(1, len(chosen), figsize=(WIDTH, 1.2 + 0.3 * len(rows)), sharey=True, squeeze=False,
+    averaging = sum(peer.kind == AVERAGING for peer in rows)
+    heights = [place + (peer.kind == QUALITY) for place, peer in enumerate(rows)]  # a row for the name of each class
+    figure, panels = plt.subplots(1, len(chosen), figsize=(WIDTH, 1.6 + 0.3 * len(rows)), sharey=True, squeeze=False,
                                   layout="constrained")  # fmt: skip
     for axes, (name, mesh) in zip(panels[0], chosen, strict=True):
-        for height, peer in enumerate(rows):
+        for height, peer in zip(heights, rows, strict=True):
             record = mesh["tools"].get(peer.name)
             if usable(record):
                 dumbbell(axes, height, record, mesh)
@@ -132,16 +134,12 @@ def ahead(document: Document, folder: Path) -> Path | None:
         axes.set_title(f"{name.split('/')[0]}, {mesh['nodes']:,} nodes", fontsize=10)
         axes.set_xlabel("seconds of one processor, set-up included")
         axes.grid(axis="x", alpha=0.25)
-    axes = panels[0][0]
-    axes.set_yticks(range(len(rows)), [peer.name for peer in rows], fontsize=9)
-    averaging = sum(peer.kind == AVERAGING for peer in rows)
-    for axes in panels[0]:
-        axes.axhline(averaging - 0.5, color=GREY, linewidth=0.8)
-        axes.set_ylim(-0.6, len(rows) - 0.4)
-    axes = panels[0][-1]
-    for height, text in ((len(rows) - 0.45, "driven by quality  "), (averaging - 0.55, "averaging, without a check  ")):
-        axes.text(1.0, height, text, transform=axes.get_yaxis_transform(), ha="right", va="top", fontsize=8, color=GREY,
-                  style="italic")  # fmt: skip
+        axes.set_ylim(-0.6, len(rows) + 1.6)
+        for height, text in ((averaging, "averaging, without a check"), (len(rows) + 1, "driven by quality")):
+            axes.text(0.02, height, text, transform=axes.get_yaxis_transform(), va="center", fontsize=9, color=GREY,
+                      style="italic")  # fmt: skip
+            axes.axhline(height + 0.6, color=GREY, linewidth=0.8)
+    panels[0][0].set_yticks(heights, [peer.name for peer in rows], fontsize=9)
     marks = [plt.Line2D([], [], marker="o", linestyle="", color=colour) for colour in (GREEN, WARM[1])]
     figure.legend(marks, ["gmsnet (auto) to the same mean 1/q", "the tool, to 99 % of its own final mean 1/q"], ncols=2,
                   loc="outside upper center", fontsize=9, frameon=False)  # fmt: skip
