@@ -2,7 +2,7 @@
 
 Reading: up to 19 digits and a power of ten give the 64 leading bits of the value by one product with a table, and a
 bound of what is missing; if the bound cannot change the rounding, that is the number (D. Lemire, Number parsing at a
-gigabyte per second, 2021). What remains, about one number in 500, is left to a slower way.
+gigabyte per second, 2021). What remains, about one number in a thousand, is left to a slower way.
 
 Printing: the shortest decimal that reads back as the same float64, and of those the nearest, is found among the
 multiples of one power of ten and of the next by three products with the 128 leading bits of a power (R. Giulietti, The
