@@ -227,6 +227,7 @@ def meet(edges, t, scale):
     wide = 0.5 * ROOT3 * math.sqrt(max(1.0 / (t * t) - 1.0, 0.0))
     for m in range(count):
         edges[m, 4] = math.sqrt(edges[m, 2] ** 2 + edges[m, 3] ** 2)
+    for m in range(count):
         if inside(edges, up, wide, scale, edges[m, 0] + up * edges[m, 2], edges[m, 1] + up * edges[m, 3]):
             return True
     for m in range(count):
