@@ -21,6 +21,8 @@ from gmsnet.limits import Limits, limits
 from gmsnet.measure import QualityReport, measure
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Smoother, smoother
+from gmsnet.methods.auto import Auto
+from gmsnet.patches import reach_target
 from gmsnet.preserve import method_for, protected
 from gmsnet.run import CALLBACK as CALLBACK
 from gmsnet.run import INTERRUPTED as INTERRUPTED
@@ -32,7 +34,7 @@ from gmsnet.run import Run, outcome, precision_of, rank_by
 from gmsnet.run import Sweep as Sweep
 from gmsnet.standing import Standing
 from gmsnet.tangles import UnmendedCell, beside, mended, still_inverted
-from gmsnet.targets import Target, reach_target
+from gmsnet.target import Target
 from gmsnet.topology import Topology, near_points
 from gmsnet.wall_stage import improve_near_walls
 from gmsnet.workers import available_threads
@@ -147,8 +149,8 @@ def smooth(
     options: dict[str, Any] = {"threads": threads or available_threads(), "best_by": best_by, "guard": guard}
     if target:
         best, stop_reason, history = reach_target(
-            given, topology, create, target, start, max_sweeps=max_sweeps, callback=callback,
-            report=None if before.inverted else before, **options,
+            given, topology, None if isinstance(chosen, Auto) else create, target, start,
+            max_sweeps=max_sweeps, callback=callback, report=None if before.inverted else before, **options,
         )  # fmt: skip
     else:
         standing = Standing.of(before.totals, best_by) if start is given_points else None
@@ -197,10 +199,7 @@ def check_options(
         preserve=preserve, target_quality=target_quality, target_angle=target_angle, callback=callback,
         weights=weights, seed=seed, **others,
     )  # fmt: skip
-    target = Target(target_quality, target_angle)
-    name = method_for(method, variant, preserve, target)
-    if name == "auto" and variant is None and target:
-        variant = "patch"
+    name = method_for(method, variant, preserve, Target(target_quality, target_angle))
     return lambda: smoother(name, variant=variant, objective=objective, weights=weights, seed=seed)
 
 

@@ -95,15 +95,16 @@ class Triangles:
     corners: NDArray[np.int32]
     turn: NDArray[np.int8]
 
-    def columns(self) -> Floats:
-        """Smallest and largest angle, shape and aspect of each: (4, T)."""
-        columns = np.empty((4, len(self.corners)))
+    def columns(self, rows: NDArray[np.int32] | None = None) -> Floats:
+        """Smallest and largest angle, shape and aspect of each: (4, T), or of some of them, the same bits."""
+        corners, turn = (self.corners, self.turn) if rows is None else (self.corners[rows], self.turn[rows])
+        columns = np.empty((4, len(corners)))
         if self.plane is None:
             largest = float(np.abs(self.points).max(initial=0.0))
             scaled = np.ldexp(self.points, -int(np.frexp(largest)[1]))
-            kernels.per_surface_cell(scaled, self.corners, columns)
+            kernels.per_surface_cell(scaled, corners, columns)
         else:
-            kernels.per_cell(planar_points(self), self.corners, self.turn, columns)
+            kernels.per_cell(planar_points(self), corners, turn, columns)
         return columns
 
     def centres(self) -> Floats:

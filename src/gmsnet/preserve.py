@@ -14,7 +14,7 @@ from gmsnet.layers import stretched_layers
 from gmsnet.mesh import Mesh
 from gmsnet.methods.sized import BAND
 from gmsnet.survey import Survey
-from gmsnet.targets import Target
+from gmsnet.target import Target
 from gmsnet.topology import Topology
 from gmsnet.walls import near_walls
 

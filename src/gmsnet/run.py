@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gmsnet.arguments import ASPECT
 from gmsnet.kernels.back import put_back
 from gmsnet.kernels.block import MOVED
+from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import LEVELS, Precision
 from gmsnet.measure import QualityReport, measure, totals_of
 from gmsnet.mesh import Mesh
@@ -58,18 +59,19 @@ class Run:
     """The state of one run: coordinates in memory order, the best so far, and the record.
 
     points: to start from, in memory order (default: the mesh's own). history: to go on with. precision: of
-    the mesh, where it is known; standing: of those points, where it is.
+    the mesh, where it is known; standing: of those points, where it is. missed: counts the cells of points that miss a
+    target.
     """
 
     def __init__(
         self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str, guard: str,
         points: Floats | None = None, history: list[Sweep] | None = None, precision: Precision | None = None,
-        standing: Standing | None = None,
+        standing: Standing | None = None, missed: Callable[[Floats], int] | None = None,
     ) -> None:  # fmt: skip
         self.topology, self.smoother, self.best_by = topology, smoother, best_by
         start = near_points(mesh, topology) if points is None else points
         self.field = Field(start.copy(), topology, precision or precision_of(mesh), LEVELS.index(guard))
-        self.threads = threads
+        self.threads, self.missed = threads, missed
         self.history: list[Sweep] = [] if history is None else history
         self.sweeps = self.history[-1].index if self.history else 0
         self.first = len(self.history)
@@ -84,7 +86,7 @@ class Run:
         if target is not None and self.best_standing.min_shape >= target:
             return TARGET_REACHED
         try:
-            with workers(self.threads, len(self.topology.stars.blocks.filled)) as share:
+            with workers(self.threads, len(self.topology.free) // LANES) as share:
                 while self.sweeps < max_sweeps:
                     moved = self._sweep(share)
                     settled = self.smoother.settled or (self.smoother.idle_ends and not moved)
@@ -134,7 +136,7 @@ class Run:
     def _standing(self, share: Share = serial) -> Standing:
         """The sums over all triangles of the coordinates as they are."""
         totals = totals_of(self.field.points, self.topology.near, self.topology.near_turn, share)
-        return Standing.of(totals, self.best_by)
+        return Standing.of(totals, self.best_by, self.missed(self.field.points) if self.missed else 0)
 
     def _stalled(self) -> bool:
         """Has nothing been gained for PATIENCE looks?"""

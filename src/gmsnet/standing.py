@@ -13,23 +13,24 @@ ROUNDING = 1e-12  # a smaller gain in q̂ is no gain
 
 @dataclass(frozen=True)
 class Standing:
-    """Where a mesh stands in the comparison of meshes on the way."""
+    """Where a mesh stands in the comparison of meshes on the way. missed: how many cells miss the target."""
 
     inverted: int
     qhat: float
     min_shape: float
     mean_shape: float
+    missed: int = 0
 
     @classmethod
-    def of(cls, totals: Totals | None, best_by: str) -> Standing:
+    def of(cls, totals: Totals | None, best_by: str, missed: int = 0) -> Standing:
         """From the sums over all triangles; None where there are none."""
         if totals is None:
-            return cls(0, math.nan, math.inf, math.nan)
+            return cls(0, math.nan, math.inf, math.nan, missed)
         qhat = totals.qhat_aspect if best_by == ASPECT else totals.qhat
-        return cls(totals.inverted, qhat, totals.shape_min, totals.shape_mean)
+        return cls(totals.inverted, qhat, totals.shape_min, totals.shape_mean, missed)
 
     def beats(self, other: Standing) -> bool:
-        """Fewer inverted cells first, then a larger q̂, by more than rounding."""
-        if self.inverted != other.inverted:
-            return self.inverted < other.inverted
+        """Fewer inverted cells first, then fewer that miss the target, then a larger q̂, by more than rounding."""
+        if (self.inverted, self.missed) != (other.inverted, other.missed):
+            return (self.inverted, self.missed) < (other.inverted, other.missed)
         return self.qhat > other.qhat + ROUNDING

@@ -18,7 +18,7 @@ from gmsnet.available_memory import refuse_unless_free
 from gmsnet.faces import Faces, Offsets, check_size
 from gmsnet.fans import closed_fans
 from gmsnet.held import MOST_NEIGHBOURS, known_marks, sorted_out
-from gmsnet.kernels import connectivity, layout
+from gmsnet.kernels import connectivity, layout, patch
 from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.compile import LANES
 from gmsnet.mesh import Mesh
@@ -116,18 +116,18 @@ class Topology:
         held = {**self.held, reason: newly.astype(np.int64)}
         return replace(self, held=held, free=self.free[~chosen[self.free]], near_colours=colours)
 
-    def restricted(self, active: Flags) -> tuple[Topology, Ints]:
+    def restricted(self, active: Flags) -> Topology:
         """The same with the active nodes (N,) by places in memory alone free, and only the triangles around them.
 
-        For a while: ``held`` does not tell of the others. Returns also the rows of those triangles in ``near``.
+        For a while: ``held`` does not tell of the others.
         """
-        rows: Ints = connectivity.touching(self.near, active)
-        near, turn = self.near.take(rows, axis=0), self.near_turn.take(rows)
-        free = np.sort(self.memory[np.flatnonzero(active)])
+        nodes = np.flatnonzero(active)
+        near = patch.triangles_around(nodes, active, self.near_start, self.near_ring)
+        turn = np.ones(len(near), dtype=np.int8)
         colours = np.where(active, self.near_colours, np.int32(-1))
-        inner = replace(self, near=near, near_turn=turn, free=free, near_colours=colours)
+        inner = replace(self, near=near, near_turn=turn, free=np.sort(self.memory[nodes]), near_colours=colours)
         inner.__dict__["changeable"] = near, turn  # all of them
-        return inner, rows
+        return inner
 
     @cached_property
     def stars(self) -> Stars:

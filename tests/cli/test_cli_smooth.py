@@ -14,7 +14,7 @@ import pytest
 import gmsnet
 from gmsnet import engine
 from gmsnet.cli.smooth_report import Outcome
-from gmsnet.targets import Target
+from gmsnet.target import Target
 
 
 def listing(folder):

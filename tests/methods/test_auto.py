@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.methods.auto import LARGE_PLAN, PATCH_PLAN, SMALL, SMALL_PLAN, Auto, to_come
+from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, Auto, to_come
 from gmsnet.paper.cases import CASES
 from gmsnet.run import Run
 from gmsnet.topology import Topology
@@ -28,7 +28,7 @@ def told(history):
 
 def test_stages_come_in_their_order_and_are_told():
     mesh = gmsnet.random_mesh(1000, seed=1)
-    for plan in (SMALL_PLAN, LARGE_PLAN, PATCH_PLAN):
+    for plan in (SMALL_PLAN, LARGE_PLAN):
         run = runs(mesh, plan)
         assert told(run.history) == [stage.name for stage in plan]
         assert [sweep.index for sweep in run.history] == sorted({sweep.index for sweep in run.history})

@@ -128,7 +128,7 @@ def smooth(
     from gmsnet.cli.smooth_report import Outcome
     from gmsnet.engine import check_options, refuse_unless_planar
     from gmsnet.engine import smooth as run
-    from gmsnet.targets import Target
+    from gmsnet.target import Target
 
     choice: dict[str, Any] = {"variant": variant, "objective": objective, "weights": weights, "seed": seed}
     options: dict[str, Any] = {

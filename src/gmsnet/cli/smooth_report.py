@@ -18,7 +18,7 @@ from gmsnet.cli.target import shown
 from gmsnet.engine import SmoothResult, Sweep
 from gmsnet.mesh import Mesh
 from gmsnet.preserve import LAYER
-from gmsnet.targets import Target
+from gmsnet.target import Target
 
 UNKNOWN = "not mended, or untangling was off"
 

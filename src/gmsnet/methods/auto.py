@@ -11,9 +11,10 @@ as there is anything to gain, and around the worst cells come sweeps of Newton's
 with every cell kept above a floor.
 
 A stage goes on as long as more than its ``gain`` in the mean of 1/q (of a sample of the cells) is to come, if gains go
-on as the last two did. What each stage is worth is measured by ``benchmarks/auto.py``; see docs/auto.md. The variant
-``patch`` has the first two stages; it is what a target (``target_quality``, ``target_angle``) uses on the patches
-around the cells that miss it.
+on as the last two did. What each stage is worth is measured by ``benchmarks/auto.py``; see docs/auto.md.
+
+With a target (``target_quality``, ``target_angle``) the cells that miss it are smoothed alone (methods/below.py), after
+Newton sweeps on Σq where they are many.
 """
 
 from __future__ import annotations
@@ -27,8 +28,10 @@ from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.quality import glance
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field, Method, Smoother, Tally
+from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.optimize import Newton
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
+from gmsnet.target import Target
 from gmsnet.workers import Share
 
 SMALL = 5000  # free nodes
@@ -76,8 +79,6 @@ POLISH = Stage("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1,
 
 LARGE_PLAN = (NEWTON._replace(looks=False), WORST._replace(looks=False), MEAN)
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
-PATCH_PLAN = (NEWTON._replace(often=1), WORST._replace(sweeps=6))
-VARIANTS = ("full", "patch")
 
 
 class Auto(Smoother):
@@ -127,9 +128,10 @@ class Auto(Smoother):
                 before, self.gained = self.gained, mean - self.mean
                 goes_on = to_come(before, self.gained) > stage.gain
             self.mean = mean
-        self.looks = self.rounds % stage.often == 0 if goes_on else stage.looks
+        reached = self.smoother.reached
+        self.looks = self.rounds % stage.often == 0 if goes_on else stage.looks or reached
         if not goes_on:
-            self._enter(self.at + 1, field)
+            self._enter(len(self.stages) if reached else self.at + 1, field)
 
 
 def mean_shape(field: Field) -> float:
@@ -148,10 +150,24 @@ def to_come(before: float, gained: float) -> float:
     return gained * gained / (before - gained) if gained < before else math.inf
 
 
+def for_target(target: Target, missed: float, *, rings: int) -> Auto:
+    """The plan for patches around the cells that miss a target. missed: which share of the patches' cells these are.
+
+    rings: of free nodes around those cells. With more than one, the worst cells are made better if some miss it yet,
+    and the others must keep to that; with more than two, first of all the whole patch is.
+    """
+    newton = Stage("Newton on q", NEWTON.create, 2, first=3, rounds=40, gain=0.006, looks=False)
+    plan = WIDE if rings > 1 else NEAR if target.angle is None else GENTLE
+    below = Stage("cells that miss the target", lambda: Below(target, plan, rings > 1), 1)
+    stages = [newton] if missed > MANY or rings > 2 else []
+    if rings > 1:
+        stages += [below._replace(looks=False), WORST._replace(looks=False)]
+    return Auto([*stages, below])
+
+
 METHOD = Method(
     name="auto",
     summary="the default: Newton's method on a barrier, then the worst cells alone, then the mean, while each pays",
     source="this package; docs/auto.md",
-    create=lambda options: Auto(PATCH_PLAN if options.variant == "patch" else ()),
-    variants=VARIANTS,
+    create=lambda options: Auto(),
 )

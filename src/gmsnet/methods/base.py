@@ -85,12 +85,13 @@ class Floor:
 class Smoother(ABC):
     """A method ready for one run.
 
-    settled: it has its own rule when to stop, and that has come true. looks: the mesh is worth measuring after the last
-    sweep. idle_ends: a sweep that moved nothing is the last. stage: what of the method the last sweep was, "" for
-    methods of one stage.
+    settled: it has its own rule when to stop, and that has come true. reached: so has the target that it was made for.
+    looks: the mesh is worth measuring after the last sweep. idle_ends: a sweep that moved nothing is the last. stage:
+    what of the method the last sweep was, "" for methods of one stage.
     """
 
     settled = False
+    reached = False
     looks = True
     idle_ends = True
     stage = ""

@@ -8,8 +8,9 @@ import pytest
 import gmsnet
 from gmsnet import engine
 from gmsnet.generate import disturb
-from gmsnet.targets import Target, around, spans
-from gmsnet.topology import Topology
+from gmsnet.kernels.patch import around
+from gmsnet.target import Target
+from gmsnet.topology import Topology, near_points
 
 
 @pytest.fixture(scope="module")
@@ -103,17 +104,19 @@ def test_patches_against_a_slow_twin():
             wanted = {node for node in wanted if topology.near_free[node]}
             if ring < rings - 1:
                 wanted |= {n for row in topology.near if wanted & set(row.tolist()) for n in row.tolist()}
-        active = around(topology, chosen, rings)
-        assert set(np.flatnonzero(active).tolist()) == {node for node in wanted if topology.near_free[node]}
-        patch, rows = topology.restricted(active)
-        assert patch.changeable[0].tolist() == topology.near[rows].tolist()
+        active = around(chosen, rings, topology.near_free, topology.near_start, topology.near_ring)
+        free = {node for node in wanted if topology.near_free[node]}
+        assert set(np.flatnonzero(active).tolist()) == free
+        patch = topology.restricted(active)
         assert set(topology.memory[np.flatnonzero(active)].tolist()) == set(patch.free.tolist())
-        assert [bool(set(row.tolist()) & set(np.flatnonzero(active).tolist())) for row in topology.near] == [
-            row in set(rows.tolist()) for row in range(len(topology.near))
-        ]
-    start = np.array([0, 2, 2, 5, 6])
-    assert spans(start, np.array([3, 0, 2])).tolist() == [5, 0, 1, 2, 3, 4]
-    assert spans(start, np.array([1])).tolist() == []
+        assert set(np.flatnonzero(patch.near_free).tolist()) == free
+        expected = sorted(sorted(row) for row in topology.near.tolist() if free & set(row))
+        assert sorted(sorted(row) for row in patch.near.tolist()) == expected
+        points = near_points(mesh, topology)
+        a, b, c = (points[patch.near[:, k]] for k in range(3))
+        assert ((b - a)[:, 0] * (c - a)[:, 1] > (b - a)[:, 1] * (c - a)[:, 0]).all()
+        assert patch.changeable[0] is patch.near
+        assert (patch.near_turn == 1).all()
 
 
 def test_what_a_target_gains_is_kept_though_the_mean_pays_for_it():
@@ -156,3 +159,39 @@ def test_no_star_gets_worse_for_a_target_at_the_level_star():
         before, after = result.before.shape, result.after.shape
         assert result.moved.any()
         assert all(after[rows].min() >= before[rows].min() - 1e-12 for rows in around_each)
+
+
+@pytest.mark.parametrize(
+    ("target", "more"), [({"target_quality": 0.6}, 1.0), ({"target_quality": 0.68}, 0.8), ({"target_angle": 28.0}, 0.5)]
+)
+def test_fewer_cells_miss_a_target_than_after_a_full_run(target, more):
+    """The default works for the cells that miss it, so that fewer are left; and the worst one is as good as before."""
+    goal, left, full = Target(**{name.removeprefix("target_"): value for name, value in target.items()}), 0, 0
+    for seed in range(3):
+        mesh = gmsnet.random_mesh(3000, seed=seed)
+        result = gmsnet.smooth(mesh, **target)
+        left += len(goal.missed_in(result.after))
+        full += len(goal.missed_in(gmsnet.smooth(mesh).after))
+        assert result.after.shape.min() >= result.before.shape.min()
+    assert left <= more * full
+
+
+def test_a_target_that_most_cells_cannot_meet_is_told_so_and_makes_nothing_worse(good):
+    result = gmsnet.smooth(good, target_quality=0.98)
+    assert result.stop_reason == engine.NO_PROGRESS
+    assert (result.after.shape < 0.98).sum() <= (result.before.shape < 0.98).sum()
+    assert result.after.shape.min() >= result.before.shape.min()
+
+
+def test_the_worst_quality_there_is_as_the_target_is_met_already():
+    """Whatever rounding says of a cell right at the target: what the report says of it counts."""
+    for seed in range(8):
+        mesh = gmsnet.random_mesh(400, seed=seed)
+        report = gmsnet.quality(mesh)
+        least, angle = float(report.shape.min()), float(report.min_angle.min())
+        for target in ({"target_quality": least}, {"target_angle": angle}):
+            result = gmsnet.smooth(mesh, **target)
+            assert (result.sweeps, result.stop_reason, result.moved.any()) == (0, engine.TARGET_REACHED, False)
+        above = gmsnet.smooth(mesh, target_quality=math.nextafter(least, 1.0))
+        assert above.moved.any()
+        assert above.after.shape.min() > least

@@ -1,0 +1,111 @@
+"""Rounds over the free nodes of the cells that miss a target, and of those alone: see methods/below.py."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gmsnet.kernels.compile import inlined, kernel
+from gmsnet.kernels.quality import shape_of
+from gmsnet.kernels.worst_first_cycles import visit
+
+
+@inlined
+def missing(px, py, qx, qy, quality, tangent):
+    """Does the triangle with these two sides miss a least 1/q, or the tangent of a least angle (0: none)?
+
+    Its smallest angle is where the product of two sides is largest.
+    """
+    short = not shape_of(px, py, qx, qy) >= quality
+    if tangent > 0.0:
+        corner = px * qx + py * qy
+        most = max(corner, max(px * px + py * py - corner, qx * qx + qy * qy - corner))
+        short |= not px * qy - py * qx >= tangent * most
+    return short
+
+
+@kernel
+def missed(points, triangles, turn, quality, tangent):
+    """The rows (int32) of the triangles that miss the target."""
+    rows = np.empty(len(triangles), dtype=np.int32)
+    count = 0
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        if turn[t] < 0:
+            b, c = c, b
+        x, y = points[a, 0], points[a, 1]
+        if missing(points[b, 0] - x, points[b, 1] - y, points[c, 0] - x, points[c, 1] - y, quality, tangent):
+            rows[count] = t
+            count += 1
+    return rows[:count].copy()
+
+
+@kernel
+def free_corners(triangles, rows, colours, seen):
+    """The free nodes (int32) of the triangles in these rows, as they come. colours: (N,), −1 where held.
+
+    seen: (N,) bool, all False before and after.
+    """
+    found = np.empty(3 * len(rows), dtype=np.int32)
+    count = 0
+    for t in rows:
+        for k in range(3):
+            i = triangles[t, k]
+            if colours[i] >= 0 and not seen[i]:
+                seen[i] = True
+                found[count] = i
+                count += 1
+    for k in range(count):
+        seen[found[k]] = False
+    return found[:count].copy()
+
+
+@kernel
+def rounds(points, nodes, start, around, colours, guard, plan, most, target, tally):
+    """Visits the nodes, then those that have a cell yet which misses the target; returns the latter.
+
+    nodes: (K,) int32, free ones, best near each other in memory. start, around: the rings of all nodes, in CSR form.
+    colours: (N,), −1 where held. plan: (R, 2) of log₂ of the power p and visits, for each round. most: visits; a round
+    that would begin after so many is not made. target: the least 1/q of a cell that meets it, for the scale; then what
+    ``missing`` asks for. tally: (3,), added to.
+    """
+    mark = np.zeros(len(points), dtype=np.bool_)
+    visits = 0
+    for r in range(len(plan)):
+        if not len(nodes) or visits > most:
+            break
+        visit(points, nodes, start, around, guard, plan[r, 0], plan[r, 1], target[0] / math.sqrt(3.0), mark, tally)
+        visits += plan[r, 1] * len(nodes)
+        nodes = still_missing(points, nodes, start, around, colours, target[1], target[2], mark)
+    return nodes
+
+
+@kernel
+def still_missing(points, nodes, start, around, colours, quality, tangent, seen):
+    """The free nodes (int32) of the cells around these nodes that miss the target, as they come.
+
+    seen: (N,) bool, all False before and after.
+    """
+    most = 0
+    for i in nodes:
+        most += start[i + 1] - start[i] + 1
+    found = np.empty(min(most, len(points)), dtype=np.int32)
+    count = 0
+    for i in nodes:
+        x, y = points[i, 0], points[i, 1]
+        before = around[start[i + 1] - 1]
+        px, py = points[before, 0] - x, points[before, 1] - y
+        for k in range(start[i], start[i + 1]):
+            after = around[k]
+            qx, qy = points[after, 0] - x, points[after, 1] - y
+            if missing(px, py, qx, qy, quality, tangent):
+                for corner in (i, before, after):
+                    if colours[corner] >= 0 and not seen[corner]:
+                        seen[corner] = True
+                        found[count] = corner
+                        count += 1
+            before, px, py = after, qx, qy
+    for k in range(count):
+        seen[found[k]] = False
+    return found[:count].copy()

@@ -1,0 +1,69 @@
+"""The cells below a target: Newton's method on high powers of q, at the free nodes of these cells alone.
+
+A round visits the free nodes of the cells that miss the target, the next one those that have such a cell yet, with a
+higher power, so that ever more weight is on the cells that miss it. That leaves fewer of them than sweeps over patches
+do, in a fraction of the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels import below as kernels
+from gmsnet.kernels import ranking
+from gmsnet.methods.base import Field, Smoother, Tally
+from gmsnet.methods.worst_first import WATCHED
+from gmsnet.target import Target
+from gmsnet.workers import Share
+
+MANY = 0.25  # of the cells: where more miss the target, most of them cannot be had, and others would be lost for them
+MOST = 4  # visits, times the free nodes there are
+
+
+class Round(NamedTuple):
+    """power: p = 2^power. visits: to each node."""
+
+    power: int
+    visits: int
+
+
+NEAR = (Round(2, 1), Round(3, 1), Round(4, 2), Round(5, 2), Round(6, 2), Round(6, 2))
+GENTLE = (Round(1, 1), Round(2, 1), Round(2, 2), Round(3, 2), Round(3, 2))  # for angles: a needle's q is not the worst
+WIDE = (Round(5, 2), Round(6, 2), Round(6, 2))
+
+
+class Below(Smoother):
+    """See the module; one sweep, all rounds. everywhere: the first round visits all free nodes there are."""
+
+    def __init__(self, target: Target, plan: Sequence[Round], everywhere: bool) -> None:
+        self.least, self.plan, self.everywhere = target.shape, np.array(plan), everywhere
+        self.limits = target.limits
+        self.settled = self.reached = False
+
+    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+        """See Smoother. The visits depend on each other, so that they are made on one thread."""
+        topology, tally = field.topology, np.zeros(3, dtype=np.int64)
+        triangles, turn = topology.changeable
+        self.settled = True
+        rows: NDArray[np.int32] = kernels.missed(field.points, triangles, turn, *self.limits)
+        if not 0 < len(rows) <= MANY * len(triangles):
+            return tally
+        shape = np.empty(len(rows))
+        ranking.shapes_of(field.points, triangles, turn, rows, shape)
+        few = min(WATCHED, len(rows)) - 1
+        field.floor.watch(rows[np.argpartition(shape, few)[: few + 1]])
+        start, ring, colours = topology.near_start, topology.near_ring, topology.near_colours
+        if self.everywhere:
+            nodes = np.flatnonzero(topology.near_free).astype(np.int32)
+        else:
+            nodes = kernels.free_corners(triangles, rows, colours, np.zeros(len(field.points), dtype=np.bool_))
+        left = kernels.rounds(
+            field.points, nodes, start, ring, colours, field.guard(share), self.plan, MOST * len(topology.free),
+            (self.least, *self.limits), tally,
+        )  # fmt: skip
+        self.reached = not len(left)
+        return tally
