@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.compile import inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, kernel
 from gmsnet.kernels.quality import shape_of
 from gmsnet.kernels.worst_first_cycles import visit
 
@@ -17,28 +17,36 @@ def missing(px, py, qx, qy, quality, tangent):
 
     Its smallest angle is where the product of two sides is largest.
     """
-    short = not shape_of(px, py, qx, qy) >= quality
-    if tangent > 0.0:
-        corner = px * qx + py * qy
-        most = max(corner, max(px * px + py * py - corner, qx * qx + qy * qy - corner))
-        short |= not px * qy - py * qx >= tangent * most
-    return short
+    corner = px * qx + py * qy
+    most = max(corner, max(px * px + py * py - corner, qx * qx + qy * qy - corner))
+    wide = tangent == 0.0 or px * qy - py * qx >= tangent * most
+    return not (wide and shape_of(px, py, qx, qy) >= quality)
 
 
 @kernel
 def missed(points, triangles, turn, quality, tangent):
     """The rows (int32) of the triangles that miss the target."""
-    rows = np.empty(len(triangles), dtype=np.int32)
-    count = 0
-    for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        if turn[t] < 0:
-            b, c = c, b
-        x, y = points[a, 0], points[a, 1]
-        if missing(points[b, 0] - x, points[b, 1] - y, points[c, 0] - x, points[c, 1] - y, quality, tangent):
-            rows[count] = t
-            count += 1
-    return rows[:count].copy()
+    rows = np.empty(len(triangles) + LANES, dtype=np.int32)
+    edges, short = np.empty(4 * LANES), np.empty(LANES, dtype=np.int64)
+    found = 0
+    for start in range(0, len(triangles), LANES):
+        count = min(LANES, len(triangles) - start)
+        for lane in range(count):
+            t = start + lane
+            # Unsigned, so that nothing is compared with zero.
+            a, b, c = np.uint32(triangles[t, 0]), np.uint32(triangles[t, 1]), np.uint32(triangles[t, 2])
+            x, y, sign = points[a, 0], points[a, 1], np.float64(turn[t])
+            edges[lane] = sign * (points[b, 0] - x)  # a triangle to be read backwards: its mirror image
+            edges[LANES + lane] = points[b, 1] - y
+            edges[2 * LANES + lane] = sign * (points[c, 0] - x)
+            edges[3 * LANES + lane] = points[c, 1] - y
+        for lane in range(LANES):
+            px, py, qx, qy = edges[lane], edges[LANES + lane], edges[2 * LANES + lane], edges[3 * LANES + lane]
+            short[lane] = missing(px, py, qx, qy, quality, tangent)
+        for lane in range(count):
+            rows[found] = start + lane
+            found += short[lane]
+    return rows[:found].copy()
 
 
 @kernel
