@@ -21,7 +21,7 @@ import math
 import numpy as np
 
 from gmsnet.kernels import objectives, stars
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, kernel, part
 from gmsnet.kernels.objectives import GRADIENT, LEAST, METRIC, OUT
 
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8
@@ -32,7 +32,7 @@ X, Y, BEST_X, BEST_Y, BEST, FACTOR, MX, MY, VX, VY, TANGLED = range(11)  # rows 
 STATE = 11
 
 
-@kernel
+@part
 def descend(objective, local, n, sizes, state, out, shift):
     """Shifts (2·LANES, over the star's size) to the best places that len(sizes) steps of these sizes visit.
 
@@ -57,7 +57,7 @@ def descend(objective, local, n, sizes, state, out, shift):
     shift[:] = state[BEST_X * LANES : (BEST_Y + 1) * LANES]
 
 
-@kernel
+@part
 def keep_best(out, state):
     """Notes where a lane stands, if that is better than all places before."""
     for lane in range(LANES):
@@ -69,7 +69,7 @@ def keep_best(out, state):
         state[BEST_Y * LANES + lane] = state[Y * LANES + lane] if better else state[BEST_Y * LANES + lane]
 
 
-@kernel
+@part
 def advance(size, correction, out, state):
     """One Adam step of a block. size: η_t/(1 − β₁ᵗ); correction: 1/(1 − β₂ᵗ)."""
     for lane in range(LANES):
@@ -93,7 +93,7 @@ def advance(size, correction, out, state):
         state[Y * LANES + lane] = y if here else state[BEST_Y * LANES + lane]
 
 
-@kernel
+@part
 def propose(objective, local, n, sizes, state, out, shift, other):
     """As ``descend``, tangled stars by ``metric``. Work: as there, and other (2·LANES)."""
     descend(objective, local, n, sizes, state, out, shift)

@@ -17,12 +17,12 @@ import math
 import numpy as np
 
 from gmsnet.kernels import stars
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, kernel, part
 
 TINY = 1e-300  # stands in for a hypotenuse that is zero: v is then too short to be turned
 
 
-@kernel
+@part
 def propose(local, n, shift):
     """Shifts (2·LANES, over the star's size) for a block of stars."""
     for k in range(2 * LANES):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, part
 
 
 class Bands(NamedTuple):
@@ -32,7 +32,7 @@ def no_bands() -> Bands:
     return Bands(np.empty((0, 2)), np.empty(0, dtype=np.bool_), 0.0)
 
 
-@kernel
+@part
 def shorten(bands, blocks, block, star, sizes, shift):
     """Shortens the shifts (2·LANES, over the stars' sizes) of a block so that they end inside all bands.
 
@@ -55,7 +55,7 @@ def shorten(bands, blocks, block, star, sizes, shift):
         shift[LANES + lane] *= share
 
 
-@kernel
+@part
 def share_inside(bands, c, a, b, px, py, qx, qy, dx, dy):
     """How much of the shift (dx, dy) of node c keeps the triangle c, a, b (counter-clockwise) in its band, 0 to 1.
 

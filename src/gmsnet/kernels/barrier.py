@@ -26,7 +26,7 @@ from gmsnet.kernels import stars
 from gmsnet.kernels.barrier_star import FAR, MOST, descend
 from gmsnet.kernels.block import MARGIN, PAIRS, REACH, SIZE, gather, ring_row
 from gmsnet.kernels.certificate import COARSE, NARROWEST, WIDER, doubt
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.guard import STAR
 
 SMALL = 1e-5  # of F: a fall that float32 may not see; the step is then so short that it is Newton's to rounding
@@ -41,7 +41,7 @@ VALUE, GX, GY, XX, XY, YY, ROUND, LEAST, AFTER, LEAST_AFTER, SURPLUS, FALL, REDO
 SUMS = 15
 
 
-@kernel
+@part
 def relate(star, n, guard, work, flat, local, sums):
     """Ring minus centre over a length of the star, in the type of ``local``; see stars.localise.
 
@@ -73,7 +73,7 @@ def relate(star, n, guard, work, flat, local, sums):
         work[REACH * LANES + lane] = reach + WIDER * size * sums[WIDTH * LANES + lane]
 
 
-@kernel
+@part
 def derive(local, n, power, sums):
     """F with its two derivatives, and the least D."""
     real = sums.dtype.type
@@ -125,7 +125,7 @@ def triangle(lane, r, s):
     return q, d, inverse, wx, wy, ((ax + bx) + q * wx) * inverse, ((ay + by) + q * wy) * inverse
 
 
-@kernel
+@part
 def propose(sums, relaxation, ratio, step):
     """The step (2·LANES) that the derivatives in ``sums`` call for; writes row FALL."""
     real = sums.dtype.type
@@ -146,7 +146,7 @@ def propose(sums, relaxation, ratio, step):
         step[LANES + lane] = longer * dy
 
 
-@kernel
+@part
 def judge(local, n, power, step, floor, sums):
     """F, the least D and the least surplus D − floor·L after the step: rows AFTER, LEAST_AFTER and SURPLUS."""
     real = sums.dtype.type
@@ -172,7 +172,7 @@ def judge(local, n, power, step, floor, sums):
             sums[SURPLUS * LANES + lane] = surplus if not surplus >= least else least
 
 
-@kernel
+@part
 def settle(sums, most, step, mean, mean_sums, with_mean):
     """Takes the mean instead of the step where F falls by it. Row REDO: 1 where float64 is called for, else 0.
 
@@ -200,7 +200,7 @@ def settle(sums, most, step, mean, mean_sums, with_mean):
             sums[SURPLUS * LANES + lane] = of_mean if taken else surplus
 
 
-@kernel
+@part
 def refine(star, n, count, work, power, sums, shift):
     """The shifts of the lanes that are to be done over, as ``descend`` finds them."""
     for lane in range(count):
@@ -210,7 +210,7 @@ def refine(star, n, count, work, power, sums, shift):
             shift[LANES + lane] = dy / work[SIZE * LANES + lane]
 
 
-@kernel
+@part
 def certify(sums, step, unit, work):
     """Row MARGIN of work: positive where all triangles are certified above the guard's floor after the step.
 
@@ -228,7 +228,7 @@ def certify(sums, step, unit, work):
     return doubtful
 
 
-@kernel
+@part
 def average(local, n, stretch, mean):
     """So many times the mean of the ring, as a step."""
     mean[:] = 0.0

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, part
 
 MOST = 50.0  # times a Newton step: the longest one
 FAR = 0.7  # of F: below it a step has led far, and another one pays
@@ -28,7 +28,7 @@ class Power(NamedTuple):
         return cls(float(p == 1), float(p == 2), float(p == 4), 1.0 + 1.0 / p)
 
 
-@kernel
+@part
 def derivatives(x, y, star, n, lane, power):
     """One star in float64 with its free node at (x, y): F, −∇F, the Hessian (xx, xy, yy), the least D."""
     value, gx, gy, xx, xy, yy, even, least = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.inf
@@ -60,7 +60,7 @@ def derivatives(x, y, star, n, lane, power):
     return value, gx, gy, xx + 2.0 * even, xy, yy + 2.0 * even, least
 
 
-@kernel
+@part
 def value_at(x, y, star, n, lane, power):
     """F of one star with its free node at (x, y), infinite where a triangle is not positive."""
     value = 0.0
@@ -89,7 +89,7 @@ def newton_step(gx, gy, xx, xy, yy):
     return length * gx, length * gy
 
 
-@kernel
+@part
 def descend(star, n, lane, power):
     """The shift of one star from (x, y): steps, halved until F falls, on and on
     until a whole one leaves it above FAR of what it was.

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, part
 
 MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
 COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
@@ -43,7 +43,7 @@ class Room(NamedTuple):
     counts: NDArray[np.int64]
 
 
-@kernel
+@part
 def room_for(most):
     """For stars of up to so many nodes."""
     return Room(
@@ -54,7 +54,7 @@ def room_for(most):
     )
 
 
-@kernel
+@part
 def gather(points, blocks, block, n, star):
     """Coordinates of the stars of a block, as they stand now."""
     gather_row(points, blocks.centre[block * LANES : (block + 1) * LANES], star[: 2 * LANES])

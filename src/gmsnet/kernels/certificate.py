@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.block import FLOORS, MARGIN, PAIRS, REACH, SIZE, SURPLUS, TARGET, WIDTH, ring_row
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, part
 from gmsnet.kernels.guard import STAR
 from gmsnet.kernels.predicates import UNDERFLOW
 
@@ -31,7 +31,7 @@ def doubt(m, delta, u):
     return 512.0 * m * (u * m + delta)
 
 
-@kernel
+@part
 def certify(local, n, shift, floor, unit, grain, work, sums):
     """Row MARGIN: positive where all triangles are certified above the floor, which is not negative, after the shift.
 
@@ -70,7 +70,7 @@ def surplus_of(px, py, qx, qy, twice):
     return (px * qy - py * qx) - twice * half
 
 
-@kernel
+@part
 def certify_stars(star, n, above, unit, grain, work):
     """As ``certify``, each triangle above ``above`` times the floor in its row from FLOORS on, in float64 from the
     coordinates: for the level STAR, at which most stars are near their floors.
@@ -93,7 +93,7 @@ def certify_stars(star, n, above, unit, grain, work):
         work[MARGIN * LANES + lane] -= doubt(work[PAIRS * LANES + lane], delta, FINE) + UNDERFLOW
 
 
-@kernel
+@part
 def gather_floors(blocks, block, guard, work):
     """The floor of each triangle of a block's stars, into the rows from FLOORS on: triangle j lies before ring node j.
 

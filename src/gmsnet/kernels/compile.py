@@ -14,6 +14,7 @@ import hashlib
 import os
 import pickle
 from collections.abc import Callable
+from functools import cached_property, update_wrapper
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,9 @@ if folder := os.environ.get("GMSNET_CACHE"):
     os.environ.setdefault("NUMBA_CACHE_DIR", folder)  # Numba reads it when it is imported
 
 import numba
+from numba.extending import typeof_impl
 
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 LANES = 64  # stars or triangles that go through the processor abreast
 
 SOURCES = hashlib.sha256(
@@ -30,29 +33,47 @@ SOURCES = hashlib.sha256(
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile, releasing the GIL."""
-    return _compiled(function, {"nogil": True, "error_model": "numpy"})
+    """Compile for Python to call, releasing the GIL, and keep on disk."""
+    try:
+        compiled: Callable[..., Any] = numba.njit(cache=True, **OPTIONS)(function)
+    except RuntimeError:  # no folder for the cache can be written
+        return numba.njit(**OPTIONS)(function)  # type: ignore[no-any-return]
+    _outlive_changes(compiled)
+    return compiled
+
+
+class Part:
+    """A function that kernels call.
+
+    What Python needs to call a function takes longer to compile than most parts do: it is made where Python calls one.
+    """
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        self.py_func = function
+        self.inside = numba.njit(**{**OPTIONS, "no_cpython_wrapper": True, **options})(function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """For Python, compiled apart from what kernels call."""
+        return self._for_python(*arguments)
+
+    @cached_property
+    def _for_python(self) -> Callable[..., Any]:
+        return kernel(self.py_func)
+
+
+@typeof_impl.register(Part)
+def _inside(part: Part, _: Any) -> Any:
+    return numba.typeof(part.inside)
+
+
+def part(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile for kernels to call."""
+    return update_wrapper(Part(function), function)
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile into its callers, however long it is: a loop over lanes that calls something is not vectorised."""
-    return _compiled(function, {"nogil": True, "error_model": "numpy", "forceinline": True})
-
-
-def part(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile for kernels alone to call: what Python needs to call a short function takes longer than the function."""
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
-    options |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return numba.njit(**options)(function)  # type: ignore[no-any-return]
-
-
-def _compiled(function: Callable[..., Any], options: dict[str, Any]) -> Callable[..., Any]:
-    try:
-        compiled: Callable[..., Any] = numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # no folder for the cache can be written
-        return numba.njit(**options)(function)  # type: ignore[no-any-return]
-    _outlive_changes(compiled)
-    return compiled
+    return update_wrapper(Part(function, forceinline=True), function)
 
 
 def _outlive_changes(compiled: Any) -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.compile import kernel, part
 from gmsnet.kernels.layout import span
 
 # Why a node is held, in the order in which reasons count.
@@ -140,7 +140,7 @@ def walk_fans(first, corner, turn, region, begin, identity, hub, marks, start, r
     return agrees
 
 
-@kernel
+@part
 def longer(values, more):
     """An array with so many zeros more."""
     new = np.zeros(len(values) + more, dtype=values.dtype)
@@ -149,7 +149,7 @@ def longer(values, more):
     return new
 
 
-@kernel
+@part
 def look_at_edges(v, listed, pair, face, later, region, link):
     """BOUNDARY, CROWDED, INTERFACE for node v as its edges are, and whether edges of two faces are read both ways.
 

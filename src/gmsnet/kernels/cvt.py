@@ -13,11 +13,11 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels import stars
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, kernel, part
 from gmsnet.kernels.laplacian import area_mean
 
 
-@kernel
+@part
 def circumcentres(local, n, row, shift):
     """Shifts (2·LANES, over the star's size) with circumcentres; row: (LANES,) Σ 2|T|. 0/0 where no area is."""
     for lane in range(LANES):
@@ -39,7 +39,7 @@ def circumcentres(local, n, row, shift):
         shift[LANES + lane] /= 2.0 * row[lane]
 
 
-@kernel
+@part
 def centroids(local, n, row, shift):
     """Shifts (2·LANES, over the star's size) with centroids; row: (LANES,) as there. Not a number where no area is.
 

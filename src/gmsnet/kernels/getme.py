@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.block import DROPPED, MOVED
-from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.compile import kernel, part
 from gmsnet.kernels.guard import STAR, permitted
 from gmsnet.kernels.heap import build, update
 from gmsnet.kernels.quality import TINY, TWO_SQRT3
@@ -89,7 +89,7 @@ def fill(queue, points, elements):
     queue.memory[STUCK] = 0
 
 
-@kernel
+@part
 def shape_of(points, corners, e):
     """1/q of an element, with the sign of its area (kernels.quality)."""
     a, b, c = corners[e, 0], corners[e, 1], corners[e, 2]
@@ -99,7 +99,7 @@ def shape_of(points, corners, e):
     )  # fmt: skip
 
 
-@kernel
+@part
 def shape(px, py, qx, qy):
     """1/q of the triangle 0, p, q."""
     rx, ry = qx - px, qy - py
@@ -107,7 +107,7 @@ def shape(px, py, qx, qy):
     return TWO_SQRT3 * (px * qy - py * qx) / max(lengths, TINY)
 
 
-@kernel
+@part
 def rank(value):
     """What an element of this 1/q is ordered by, without its penalty.
 
@@ -117,7 +117,7 @@ def rank(value):
     return value if value > 0.0 else INVALID * value
 
 
-@kernel
+@part
 def transformed(px, py, qx, qy, straight, across):
     """The triangle 0, p, q transformed and scaled: its centroid, and the new place of each corner from there."""
     gx, gy = (px + qx) / 3.0, (py + qy) / 3.0
@@ -130,7 +130,7 @@ def transformed(px, py, qx, qy, straight, across):
     return gx, gy, s * ox, s * oy, s * ux, s * uy, s * vx, s * vy
 
 
-@kernel
+@part
 def length(x, y):
     """Of a vector; coordinates are near 1 or in single precision, so that squares neither under- nor overflow."""
     return math.sqrt(x * x + y * y)
@@ -170,7 +170,7 @@ def steps(points, elements, queue, transformation, guard, count, tally):
         memory[LAST] = e
 
 
-@kernel
+@part
 def propose(points, elements, e, transformation, single, old, target):
     """Where the corners of an element are (x, y each) and where its free ones are to go; the others stay."""
     a, b, c = elements.corners[e, 0], elements.corners[e, 1], elements.corners[e, 2]
@@ -196,7 +196,7 @@ def propose(points, elements, e, transformation, single, old, target):
                 target[2 * k], target[2 * k + 1] = np.float32(target[2 * k]), np.float32(target[2 * k + 1])
 
 
-@kernel
+@part
 def moved(points, elements, e, old, target, guard, room):
     """Moves the corners of an element to their targets if that breaks no triangle; tells whether it has."""
     for k in range(3):
@@ -217,7 +217,7 @@ def moved(points, elements, e, old, target, guard, room):
     return True
 
 
-@kernel
+@part
 def seen(elements, e, k, f):
     """Has element f been met already at one of the free corners of e before the k-th?"""
     for m in range(k):
@@ -229,7 +229,7 @@ def seen(elements, e, k, f):
     return False
 
 
-@kernel
+@part
 def allowed(points, corners, f, e, old, guard, room):
     """May element f be as it is now that the corners of e have left their old places? The rule of kernels.guard."""
     x, was = room[:6], room[6:]
@@ -248,7 +248,7 @@ def allowed(points, corners, f, e, old, guard, room):
     return permitted(was, x, guard.unit * reach + guard.grain, floor)
 
 
-@kernel
+@part
 def arrange(points, elements, e, queue):
     """Measures the elements around the free corners of e anew, and arranges them."""
     for k in range(3):

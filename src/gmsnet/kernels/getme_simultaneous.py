@@ -11,11 +11,11 @@ import numpy as np
 
 from gmsnet.kernels import stars
 from gmsnet.kernels.block import SIZE
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, kernel, part
 from gmsnet.kernels.getme import shape, transformed
 
 
-@kernel
+@part
 def mean_shifts(local, n, transformation, weights, shift):
     """Of each star in a block the mean shift of its centre in the n transformed triangles, over the star's size.
 

@@ -15,13 +15,13 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels import stars
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, kernel, part
 
 EPSILON = np.float32(1e-5)  # of both norms, as in PyTorch and PyTorch Geometric
 ZERO, ONE, TWO = np.float32(0.0), np.float32(1.0), np.float32(2.0)
 
 
-@kernel
+@part
 def moments(local, n, m):
     """Mean (rows 0, 1) and covariance xx, xy, yy (rows 2–4) of the n + 1 nodes of each star, the centre at 0."""
     inverse = ONE / np.float32(n + 1)
@@ -48,7 +48,7 @@ def moments(local, n, m):
         m[k] *= inverse
 
 
-@kernel
+@part
 def propose(local, n, weights, hidden, m, row, features, decoded, shift):
     """Shifts (2·LANES, over the star's size) for a block of stars. weights: what ``fold`` returns, flat float32.
 
@@ -81,7 +81,7 @@ def propose(local, n, weights, hidden, m, row, features, decoded, shift):
     decode(weights, hidden, features, row, decoded, shift)
 
 
-@kernel
+@part
 def add_ring(local, n, row):
     """Adds ReLU(x̂) of the ring's nodes to row 3, three nodes at a time."""
     j = 0
@@ -102,7 +102,7 @@ def add_ring(local, n, row):
         j += 1
 
 
-@kernel
+@part
 def decode(weights, hidden, features, row, decoded, shift):
     """Equations 7 and 8: residual graph convolution at the centre, then Linear → InstanceNorm → ReLU → Linear."""
     padded = 4 * ((hidden + 3) // 4)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import stars
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.elementary import exponential, logarithm
 
 SILU, RELU = 0, 1  # activations σ: z/(1 + exp(−z)), and max(z, 0)
@@ -65,7 +65,7 @@ class Room(NamedTuple):
     kept: NDArray[np.float32]
 
 
-@kernel
+@part
 def room(network, most):
     """Room for stars of up to so many neighbours. Rows of hidden features from H on are zeros and stay it."""
     padded = network.triangle.shape[1] - 1
@@ -86,7 +86,7 @@ def silu(z):
     return z / (ONE + exponential(-z))
 
 
-@kernel
+@part
 def activate(activation, rows):
     """σ of all numbers in place."""
     if activation == SILU:
@@ -97,7 +97,7 @@ def activate(activation, rows):
             rows[k] = max(rows[k], ZERO)
 
 
-@kernel
+@part
 def layer(matrix, inputs, outputs):
     """outputs = matrix · [inputs; 1], rows of LANES; the number of inputs is a multiple of 4."""
     count = matrix.shape[1] - 1
@@ -127,7 +127,7 @@ def layer(matrix, inputs, outputs):
             i += 4
 
 
-@kernel
+@part
 def scales(local, n, mean):
     """Fills the rows of ``mean`` from the rings (ring minus free node, [ring node][axis][lane])."""
     for lane in range(LANES):
@@ -147,7 +147,7 @@ def scales(local, n, mean):
         mean[lane] = count / max(mean[lane], TINY)
 
 
-@kernel
+@part
 def describe(p, q, mean, features, skew):
     """The features of the triangle with the free node of ring nodes p, q (two rows each), and its s."""
     for lane in range(LANES):
@@ -166,7 +166,7 @@ def describe(p, q, mean, features, skew):
         skew[lane] = s
 
 
-@kernel
+@part
 def encode(matrix, features, hidden):
     """W₁f + b₁ of one triangle."""
     for k in range(matrix.shape[0]):
@@ -179,7 +179,7 @@ def encode(matrix, features, hidden):
             z[lane] = bias + (left + (right + w4 * features[4 * LANES + lane]))
 
 
-@kernel
+@part
 def gather_hidden(hidden, pooled):
     """Adds the hidden features of a triangle (P rows) to their sum, and takes the larger ones."""
     size = len(hidden)
@@ -190,7 +190,7 @@ def gather_hidden(hidden, pooled):
         highest[k] = max(highest[k], hidden[k])
 
 
-@kernel
+@part
 def propose(local, n, network, work, shift):
     """Shifts (2·LANES, in the units of ``local``) for a block of stars of degree n. work: a Room."""
     padded = network.triangle.shape[1] - 1
@@ -234,14 +234,14 @@ def propose(local, n, network, work, shift):
     conclude(local, n, work.mean, work.out, shift)
 
 
-@kernel
+@part
 def add(rows, more):
     """rows += more, as many as rows has."""
     for k in range(len(rows)):
         rows[k] += more[k]
 
 
-@kernel
+@part
 def vote(p, q, skew, out):
     """Adds the vector of one triangle with its weight, exp(o₀), to the sums."""
     for lane in range(LANES):
@@ -255,7 +255,7 @@ def vote(p, q, skew, out):
         out[SUM_Y * LANES + lane] += weight * vy
 
 
-@kernel
+@part
 def conclude(local, n, mean, out, shift):
     """The weighted mean of the vectors; in stars with a triangle of D ≤ 0 the mean of the ring."""
     inverse = ONE / np.float32(n)

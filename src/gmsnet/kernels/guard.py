@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.predicates import SHEWCHUK, UNDERFLOW, UNIT, determinant_and_bound
 
 LEVELS = ("valid", "worst", "star")
@@ -114,7 +114,7 @@ def most_of(px, py, qx, qy, delta):
     return min(ratio + 4.0 * UNIT * abs(ratio), LARGEST)
 
 
-@kernel
+@part
 def permitted(was, now, delta, floor):
     """May a triangle with the corners ``was`` (6 numbers) become ``now``? The scalar form of the rule."""
     after, doubt = determinant_and_bound(now[0], now[1], now[2], now[3], now[4], now[5], delta)

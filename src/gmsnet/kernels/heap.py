@@ -7,10 +7,10 @@ not depend on the order in which keys were changed.
 
 from __future__ import annotations
 
-from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.compile import part
 
 
-@kernel
+@part
 def build(heap, place, key):
     """Arranges all items by their keys."""
     for item in range(len(heap)):
@@ -20,20 +20,20 @@ def build(heap, place, key):
         sink(heap, place, key, slot)
 
 
-@kernel
+@part
 def update(heap, place, key, item):
     """Puts an item where it belongs after its key has been lowered or raised."""
     rise(heap, place, key, place[item])
     sink(heap, place, key, place[item])
 
 
-@kernel
+@part
 def before(key, one, other):
     """Does one item come before another?"""
     return key[one] < key[other] or (key[one] == key[other] and one < other)
 
 
-@kernel
+@part
 def rise(heap, place, key, slot):
     """Exchanges the item of a slot with its parent for as long as it comes before it."""
     item = heap[slot]
@@ -49,7 +49,7 @@ def rise(heap, place, key, slot):
     place[item] = slot
 
 
-@kernel
+@part
 def sink(heap, place, key, slot):
     """Exchanges the item of a slot with the first of its children for as long as that comes before it."""
     item = heap[slot]

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels import stars
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, kernel, part
 
 SMART, PLAIN, INVERSE_LENGTH, AREA = range(4)
 TINY = 1e-300  # stands in for a product of areas that is not positive: the star is judged by its signs then
 
 
-@kernel
+@part
 def mean(local, n, shift):
     """w_j = 1."""
     for k in range(2 * LANES):
@@ -30,7 +30,7 @@ def mean(local, n, shift):
         shift[k] *= factor
 
 
-@kernel
+@part
 def inverse_length_mean(local, n, row, shift):
     """w_j = 1/|p_j|; not a number, so no move, where a neighbour lies on the centre. row: the sum of weights."""
     for lane in range(LANES):
@@ -48,7 +48,7 @@ def inverse_length_mean(local, n, row, shift):
         shift[LANES + lane] /= row[lane]
 
 
-@kernel
+@part
 def area_mean(local, n, row, shift):
     """w_j = |T_j−1| + |T_j|, so Σ w_j p_j = Σ |T_j|(p_j + p_j+1) and Σ w_j = 2 Σ |T_j|; row: the latter.
 
@@ -71,7 +71,7 @@ def area_mean(local, n, row, shift):
         shift[LANES + lane] /= 2.0 * row[lane]
 
 
-@kernel
+@part
 def judge(local, n, shift, row):
     """What the shift does to the star, into three rows of LANES.
 
@@ -99,7 +99,7 @@ def judge(local, n, shift, row):
             row[2 * LANES + lane] = min(row[2 * LANES + lane], before)
 
 
-@kernel
+@part
 def smart_mean(local, n, row, shift):
     """The mean where nothing is inverted by it and Σ q falls, or is infinite before (a tangled star); else 0."""
     mean(local, n, shift)
@@ -110,7 +110,7 @@ def smart_mean(local, n, row, shift):
         shift[LANES + lane] = shift[LANES + lane] if taken else 0.0
 
 
-@kernel
+@part
 def propose(local, n, variant, row, shift):
     """Shifts (2·LANES, over the star's size) of a variant for a block of stars. row: (3·LANES,) to work in."""
     if variant == SMART:

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, kernel, part
 
 BITS = 11  # of the 32 along the curve, by which points are sorted at a time
 
 
-@kernel
+@part
 def spread(x):
     """The lower 16 bits of x with a zero between any two."""
     x = (x | (x << 8)) & 0x00FF00FF

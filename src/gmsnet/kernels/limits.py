@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.compile import inlined, kernel
+from gmsnet.kernels.compile import inlined, kernel, part
 
 HELD, FREE_CORNER, CORNER, RING = range(4)  # kinds of groups
 ROOT3 = math.sqrt(3.0)
@@ -89,7 +89,7 @@ def collect(points, triangles, turn, free, below, groups):
     return used
 
 
-@kernel
+@part
 def incident(triangles, degree, worth):
     """start (N + 1,) and rows: the triangles around each node that is worth it."""
     nodes = len(degree)
@@ -135,7 +135,7 @@ def shape_of(points, i, j, k):
     return 2.0 * ROOT3 * (ax * by - ay * bx) / lengths if lengths > 0.0 else 0.0
 
 
-@kernel
+@part
 def corners(points, free, below, v, around, left, right, groups, used):
     """The groups of cells between two neighbouring held edges at a held node, or all around it."""
     n = len(around)
@@ -175,7 +175,7 @@ def corners(points, free, below, v, around, left, right, groups, used):
     return used
 
 
-@kernel
+@part
 def ring(points, free, below, v, around, left, right, discs, groups, used):
     """The group of a free node's cells whose opposite edges are held, if there are two or more."""
     n, count = len(around), 0
@@ -196,7 +196,7 @@ def ring(points, free, below, v, around, left, right, discs, groups, used):
     return enter(groups, used, RING, v, 0.0, bound, count) if bound < below else used
 
 
-@kernel
+@part
 def best_apex(edges):
     """The largest t for which one apex makes 1/q ≥ t with all edges (m, 5), from above.
 
@@ -219,7 +219,7 @@ def best_apex(edges):
     return high
 
 
-@kernel
+@part
 def meet(edges, t, scale):
     """Have the discs of all edges at this t a point in common? One that two circles share, or a centre."""
     count = len(edges)
@@ -248,7 +248,7 @@ def meet(edges, t, scale):
     return False
 
 
-@kernel
+@part
 def inside(edges, up, wide, scale, x, y):
     """Does a point lie in all discs, but for rounding?"""
     for m in range(len(edges)):

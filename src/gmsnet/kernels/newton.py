@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from gmsnet.kernels import objectives, stars
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.objectives import GRADIENT, LEAST, METRIC, OUT, Q2, VALUE, Q
 
 STEPS, TRIALS = 20, 100  # at most so many steps and, halvings included, evaluations
@@ -51,7 +51,7 @@ def newton_step(gx, gy, xx, xy, yy):
     return -(equal + turn * half) * gx - turn * xy * gy, -turn * xy * gx - (equal - turn * half) * gy
 
 
-@kernel
+@part
 def descend(objective, local, n, state, out, hessian, shift):
     """Shifts (2·LANES, over the star's size) to where the steps end.
 
@@ -72,7 +72,7 @@ def descend(objective, local, n, state, out, hessian, shift):
     shift[:] = state[X * LANES : (Y + 1) * LANES]
 
 
-@kernel
+@part
 def begin(local, n, margin, state):
     """All lanes at the origin, their radii, and the least D that they may come to."""
     state[:] = 0.0
@@ -90,7 +90,7 @@ def begin(local, n, margin, state):
         state[ALIVE * LANES + lane] = 1.0
 
 
-@kernel
+@part
 def judge(out, hessian, state):
     """Takes the places on trial that are good enough, with new steps from there; halves the steps to the others."""
     for lane in range(LANES):
@@ -126,7 +126,7 @@ def judge(out, hessian, state):
         state[TRIAL_Y * LANES + lane] = state[Y * LANES + lane] + alive * share * dy
 
 
-@kernel
+@part
 def propose(objective, local, n, state, out, hessian, shift, other):
     """As ``descend``, tangled stars by ``metric``. Work: as there, and other (2·LANES)."""
     descend(objective, local, n, state, out, hessian, shift)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels import laplacian, stars
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, kernel, part
 
 ZERO, HALF, ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 LOG2_E = np.float32(1.0 / np.log(2.0))
@@ -30,7 +30,7 @@ def padded(width):
     return GROUP * ((width + GROUP - 1) // GROUP)
 
 
-@kernel
+@part
 def frame(local, n, box, inputs):
     """The ring in its own frame: rows of ``inputs``, then rows of zeros up to a multiple of GROUP.
 
@@ -57,7 +57,7 @@ def frame(local, n, box, inputs):
     inputs[2 * n * LANES : padded(2 * n) * LANES] = ZERO
 
 
-@kernel
+@part
 def layer(weights, inputs, count, width, outputs):
     """outputs = W·inputs + b, ``width`` rows. weights: b and W row by row, W padded with zeros as the inputs are."""
     most = padded(count)
@@ -76,7 +76,7 @@ def layer(weights, inputs, count, width, outputs):
     return width * (1 + most)
 
 
-@kernel
+@part
 def activate(width, rows):
     """σ of the rows, in place; then rows of zeros up to a multiple of GROUP.
 
@@ -93,7 +93,7 @@ def activate(width, rows):
     rows[width * LANES : padded(width) * LANES] = ZERO
 
 
-@kernel
+@part
 def propose(local, n, table, weights, box, inputs, first, second, shift):
     """Shifts (2·LANES, over the star's size) for a block of stars.
 
@@ -115,7 +115,7 @@ def propose(local, n, table, weights, box, inputs, first, second, shift):
         shift[LANES + lane] = box[LANES + lane] + box[2 * LANES + lane] * shift[LANES + lane]
 
 
-@kernel
+@part
 def room(table):
     """The arrays that ``propose`` works in: box, inputs, first, second and shift."""
     return (

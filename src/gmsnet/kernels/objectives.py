@@ -29,7 +29,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, part
 from gmsnet.kernels.quality import angle
 
 NAMES = ("metric", "q", "q2", "cosine", "min-max-angle")
@@ -146,7 +146,7 @@ def largest_angle(ax, ay, bx, by):
     return angle(abs(d), least), ka * ux + kb * vx, ka * uy + kb * vy, xx, ka * uxy + kb * vxy, -xx
 
 
-@kernel
+@part
 def evaluate(objective, local, n, at, out, hessian):
     """The objective of a block of stars with their free nodes at ``at`` (2·LANES), in the frame of ``local``.
 
@@ -210,7 +210,7 @@ def add(lane, at, p, q, triangle, out, hessian):
         hessian[2 * LANES + lane] += yy
 
 
-@kernel
+@part
 def choose(tangled, other, shift):
     """Takes over the other shift (2·LANES) in the lanes where ``tangled`` (LANES) is 1."""
     for lane in range(LANES):

@@ -12,14 +12,14 @@ that the bound's own rounding does not matter.
 
 from __future__ import annotations
 
-from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.compile import kernel, part
 
 UNIT = 2.0**-53
 SHEWCHUK = (3.0 + 16.0 * UNIT) * UNIT
 UNDERFLOW = 1e-290  # below it a product may have lost digits
 
 
-@kernel
+@part
 def determinant_and_bound(ax, ay, bx, by, cx, cy, delta):
     """D of the triangle a, b, c, and how far it may be from the true one if coordinates are known up to ±delta."""
     px = ax - cx

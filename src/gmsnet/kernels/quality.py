@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.predicates import SHEWCHUK, UNDERFLOW
 
 TWO_SQRT3 = 2.0 * math.sqrt(3.0)
@@ -53,7 +53,7 @@ def folded(y, x):
     return p * t, far
 
 
-@kernel
+@part
 def angle(y, x):
     """atan2(y, x) in radians for y ≥ 0 without a branch; π where both are zero (a corner that has collapsed)."""
     r, far = folded(y, x)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, kernel, part
 from gmsnet.kernels.quality import shape_of
 
 HALVINGS = 24  # of the interval in which a limit is looked for: single precision has no more
@@ -48,7 +48,7 @@ def shapes_of(points, triangles, turn, cells, shape):
         shape[k] = turn[t] * shape_of(points[b, 0] - x, points[b, 1] - y, points[c, 0] - x, points[c, 1] - y)
 
 
-@kernel
+@part
 def count_up_to(shape, limit):
     """How many of the values are at most the limit."""
     count = 0
@@ -84,7 +84,7 @@ def worst(shape, wanted):
     return cells
 
 
-@kernel
+@part
 def smallest(values, rank):
     """The value that would stand at the place ``rank`` if the values were sorted (Hoare's selection).
 
@@ -115,7 +115,7 @@ def smallest(values, rank):
     return some[rank]
 
 
-@kernel
+@part
 def free_nodes(triangles, cells, shape, limit, colours, colours_most, seen):
     """The free nodes (int32) of those of the cells whose shape is at most the limit, colour after colour.
 

@@ -25,7 +25,7 @@ import numpy as np
 
 from gmsnet.kernels import bands, stars
 from gmsnet.kernels.block import SIZE
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.objectives import aspect_squared
 
 REACH = 0.25
@@ -82,7 +82,7 @@ def double(points, i, j, k):
     return ax * by - ay * bx
 
 
-@kernel
+@part
 def derive(local, n, wanted, weight, state):
     """The objective with its derivatives, and the least D, where the nodes are. wanted: D₀ over the size squared."""
     state[VALUE * LANES : (VALUE + 1) * LANES] = 0.0
@@ -111,7 +111,7 @@ def derive(local, n, wanted, weight, state):
             state[LEAST * LANES + lane] = min(state[LEAST * LANES + lane], d)
 
 
-@kernel
+@part
 def judge(local, n, wanted, weight, state):
     """The objective with the share SHARE of the step taken: row AFTER, infinite where a D is not positive."""
     state[AFTER * LANES : (AFTER + 1) * LANES] = 0.0
@@ -130,7 +130,7 @@ def judge(local, n, wanted, weight, state):
             state[AFTER * LANES + lane] += value if d > 0.0 else np.inf
 
 
-@kernel
+@part
 def steps(state):
     """The step that the derivatives call for; none where the star is tangled or there is nothing to gain."""
     for lane in range(LANES):
@@ -147,7 +147,7 @@ def steps(state):
         state[OPEN * LANES + lane] = going
 
 
-@kernel
+@part
 def descend(local, n, wanted, weight, state):
     """Takes up to STEPS steps from the origin; rows X and Y say where they lead."""
     state[:] = 0.0

@@ -25,12 +25,12 @@ from gmsnet.kernels.block import (
 from gmsnet.kernels.block import Blocks as Blocks
 from gmsnet.kernels.block import room_for as room_for
 from gmsnet.kernels.certificate import certify, certify_stars, gather_floors
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, part
 from gmsnet.kernels.guard import STAR
 from gmsnet.kernels.truncation import halve_abreast, truncate
 
 
-@kernel
+@part
 def fetch(points, blocks, block, room, local):
     """Gathers a block and brings it to the size of the star (``localise``); returns the degree."""
     n = blocks.degree[block]
@@ -39,7 +39,7 @@ def fetch(points, blocks, block, room, local):
     return n
 
 
-@kernel
+@part
 def localise(star, n, work, local):
     """Ring minus centre over the size of the star, in the type of ``local``, as [ring node][axis][lane].
 
@@ -74,7 +74,7 @@ def localise(star, n, work, local):
             q[LANES + lane] = work[low + 2 * lane + 1]
 
 
-@kernel
+@part
 def take_centres(star, work):
     """The rows CENTRE."""
     for lane in range(LANES):
@@ -82,7 +82,7 @@ def take_centres(star, work):
         work[(CENTRE + 1) * LANES + lane] = star[2 * lane + 1]
 
 
-@kernel
+@part
 def commit(points, blocks, block, room, local, shift, guard, tally):
     """Moves the free nodes of a block by size·shift, truncated by the guard; counts what happened in ``tally``.
 
@@ -99,7 +99,7 @@ def commit(points, blocks, block, room, local, shift, guard, tally):
     store(points, blocks, block, room, shift, guard, tally)
 
 
-@kernel
+@part
 def aim(work, shift, single):
     """The targets: the free nodes plus size·shift."""
     for lane in range(LANES):
@@ -111,7 +111,7 @@ def aim(work, shift, single):
             work[k] = np.float64(np.float32(work[k]))
 
 
-@kernel
+@part
 def store(points, blocks, block, room, shift, guard, tally):
     """Moves the free nodes whose row MARGIN is positive to their targets, and tries the others one by one.
 

@@ -6,13 +6,13 @@ import numpy as np
 
 from gmsnet.kernels.block import CENTRE, DROPPED, FLOORS, KEPT, MARGIN, MOVED, REACH, SHARE, SIZE, TARGET, TRUNCATED
 from gmsnet.kernels.certificate import certify_stars
-from gmsnet.kernels.compile import LANES, kernel
+from gmsnet.kernels.compile import LANES, part
 from gmsnet.kernels.guard import permitted, surplus_above
 
 HALVINGS, FEW_HALVINGS = 20, 6
 
 
-@kernel
+@part
 def halve_abreast(n, room, shift, guard):
     """Halves the shifts of the lanes that are not allowed, all at once, until none is left or FEW_HALVINGS are made.
 
@@ -53,7 +53,7 @@ def halve_abreast(n, room, shift, guard):
         work[TARGET * LANES + k] = work[KEPT * LANES + k]
 
 
-@kernel
+@part
 def truncate(points, i, n, lane, room, shift, guard, tally):
     """Halves the shift of one lane until it is allowed (Algorithm 1), or drops it.
 
@@ -91,7 +91,7 @@ def truncate(points, i, n, lane, room, shift, guard, tally):
     tally[DROPPED] += 1
 
 
-@kernel
+@part
 def clear(tx, ty, star, n, lane, delta, floor):
     """Is each triangle of one lane certified above a floor that is not negative, with the free node at (tx, ty)?"""
     last = 2 * (n * LANES + lane)
@@ -105,7 +105,7 @@ def clear(tx, ty, star, n, lane, delta, floor):
     return True
 
 
-@kernel
+@part
 def allowed(tx, ty, star, n, lane, delta, work):
     """May the free node of one lane move to (tx, ty)? The scalar form of the rule, which also knows inverted cells.
 

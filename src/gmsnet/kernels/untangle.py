@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.compile import kernel, part
 from gmsnet.kernels.predicates import determinant_and_bound
 
 TINY = 1e-290  # stands in for a squared length of zero
 
 
-@kernel
+@part
 def surplus(points, a, b, c, unit, grain):
     """By how much the determinant of the triangle a, b, c exceeds its bound; positive: certified."""
     ax, ay, bx, by = points[a, 0], points[a, 1], points[b, 0], points[b, 1]
@@ -109,7 +109,7 @@ def cut(nodes, start, ring, number):
     return every[:size].copy(), new_start, new_ring, cells[:made].copy()
 
 
-@kernel
+@part
 def bad_in_star(points, v, start, ring, unit, grain):
     """How many cells of the star of v are not certified."""
     count = 0
@@ -155,7 +155,7 @@ def average(points, nodes, start, ring, weighing, unit, grain, single):
         points[v, 0], points[v, 1] = x, y
 
 
-@kernel
+@part
 def weigh(points, v, start, ring, x, y):
     """The mean of the ring of v weighted by the inverse distances from (x, y), the nearest one's a little larger."""
     nearest = np.inf
@@ -251,7 +251,7 @@ def find_slivers(points, before, triangles, turn, limit, slivers):
             slivers[t] = share(points, a, b, c) < limit
 
 
-@kernel
+@part
 def share(points, a, b, c):
     """D/L of the triangle a, b, c; 0 where all its nodes are in one place."""
     px, py = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.compile import inlined, kernel
+from gmsnet.kernels.compile import inlined, kernel, part
 from gmsnet.kernels.predicates import determinant_and_bound
 from gmsnet.kernels.untangle import surplus
 
@@ -71,7 +71,7 @@ def energy(points, cells, scale, epsilon, gradient):
     return total
 
 
-@kernel
+@part
 def star(points, x, y, v, start, ring, scale, epsilon):
     """E of the star of v with the node at (x, y), gradient and Hessian (xx, xy, yy, as above)."""
     total, gx, gy, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -98,7 +98,7 @@ def star(points, x, y, v, start, ring, scale, epsilon):
     return total, gx, gy, xx, xy, yy
 
 
-@kernel
+@part
 def is_certified(points, v, start, ring, unit, grain):
     """Is each cell of the star of v certified?"""
     before = ring[start[v + 1] - 1]
@@ -110,7 +110,7 @@ def is_certified(points, v, start, ring, unit, grain):
     return True
 
 
-@kernel
+@part
 def keeps(points, v, x, y, start, ring, unit, grain, floor):
     """May v move to (x, y)? Certified cells must stay so, the others become less inverted, with D/L at least floor."""
     before = ring[start[v + 1] - 1]

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.barrier_star import newton_step
-from gmsnet.kernels.compile import inlined, kernel
+from gmsnet.kernels.compile import inlined, part
 from gmsnet.kernels.guard import STAR, permitted, surplus_above, surplus_above_zero
 from gmsnet.kernels.truncation import HALVINGS
 
@@ -33,7 +33,7 @@ def power(t, doublings):
     return t
 
 
-@kernel
+@part
 def largest(ring, n, x, y):
     """The largest Q with the free node at (x, y), all triangles being positive. ring: x and y of each ring node."""
     most = 0.0
@@ -46,7 +46,7 @@ def largest(ring, n, x, y):
     return most
 
 
-@kernel
+@part
 def value_at(ring, n, x, y, inverse, doublings):
     """F with the free node at (x, y), 1/M given; infinite where a triangle is not positive."""
     value = 0.0
@@ -62,7 +62,7 @@ def value_at(ring, n, x, y, inverse, doublings):
     return value
 
 
-@kernel
+@part
 def newton(ring, n, x, y, inverse, doublings):
     """F with the free node at (x, y), 1/M given; the step from there; and the least D."""
     p = 2.0**doublings
@@ -92,7 +92,7 @@ def newton(ring, n, x, y, inverse, doublings):
     return value, longer * dx, longer * dy, least
 
 
-@kernel
+@part
 def descend(ring, n, x, y, scale, doublings):
     """Where the free node at (x, y) is to go: nowhere else if F falls nowhere; to the mean if the star is tangled.
 
@@ -123,7 +123,7 @@ def descend(ring, n, x, y, scale, doublings):
     return x, y
 
 
-@kernel
+@part
 def mean(ring, n):
     """Of the ring."""
     x, y = 0.0, 0.0
@@ -133,7 +133,7 @@ def mean(ring, n):
     return x, y
 
 
-@kernel
+@part
 def gather(points, i, start, around, guard, star):
     """Ring and floors of one star, and its largest coordinate, into ``star``.
 
@@ -154,7 +154,7 @@ def gather(points, i, start, around, guard, star):
     return n
 
 
-@kernel
+@part
 def certified(star, n, tx, ty, delta):
     """Are all triangles certified above 0 and their floors with the free node at (tx, ty)?"""
     ax, ay = star[2 * n - 2] - tx, star[2 * n - 1] - ty
@@ -170,7 +170,7 @@ def certified(star, n, tx, ty, delta):
     return least > 0.0
 
 
-@kernel
+@part
 def allowed(star, n, x, y, tx, ty, delta):
     """The rule of the guard for a free node that is to go from (x, y) to (tx, ty), inverted triangles and all."""
     was, now = np.empty(6), np.empty(6)
@@ -185,7 +185,7 @@ def allowed(star, n, x, y, tx, ty, delta):
     return True
 
 
-@kernel
+@part
 def way_there(star, n, x, y, tx, ty, unit, grain, single):
     """How far (x, y) may go to (tx, ty): the halved shift that the guard allows (kernels.truncation), how often halved.
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from gmsnet.kernels.block import DROPPED, MOVED, TRUNCATED
-from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.compile import kernel, part
 from gmsnet.kernels.ranking import free_nodes, shapes_of, smallest
 from gmsnet.kernels.truncation import HALVINGS
 from gmsnet.kernels.worst_first import descend, gather, way_there
@@ -36,7 +36,7 @@ def cycles(points, triangles, turn, cells, colours, colours_most, start, around,
     return before, shape.min()
 
 
-@kernel
+@part
 def visit(points, nodes, start, around, guard, doublings, sweeps, scale, awake, tally):
     """Visits the nodes in their order, so many times, p = 2^doublings. tally: (3,), added to.
 
