@@ -35,7 +35,7 @@ from barrier import Minimum, Problem, aspects, minimise
 from machine import describe
 
 import gmsnet
-from gmsnet.kernels.guard import LARGEST, STAR, Guard, Precision
+from gmsnet.kernels.guard import LARGEST, STAR, Precision, StarGuard
 from gmsnet.measure import measure
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Field, smoother
@@ -176,7 +176,7 @@ class Capped(Field):
         super().__init__(points, topology, Precision(), STAR)
         self.cap = cap
 
-    def guard(self, share: Share) -> Guard:
+    def guard(self, share: Share) -> StarGuard:
         """See Field."""
         guard = super().guard(share)
         return guard._replace(floors=np.minimum(guard.floors, self.cap * LARGEST))

@@ -14,7 +14,7 @@ from gmsnet.kernels import barrier, block, certificate
 from gmsnet.kernels import stars as kernels
 from gmsnet.kernels.barrier_star import Power
 from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.guard import WORST, Precision, plain_guard
+from gmsnet.kernels.guard import Precision, plain_guard
 
 READINGS = 6
 
@@ -108,7 +108,7 @@ def test_what_is_certified_is_so(certify, seed, degree, scale, offset, digits, a
     rng = np.random.default_rng(seed)
     centre, ring = star(rng, degree)
     place, ring = (np.asarray(v) * (scale, squeeze * scale) + scale * offset for v in (centre, ring))
-    guard = plain_guard(Precision(2.0**-24, 2.0**-150, single=True) if single else Precision())._replace(level=WORST)
+    guard = plain_guard(Precision(2.0**-24, 2.0**-150, single=True) if single else Precision())
     if single:
         place, ring = (v.astype(np.float32).astype(float) for v in (place, ring))
     shift = 10.0 ** rng.uniform(-4, 0) * rng.normal(size=2) * (1.0, squeeze)
@@ -131,7 +131,7 @@ def test_a_sound_star_is_certified(certify):
     for scale in (2.0**-60, 1e-3, 1.0):
         ring = scale * np.column_stack([np.cos(angle), np.sin(angle)])
         for floor in (-np.inf, 0.0, 0.2, 0.28):
-            guard = plain_guard()._replace(level=WORST, floor=floor)
+            guard = plain_guard()._replace(floor=floor)
             margin, _ = certify(np.zeros(2), ring, np.array([0.01, 0.0]), guard)
             assert margin > 0
         margin, _ = certify(np.zeros(2), ring, np.array([0.01, 0.0]), guard._replace(floor=0.28867))

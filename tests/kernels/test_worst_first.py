@@ -17,7 +17,7 @@ from gmsnet.kernels import stars as kernels_stars
 from gmsnet.kernels import worst_first as kernels
 from gmsnet.kernels import worst_first_cycles as cycles
 from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, plain_guard
+from gmsnet.kernels.guard import STAR, VALID, WORST, MeshGuard, StarGuard, plain_guard
 
 DOUBLINGS = (3, 4, 6)
 every_power = pytest.mark.parametrize("doublings", DOUBLINGS)
@@ -112,7 +112,8 @@ def test_the_guard_is_that_of_blocks(level, single):
         unit = 2.0**-24 if single else 2.0**-53
         floors = np.where(np.arange(len(points)) < LANES, rng.uniform(-0.1, 0.15, len(points)), -np.inf)
         floor = 0.05 if level == WORST else -np.inf
-        guard = Guard(unit, 0.0, single, level, floor, floors if level == STAR else np.empty(0))
+        guard = MeshGuard(unit, 0.0, single, floor)
+        guard = StarGuard(*guard, floors) if level == STAR else guard
         shifts = rng.choice([0.1, 1.0, 5.0], LANES)[:, None] * rng.normal(size=(LANES, 2))
         targets = points[:LANES] + shifts
 

@@ -27,7 +27,7 @@ from gmsnet.kernels.barrier_star import FAR, MOST, descend
 from gmsnet.kernels.block import MARGIN, PAIRS, REACH, SIZE, gather, ring_row
 from gmsnet.kernels.certificate import COARSE, NARROWEST, WIDER, doubt
 from gmsnet.kernels.compile import LANES, inlined, kernel, part
-from gmsnet.kernels.guard import STAR
+from gmsnet.kernels.guard import WITH_FLOORS
 
 SMALL = 1e-5  # of F: a fall that float32 may not see; the step is then so short that it is Newton's to rounding
 
@@ -269,7 +269,7 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
         doubtful = certify(sums, step, guard.unit, work)
         if doubtful:
             refine(star, n, count, work, power, sums, shift)
-        if guard.level == STAR:
+        if len(guard) == WITH_FLOORS:
             stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
             continue
         stars.aim(work, shift, guard.single)

@@ -9,7 +9,7 @@ import numpy as np
 
 from gmsnet.kernels.block import FLOORS, MARGIN, PAIRS, REACH, SIZE, SURPLUS, TARGET, WIDTH, ring_row
 from gmsnet.kernels.compile import LANES, inlined, part
-from gmsnet.kernels.guard import STAR
+from gmsnet.kernels.guard import WITH_FLOORS
 from gmsnet.kernels.predicates import UNDERFLOW
 
 WIDER = 1.0 + 2.0**-20  # so that what is rounded to float32 is an upper bound
@@ -99,10 +99,12 @@ def gather_floors(blocks, block, guard, work):
 
     At the level STAR that is the largest of its nodes' floors, else the mesh's.
     """
-    n, rings, offset, floors = blocks.degree[block], blocks.rings, blocks.offset[block], guard.floors
-    if guard.level != STAR:
-        work[FLOORS * LANES : (FLOORS + n) * LANES] = guard.floor
+    n = blocks.degree[block]
+    if len(guard) != WITH_FLOORS:
+        for k in range(FLOORS * LANES, (FLOORS + n) * LANES):
+            work[k] = guard.floor
         return
+    rings, offset, floors = blocks.rings, blocks.offset[block], guard.floors
     for j in range(n):
         i = n - 1 if j == 0 else j - 1
         for lane in range(LANES):

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.block import DROPPED, MOVED
 from gmsnet.kernels.compile import kernel, part
-from gmsnet.kernels.guard import STAR, permitted
+from gmsnet.kernels.guard import WITH_FLOORS, permitted
 from gmsnet.kernels.heap import build, update
 from gmsnet.kernels.quality import TINY, TWO_SQRT3
 
@@ -236,7 +236,7 @@ def allowed(points, corners, f, e, old, guard, room):
     reach, floor = 0.0, guard.floor
     for k in range(3):
         i = corners[f, k]
-        if guard.level == STAR:
+        if len(guard) == WITH_FLOORS:
             floor = max(floor, guard.floors[i])
         x[2 * k], x[2 * k + 1] = points[i, 0], points[i, 1]
         was[2 * k], was[2 * k + 1] = points[i, 0], points[i, 1]

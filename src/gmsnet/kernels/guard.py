@@ -56,24 +56,36 @@ class Precision(NamedTuple):
         return cls(grain=grain if grain > 1e-290 else 0.0)  # a subnormal one would only be slow
 
 
-class Guard(NamedTuple):
+class MeshGuard(NamedTuple):
     """What a sweep must keep. unit, grain, single: see Precision.
 
-    level: VALID, WORST or STAR. floor: of D/L for the whole mesh, −∞ unless the level is WORST. floors: (N,) for each
-    node in memory order, −∞ where it has no ring, at the level STAR; else empty.
+    floor: of D/L for the whole mesh, −∞ at the level VALID.
     """
 
     unit: float
     grain: float
     single: bool
-    level: int
+    floor: float
+
+
+class StarGuard(NamedTuple):
+    """What a sweep must keep at the level STAR. floors: (N,) for each node in memory order, −∞ where it has no ring."""
+
+    unit: float
+    grain: float
+    single: bool
     floor: float
     floors: NDArray[np.float64]
 
 
-def plain_guard(precision: Precision = Precision()) -> Guard:  # noqa: B008 (a tuple of constants)
+Guard = MeshGuard | StarGuard
+# ``len(guard) == WITH_FLOORS`` is known when a kernel is compiled: what only one level needs is left out for the other.
+WITH_FLOORS = len(StarGuard._fields)
+
+
+def plain_guard(precision: Precision = Precision()) -> MeshGuard:  # noqa: B008 (a tuple of constants)
     """The guard of the level VALID."""
-    return Guard(*precision, VALID, -math.inf, np.empty(0))
+    return MeshGuard(*precision, -math.inf)
 
 
 @inlined

@@ -26,7 +26,7 @@ from gmsnet.kernels.block import Blocks as Blocks
 from gmsnet.kernels.block import room_for as room_for
 from gmsnet.kernels.certificate import certify, certify_stars, gather_floors
 from gmsnet.kernels.compile import LANES, part
-from gmsnet.kernels.guard import STAR
+from gmsnet.kernels.guard import WITH_FLOORS
 from gmsnet.kernels.truncation import halve_abreast, truncate
 
 
@@ -90,7 +90,7 @@ def commit(points, blocks, block, room, local, shift, guard, tally):
     """
     n, work = blocks.degree[block], room.work
     aim(work, shift, guard.single)
-    if guard.level == STAR:
+    if len(guard) == WITH_FLOORS:
         gather_floors(blocks, block, guard, work)
         certify_stars(room.star, n, 1.0, guard.unit, guard.grain, work)
         halve_abreast(n, room, shift, guard)
@@ -117,7 +117,8 @@ def store(points, blocks, block, room, shift, guard, tally):
 
     At the level STAR, row SHARE: how much is left of the shift.
     """
-    n, count, level, work = blocks.degree[block], blocks.filled[block], guard.level, room.work
+    n, count, work = blocks.degree[block], blocks.filled[block], room.work
+    to_the_star = len(guard) == WITH_FLOORS
     centre = blocks.centre[block * LANES : (block + 1) * LANES]
     refused, moved = 0, 0
     for lane in range(LANES):
@@ -139,10 +140,10 @@ def store(points, blocks, block, room, shift, guard, tally):
             if work[MARGIN * LANES + lane] > 0.0:
                 points[i, 0] = work[TARGET * LANES + lane]
                 points[i, 1] = work[(TARGET + 1) * LANES + lane]
-            elif level == STAR and work[MARGIN * LANES + lane] == -np.inf:
+            elif to_the_star and work[MARGIN * LANES + lane] == -np.inf:
                 tally[DROPPED] += 1
             else:
                 truncate(points, i, n, lane, room, shift, guard, tally)
-    if level == STAR:
+    if len(guard) == WITH_FLOORS:
         for lane in range(count):
             tally[TRUNCATED] += (work[MARGIN * LANES + lane] > 0.0) & (work[SHARE * LANES + lane] < 1.0)

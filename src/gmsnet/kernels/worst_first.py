@@ -16,7 +16,7 @@ import numpy as np
 
 from gmsnet.kernels.barrier_star import newton_step
 from gmsnet.kernels.compile import inlined, part
-from gmsnet.kernels.guard import STAR, permitted, surplus_above, surplus_above_zero
+from gmsnet.kernels.guard import WITH_FLOORS, permitted, surplus_above, surplus_above_zero
 from gmsnet.kernels.truncation import HALVINGS
 
 MOST = 50.0  # times a Newton step: the longest one
@@ -146,7 +146,7 @@ def gather(points, i, start, around, guard, star):
         star[2 * j], star[2 * j + 1] = points[k, 0], points[k, 1]
         reach = max(reach, max(abs(points[k, 0]), abs(points[k, 1])))
         star[2 * n + j] = guard.floor
-    if guard.level == STAR:
+    if len(guard) == WITH_FLOORS:
         for j in range(n):
             before, after = around[start[i] + (n - 1 if j == 0 else j - 1)], around[start[i] + j]
             star[2 * n + j] = max(guard.floors[i], max(guard.floors[before], guard.floors[after]))

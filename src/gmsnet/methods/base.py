@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, Precision, most_ratios, plain_guard, star_floors
+from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, Precision, StarGuard, most_ratios, plain_guard, star_floors
 from gmsnet.topology import Topology
 from gmsnet.workers import Share, serial
 
@@ -35,12 +35,12 @@ class Field:
         guard = plain_guard(self.precision)
         if self.level == WORST:
             floor = self.floor.of(self.points, self.topology, self.precision, share)
-            return guard._replace(level=WORST, floor=floor)
+            return guard._replace(floor=floor)
         if self.level == STAR:
             floors = np.empty(len(self.points))
             triangles, turn = self.topology.changeable
             star_floors(self.points, triangles, turn, self.topology.near_ringed, guard.unit, guard.grain, floors)
-            return guard._replace(level=STAR, floors=floors)
+            return StarGuard(*guard, floors)
         return guard
 
 
