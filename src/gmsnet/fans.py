@@ -52,8 +52,9 @@ def _walked(faces: NearFaces, turn: Turns, marks: Marks, identity: Ints, hub: in
     count = len(faces.corner)
     start = np.empty(len(marks) + 1, dtype=offset_type(count))
     ring = np.empty(count + connectivity.WIDTH, dtype=np.int32)
+    link, lists = np.zeros(len(marks) + 1, dtype=np.int64), np.zeros(len(marks), dtype=np.int64)
     agrees = connectivity.walk_fans(
-        faces.first, faces.corner, turn, faces.region, faces.begin, identity, hub, marks, start, ring
+        faces.first, faces.corner, turn, faces.region, faces.begin, identity, hub, marks, link, lists, start, ring
     )
     ring[start[-1] : start[-1] + connectivity.WIDTH] = 0
     return start, ring, agrees

@@ -44,6 +44,7 @@ class Survey:
         for reason, bit in (("boundary", kernels.BOUNDARY), ("interface between regions", kernels.INTERFACE)):
             nodes[topology.held.get(reason, np.empty(0, dtype=np.int64))] = bit
         rim = np.take(nodes, topology.memory)
-        ring, beside, total = kernels.first_ring(near, topology.near, rim, MOST)
+        ring = np.zeros((len(rim), 4), dtype=np.float32)
+        beside, total = kernels.first_ring(near, topology.near, rim, MOST, ring)
         suspects = kernels.suspects(topology.near, rim, MOST, FEW, SEED - SLACK, ring)
         return cls(near, rim, suspects, beside, total / len(topology.near))

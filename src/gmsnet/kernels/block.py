@@ -46,12 +46,11 @@ class Room(NamedTuple):
 @part
 def room_for(most):
     """For stars of up to so many nodes."""
-    return Room(
-        np.empty(2 * (1 + most) * LANES),
-        np.empty((FLOORS + most) * LANES),
-        np.empty(2 * LANES, dtype=np.float32),
-        np.zeros(COUNTERS, dtype=np.int64),
-    )
+    counts = np.empty(COUNTERS, dtype=np.int64)
+    for k in range(COUNTERS):
+        counts[k] = 0
+    star, work = np.empty(2 * (1 + most) * LANES), np.empty((FLOORS + most) * LANES)
+    return Room(star, work, np.empty(2 * LANES, dtype=np.float32), counts)
 
 
 @part

@@ -39,7 +39,7 @@ def touching(triangles, chosen):
 
 
 @kernel
-def walk_fans(first, corner, turn, region, begin, identity, hub, marks, start, ring):
+def walk_fans(first, corner, turn, region, begin, identity, hub, marks, link, lists, start, ring):
     """The ring of each node that has a closed fan and no mark; the marks that follow from the faces around a node.
 
     turn: (F,) int8; faces of turn −1 are read backwards. region: (F,) int64, or none (0,) where all are the same.
@@ -49,16 +49,18 @@ def walk_fans(first, corner, turn, region, begin, identity, hub, marks, start, r
     ring, with room for as many as corners and WIDTH more: the nodes around, in the sense in which the faces are read,
     from the smallest id on. Returns whether all edges of two faces are read in both directions, as they must be.
 
+    link (N + 1,), of the node at hand ≪ 32 | the node that follows this one around it, and lists (N,), the first corner
+    listed at a node ≪ 32 | how many: int64 zeros, to work with.
+
     Corners are listed at their nodes some nodes ahead, and forgotten once the node has been visited. As near nodes are
     near in memory, few are listed at a time, and stay in the cache.
     """
     nodes = len(identity)
-    link = np.zeros(nodes + 1, dtype=np.int64)  # of the node at hand ≪ 32 | the node that follows this one around it
-    lists = np.zeros(nodes, dtype=np.int64)  # the first corner listed at a node ≪ 32 | how many
     # Of each corner listed: the node after ≪ 32 | the node before; its face (where regions differ); the next one of its
     # list. Number 0 is none. The first ``left`` of ``unused`` are not in use.
-    pair, face = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int32)
-    later, unused, left = np.zeros(1, dtype=np.int32), np.zeros(1, dtype=np.int32), 0
+    pair, face = np.empty(1, dtype=np.int64), np.empty(1, dtype=np.int32)
+    later, unused, left = np.empty(1, dtype=np.int32), np.empty(1, dtype=np.int32), 0
+    pair[0] = face[0] = later[0] = unused[0] = 0
     others = np.empty(AHEAD, dtype=np.int64)  # nodes without a closed fan
     end, agrees = np.int64(0), True
     for ahead in range(0, nodes, AHEAD):
@@ -67,9 +69,11 @@ def walk_fans(first, corner, turn, region, begin, identity, hub, marks, start, r
         new = span(first, there)[0] - span(first, here)[0]
         if left < new:
             size, more = len(pair), max(len(pair), new)
-            pair, face, later = longer(pair, more), longer(face, more), longer(later, more)
-            unused = longer(unused, more)
-            for number in range(size, size + more):
+            more += size
+            pair, face = copied(pair, np.empty(more, dtype=np.int64)), copied(face, np.empty(more, dtype=np.int32))
+            later = copied(later, np.empty(more, dtype=np.int32))
+            unused = copied(unused, np.empty(more, dtype=np.int32))
+            for number in range(size, more):
                 unused[left] = number
                 left += 1
         for f in range(here, there):
@@ -141,12 +145,13 @@ def walk_fans(first, corner, turn, region, begin, identity, hub, marks, start, r
 
 
 @part
-def longer(values, more):
-    """An array with so many zeros more."""
-    new = np.zeros(len(values) + more, dtype=values.dtype)
+def copied(values, longer):
+    """The longer array, with the values at its beginning and zeros behind."""
     for k in range(len(values)):
-        new[k] = values[k]
-    return new
+        longer[k] = values[k]
+    for k in range(len(values), len(longer)):
+        longer[k] = 0
+    return longer
 
 
 @part
@@ -156,8 +161,8 @@ def look_at_edges(v, listed, pair, face, later, region, link):
     Linear in its corners: see ``walk_fans``. link: here of the node at hand ≪ 32 | the number of the edge.
     """
     head, count = listed >> 32, listed & HALF
-    faces, balance = np.zeros(2 * count, dtype=np.int64), np.zeros(2 * count, dtype=np.int64)
-    own, differ = np.zeros(2 * count, dtype=np.int64), np.zeros(2 * count, dtype=np.bool_)
+    faces, balance = np.empty(2 * count, dtype=np.int64), np.empty(2 * count, dtype=np.int64)
+    own, differ = np.empty(2 * count, dtype=np.int64), np.empty(2 * count, dtype=np.int64)
     at = head
     for _ in range(count):
         link[pair[at] >> 32] = link[pair[at] & HALF] = -1 << 32
@@ -172,6 +177,7 @@ def look_at_edges(v, listed, pair, face, later, region, link):
             if link[other] >> 32 != v:
                 link[other] = np.int64(v) << 32 | edges
                 own[edges] = here
+                faces[edges] = balance[edges] = differ[edges] = 0
                 edges += 1
             e = link[other] & HALF
             differ[e] |= own[e] != here
@@ -186,7 +192,7 @@ def look_at_edges(v, listed, pair, face, later, region, link):
             found |= CROWDED
         else:
             both_ways &= balance[e] == 0
-            if differ[e]:
+            if differ[e] != 0:
                 found |= INTERFACE
     return found, both_ways
 

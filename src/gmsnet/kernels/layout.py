@@ -36,22 +36,24 @@ def morton_order(points, keys, other, memory, position):
     extent = max(right - left, top - bottom)
     scale = 65535.0 / extent if extent > 0.0 else 0.0
     mask = (1 << BITS) - 1
-    at = np.zeros((3, mask + 1), dtype=np.int64)  # by digit, the last one first: where the next key goes
+    at = np.empty(3 << BITS, dtype=np.int64)  # by digit, the last one first: where the next key goes
+    for k in range(len(at)):
+        at[k] = 0
     for i in range(n):
         x, y = np.int64((points[i, 0] - left) * scale), np.int64((points[i, 1] - bottom) * scale)
         code = spread(x) | spread(y) << 1
         keys[i] = code << 31 | i
-        at[0, code & mask] += 1
-        at[1, code >> BITS & mask] += 1
-        at[2, code >> 2 * BITS] += 1
+        at[code & mask] += 1
+        at[(1 << BITS) + (code >> BITS & mask)] += 1
+        at[(2 << BITS) + (code >> 2 * BITS)] += 1
     for digit in range(3):
-        end = 0
-        for k in range(mask + 1):
-            end, at[digit, k] = end + at[digit, k], end
+        end, begin = 0, digit << BITS
+        for k in range(begin, begin + mask + 1):
+            end, at[k] = end + at[k], end
         for i in range(n):
-            k = keys[i] >> 31 + digit * BITS & mask
-            other[at[digit, k]] = keys[i]
-            at[digit, k] += 1
+            k = begin + (keys[i] >> 31 + digit * BITS & mask)
+            other[at[k]] = keys[i]
+            at[k] += 1
         keys, other = other, keys
     for i in range(n):
         node = keys[i] & 0x7FFFFFFF

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.compile import inlined, kernel, part
 
-HELD, FREE_CORNER, CORNER, RING = range(4)  # kinds of groups
+# Kinds of groups, and no node. Their types keep a kernel from being compiled once for each of their values.
+HELD, FREE_CORNER, CORNER, RING = map(np.int8, range(4))
+NOWHERE = np.int64(-1)
 ROOT3 = math.sqrt(3.0)
 LEAST = 1e-4  # a smaller bound of the kind RING is given as this one
 BISECTIONS = 40
@@ -41,11 +43,13 @@ def best_with_corner(angle):
 @kernel
 def collect(points, triangles, turn, free, below, groups):
     """Fills in all groups with a bound less than ``below``; returns how many. free: (N,) bool."""
-    nodes, used = len(points), 0
+    nodes, used = len(points), np.int64(0)
     groups.first[0] = 0
-    degree, edges = np.zeros(nodes, dtype=np.int32), np.zeros(nodes, dtype=np.int32)
+    degree, edges = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
+    for v in range(nodes):
+        degree[v] = edges[v] = 0
     for t in range(len(triangles)):
-        i, j, k = triangles[t]
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         degree[i] += 1
         degree[j] += 1
         degree[k] += 1
@@ -56,7 +60,7 @@ def collect(points, triangles, turn, free, below, groups):
             bound = shape_of(points, i, j, k) * turn[t]
             if bound < below:
                 groups.cells[groups.first[used]] = t
-                used = enter(groups, used, HELD, -1, 0.0, bound, 1)
+                used = enter(groups, used, HELD, NOWHERE, 0.0, bound, np.int64(1))
             continue
         # At a free node, count the held edges around it; at a held one, note that there is a free node.
         edges[i] += not (at_i and (at_j or at_k))
@@ -81,7 +85,8 @@ def collect(points, triangles, turn, free, below, groups):
         if free[v]:
             bound = best_with_corner(2.0 * math.pi / n)
             if bound < below:
-                groups.cells[groups.first[used] : groups.first[used] + n] = around
+                for m in range(n):  # an assignment of slices would take seconds to compile
+                    groups.cells[groups.first[used] + m] = around[m]
                 used = enter(groups, used, FREE_CORNER, v, 2.0 * math.pi, bound, n)
             used = ring(points, free, below, v, around, left, right, discs, groups, used)
         else:
@@ -93,10 +98,12 @@ def collect(points, triangles, turn, free, below, groups):
 def incident(triangles, degree, worth):
     """start (N + 1,) and rows: the triangles around each node that is worth it."""
     nodes = len(degree)
-    start = np.zeros(nodes + 1, dtype=np.int32)
+    start, end = np.empty(nodes + 1, dtype=np.int32), np.empty(nodes, dtype=np.int32)
+    start[0] = 0
     for i in range(nodes):
+        end[i] = start[i]
         start[i + 1] = start[i] + (degree[i] if worth[i] else 0)
-    rows, end = np.empty(start[nodes], dtype=np.int32), start[:-1].copy()
+    rows = np.empty(start[nodes], dtype=np.int32)
     if len(rows):
         for t in range(len(triangles)):
             for k in range(3):
@@ -107,7 +114,7 @@ def incident(triangles, degree, worth):
     return start, rows
 
 
-@inlined
+@part
 def enter(groups, used, kind, node, angle, bound, cells):
     """Closes the row of a group, whose cells are written already."""
     groups.kind[used], groups.node[used], groups.angle[used], groups.bound[used] = kind, node, angle, bound
@@ -118,7 +125,7 @@ def enter(groups, used, kind, node, angle, bound, cells):
 @inlined
 def others(triangles, turn, t, v):
     """The other two corners of a triangle, so that (v, first, second) is counter-clockwise where it is positive."""
-    i, j, k = triangles[t]
+    i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     if v == j:
         i, j, k = j, k, i
     elif v == k:

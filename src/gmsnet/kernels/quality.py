@@ -143,7 +143,9 @@ def summarise(points, triangles, turn, first, last, coarse, fine):
     The sums of all blocks follow from those of parts exactly, so they do not depend on how the blocks are shared out,
     nor on the order of the triangles, or of a triangle's corners but for the rounding of its own measures.
     """
-    work = np.zeros(ROOM)
+    work = np.empty(ROOM)
+    for k in range(ROOM):
+        work[k] = 0.0
     for lane in range(LANES):
         work[TOTALS + (EXTREME + LOW) * LANES + lane] = np.inf
         work[TOTALS + (EXTREME + SHAPE) * LANES + lane] = np.inf

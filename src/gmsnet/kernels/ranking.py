@@ -85,6 +85,15 @@ def worst(shape, wanted):
 
 
 @part
+def least(values):
+    """The least of them; NumPy's takes a third of a second to compile."""
+    found = np.inf
+    for k in range(len(values)):
+        found = min(found, values[k])
+    return found
+
+
+@part
 def smallest(values, rank):
     """The value that would stand at the place ``rank`` if the values were sorted (Hoare's selection).
 
@@ -122,7 +131,9 @@ def free_nodes(triangles, cells, shape, limit, colours, colours_most, seen):
     shape: (len(cells),). colours: (N,), −1 where held. seen: (N,) bool, all False before and after.
     """
     found = np.empty(3 * len(cells), dtype=np.int32)
-    start = np.zeros(colours_most + 1, dtype=np.int32)
+    start = np.empty(colours_most + 1, dtype=np.int32)
+    for c in range(colours_most + 1):
+        start[c] = 0
     count = 0
     for k in range(len(cells)):
         if shape[k] <= limit:

@@ -26,14 +26,13 @@ ZERO, ONE, THIRD = np.float32(0.0), np.float32(1.0), np.float32(1.0 / 3.0)
 
 
 @kernel
-def first_ring(points, triangles, rim, most):
+def first_ring(points, triangles, rim, most, ring):
     """Sums over the cells around each node of planar points, and what else there is to know of all triangles (T, 3).
 
-    rim: (N,) uint8, bits of each node. Returns (N, 4) in single precision: the sums of v, no longer than ``most``, over
-    the cells without a node of the rim, their number, and a zero; the rows (int32, ascending) of the triangles
-    with two nodes of the boundary or more; and the sum of |D|, D twice the area.
+    rim: (N,) uint8, bits of each node. ring: (N, 4) float32 zeros, to which are added the sums of v, no longer than
+    ``most``, over the cells without a node of the rim, and their number. Returns the rows (int32, ascending) of the
+    triangles with two nodes of the boundary or more, and the sum of |D|, D twice the area.
     """
-    ring = np.zeros((len(rim), 4), dtype=np.float32)
     beside = np.empty(len(triangles), dtype=np.int32)
     count, total = 0, 0.0
     work = np.empty(7 * LANES)
@@ -70,7 +69,7 @@ def first_ring(points, triangles, rim, most):
                 ring[node, ACROSS] += across
                 ring[node, NUMBER] += ONE
         total += sizes
-    return ring, beside[:count].copy(), total
+    return beside[:count].copy(), total
 
 
 @kernel
@@ -101,7 +100,9 @@ def suspects(triangles, rim, most, fewest, limit, ring):
                 ring[node, EXCESS] += more
             warm[count] = t
             count += 1
-    found = np.zeros(len(rim), dtype=np.bool_)
+    found = np.empty(len(rim), dtype=np.bool_)
+    for i in range(len(rim)):
+        found[i] = False
     for n in range(count):
         for corner in range(3):
             i = triangles[warm[n], corner]

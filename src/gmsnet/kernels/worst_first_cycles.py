@@ -8,7 +8,7 @@ import numpy as np
 
 from gmsnet.kernels.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.compile import kernel, part
-from gmsnet.kernels.ranking import free_nodes, shapes_of, smallest
+from gmsnet.kernels.ranking import free_nodes, least, shapes_of, smallest
 from gmsnet.kernels.truncation import HALVINGS
 from gmsnet.kernels.worst_first import descend, gather, way_there
 
@@ -23,17 +23,19 @@ def cycles(points, triangles, turn, cells, colours, colours_most, start, around,
     cells: indices of triangles. colours: (N,), −1 where held. start, around: the rings of all nodes, in CSR form.
     plan: (C, 3) of cells to take, log₂ of the power p, and visits to their free nodes. tally: (3,), added to.
     """
-    shape, mark = np.empty(len(cells)), np.zeros(len(points), dtype=np.bool_)
+    shape, mark = np.empty(len(cells)), np.empty(len(points), dtype=np.bool_)
+    for i in range(len(points)):
+        mark[i] = False
     shapes_of(points, triangles, turn, cells, shape)
-    before = shape.min()
+    before = least(shape)
     for c in range(len(plan)):
         wanted = min(plan[c, 0], len(cells))
         limit = smallest(shape, wanted - 1)
-        scale = max(shape.min(), LEAST) / math.sqrt(3.0)
+        scale = max(least(shape), LEAST) / math.sqrt(3.0)
         nodes = free_nodes(triangles, cells, shape, limit, colours, colours_most, mark)
         visit(points, nodes, start, around, guard, plan[c, 1], plan[c, 2], scale, mark, tally)
         shapes_of(points, triangles, turn, cells, shape)
-    return before, shape.min()
+    return before, least(shape)
 
 
 @part
