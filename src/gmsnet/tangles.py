@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from gmsnet.kernels.guard import Precision
 from gmsnet.measure import QualityReport
 from gmsnet.topology import Topology
-from gmsnet.untangle import untangle
 
 Floats = NDArray[np.float64]
 Reasons = dict[tuple[int, ...], str]
@@ -28,6 +27,8 @@ def mended(points: Floats, topology: Topology, precision: Precision) -> tuple[Fl
 
     The reasons are kept by the nodes of the cells, ascending.
     """
+    from gmsnet.untangle import untangle  # what it needs of SciPy takes a third of a second to import
+
     done = untangle(points, topology, precision)
     stages = ", ".join(f"{stage.name} ({stage.sweeps})" for stage in done.stages) or "nothing to try"
     left = f"{done.after:,} of {done.before:,} inverted cells are left" if done.after else f"all {done.before:,} mended"
