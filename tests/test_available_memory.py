@@ -1,12 +1,19 @@
 from __future__ import annotations
 
 import os
+import tracemalloc
 
+import numpy as np
 import pytest
 
-from gmsnet import available_memory
+import gmsnet
+from gmsnet import available_memory, engine, layers, topology
 from gmsnet.available_memory import available, refuse_unless_free
 from gmsnet.errors import InputError
+from gmsnet.generate import disturb, layered_mesh
+from gmsnet.layers import stretched_layers
+from gmsnet.survey import Survey
+from gmsnet.topology import Topology, near_points
 
 MEMINFO = """\
 MemTotal:       24600000 kB
@@ -85,3 +92,43 @@ def test_too_much_is_refused_with_both_amounts(monkeypatch):
 def test_little_is_not_asked_for(monkeypatch):
     monkeypatch.setattr(available_memory, "available", lambda: pytest.fail("asked"))
     refuse_unless_free(available_memory.ALWAYS_FREE, "this")
+
+
+def most_traced(work) -> int:
+    """Bytes that NumPy has allocated at the most while this works, once all is loaded and compiled."""
+    work()
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def arrays(mesh):
+    return np.array(mesh.points), np.array(mesh.cells[0].nodes)
+
+
+@pytest.mark.parametrize(("method", "most"), [("auto", 250), ("laplacian", 260), ("getme", engine.BYTES_PER_NODE)])
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_call_allocates_no_more_than_is_asked_for(method, most, threads):
+    given = arrays(gmsnet.random_mesh(30_000, seed=0))
+    traced = most_traced(lambda: gmsnet.smooth(given, method, max_sweeps=3, threads=threads))
+    assert traced <= most * len(given[0])
+
+
+def test_the_connectivity_allocates_no_more_than_is_asked_for():
+    mesh = gmsnet.random_mesh(20_000, seed=0)
+    tangled = disturb(mesh, Topology.of(mesh).free, 0.8, seed=1, keep_valid=False)
+    for each in (mesh, tangled):
+        asked_for = topology.PER_NODE * len(each.points) + topology.PER_CORNER * 3 * len(each.cells[0].nodes)
+        assert most_traced(lambda each=each: Topology.of(each)) <= asked_for
+
+
+def test_layers_allocate_no_more_than_is_asked_for():
+    mesh = layered_mesh(30, 1000.0, 200)
+    known = Topology.of(mesh)
+    near = near_points(mesh, known)
+    assert stretched_layers(mesh, known, Survey.of(mesh, known, near))
+    traced = most_traced(lambda: stretched_layers(mesh, known, Survey.of(mesh, known, near)))
+    assert traced <= layers.BYTES_PER_NODE * len(near)

@@ -187,7 +187,7 @@ def test_many_runs_at_once_give_what_one_gives(square):
 
 
 def test_no_threads_are_left_behind(monkeypatch):
-    monkeypatch.setattr(workers, "BLOCKS_PER_THREAD", 1)
+    monkeypatch.setattr(workers, "FEWEST_BLOCKS", 1)
     mesh = gmsnet.random_mesh(20_000, seed=0)
     gmsnet.smooth(mesh, max_sweeps=1, threads=3)
     for _ in range(100):

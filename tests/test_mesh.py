@@ -231,6 +231,20 @@ def test_blocks_may_come_from_a_generator():
     assert len(full(cells=(b for b in [block()])).cells) == 1
 
 
+@pytest.mark.parametrize(("axis", "plane"), [(0, (1, 2)), (1, (0, 2)), (2, (0, 1))])
+def test_without_cells_a_mesh_stays_in_the_plane_that_they_were_in(axis, plane):
+    """A node that no cell uses may lie anywhere."""
+    points = np.insert(np.random.default_rng(0).random((5, 2)), axis, 3.0, axis=1)
+    points[4] = [7.0, 8.0, 9.0]
+    mesh = Mesh(points, (CellBlock("triangle", np.array([[0, 1, 2], [1, 3, 2]]), np.zeros(2, int)),), single=True)
+    bare = mesh.without_cells()
+    assert mesh.plane == bare.plane == bare.with_points(points + 1.0).plane == plane
+    assert bare.points is mesh.points
+    assert bare.single
+    assert not bare.cells
+    assert len(mesh.cells) == 1
+
+
 def test_other_points_change_nothing_else():
     mesh = full(points=np.column_stack([POINTS, np.zeros(4)]))
     assert mesh.plane == (0, 1)

@@ -27,6 +27,8 @@ VTK_KIND = {
     12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8", 24: "tetra10",
     25: "hexahedron20", 28: "quad9", 34: "triangle7", 35: "line4",
 }  # fmt: skip
+NOWHERE = np.zeros((), dtype=np.int64)  # the region of cells without any, once for all of them
+NOWHERE.flags.writeable = False
 VTK_CHAINS = {2: ("vertex", 1), 4: ("line", 2)}  # cells of any number of nodes that are taken as their pieces
 
 # meshio's names of cells, those of higher order ("tetra35") included.
@@ -153,9 +155,10 @@ def _mesh(
     array = coordinates(points)
     cell_data, node_sets = cell_data or {}, dict(node_sets or {})
     counts = [len(nodes) for _, nodes in blocks]
-    region = np.zeros(sum(counts), dtype=np.int64)
+    region: NDArray[np.int64] = np.broadcast_to(NOWHERE, sum(counts))
     region_names: dict[tuple[int, int], str] = {}
     if cell_data or cell_sets:
+        region = np.zeros(len(region), dtype=np.int64)
         dimension = np.repeat([DIMENSION.get(kind, 3) for kind, _ in blocks], counts).astype(np.int64)
         physical = cell_data.get("gmsh:physical")
         for dim in np.unique(dimension).tolist():

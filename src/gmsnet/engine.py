@@ -23,7 +23,7 @@ from gmsnet.mesh import Mesh
 from gmsnet.methods import Smoother, smoother
 from gmsnet.methods.auto import Auto
 from gmsnet.patches import reach_target
-from gmsnet.preserve import method_for, protected
+from gmsnet.preserve import Protection, method_for, protected
 from gmsnet.run import CALLBACK as CALLBACK
 from gmsnet.run import INTERRUPTED as INTERRUPTED
 from gmsnet.run import MAX_SWEEPS as MAX_SWEEPS
@@ -37,11 +37,12 @@ from gmsnet.tangles import UnmendedCell, beside, mended, still_inverted
 from gmsnet.target import Target
 from gmsnet.topology import Topology, near_points
 from gmsnet.wall_stage import improve_near_walls
-from gmsnet.workers import available_threads
+from gmsnet.workers import available_threads, side_by_side
 
 Floats = NDArray[np.float64]
 
-BYTES_PER_NODE = 600  # that a call takes at most beside the mesh, measured with ``auto`` on a mesh of triangles
+MANY = 20_000  # nodes: for the set-up of fewer a second thread is not worth starting
+BYTES_PER_NODE = 400  # that a call takes at most on a mesh of triangles, copies of them included; ``auto`` takes 250
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,10 +131,20 @@ def smooth(
     given, restore = to_mesh(mesh)
     refuse_unless_planar(given)
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
-    topology = Topology.of(given, fixed_mask(given, fixed))
-    start = given_points = near_points(given, topology)
-    before = measure(given, topology, start)
-    protection = protected(given, topology, preserve, fix_layers, start)
+    threads = threads or available_threads()
+    apart = threads if len(given.points) >= MANY else 1
+    topology = Topology.of(given, fixed_mask(given, fixed), apart)
+    given = given.without_cells()  # whatever was copied of them is given back
+
+    def looked_at() -> tuple[Floats, QualityReport, Protection]:
+        near = near_points(given, topology)
+        return near, measure(given, topology, near), protected(given, topology, preserve, fix_layers, near)
+
+    if apart == 1 or target:
+        start, before, protection = looked_at()
+    else:  # most often nothing is protected, and these are the stars that are smoothed
+        (start, before, protection), _ = side_by_side(apart, looked_at, lambda: topology.stars)
+    given_points = start
     reasons: dict[tuple[int, ...], str] = {}
     untangling: list[str] = []
     if untangle and before.inverted:
@@ -146,7 +157,7 @@ def smooth(
         untangling.append(note)
     topology, notes = protection.topology, [*protection.notes, *untangling]
 
-    options: dict[str, Any] = {"threads": threads or available_threads(), "best_by": best_by, "guard": guard}
+    options: dict[str, Any] = {"threads": threads, "best_by": best_by, "guard": guard}
     if target:
         best, stop_reason, history = reach_target(
             given, topology, None if isinstance(chosen, Auto) else create, target, start,
@@ -154,9 +165,9 @@ def smooth(
         )  # fmt: skip
     else:
         standing = Standing.of(before.totals, best_by) if start is given_points else None
-        run = Run(given, topology, chosen, points=start, standing=standing, **options)
-        stop_reason = run.to_the_end(max_sweeps, None, callback)
-        best, history = run.best, run.history
+        best, stop_reason, history = _smoothed(
+            Run(given, topology, chosen, points=start, standing=standing, **options), max_sweeps, callback
+        )
         if protection.kept is not None and stop_reason in (NO_PROGRESS, NOTHING_TO_MOVE):
             topology = protection.outer
             try:
@@ -169,10 +180,11 @@ def smooth(
 
     rank = target.rank if target else rank_by(best_by)
     try:
-        points, moved, after = outcome(given, topology, best, before, rank, given_points)
+        points, moved, after = outcome(given, topology, best, before, rank, given_points, threads)
     except KeyboardInterrupt:  # nothing is lost by finishing what takes less than a sweep
         stop_reason = INTERRUPTED
-        points, moved, after = outcome(given, topology, best, before, rank, given_points)
+        points, moved, after = outcome(given, topology, best, before, rank, given_points, threads)
+    del start, given_points, best  # before the copies for the result are made
     return SmoothResult(
         mesh=restore(points),
         points=points.copy(),
@@ -188,6 +200,14 @@ def smooth(
         topology=topology,
         seconds=time.perf_counter() - began,
     )
+
+
+def _smoothed(
+    run: Run, max_sweeps: int, callback: Callable[[Sweep], bool | None] | None
+) -> tuple[Floats, str, list[Sweep]]:
+    """The best points of a whole run, why it ended, and its record; nothing else of it is kept."""
+    stop_reason = run.to_the_end(max_sweeps, None, callback)
+    return run.best, stop_reason, run.history
 
 
 def check_options(

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.available_memory import refuse_unless_free
 from gmsnet.kernels import connectivity, stretch
 from gmsnet.kernels.pieces import pieces, surroundings
 from gmsnet.mesh import Mesh
@@ -35,6 +36,7 @@ FEWEST = 6  # nodes above SEED that hang together
 RINGS = 4  # how far a layer extends beyond those, in edges
 EVEN = 0.2  # of the mean area of a star: the least of its areas where a layer goes around a corner
 NEXT = 3.0  # how many times the area of a cell's neighbour in a layer its own may be, or the other way round
+BYTES_PER_NODE = 600  # that the layers of a mesh that has some take to be told, measured where all cells are in one
 BROKEN = 0.05  # of the mean area around: a cell of less is damaged, and its nodes are not held
 
 
@@ -86,6 +88,7 @@ def stretched_layers(mesh: Mesh, topology: Topology, survey: Survey | None = Non
     layer = _seeds(survey, topology)
     if not layer.any():
         return nothing
+    refuse_unless_free(BYTES_PER_NODE * count, f"telling the layers among {count:,} nodes")
     cells, number = np.empty((len(triangles), stretch.COLUMNS)), np.empty(count, dtype=np.int32)
     stretch.per_cell(survey.points, triangles, turn, MOST, cells)
     means = np.empty((count, stretch.COLUMNS))

@@ -16,7 +16,7 @@ from gmsnet.kernels import quality as kernels
 from gmsnet.kernels.compile import LANES
 from gmsnet.mesh import Mesh
 from gmsnet.topology import Topology, near_points, planar_points
-from gmsnet.workers import Share, serial
+from gmsnet.workers import Share, serial, workers
 
 Floats = NDArray[np.float64]
 
@@ -223,7 +223,9 @@ def percentile(values: Floats, percent: int) -> float:
     return low if place == below else low + (float(parted[below + 1 :].min()) - low) * (place - below)
 
 
-def measure(mesh: Mesh, topology: Topology | None = None, near: Floats | None = None) -> QualityReport:
+def measure(
+    mesh: Mesh, topology: Topology | None = None, near: Floats | None = None, threads: int = 1
+) -> QualityReport:
     """The measures of a mesh; ``topology`` saves building it again (it must belong to the same connectivity).
 
     The signs are those of the topology's winding, so a report on moved points sees what has turned over. near:
@@ -240,7 +242,9 @@ def measure(mesh: Mesh, topology: Topology | None = None, near: Floats | None = 
         )
         report.__dict__["_columns"] = columns
         return report
-    totals = totals_of(near_points(mesh, topology) if near is None else near, topology.near, topology.near_turn)
+    near = near_points(mesh, topology) if near is None else near
+    with workers(threads, -(-len(topology.near) // LANES)) as share:
+        totals = totals_of(near, topology.near, topology.near_turn, share)
     assert totals is not None
     signs = exact_signs(planar_points(mesh), topology.triangles, topology.turn) if totals.doubts else None
     return QualityReport(topology.cell, totals, triangles, signs)

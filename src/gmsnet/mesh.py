@@ -139,8 +139,18 @@ class Mesh:
         if np.shape(points) != self.points.shape:
             raise InputError(f"new points must have the shape {self.points.shape}, got {np.shape(points)}")
         made = copy(self)  # all else has been checked
-        made.__dict__.pop("plane", None)
+        if self.cells:  # without any (``without_cells``), it is the plane of those that there were
+            made.__dict__.pop("plane", None)
         object.__setattr__(made, "points", _finite(points))
+        return made
+
+    def without_cells(self) -> Mesh:
+        """The points alone, in the same plane: all that is needed of a mesh once its connectivity is known."""
+        made = copy(self)
+        nothing: dict[str, Any] = {"cells": (), "point_data": {}, "cell_data": {}, "node_sets": {}, "source": None}
+        for name, value in nothing.items():
+            object.__setattr__(made, name, value)
+        made.__dict__["plane"] = self.plane
         return made
 
     @cached_property

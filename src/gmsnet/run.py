@@ -158,7 +158,7 @@ def precision_of(mesh: Mesh) -> Precision:
 
 def outcome(
     mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
-    start: Floats | None = None,
+    start: Floats | None = None, threads: int = 1,
 ) -> tuple[Floats, NDArray[np.bool_], QualityReport]:  # fmt: skip
     """Points (N, dim), which of them moved, and their measures; those of the input if the quick sums misjudged them.
 
@@ -172,7 +172,7 @@ def outcome(
     count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)
     if count:
         points.flags.writeable = False  # so that the mesh need not copy them
-        after = measure(mesh.with_points(points), topology, best if exact else None)
+        after = measure(mesh.with_points(points), topology, best if exact else None, threads)
         if rank(after) <= rank(before):
             return points, moved, after
         moved[:] = False

@@ -8,7 +8,7 @@ looks at some of the cells, or adds over all of them, takes them in that order.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -22,6 +22,7 @@ from gmsnet.kernels import connectivity, layout, patch
 from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.compile import LANES
 from gmsnet.mesh import Mesh
+from gmsnet.workers import side_by_side
 
 Ints = NDArray[np.int32]
 Flags = NDArray[np.bool_]
@@ -43,6 +44,27 @@ class Stars:
 
 
 @dataclass(frozen=True, eq=False)
+class Colouring:
+    """Greedy colours of the nodes at some places in memory, in this order; made when they are first asked for.
+
+    start, ring: CSR by places in memory, the ring with WIDTH more (kernels.connectivity).
+    """
+
+    places: Ints
+    start: Offsets
+    ring: Ints
+
+    @cached_property
+    def colours(self) -> Ints:
+        """(N,) by places in memory, −1 for all others."""
+        colours = np.zeros(len(self.start) - 1, dtype=np.int32)
+        if not connectivity.colour(self.places, self.start, self.ring, colours):
+            colours[:] = -1
+            connectivity.colour_many(self.places, self.start, self.ring, colours)
+        return colours
+
+
+@dataclass(frozen=True, eq=False)
 class Topology:
     """The connectivity of a mesh, seen from its nodes.
 
@@ -52,8 +74,9 @@ class Topology:
     held: reason → node ids, the first reason that applies.
     free: (F,) ids of the nodes that may move, ascending.
     memory: (N,) node ids in memory order. In that order, by places in memory: near (T, 3) and near_turn (T,), the
-    triangles; rings, each from its smallest id on, their CSR start (N + 1) and the colours (N,), of which no two free
-    nodes of one cell share one (−1 where held).
+    triangles; rings, each from its smallest id on, and their CSR start (N + 1); near_free (N,), which nodes may move.
+    colouring: of all nodes that were free at first, in the order of the ids, so that colours follow from the
+    connectivity alone.
     """
 
     plane: tuple[int, int] | None
@@ -67,22 +90,24 @@ class Topology:
     near_turn: NDArray[np.int8]
     near_start: Offsets
     near_ring: Ints
-    near_colours: Ints
+    near_free: Flags
+    colouring: Colouring
 
     @classmethod
-    def of(cls, mesh: Mesh, fixed: Flags | None = None) -> Topology:
+    def of(cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1) -> Topology:
         """The topology of a mesh; ``fixed`` (N,) bool holds further nodes ("fixed by the user").
+
+        threads: one or two; more have nothing to do.
 
         Raises InputError for more nodes or faces than int32 can number, and where memory does not suffice.
         """
         nodes, corners = len(mesh.points), check_size(mesh)
         refuse_unless_free(nodes * PER_NODE + corners * PER_CORNER, f"the connectivity of {nodes:,} nodes")
         planar = planar_points(mesh)
-        memory, position = _memory_order(planar)
-        written = Faces.of(mesh)
-        faces = written.renumbered(position)
+        (memory, position), written = side_by_side(threads, partial(_memory_order, planar), partial(Faces.of, mesh))
+        faces, planar = side_by_side(threads, partial(written.renumbered, position), partial(_taken, planar, memory))
         marks = known_marks(mesh, fixed, position)
-        points = None if mesh.plane is None else planar.take(memory, axis=0)
+        points = None if mesh.plane is None else planar
         near_turn, start, ring = closed_fans(faces, points, marks, memory, MOST_NEIGHBOURS)
         held, free, places = sorted_out(marks, position)
         three, triangles = written.triangles()
@@ -103,8 +128,8 @@ class Topology:
             near_turn=near_turn[whole],
             near_start=start,
             near_ring=ring[: start[-1]],
-            # In the order of the node ids, so that colours follow from the connectivity alone.
-            near_colours=_colours(places, start, ring),
+            near_free=marks == 0,
+            colouring=Colouring(places, start, ring),
         )
 
     def holding(self, chosen: Flags, reason: str) -> Topology:
@@ -112,9 +137,9 @@ class Topology:
         newly = self.free[chosen[self.free]]
         if not len(newly):
             return self
-        colours = np.where(chosen[self.memory], -1, self.near_colours).astype(np.int32)
         held = {**self.held, reason: newly.astype(np.int64)}
-        return replace(self, held=held, free=self.free[~chosen[self.free]], near_colours=colours)
+        free = self.near_free & ~chosen[self.memory]
+        return replace(self, held=held, free=self.free[~chosen[self.free]], near_free=free)
 
     def restricted(self, active: Flags) -> Topology:
         """The same with the active nodes (N,) by places in memory alone free, and only the triangles around them.
@@ -124,8 +149,7 @@ class Topology:
         nodes = np.flatnonzero(active)
         near = patch.triangles_around(nodes, active, self.near_start, self.near_ring)
         turn = np.ones(len(near), dtype=np.int8)
-        colours = np.where(active, self.near_colours, np.int32(-1))
-        inner = replace(self, near=near, near_turn=turn, free=np.sort(self.memory[nodes]), near_colours=colours)
+        inner = replace(self, near=near, near_turn=turn, free=np.sort(self.memory[nodes]), near_free=active)
         inner.__dict__["changeable"] = near, turn  # all of them
         return inner
 
@@ -135,20 +159,20 @@ class Topology:
         free = np.flatnonzero(self.near_free).astype(np.int32)
         degrees = np.diff(self.near_start).take(free)
         most, colours = int(degrees.max(initial=0)), int(self.near_colours.max(initial=-1)) + 1
-        kind = self.near_colours.take(free) * (most + 1) + degrees  # first all of the first colour, by degree
-        stars = np.bincount(kind, minlength=colours * (most + 1))
-        number = -(-stars // LANES)
-        end = np.cumsum(number)
-        degree = np.repeat(np.tile(np.arange(most + 1, dtype=np.int32), colours), number)
-        filled = np.full(len(degree), LANES, dtype=np.int32)
-        filled[end[stars > 0] - 1] = (stars - (number - 1) * LANES)[stars > 0]
-        offset = np.zeros(len(degree) + 1, dtype=np.int64)
-        np.cumsum(LANES * degree, out=offset[1:])
-        centre, rings = np.empty(len(degree) * LANES, dtype=np.int32), np.empty(offset[-1], dtype=np.int32)
-        seat = (end - number) * LANES
-        layout.fill_blocks(free, self.near_start, self.near_ring, kind, seat, filled, offset, centre, rings)
-        first = np.concatenate([[0], end[most :: most + 1]]).astype(np.int32)
-        return Stars(Blocks(centre, rings, offset[:-1], degree, filled, most), first)
+        kind = self.near_colours.take(free) * (most + 1) + degrees
+        number = -(-np.bincount(kind, minlength=colours * (most + 1)).reshape(colours, most + 1) // LANES)
+        first, to = np.zeros((2, colours + 1), dtype=np.int64)
+        np.cumsum(number.sum(axis=1), out=first[1:])
+        np.cumsum(LANES * (number @ np.arange(most + 1)), out=to[1:])
+        blocks = int(first[-1])
+        centre, rings = np.empty(blocks * LANES, dtype=np.int32), np.empty(to[-1], dtype=np.int32)
+        offset, degree = np.empty(blocks, dtype=np.int64), np.empty(blocks, dtype=np.int32)
+        filled = np.zeros(blocks, dtype=np.int32)
+        layout.fill_blocks(
+            free, self.near_start, self.near_ring, kind, most + 1, first[:-1].copy(), to[:-1], centre, rings,
+            offset, degree, filled,
+        )  # fmt: skip
+        return Stars(Blocks(centre, rings, offset, degree, filled, most), first.astype(np.int32))
 
     @cached_property
     def patches(self) -> tuple[Offsets, Ints]:
@@ -169,9 +193,12 @@ class Topology:
         return _inverse(self.memory)
 
     @cached_property
-    def near_free(self) -> Flags:
-        """(N,) by places in memory: which nodes may move."""
-        return self.near_colours >= 0
+    def near_colours(self) -> Ints:
+        """(N,) by places in memory: colours, of which no two free nodes of one cell share one; −1 where held."""
+        colours = self.colouring.colours
+        if len(self.free) == len(self.colouring.places):
+            return colours
+        return np.where(self.near_free, colours, np.int32(-1))
 
     @cached_property
     def near_ringed(self) -> Flags:
@@ -217,15 +244,6 @@ def _memory_order(points: NDArray[np.float64]) -> tuple[Ints, Ints]:
     return memory, position
 
 
-def _colours(places: Ints, start: Offsets, ring: Ints) -> Ints:
-    """(N,) by places in memory: greedy colours of the free nodes, in the order of ``places``; −1 for all others."""
-    colours = np.zeros(len(start) - 1, dtype=np.int32)
-    if not connectivity.colour(places, start, ring, colours):
-        colours[:] = -1
-        connectivity.colour_many(places, start, ring, colours)
-    return colours
-
-
 class Flat(Protocol):
     """Points in a plane: a Mesh, or what is kept of one. See there."""
 
@@ -259,7 +277,11 @@ def planar_points(mesh: Flat) -> NDArray[np.float64]:
 
 def near_points(mesh: Flat, topology: Topology) -> NDArray[np.float64]:
     """The same by places in memory."""
-    return np.take(planar_points(mesh), topology.memory, axis=0)
+    return _taken(planar_points(mesh), topology.memory)
+
+
+def _taken(points: NDArray[np.float64], memory: Ints) -> NDArray[np.float64]:
+    return np.take(points, memory, axis=0)
 
 
 def scale_exponent(mesh: Flat) -> int:

@@ -1,4 +1,4 @@
-"""Work on ranges of blocks, side by side on threads where that pays. The kernels release the GIL."""
+"""Work on ranges of blocks, and works apart, side by side on threads where that pays. The kernels release the GIL."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
-BLOCKS_PER_THREAD = 256  # about a millisecond of work: for less, waking a thread can cost more than it brings
+FEWEST_BLOCKS = 64  # in a piece: a tenth of a millisecond of work, ten times what handing it to a thread takes
 
 Share = Callable[[Callable[[int, int], Any], int, int], list[Any]]
+One = TypeVar("One")
+Other = TypeVar("Other")
 
 
 def serial(work: Callable[[int, int], Any], first: int, last: int) -> list[Any]:
@@ -20,19 +22,50 @@ def serial(work: Callable[[int, int], Any], first: int, last: int) -> list[Any]:
 
 @contextmanager
 def workers(threads: int, blocks: int) -> Iterator[Share]:
-    """Gives a function that calls another on ranges first…last, in ``threads`` pieces side by side where that pays."""
-    if threads == 1 or blocks < 2 * BLOCKS_PER_THREAD:
+    """Gives a function that calls another on the pieces of a range first…last, side by side where that pays.
+
+    Threads take the next piece when they have done one, so that none waits long for another that was held up. What
+    the pieces return comes in their order. blocks: how many there are in all.
+    """
+    if threads == 1 or blocks < 8 * FEWEST_BLOCKS:
         yield serial
         return
     with ThreadPoolExecutor(threads - 1) as pool:
 
         def share(work: Callable[[int, int], Any], first: int, last: int) -> list[Any]:
-            pieces = max(1, min(threads, (last - first) // BLOCKS_PER_THREAD))
-            ends = [first + (last - first) * k // pieces for k in range(pieces + 1)]
-            others = [pool.submit(work, *ends[k : k + 2]) for k in range(1, pieces)]
-            return [work(first, ends[1]), *(other.result() for other in others)]  # the caller works too
+            ends = pieces(first, last, threads)
+            found: list[Any] = [None] * (len(ends) - 1)
+            numbers = iter(range(len(found)))
+
+            def take() -> None:
+                for k in numbers:  # each number goes to one thread
+                    found[k] = work(ends[k], ends[k + 1])
+
+            others = [pool.submit(take) for _ in range(min(threads, len(found)) - 1)]
+            take()  # the caller works too
+            for other in others:
+                if not other.cancel():  # one that has not begun by now has nothing left to do
+                    other.result()
+            return found
 
         yield share
+
+
+def pieces(first: int, last: int, threads: int) -> list[int]:
+    """Where the pieces of a range begin, and its end: large ones first, so that they are few and end together."""
+    ends = [first]
+    while last - ends[-1] >= 2 * FEWEST_BLOCKS:
+        ends.append(ends[-1] + max((last - ends[-1]) // (2 * threads), FEWEST_BLOCKS))
+    return [*ends, last]
+
+
+def side_by_side(threads: int, one: Callable[[], One], other: Callable[[], Other]) -> tuple[One, Other]:
+    """What two works return that have nothing to do with each other, each on a thread if there are two."""
+    if threads == 1:
+        return one(), other()
+    with ThreadPoolExecutor(1) as pool:
+        later = pool.submit(other)
+        return one(), later.result()
 
 
 def available_threads() -> int:

@@ -45,7 +45,7 @@ def test_a_cell_misses_a_target_as_its_definition_says(a, b, c, quality, angle):
 def test_rows_and_nodes_against_a_slow_twin(target):
     mesh = gmsnet.random_mesh(300, seed=2)
     topology = Topology.of(mesh)
-    points, near, colours = near_points(mesh, topology), topology.near, topology.near_colours
+    points, near, may_move = near_points(mesh, topology), topology.near, topology.near_free
     report = gmsnet.quality(mesh)
     rows = below.missed(points, near, topology.near_turn, *target.limits)
     expected = np.flatnonzero(target.missed(report.shape, report.min_angle))
@@ -54,33 +54,33 @@ def test_rows_and_nodes_against_a_slow_twin(target):
     )
     assert target.missed_in(report).tolist() == expected.tolist()
     seen = np.zeros(len(points), dtype=bool)
-    free = below.free_corners(near, rows, colours, seen)
+    free = below.free_corners(near, rows, may_move, seen)
     assert len(set(free.tolist())) == len(free)
-    assert set(free.tolist()) == {i for i in near[rows].ravel().tolist() if colours[i] >= 0}
+    assert set(free.tolist()) == {i for i in near[rows].ravel().tolist() if may_move[i]}
     chosen = free[: len(free) // 2]
     around = {t for t in rows.tolist() if set(near[t].tolist()) & set(chosen.tolist())}
-    found = below.still_missing(points, chosen, topology.near_start, topology.near_ring, colours, *target.limits, seen)
+    found = below.still_missing(points, chosen, topology.near_start, topology.near_ring, may_move, *target.limits, seen)
     assert len(set(found.tolist())) == len(found)
-    assert set(found.tolist()) == {i for t in around for i in near[t].tolist() if colours[i] >= 0}
+    assert set(found.tolist()) == {i for t in around for i in near[t].tolist() if may_move[i]}
     assert not seen.any()
 
 
 def test_rounds_end_where_nothing_is_missed_or_too_much_was_done():
     mesh = gmsnet.random_mesh(500, seed=3)
     topology, target = Topology.of(mesh), Target(0.3)
-    near, turn, colours = topology.near, topology.near_turn, topology.near_colours
+    near, turn, may_move = topology.near, topology.near_turn, topology.near_free
     rings = topology.near_start, topology.near_ring
 
     def made(plan, most):
         points, tally = near_points(mesh, topology), np.zeros(3, dtype=np.int64)
         rows = below.missed(points, near, turn, *target.limits)
-        nodes = below.free_corners(near, rows, colours, np.zeros(len(points), dtype=bool))
+        nodes = below.free_corners(near, rows, may_move, np.zeros(len(points), dtype=bool))
         limits = (target.shape, *target.limits)
         left = below.rounds(
-            points, nodes, *rings, colours, plain_guard(Precision()), np.array(plan), most, limits, tally
+            points, nodes, *rings, may_move, plain_guard(Precision()), np.array(plan), most, limits, tally
         )
         rows = below.missed(points, near, turn, *target.limits)
-        assert set(left.tolist()) == {i for i in near[rows].ravel().tolist() if colours[i] >= 0}
+        assert set(left.tolist()) == {i for i in near[rows].ravel().tolist() if may_move[i]}
         return points.tobytes(), tally.tolist(), len(nodes), len(left)
 
     plan = [(2, 1), (3, 1), (4, 2), (5, 2), (6, 2), (6, 2)]

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gmsnet.kernels import connectivity
-from gmsnet.topology import _colours
+from gmsnet.topology import Colouring
 
 
 def csr(rings):
@@ -32,7 +32,7 @@ def test_first_fit_in_the_order_of_the_ids(seed, nodes, share):
     for v in range(nodes):
         by_place[place[v]] = place[rings[v]].tolist() if rings[v] else []
     start, ring = csr(by_place)
-    found = _colours(place[free].astype(np.int32), start, ring)
+    found = Colouring(place[free].astype(np.int32), start, ring).colours
     assert found[place].tolist() == [colours.get(v, -1) for v in range(nodes)]
 
 
@@ -42,4 +42,4 @@ def test_any_number_of_colours(nodes):
     start, ring = csr([[u for u in range(nodes) if u != v] for v in range(nodes)])
     places, colours = np.arange(nodes, dtype=np.int32)[::-1].copy(), np.zeros(nodes, dtype=np.int32)
     assert connectivity.colour(places, start, ring, colours) == (nodes <= connectivity.COLOURS)
-    assert _colours(places, start, ring).tolist() == list(range(nodes))[::-1]
+    assert Colouring(places, start, ring).colours.tolist() == list(range(nodes))[::-1]

@@ -104,7 +104,7 @@ def test_nothing_valid_is_inverted_and_nothing_held_moves(method, seed, nodes, t
 
 @every_method
 def test_the_same_bits_for_any_number_of_threads_and_from_run_to_run(method, monkeypatch):
-    monkeypatch.setattr(workers, "BLOCKS_PER_THREAD", 1)  # so that a mesh of this size is shared out at all
+    monkeypatch.setattr(workers, "FEWEST_BLOCKS", 1)  # so that a mesh of this size is shared out at all
     mesh = square(20_000, 3)
     results = [gmsnet.smooth(mesh, **method, max_sweeps=2, threads=n).points.tobytes() for n in (1, 2, 4, 1)]
     assert len(set(results)) == 1

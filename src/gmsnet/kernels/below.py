@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, inlined, kernel
+from gmsnet.kernels.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.quality import shape_of
 from gmsnet.kernels.worst_first_cycles import visit
 
@@ -50,8 +50,8 @@ def missed(points, triangles, turn, quality, tangent):
 
 
 @kernel
-def free_corners(triangles, rows, colours, seen):
-    """The free nodes (int32) of the triangles in these rows, as they come. colours: (N,), −1 where held.
+def free_corners(triangles, rows, free, seen):
+    """The free nodes (int32) of the triangles in these rows, as they come. free: (N,) bool.
 
     seen: (N,) bool, all False before and after.
     """
@@ -60,7 +60,7 @@ def free_corners(triangles, rows, colours, seen):
     for t in rows:
         for k in range(3):
             i = triangles[t, k]
-            if colours[i] >= 0 and not seen[i]:
+            if free[i] and not seen[i]:
                 seen[i] = True
                 found[count] = i
                 count += 1
@@ -70,11 +70,11 @@ def free_corners(triangles, rows, colours, seen):
 
 
 @kernel
-def rounds(points, nodes, start, around, colours, guard, plan, most, target, tally):
+def rounds(points, nodes, start, around, free, guard, plan, most, target, tally):
     """Visits the nodes, then those that have a cell yet which misses the target; returns the latter.
 
     nodes: (K,) int32, free ones, best near each other in memory. start, around: the rings of all nodes, in CSR form.
-    colours: (N,), −1 where held. plan: (R, 2) of log₂ of the power p and visits, for each round. most: visits; a round
+    free: (N,) bool. plan: (R, 2) of log₂ of the power p and visits, for each round. most: visits; a round
     that would begin after so many is not made. target: the least 1/q of a cell that meets it, for the scale; then what
     ``missing`` asks for. tally: (3,), added to.
     """
@@ -85,12 +85,12 @@ def rounds(points, nodes, start, around, colours, guard, plan, most, target, tal
             break
         visit(points, nodes, start, around, guard, plan[r, 0], plan[r, 1], target[0] / math.sqrt(3.0), mark, tally)
         visits += plan[r, 1] * len(nodes)
-        nodes = still_missing(points, nodes, start, around, colours, target[1], target[2], mark)
+        nodes = still_missing(points, nodes, start, around, free, target[1], target[2], mark)
     return nodes
 
 
-@kernel
-def still_missing(points, nodes, start, around, colours, quality, tangent, seen):
+@part
+def still_missing(points, nodes, start, around, free, quality, tangent, seen):
     """The free nodes (int32) of the cells around these nodes that miss the target, as they come.
 
     seen: (N,) bool, all False before and after.
@@ -109,7 +109,7 @@ def still_missing(points, nodes, start, around, colours, quality, tangent, seen)
             qx, qy = points[after, 0] - x, points[after, 1] - y
             if missing(px, py, qx, qy, quality, tangent):
                 for corner in (i, before, after):
-                    if colours[corner] >= 0 and not seen[corner]:
+                    if free[corner] and not seen[corner]:
                         seen[corner] = True
                         found[count] = corner
                         count += 1

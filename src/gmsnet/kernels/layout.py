@@ -108,23 +108,36 @@ def take_faces(first, corner, order, new_first, new_corner):
 
 
 @kernel
-def fill_blocks(free, start, ring, kind, seat, filled, offset, centre, rings):
-    """Writes the stars of the free nodes (by places, ascending) into blocks of LANES stars of one kind.
+def fill_blocks(free, start, ring, kind, degrees, block, to, centre, rings, offset, degree, filled):
+    """Writes the stars of the free nodes (by places, ascending) into blocks of LANES stars of one colour and degree.
 
-    start, ring: CSR by places. kind: (F,) of each star. seat: lane, from the first block on, of the first star of each
-    kind; counted up here. filled: (blocks,) the stars in each; the lanes left over repeat the last one. offset:
-    (blocks + 1,) where in ``rings`` the rings of each block begin, as [ring node][lane].
+    A block stands where its first star does among those of its colour, so that what is near in memory is visited at
+    about the same time, of whatever degree. start, ring: CSR by places. kind: (F,) of each star, colour·degrees +
+    degree. block, to: by colour, the first block and where its ring begins in ``rings``; counted up here. Writes the
+    arrays of ``kernels.block.Blocks``; filled: zeros before. The lanes left over repeat the last star.
     """
+    open_block = np.full(len(block) * degrees, -1, dtype=np.int64)  # of each kind, the one that has room
     for i in range(len(free)):
-        v = free[i]
-        lane = seat[kind[i]]
-        seat[kind[i]] = lane + 1
-        centre[lane] = v
-        to = offset[lane // LANES] + lane % LANES
-        for j in range(start[v + 1] - start[v]):
-            rings[to + j * LANES] = ring[start[v] + j]
+        v, k = free[i], kind[i]
+        n = k % degrees
+        b = open_block[k]
+        if b < 0:
+            colour = k // degrees
+            b = open_block[k] = block[colour]
+            block[colour] = b + 1
+            offset[b], degree[b] = to[colour], n
+            to[colour] += LANES * n
+        lane = filled[b]
+        filled[b] = lane + 1
+        if lane + 1 == LANES:
+            open_block[k] = -1
+        centre[b * LANES + lane] = v
+        at, low = offset[b] + lane, np.int64(start[v])
+        for j in range(n):
+            rings[at + j * LANES] = ring[low + j]
     for b in range(len(filled)):
-        for lane in range(filled[b], LANES):
-            centre[b * LANES + lane] = centre[b * LANES + filled[b] - 1]
-            for row in range(offset[b], offset[b + 1], LANES):
-                rings[row + lane] = rings[row + filled[b] - 1]
+        last = filled[b] - 1
+        for lane in range(last + 1, LANES):
+            centre[b * LANES + lane] = centre[b * LANES + last]
+            for row in range(offset[b], offset[b] + LANES * degree[b], LANES):
+                rings[row + lane] = rings[row + last]

@@ -56,13 +56,13 @@ class Below(Smoother):
         ranking.shapes_of(field.points, triangles, turn, rows, shape)
         few = min(WATCHED, len(rows)) - 1
         field.floor.watch(rows[np.argpartition(shape, few)[: few + 1]])
-        start, ring, colours = topology.near_start, topology.near_ring, topology.near_colours
+        start, ring, free = topology.near_start, topology.near_ring, topology.near_free
         if self.everywhere:
-            nodes = np.flatnonzero(topology.near_free).astype(np.int32)
+            nodes = np.flatnonzero(free).astype(np.int32)
         else:
-            nodes = kernels.free_corners(triangles, rows, colours, np.zeros(len(field.points), dtype=np.bool_))
+            nodes = kernels.free_corners(triangles, rows, free, np.zeros(len(field.points), dtype=np.bool_))
         left = kernels.rounds(
-            field.points, nodes, start, ring, colours, field.guard(share), self.plan, MOST * len(topology.free),
+            field.points, nodes, start, ring, free, field.guard(share), self.plan, MOST * len(topology.free),
             (self.least, *self.limits), tally,
         )  # fmt: skip
         self.reached = not len(left)
