@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gmsnet
-from gmsnet.kernels import below
+from gmsnet.kernels import below, ranking
 from gmsnet.kernels.guard import Precision, plain_guard
 from gmsnet.target import Target
 from gmsnet.topology import Topology, near_points
@@ -54,7 +54,7 @@ def test_rows_and_nodes_against_a_slow_twin(target):
     )
     assert target.missed_in(report).tolist() == expected.tolist()
     seen = np.zeros(len(points), dtype=bool)
-    free = below.free_corners(near, rows, may_move, seen)
+    free = ranking.free_nodes(near, rows, np.zeros(len(rows)), 0.0, may_move, seen)
     assert len(set(free.tolist())) == len(free)
     assert set(free.tolist()) == {i for i in near[rows].ravel().tolist() if may_move[i]}
     chosen = free[: len(free) // 2]
@@ -74,7 +74,7 @@ def test_rounds_end_where_nothing_is_missed_or_too_much_was_done():
     def made(plan, most):
         points, tally = near_points(mesh, topology), np.zeros(3, dtype=np.int64)
         rows = below.missed(points, near, turn, *target.limits)
-        nodes = below.free_corners(near, rows, may_move, np.zeros(len(points), dtype=bool))
+        nodes = ranking.free_nodes(near, rows, np.zeros(len(rows)), 0.0, may_move, np.zeros(len(points), dtype=bool))
         limits = (target.shape, *target.limits)
         left = below.rounds(
             points, nodes, *rings, may_move, plain_guard(Precision()), np.array(plan), most, limits, tally

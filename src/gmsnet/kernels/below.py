@@ -50,26 +50,6 @@ def missed(points, triangles, turn, quality, tangent):
 
 
 @kernel
-def free_corners(triangles, rows, free, seen):
-    """The free nodes (int32) of the triangles in these rows, as they come. free: (N,) bool.
-
-    seen: (N,) bool, all False before and after.
-    """
-    found = np.empty(3 * len(rows), dtype=np.int32)
-    count = 0
-    for t in rows:
-        for k in range(3):
-            i = triangles[t, k]
-            if free[i] and not seen[i]:
-                seen[i] = True
-                found[count] = i
-                count += 1
-    for k in range(count):
-        seen[found[k]] = False
-    return found[:count].copy()
-
-
-@kernel
 def rounds(points, nodes, start, around, free, guard, plan, most, target, tally):
     """Visits the nodes, then those that have a cell yet which misses the target; returns the latter.
 

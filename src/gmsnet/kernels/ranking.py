@@ -124,32 +124,22 @@ def smallest(values, rank):
     return some[rank]
 
 
-@part
-def free_nodes(triangles, cells, shape, limit, colours, colours_most, seen):
-    """The free nodes (int32) of those of the cells whose shape is at most the limit, colour after colour.
+@kernel
+def free_nodes(triangles, cells, shape, limit, free, seen):
+    """The free nodes (int32) of those of the cells whose shape is at most the limit, as they come.
 
-    shape: (len(cells),). colours: (N,), −1 where held. seen: (N,) bool, all False before and after.
+    shape: (len(cells),). free: (N,) bool. seen: (N,) bool, all False before and after.
     """
     found = np.empty(3 * len(cells), dtype=np.int32)
-    start = np.empty(colours_most + 1, dtype=np.int32)
-    for c in range(colours_most + 1):
-        start[c] = 0
     count = 0
     for k in range(len(cells)):
         if shape[k] <= limit:
             for m in range(3):
                 i = triangles[cells[k], m]
-                if colours[i] >= 0 and not seen[i]:
+                if free[i] and not seen[i]:
                     seen[i] = True
                     found[count] = i
                     count += 1
-                    start[colours[i] + 1] += 1
-    for c in range(colours_most):
-        start[c + 1] += start[c]
-    nodes = np.empty(count, dtype=np.int32)
     for k in range(count):
-        i = found[k]
-        seen[i] = False
-        nodes[start[colours[i]]] = i
-        start[colours[i]] += 1
-    return nodes
+        seen[found[k]] = False
+    return found[:count].copy()

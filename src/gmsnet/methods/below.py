@@ -60,7 +60,8 @@ class Below(Smoother):
         if self.everywhere:
             nodes = np.flatnonzero(free).astype(np.int32)
         else:
-            nodes = kernels.free_corners(triangles, rows, free, np.zeros(len(field.points), dtype=np.bool_))
+            seen = np.zeros(len(free), dtype=np.bool_)
+            nodes = ranking.free_nodes(triangles, rows, shape, np.inf, free, seen)
         left = kernels.rounds(
             field.points, nodes, start, ring, free, field.guard(share), self.plan, MOST * len(topology.free),
             (self.least, *self.limits), tally,
