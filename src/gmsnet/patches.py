@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import ranking
 from gmsnet.kernels.below import missed
 from gmsnet.kernels.patch import around
 from gmsnet.measure import QualityReport
@@ -21,6 +19,7 @@ from gmsnet.target import Target
 from gmsnet.topology import Topology
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 RINGS = (1, 2, 4, 8)  # of free nodes that move with the corners of a cell that misses the target
 NARROW = (1, 2, 4)  # those where the method looks for the cells itself
@@ -42,7 +41,7 @@ def reach_target(
     many and the worst of them is better.
     """
     history: list[Sweep] = []
-    rows = look(points, topology, target).rows
+    rows = missed_in(points, topology, target)
     corners = topology.near[rows]
     if report is not None and not target.clearly_missed(points, corners, topology.near_turn[rows]):
         corners = topology.places[topology.triangles[target.missed_in(report)]]
@@ -55,61 +54,45 @@ def reach_target(
             active = around(corners, rings, topology.near_free, topology.near_start, topology.near_ring)
             if not active.any():
                 return points, NO_PROGRESS if history else NOTHING_TO_MOVE, history
-            if (
-                create is None
-                and rings > 1
-                and (
-                    np.count_nonzero(active) > LARGE * len(topology.free)
-                    or (rings == NARROW[-1] and len(corners) > FEW * at_first)
-                )
-            ):
+            if create is None and rings > 1 and too_large(rings, active, len(corners) / at_first, topology):
                 break
             patch = topology.restricted(active)
-            before = look(points, patch, target)
-            smoother = create() if create else for_target(target, len(before.rows) / len(patch.near), rings=rings)
+            smoother = create() if create else for_target(target, len(corners) / len(patch.near), rings=rings)
             run = Run(
                 mesh, patch, smoother, threads, best_by, guard, points, history, precision,
                 missed=partial(how_many, topology=patch, target=target),
             )  # fmt: skip
+            before = run.best_standing
             reason = run.to_the_end(max_sweeps, target.sure if target.angle is None else None, callback)
-            after = look(run.best, patch, target)
-            if after.beats(before):
-                points, corners = run.best, patch.near[after.rows]
-            if not len(after.rows):
+            after = run.best_standing
+            if (after.missed, -after.min_shape) < (before.missed, -before.min_shape):
+                points = run.best
+            if not after.missed:
                 return points, NO_PROGRESS if hopeless else TARGET_REACHED, history
             if reason not in (NO_PROGRESS, TARGET_REACHED):  # stopped from outside, or at the most sweeps
                 return points, reason, history
             if run.sweeps >= max_sweeps:
                 return points, MAX_SWEEPS, history
-            idle = idle + 1 if len(after.rows) > FEWER * len(before.rows) else 0
+            idle = idle + 1 if after.missed > FEWER * before.missed else 0
             if idle == IDLE:
                 break
+            corners = patch.near[missed_in(points, patch, target)]
     except KeyboardInterrupt:  # in a round itself the run has caught it
         return points, INTERRUPTED, history
     return points, NO_PROGRESS, history
 
 
-@dataclass(frozen=True)
-class Missed:
-    """Which cells of some miss a target. rows: of ``near``. least: of their 1/q."""
-
-    rows: NDArray[np.int32]
-    least: float
-
-    def beats(self, other: Missed) -> bool:
-        """Fewer cells below the target, or as many and the worst of them better."""
-        return (len(self.rows), -self.least) < (len(other.rows), -other.least)
+def too_large(rings: int, active: Flags, left: float, topology: Topology) -> bool:
+    """Do patches of so many active nodes take more than they bring? left: the share of the cells that still miss it."""
+    return bool(np.count_nonzero(active) > LARGE * len(topology.free) or (rings == NARROW[-1] and left > FEW))
 
 
-def look(points: Floats, topology: Topology, target: Target) -> Missed:
-    """Which of the cells in ``near`` miss the target, or are not clear of it."""
-    triangles, turn = topology.near, topology.near_turn
-    rows = missed(points, triangles, turn, *target.limits)
-    shape = np.empty(len(rows))
-    ranking.shapes_of(points, triangles, turn, rows, shape)
-    return Missed(rows, float(shape.min(initial=np.inf)))
+def missed_in(points: Floats, topology: Topology, target: Target) -> NDArray[np.int32]:
+    """The cells in ``near`` that miss the target, or are not clear of it."""
+    rows: NDArray[np.int32] = missed(points, topology.near, topology.near_turn, *target.limits)
+    return rows
 
 
 def how_many(points: Floats, topology: Topology, target: Target) -> int:
-    """How many of the cells in ``near`` miss the target, or are not clear of it."""
-    return len(missed(points, topology.near, topology.near_turn, *target.limits))
+    """How many cells in ``near`` miss the target, or are not clear of it."""
+    return len(missed_in(points, topology, target))
