@@ -6,6 +6,7 @@ Nothing heavy is imported before a subcommand runs, so that help and completion 
 from __future__ import annotations
 
 import contextlib
+import gc
 import io
 import os
 import sys
@@ -19,6 +20,9 @@ from gmsnet.cli.signals import Interrupted
 from gmsnet.errors import GmsnetError
 
 DONE, TARGET_NOT_MET, BAD_INPUT = 0, 1, 2
+MANY_OBJECTS = (
+    200_000  # before cycles are looked for: what imports make is kept, and rounds over it took a tenth of a run
+)
 BUG, INTERRUPTED, BROKEN_PIPE = 70, 130, 141  # as the shells and sysexits.h have them
 
 # Whichever Click the installed Typer uses, its own or the package: this is the base of all its usage errors.
@@ -62,6 +66,7 @@ def _gmsnet(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0, 1, 2; 130 interrupted, 141 broken pipe, 70 a bug of ours."""
+    gc.set_threshold(MANY_OBJECTS)
     _open_what_is_closed()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a name that the terminal cannot show must not end the run

@@ -159,7 +159,7 @@ def smooth(
                 target = replace(target, format=mesh.source.format)
             fixed = fixed_nodes(mesh, fix or [])
             _check_conversion(mesh, target)
-            progress.stage("preparing (the first run compiles: about a minute)")
+            progress.stage("preparing (the first run compiles: some twenty seconds)")
             result = run(
                 mesh,
                 method,

@@ -116,7 +116,9 @@ def fill_blocks(free, start, ring, kind, degrees, block, to, centre, rings, offs
     degree. block, to: by colour, the first block and where its ring begins in ``rings``; counted up here. Writes the
     arrays of ``kernels.block.Blocks``; filled: zeros before. The lanes left over repeat the last star.
     """
-    open_block = np.full(len(block) * degrees, -1, dtype=np.int64)  # of each kind, the one that has room
+    open_block = np.empty(len(block) * degrees, dtype=np.int64)  # of each kind, the one that has room
+    for k in range(len(open_block)):
+        open_block[k] = -1
     for i in range(len(free)):
         v, k = free[i], kind[i]
         n = k % degrees
