@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.compile import LANES, inlined, part
+from gmsnet.kernels.prefetch import prefetch
 
 MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
 COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
 # Rows of a block's work array. CENTRE, TARGET and KEPT have two, one an axis; PAIRS four, two [lane][axis]; FLOORS n.
 SIZE, REACH, CENTRE, TARGET, MARGIN, SHARE, KEPT, PAIRS, FLOORS = 0, 1, 2, 4, 6, 7, 8, 10, 14
 SURPLUS, WIDTH = range(2)  # rows of what a certificate is made of
+FAR = 2**18  # nodes: the coordinates of more (4 MiB) do not stay in the second-level cache
 
 
 class Blocks(NamedTuple):
@@ -61,6 +63,15 @@ def gather(points, blocks, block, n, star):
     for j in range(n):
         nodes = blocks.rings[offset + j * LANES : offset + (j + 1) * LANES]
         gather_row(points, nodes, ring_row(star, j))
+
+
+@part
+def fetch(points, blocks, block):
+    """Has the coordinates that a block will gather fetched, if there is one, and a mesh of more than FAR nodes."""
+    if len(points) > FAR and block < len(blocks.degree):
+        low = blocks.offset[block]
+        for k in range(low, low + LANES * blocks.degree[block]):
+            prefetch(points, np.uint32(blocks.rings[k]))
 
 
 @inlined
