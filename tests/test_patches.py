@@ -195,3 +195,12 @@ def test_the_worst_quality_there_is_as_the_target_is_met_already():
         above = gmsnet.smooth(mesh, target_quality=math.nextafter(least, 1.0))
         assert above.moved.any()
         assert above.after.shape.min() > least
+
+
+def test_turning_or_mirroring_a_mesh_turns_or_mirrors_what_a_target_makes_of_it():
+    mesh = gmsnet.random_mesh(800, seed=9)
+    expected = gmsnet.smooth(mesh, target_quality=0.4).points[:, :2]
+    quarter, mirror = np.array([[0.0, 1.0], [-1.0, 0.0]]), np.diag([-1.0, 1.0])
+    for change in (quarter, mirror):
+        turned = gmsnet.smooth((mesh.points[:, :2] @ change, mesh.cells[0].nodes), target_quality=0.4)
+        np.testing.assert_allclose(turned.points, expected @ change, rtol=0, atol=1e-9)

@@ -54,7 +54,7 @@ def test_rows_and_nodes_against_a_slow_twin(target):
     )
     assert target.missed_in(report).tolist() == expected.tolist()
     seen = np.zeros(len(points), dtype=bool)
-    free = ranking.free_nodes(near, rows, np.zeros(len(rows)), 0.0, may_move, seen)
+    free = ranking.free_nodes(near, rows, np.zeros(len(rows)), 0.0, may_move, topology.memory, seen)
     assert len(set(free.tolist())) == len(free)
     assert set(free.tolist()) == {i for i in near[rows].ravel().tolist() if may_move[i]}
     chosen = free[: len(free) // 2]
@@ -69,16 +69,15 @@ def test_rounds_end_where_nothing_is_missed_or_too_much_was_done():
     mesh = gmsnet.random_mesh(500, seed=3)
     topology, target = Topology.of(mesh), Target(0.3)
     near, turn, may_move = topology.near, topology.near_turn, topology.near_free
-    rings = topology.near_start, topology.near_ring
+    rings, ids = (topology.near_start, topology.near_ring), topology.memory
 
     def made(plan, most):
         points, tally = near_points(mesh, topology), np.zeros(3, dtype=np.int64)
         rows = below.missed(points, near, turn, *target.limits)
-        nodes = ranking.free_nodes(near, rows, np.zeros(len(rows)), 0.0, may_move, np.zeros(len(points), dtype=bool))
-        limits = (target.shape, *target.limits)
-        left = below.rounds(
-            points, nodes, *rings, may_move, plain_guard(Precision()), np.array(plan), most, limits, tally
-        )
+        shape, seen = np.zeros(len(rows)), np.zeros(len(points), dtype=bool)
+        nodes = ranking.free_nodes(near, rows, shape, 0.0, may_move, ids, seen)
+        limits, guard = (target.shape, *target.limits), plain_guard(Precision())
+        left = below.rounds(points, nodes, *rings, may_move, ids, guard, np.array(plan), most, limits, tally)
         rows = below.missed(points, near, turn, *target.limits)
         assert set(left.tolist()) == {i for i in near[rows].ravel().tolist() if may_move[i]}
         return points.tobytes(), tally.tolist(), len(nodes), len(left)

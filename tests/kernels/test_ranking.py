@@ -48,9 +48,10 @@ def test_free_nodes_once_each():
     cells = rng.choice(len(triangles), 60, replace=False).astype(np.int32)
     shape = rng.random(60)
     seen = np.zeros(len(free), dtype=np.bool_)
-    nodes = ranking.free_nodes(triangles, cells, shape, 0.5, free, seen)
+    nodes = ranking.free_nodes(triangles, cells, shape, 0.5, free, topology.memory, seen)
     wanted = np.unique(triangles[cells[shape <= 0.5]])
     np.testing.assert_array_equal(np.sort(nodes), wanted[free[wanted]])
+    assert (np.diff(topology.memory[nodes]) > 0).all()
     assert not seen.any()
 
 
@@ -60,3 +61,15 @@ def test_the_smallest_are_as_sorting_says(values, data):
     before = np.array(values)
     assert ranking.smallest(before, rank) == sorted(values)[rank]
     np.testing.assert_array_equal(before, values)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 400))
+def test_nodes_in_the_order_of_their_ids(seed, count):
+    """Few among many, which are sorted, and so many that all are gone through."""
+    rng = np.random.default_rng(seed)
+    for total in (count, 16 * count, 20 * count):
+        memory = rng.permutation(total).astype(np.int32)
+        nodes = rng.choice(total, count, replace=False).astype(np.int32)
+        wanted = nodes[np.argsort(memory[nodes])].tolist()
+        ranking.by_id(nodes, memory)
+        assert nodes.tolist() == wanted

@@ -8,6 +8,7 @@ import numpy as np
 
 from gmsnet.kernels.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.quality import shape_of
+from gmsnet.kernels.ranking import by_id
 from gmsnet.kernels.worst_first_cycles import visit
 
 
@@ -50,13 +51,13 @@ def missed(points, triangles, turn, quality, tangent):
 
 
 @kernel
-def rounds(points, nodes, start, around, free, guard, plan, most, target, tally):
+def rounds(points, nodes, start, around, free, memory, guard, plan, most, target, tally):
     """Visits the nodes, then those that have a cell yet which misses the target; returns the latter.
 
-    nodes: (K,) int32, free ones, best near each other in memory. start, around: the rings of all nodes, in CSR form.
-    free: (N,) bool. plan: (R, 2) of log₂ of the power p and visits, for each round. most: visits; a round
-    that would begin after so many is not made. target: the least 1/q of a cell that meets it, for the scale; then what
-    ``missing`` asks for. tally: (3,), added to.
+    nodes: (K,) int32, free ones in the order of their ids. start, around: the rings of all nodes, in CSR form.
+    free: (N,) bool. memory: (N,) ids. plan: (R, 2) of log₂ of the power p and visits, for each round. most: visits; a
+    round that would begin after so many is not made. target: the least 1/q of a cell that meets it, for the scale; then
+    what ``missing`` asks for. tally: (3,), added to.
     """
     mark = np.zeros(len(points), dtype=np.bool_)
     visits = 0
@@ -66,6 +67,7 @@ def rounds(points, nodes, start, around, free, guard, plan, most, target, tally)
         visit(points, nodes, start, around, guard, plan[r, 0], plan[r, 1], target[0] / math.sqrt(3.0), mark, tally)
         visits += plan[r, 1] * len(nodes)
         nodes = still_missing(points, nodes, start, around, free, target[1], target[2], mark)
+        by_id(nodes, memory)
     return nodes
 
 

@@ -125,10 +125,11 @@ def smallest(values, rank):
 
 
 @kernel
-def free_nodes(triangles, cells, shape, limit, free, seen):
-    """The free nodes (int32) of those of the cells whose shape is at most the limit, as they come.
+def free_nodes(triangles, cells, shape, limit, free, memory, seen):
+    """The free nodes (int32) of those of the cells whose shape is at most the limit, in the order of their ids.
 
-    shape: (len(cells),). free: (N,) bool. seen: (N,) bool, all False before and after.
+    shape: (len(cells),). free: (N,) bool. memory: (N,) the id of each node. seen: (N,) bool, all False before and
+    after.
     """
     found = np.empty(3 * len(cells), dtype=np.int32)
     count = 0
@@ -142,4 +143,36 @@ def free_nodes(triangles, cells, shape, limit, free, seen):
                     count += 1
     for k in range(count):
         seen[found[k]] = False
-    return found[:count].copy()
+    nodes = found[:count].copy()
+    by_id(nodes, memory)
+    return nodes
+
+
+@part
+def by_id(nodes, memory):
+    """Puts nodes, each there once, into the order of their ids: whatever is made of them does not depend on places."""
+    count = len(nodes)
+    if count > len(memory) // 16:
+        at = np.empty(len(memory), dtype=np.int32)
+        for i in range(len(memory)):
+            at[i] = -1
+        for k in range(count):
+            at[memory[nodes[k]]] = nodes[k]
+        k = 0
+        for i in at:
+            if i >= 0:
+                nodes[k] = i
+                k += 1
+        return
+    gap = 1
+    while 3 * gap < count:
+        gap = 3 * gap + 1
+    while gap > 0:  # Shell's sort
+        for k in range(gap, count):
+            i = nodes[k]
+            j = k
+            while j >= gap and memory[nodes[j - gap]] > memory[i]:
+                nodes[j] = nodes[j - gap]
+                j -= gap
+            nodes[j] = i
+        gap //= 3

@@ -17,10 +17,10 @@ LEAST = 1e-6  # of 1/q, where cells are inverted: the scale of q is taken from t
 
 
 @kernel
-def cycles(points, triangles, turn, cells, free, start, around, guard, plan, tally):
+def cycles(points, triangles, turn, cells, free, memory, start, around, guard, plan, tally):
     """Makes the cycles of a plan among the cells; returns the least 1/q of these before and after it.
 
-    cells: indices of triangles. free: (N,) bool. start, around: the rings of all nodes, in CSR form.
+    cells: indices of triangles. free: (N,) bool. memory: (N,) ids. start, around: the rings of all nodes, in CSR form.
     plan: (C, 3) of cells to take, log₂ of the power p, and visits to their free nodes. tally: (3,), added to.
     """
     shape, mark = np.empty(len(cells)), np.empty(len(points), dtype=np.bool_)
@@ -32,7 +32,7 @@ def cycles(points, triangles, turn, cells, free, start, around, guard, plan, tal
         wanted = min(plan[c, 0], len(cells))
         limit = smallest(shape, wanted - 1)
         scale = max(least(shape), LEAST) / math.sqrt(3.0)
-        nodes = free_nodes(triangles, cells, shape, limit, free, mark)
+        nodes = free_nodes(triangles, cells, shape, limit, free, memory, mark)
         visit(points, nodes, start, around, guard, plan[c, 1], plan[c, 2], scale, mark, tally)
         shapes_of(points, triangles, turn, cells, shape)
     return before, least(shape)

@@ -58,13 +58,13 @@ class Below(Smoother):
         field.floor.watch(rows[np.argpartition(shape, few)[: few + 1]])
         start, ring, free = topology.near_start, topology.near_ring, topology.near_free
         if self.everywhere:
-            nodes = np.flatnonzero(free).astype(np.int32)
+            nodes = topology.places[topology.free]
         else:
             seen = np.zeros(len(free), dtype=np.bool_)
-            nodes = ranking.free_nodes(triangles, rows, shape, np.inf, free, seen)
+            nodes = ranking.free_nodes(triangles, rows, shape, np.inf, free, topology.memory, seen)
         left = kernels.rounds(
-            field.points, nodes, start, ring, free, field.guard(share), self.plan, MOST * len(topology.free),
-            (self.least, *self.limits), tally,
+            field.points, nodes, start, ring, free, topology.memory, field.guard(share), self.plan,
+            MOST * len(topology.free), (self.least, *self.limits), tally,
         )  # fmt: skip
         self.reached = not len(left)
         return tally

@@ -1,7 +1,7 @@
 """The worst cells first: Newton's method on high powers of q, at the free nodes of the worst cells alone.
 
 A cycle ranks the cells, takes a share of them, and visits their free nodes a number of times (kernels/worst_first.py),
-in one order whatever the number of threads. Cells are ranked among the candidates, which are the
+in the order of their ids. Cells are ranked among the candidates, which are the
 worst of all when the list of cycles begins: a cell next to a mended one can become the worst, and is one of them.
 
 A sweep is one cycle of CYCLES; after the last of them LAST goes on, with new candidates each time, until the worst cell
@@ -69,8 +69,8 @@ class WorstFirst(Smoother):
         chosen = LAST if late else self.cycles[self.next : self.next + self.at_once]
         plan = [(max(FEWEST, math.ceil(cycle.share * len(triangles))), cycle.power, cycle.sweeps) for cycle in chosen]
         before, after = kernels.cycles(
-            field.points, triangles, turn, self.cells, topology.near_free, topology.near_start, topology.near_ring,
-            field.guard(share), np.array(plan), tally,
+            field.points, triangles, turn, self.cells, topology.near_free, topology.memory, topology.near_start,
+            topology.near_ring, field.guard(share), np.array(plan), tally,
         )  # fmt: skip
         self.next += len(chosen)
         self.settled = late and after < before + GAIN
