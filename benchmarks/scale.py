@@ -35,7 +35,7 @@ from set_up import RESET, status
 
 import gmsnet
 from gmsnet.adapters import to_mesh
-from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.compile import LANES, kernel
 from gmsnet.kernels.guard import Precision
 from gmsnet.methods import Field, smoother
 from gmsnet.topology import Topology, near_points
@@ -112,13 +112,13 @@ def sweeps(arrays, threads, rounds, patience):
     """(method, threads) → ns per node, others' share; and the bytes per node that the caches must exchange for one."""
     mesh, _ = to_mesh(arrays)
     topology = Topology.of(mesh)
-    points, blocks = near_points(mesh, topology), topology.stars.blocks
+    points, _ = near_points(mesh, topology), topology.stars  # made before, as in a call
     del mesh
     found, often = {}, math.ceil(ENOUGH / len(points))
     for method in METHODS:
         fields, jobs, pools = {}, {}, []
         for count in threads:
-            pools.append(workers(count, len(blocks.filled)))
+            pools.append(workers(count, len(topology.free) // LANES))
             share, chosen = pools[-1].__enter__(), smoother(method)
             field = fields[count] = Field(points.copy(), topology, Precision())
 

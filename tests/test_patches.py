@@ -199,8 +199,65 @@ def test_the_worst_quality_there_is_as_the_target_is_met_already():
 
 def test_turning_or_mirroring_a_mesh_turns_or_mirrors_what_a_target_makes_of_it():
     mesh = gmsnet.random_mesh(800, seed=9)
-    expected = gmsnet.smooth(mesh, target_quality=0.4).points[:, :2]
     quarter, mirror = np.array([[0.0, 1.0], [-1.0, 0.0]]), np.diag([-1.0, 1.0])
-    for change in (quarter, mirror):
-        turned = gmsnet.smooth((mesh.points[:, :2] @ change, mesh.cells[0].nodes), target_quality=0.4)
-        np.testing.assert_allclose(turned.points, expected @ change, rtol=0, atol=1e-9)
+    for target in ({"target_quality": 0.4}, {"target_angle": 20.0}):
+        expected = gmsnet.smooth(mesh, **target).points[:, :2]
+        for change in (quarter, mirror):
+            turned = gmsnet.smooth((mesh.points[:, :2] @ change, mesh.cells[0].nodes), **target)
+            np.testing.assert_allclose(turned.points, expected @ change, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_a_full_run_meets_a_target_run_meets_on_small_meshes_too(seed):
+    """Where all is near the cells that miss it, patches may be as large as the mesh."""
+    mesh = gmsnet.random_mesh((2, 5, 12, 20, 35, 60)[seed % 6], seed=seed)
+    target = 0.97 * float(gmsnet.smooth(mesh).after.shape.min())
+    result = gmsnet.smooth(mesh, target_quality=target)
+    assert result.stop_reason == engine.TARGET_REACHED
+    assert result.after.shape.min() >= target
+
+
+def test_a_cell_in_one_place_meets_no_angle():
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.8], [3.0, 3.0], [3.0, 3.0], [3.0, 3.0]])
+    mesh = (points, np.array([[0, 1, 2], [3, 4, 5]]))
+    target = Target(angle=10.0)
+    assert target.missed_in(gmsnet.quality(mesh)).tolist() == [1]
+    assert gmsnet.smooth(mesh, target_angle=10.0).stop_reason != engine.TARGET_REACHED
+
+
+def test_held_cells_that_miss_a_target_do_not_change_what_is_done_for_the_others(good):
+    """Slivers that cannot move, far away, are no share of any patch."""
+    bad = disturb(good, Topology.of(good).free[100:130], 0.6, seed=1)
+    corners, count = Topology.of(bad).triangles, len(bad.points)
+    slivers = np.array([[5.0, 0.0], [6.0, 0.0], [5.5, 1e-3]])
+    points = np.vstack([bad.points[:, :2], *(slivers + np.array([0.0, k]) for k in range(60))])
+    cells = np.vstack([corners, count + np.arange(180).reshape(60, 3)])
+    alone, beside = (
+        gmsnet.smooth(mesh, target_quality=0.45) for mesh in ((bad.points[:, :2], corners), (points, cells))
+    )
+    assert [sweep.stage for sweep in beside.history] == [sweep.stage for sweep in alone.history]
+    below = [int((result.after.shape < 0.45).sum()) for result in (alone, beside)]
+    assert below[1] == below[0] + 60
+    only = gmsnet.smooth((points[count:], cells[len(corners) :] - count), target_quality=0.45)
+    assert only.stop_reason == engine.NOTHING_TO_MOVE
+
+
+def test_any_number_says_what_the_target_is():
+    """In single precision the slack for rounding would be none."""
+    assert Target(np.float32(0.5)).limits == Target(0.5).limits
+    assert Target(angle=np.float32(20)).limits == Target(angle=20).limits
+    assert Target(0.5).limits[0] > 0.5
+
+
+def test_targets_on_cells_wound_both_ways_and_in_any_plane(good):
+    bad = disturb(good, Topology.of(good).free[100:200], 0.6, seed=1)
+    corners, flat = Topology.of(bad).triangles, bad.points[:, :2]
+    expected = gmsnet.smooth((flat, corners), target_quality=0.5).points
+    backwards = corners.copy()
+    backwards[::2] = backwards[::2, ::-1]
+    np.testing.assert_allclose(gmsnet.smooth((flat, backwards), target_quality=0.5).points, expected, atol=1e-12)
+    for axis in range(3):
+        points = np.insert(flat, axis, 2.0, axis=1)
+        for threads in (1, 3):
+            moved = gmsnet.smooth((points, corners), target_quality=0.5, threads=threads).points
+            np.testing.assert_allclose(np.delete(moved, axis, axis=1), expected, atol=1e-9)

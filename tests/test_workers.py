@@ -54,6 +54,23 @@ def test_what_goes_wrong_in_a_piece_is_raised(bad):
         share(work, 0, MANY)
 
 
+def test_after_an_interrupt_nobody_begins_another_piece():
+    begun = []
+
+    def work(first, last):
+        begun.append(first)
+        if threading.current_thread() is threading.main_thread():
+            raise KeyboardInterrupt
+        caller_is_through.wait(30)
+
+    caller_is_through = threading.Event()
+    with workers(3, MANY) as share:
+        threading.Timer(0.2, caller_is_through.set).start()
+        with pytest.raises(KeyboardInterrupt):
+            share(work, 0, MANY)
+    assert len(begun) <= 3 < len(pieces(0, MANY, 3)) - 1
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 def test_two_works_side_by_side(threads):
     assert side_by_side(threads, lambda: "one", lambda: "other") == ("one", "other")

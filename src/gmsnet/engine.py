@@ -20,7 +20,7 @@ from gmsnet.fixed import fixed_mask
 from gmsnet.limits import Limits, limits
 from gmsnet.measure import QualityReport, measure
 from gmsnet.mesh import Mesh
-from gmsnet.methods import Smoother, smoother
+from gmsnet.methods import Smoother, StarSmoother, smoother
 from gmsnet.methods.auto import Auto
 from gmsnet.patches import reach_target
 from gmsnet.preserve import Protection, method_for, protected
@@ -140,7 +140,7 @@ def smooth(
         near = near_points(given, topology)
         return near, measure(given, topology, near), protected(given, topology, preserve, fix_layers, near)
 
-    if apart == 1 or target:
+    if apart == 1 or target or not isinstance(chosen, Auto | StarSmoother):
         start, before, protection = looked_at()
     else:  # most often nothing is protected, and these are the stars that are smoothed
         (start, before, protection), _ = side_by_side(apart, looked_at, lambda: topology.stars)

@@ -23,7 +23,7 @@ Flags = NDArray[np.bool_]
 
 RINGS = (1, 2, 4, 8)  # of free nodes that move with the corners of a cell that misses the target
 NARROW = (1, 2, 4)  # those where the method looks for the cells itself
-LARGE = 0.25  # of all free nodes: no larger patches around the cells that are left
+LARGE, SMALL = 0.25, 1000  # no larger patches around the cells that are left: of all free nodes, or so many
 FEW = 0.02  # of the cells that missed it at first: for so few that are left, the largest patches are tried
 FEWER, IDLE = 0.9, 2  # a round that leaves more of the cells below the target is idle; so many in a row are the last
 
@@ -47,25 +47,28 @@ def reach_target(
         corners = topology.places[topology.triangles[target.missed_in(report)]]
     if not len(corners):
         return points, TARGET_REACHED, history
+    changeable = topology.near_free[corners].any(axis=1)
+    hopeless = not changeable.all()  # cells that miss it and cannot change
+    corners = corners[changeable]
     idle, at_first, precision = 0, len(corners), precision_of(mesh)
-    hopeless = not topology.near_free[corners].any(axis=1).all()  # cells that miss it and cannot change
     try:
         for rings in RINGS if create else NARROW:
-            active = around(corners, rings, topology.near_free, topology.near_start, topology.near_ring)
-            if not active.any():
+            if not len(corners):
                 return points, NO_PROGRESS if history else NOTHING_TO_MOVE, history
+            active = around(corners, rings, topology.near_free, topology.near_start, topology.near_ring)
             if create is None and rings > 1 and too_large(rings, active, len(corners) / at_first, topology):
                 break
             patch = topology.restricted(active)
-            smoother = create() if create else for_target(target, len(corners) / len(patch.near), rings=rings)
+            share = len(corners) / len(patch.near)
+            smoother = create() if create else for_target(target, share, rings=rings)
             run = Run(
                 mesh, patch, smoother, threads, best_by, guard, points, history, precision,
-                missed=partial(how_many, topology=patch, target=target),
+                count_missed=partial(how_many, topology=patch, target=target),
             )  # fmt: skip
             before = run.best_standing
             reason = run.to_the_end(max_sweeps, target.sure if target.angle is None else None, callback)
             after = run.best_standing
-            if (after.missed, -after.min_shape) < (before.missed, -before.min_shape):
+            if after.rank < before.rank:
                 points = run.best
             if not after.missed:
                 return points, NO_PROGRESS if hopeless else TARGET_REACHED, history
@@ -84,7 +87,8 @@ def reach_target(
 
 def too_large(rings: int, active: Flags, left: float, topology: Topology) -> bool:
     """Do patches of so many active nodes take more than they bring? left: the share of the cells that still miss it."""
-    return bool(np.count_nonzero(active) > LARGE * len(topology.free) or (rings == NARROW[-1] and left > FEW))
+    count = np.count_nonzero(active)
+    return bool(count > SMALL and (count > LARGE * len(topology.free) or (rings == NARROW[-1] and left > FEW)))
 
 
 def missed_in(points: Floats, topology: Topology, target: Target) -> NDArray[np.int32]:

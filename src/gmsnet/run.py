@@ -59,19 +59,20 @@ class Run:
     """The state of one run: coordinates in memory order, the best so far, and the record.
 
     points: to start from, in memory order (default: the mesh's own). history: to go on with. precision: of
-    the mesh, where it is known; standing: of those points, where it is. missed: counts the cells of points that miss a
+    the mesh, where it is known; standing: of those points, where it is. count_missed: the cells of points that miss a
     target.
     """
 
     def __init__(
         self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str, guard: str,
         points: Floats | None = None, history: list[Sweep] | None = None, precision: Precision | None = None,
-        standing: Standing | None = None, missed: Callable[[Floats], int] | None = None,
+        standing: Standing | None = None, count_missed: Callable[[Floats], int] | None = None,
     ) -> None:  # fmt: skip
         self.topology, self.smoother, self.best_by = topology, smoother, best_by
         start = near_points(mesh, topology) if points is None else points
         self.field = Field(start.copy(), topology, precision or precision_of(mesh), LEVELS.index(guard))
-        self.threads, self.missed = threads, missed
+        self.threads, self.count_missed = threads, count_missed
+        self.fewest: list[int] = []  # cells that missed the target, up to each look
         self.history: list[Sweep] = [] if history is None else history
         self.sweeps = self.history[-1].index if self.history else 0
         self.first = len(self.history)
@@ -124,6 +125,7 @@ class Run:
             standing.min_shape, standing.mean_shape,
         )  # fmt: skip
         self.history.append(sweep)
+        self.fewest.append(min([standing.missed, *self.fewest[-1:]]))
         self.stages.clear()
         return sweep
 
@@ -136,12 +138,15 @@ class Run:
     def _standing(self, share: Share = serial) -> Standing:
         """The sums over all triangles of the coordinates as they are."""
         totals = totals_of(self.field.points, self.topology.near, self.topology.near_turn, share)
-        return Standing.of(totals, self.best_by, self.missed(self.field.points) if self.missed else 0)
+        missed = self.count_missed(self.field.points) if self.count_missed else 0
+        return Standing.of(totals, self.best_by, missed)
 
     def _stalled(self) -> bool:
         """Has nothing been gained for PATIENCE looks?"""
         own = self.history[self.first :]
         if len(own) <= PATIENCE:
+            return False
+        if self.fewest[-1] < self.fewest[-1 - PATIENCE]:
             return False
         earlier, recent = own[:-PATIENCE], own[-PATIENCE:]
         fewest = min(s.inverted for s in earlier)

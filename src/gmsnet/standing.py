@@ -29,6 +29,11 @@ class Standing:
         qhat = totals.qhat_aspect if best_by == ASPECT else totals.qhat
         return cls(totals.inverted, qhat, totals.shape_min, totals.shape_mean, missed)
 
+    @property
+    def rank(self) -> tuple[int, int, float]:
+        """Of two meshes that of the lesser rank is nearer to the target; the worst cell decides, not q̂."""
+        return self.inverted, self.missed, -self.min_shape
+
     def beats(self, other: Standing) -> bool:
         """Fewer inverted cells first, then fewer that miss the target, then a larger q̂, by more than rounding."""
         if (self.inverted, self.missed) != (other.inverted, other.missed):

@@ -26,6 +26,12 @@ class Target:
     quality: float | None = None
     angle: float | None = None
 
+    def __post_init__(self) -> None:
+        """Takes any number for a float64: of single precision, SURE would be 1."""
+        for name in ("quality", "angle"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, float(getattr(self, name)))
+
     def __bool__(self) -> bool:
         return self.quality is not None or self.angle is not None
 

@@ -42,7 +42,12 @@ def workers(threads: int, blocks: int) -> Iterator[Share]:
                     found[k] = work(ends[k], ends[k + 1])
 
             others = [pool.submit(take) for _ in range(min(threads, len(found)) - 1)]
-            take()  # the caller works too
+            try:
+                take()  # the caller works too
+            except BaseException:
+                for _ in numbers:  # nobody begins another piece
+                    pass
+                raise
             for other in others:
                 if not other.cancel():  # one that has not begun by now has nothing left to do
                     other.result()

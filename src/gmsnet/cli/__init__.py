@@ -66,7 +66,15 @@ def _gmsnet(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0, 1, 2; 130 interrupted, 141 broken pipe, 70 a bug of ours."""
+    before = gc.get_threshold()
     gc.set_threshold(MANY_OBJECTS)
+    try:
+        return _run(arguments)
+    finally:
+        gc.set_threshold(*before)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     _open_what_is_closed()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # a name that the terminal cannot show must not end the run

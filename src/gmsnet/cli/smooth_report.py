@@ -156,6 +156,8 @@ class Outcome:
     def verdict(self) -> str:
         """One honest sentence on what was gained and why the run ended."""
         result = self.result
+        if result.stop_reason == engine.NOTHING_TO_MOVE and self.free:
+            return f"nothing to move: of the cells that miss the target all nodes are held ({self._reasons()})"
         if result.stop_reason == engine.NOTHING_TO_MOVE:
             return f"nothing to move: all {report.amount(len(self.mesh.points), 'node')} are held ({self._reasons()})"
         given = [self.choice.get(key) for key in ("variant", "objective", "weights")]

@@ -24,7 +24,7 @@ import numpy as np
 
 from gmsnet.kernels import stars
 from gmsnet.kernels.barrier_star import FAR, MOST, descend
-from gmsnet.kernels.block import MARGIN, PAIRS, REACH, SIZE, fetch, gather, ring_row
+from gmsnet.kernels.block import MARGIN, PAIRS, REACH, SIZE, ask_ahead, gather, ring_row
 from gmsnet.kernels.certificate import COARSE, NARROWEST, WIDER, doubt
 from gmsnet.kernels.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.guard import WITH_FLOORS
@@ -256,7 +256,7 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
     for block in range(first, last):
         n, count = blocks.degree[block], blocks.filled[block]
         gather(points, blocks, block, n, star)
-        fetch(points, blocks, block + 1)
+        ask_ahead(points, blocks, block + 1)
         relate(star, n, guard, work, room.sums, local, sums)
         derive(local, n, power, sums)
         propose(sums, relaxation, power.ratio, step)

@@ -20,7 +20,8 @@ def missing(px, py, qx, qy, quality, tangent):
     """
     corner = px * qx + py * qy
     most = max(corner, max(px * px + py * py - corner, qx * qx + qy * qy - corner))
-    wide = tangent == 0.0 or px * qy - py * qx >= tangent * most
+    area = px * qy - py * qx
+    wide = tangent == 0.0 or (area > 0.0 and area >= tangent * most)
     return not (wide and shape_of(px, py, qx, qy) >= quality)
 
 

@@ -66,7 +66,7 @@ def gather(points, blocks, block, n, star):
 
 
 @part
-def fetch(points, blocks, block):
+def ask_ahead(points, blocks, block):
     """Has the coordinates that a block will gather fetched, if there is one, and a mesh of more than FAR nodes."""
     if len(points) > FAR and block < len(blocks.degree):
         low = blocks.offset[block]

@@ -150,16 +150,16 @@ def to_come(before: float, gained: float) -> float:
     return gained * gained / (before - gained) if gained < before else math.inf
 
 
-def for_target(target: Target, missed: float, *, rings: int) -> Auto:
-    """The plan for patches around the cells that miss a target. missed: which share of the patches' cells these are.
+def for_target(target: Target, share: float, *, rings: int) -> Auto:
+    """The plan for patches around the cells that miss a target. share: these, of the patches' cells.
 
-    rings: of free nodes around those cells. With more than one, the worst cells are made better if some miss it yet,
-    and the others must keep to that; with more than two, first of all the whole patch is.
+    rings: of free nodes that move. With more than one, what misses it still after that is followed by the worst cells
+    alone, and by another try that keeps these; with more than two, Newton's sweeps on Σq over the patches come first.
     """
     newton = Stage("Newton on q", NEWTON.create, 2, first=3, rounds=40, gain=0.006, looks=False)
     plan = WIDE if rings > 1 else NEAR if target.angle is None else GENTLE
     below = Stage("cells that miss the target", lambda: Below(target, plan, rings > 1), 1)
-    stages = [newton] if missed > MANY or rings > 2 else []
+    stages = [newton] if share > MANY or rings > 2 else []
     if rings > 1:
         stages += [below._replace(looks=False), WORST._replace(looks=False)]
     return Auto([*stages, below])

@@ -21,6 +21,7 @@ from gmsnet.target import Target
 from gmsnet.workers import Share
 
 MANY = 0.25  # of the cells: where more miss the target, most of them cannot be had, and others would be lost for them
+SMALL = 1000  # cells: so few cost nothing
 MOST = 4  # visits, times the free nodes there are
 
 
@@ -50,12 +51,14 @@ class Below(Smoother):
         triangles, turn = topology.changeable
         self.settled = True
         rows: NDArray[np.int32] = kernels.missed(field.points, triangles, turn, *self.limits)
-        if not 0 < len(rows) <= MANY * len(triangles):
+        self.reached = not len(rows)
+        if self.reached or len(rows) > max(MANY * len(triangles), SMALL):
             return tally
         shape = np.empty(len(rows))
         ranking.shapes_of(field.points, triangles, turn, rows, shape)
-        few = min(WATCHED, len(rows)) - 1
-        field.floor.watch(rows[np.argpartition(shape, few)[: few + 1]])
+        if not self.limits[1]:  # of angles other cells can be the worst
+            few = min(WATCHED, len(rows)) - 1
+            field.floor.watch(rows[np.argpartition(shape, few)[: few + 1]])
         start, ring, free = topology.near_start, topology.near_ring, topology.near_free
         if self.everywhere:
             nodes = topology.places[topology.free]

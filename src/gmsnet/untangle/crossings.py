@@ -68,7 +68,7 @@ def held_edges(topology: Topology) -> tuple[Ints, Ints]:
     """The edges of triangles whose two nodes are held (e, 2), by places in memory: those of one triangle, and all."""
     near = topology.near
     edges = np.concatenate([near[:, [0, 1]], near[:, [1, 2]], near[:, [2, 0]]])
-    edges = np.sort(edges[(topology.near_colours[edges] < 0).all(axis=1)], axis=1)
+    edges = np.sort(edges[~topology.near_free[edges].any(axis=1)], axis=1)
     every, triangles = np.unique(edges, axis=0, return_counts=True)
     return every[triangles == 1], every
 

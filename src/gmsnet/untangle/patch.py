@@ -76,4 +76,4 @@ def free_nodes_of(topology: Topology, cells: NDArray[np.intp] | Flags) -> Flags:
     """(N,) which free nodes the cells (rows of ``near``) have."""
     chosen = np.zeros(len(topology.memory), dtype=bool)
     chosen[topology.near[cells].ravel()] = True
-    return chosen & (topology.near_colours >= 0)
+    return chosen & topology.near_free

@@ -28,7 +28,7 @@ def reasons(topology: Topology, points: Floats, bad: Flags, sweeps: int) -> tupl
     if not len(rows):
         return ()
     cells = topology.near[rows]
-    held = topology.near_colours[cells] < 0
+    held = ~topology.near_free[cells]
     places = points[cells].mean(axis=1)
     signs = exact_signs(points, topology.near[rows], topology.near_turn[rows])
     boundary, fixed = (near_crossings(points, edges, cells) for edges in held_edges(topology))
@@ -82,7 +82,7 @@ def has_no_place(points: Floats, topology: Topology, v: int, known: dict[int, bo
     """Is the ring of v all held, and is there no place for v at which all triangles of its star are positive?"""
     if v not in known:
         ring = topology.near_ring[topology.near_start[v] : topology.near_start[v + 1]]
-        known[v] = bool((topology.near_colours[ring] < 0).all()) and kernel_depth(points[ring]) <= 0.0
+        known[v] = not topology.near_free[ring].any() and kernel_depth(points[ring]) <= 0.0
     return known[v]
 
 
