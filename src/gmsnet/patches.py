@@ -37,11 +37,11 @@ def reach_target(
 
     create: makes a method ready for a run on one set of patches; None for ``methods.auto``, which has a plan for each.
     points: (N, 2) in memory order, not changed. report: the measures of these points, if they are known. Returns the
-    new points, why it ended, and the record. A patch's result is taken if fewer of its cells miss the target, or as
-    many and the worst of them is better.
+    new points, why it ended, and the record. A patch's result is taken if fewer of its cells are inverted, or as many
+    and fewer miss the target, or as many and the worst of them is better.
     """
     history: list[Sweep] = []
-    rows = missed_in(points, topology, target)
+    rows = rows_missing(points, topology, target)
     corners = topology.near[rows]
     if report is not None and not target.clearly_missed(points, corners, topology.near_turn[rows]):
         corners = topology.places[topology.triangles[target.missed_in(report)]]
@@ -79,7 +79,7 @@ def reach_target(
             idle = idle + 1 if after.missed > FEWER * before.missed else 0
             if idle == IDLE:
                 break
-            corners = patch.near[missed_in(points, patch, target)]
+            corners = patch.near[rows_missing(points, patch, target)]
     except KeyboardInterrupt:  # in a round itself the run has caught it
         return points, INTERRUPTED, history
     return points, NO_PROGRESS, history
@@ -91,7 +91,7 @@ def too_large(rings: int, active: Flags, left: float, topology: Topology) -> boo
     return bool(count > SMALL and (count > LARGE * len(topology.free) or (rings == NARROW[-1] and left > FEW)))
 
 
-def missed_in(points: Floats, topology: Topology, target: Target) -> NDArray[np.int32]:
+def rows_missing(points: Floats, topology: Topology, target: Target) -> NDArray[np.int32]:
     """The cells in ``near`` that miss the target, or are not clear of it."""
     rows: NDArray[np.int32] = missed(points, topology.near, topology.near_turn, *target.limits)
     return rows
@@ -99,4 +99,4 @@ def missed_in(points: Floats, topology: Topology, target: Target) -> NDArray[np.
 
 def how_many(points: Floats, topology: Topology, target: Target) -> int:
     """How many cells in ``near`` miss the target, or are not clear of it."""
-    return len(missed_in(points, topology, target))
+    return len(rows_missing(points, topology, target))

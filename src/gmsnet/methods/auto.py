@@ -156,10 +156,9 @@ def for_target(target: Target, share: float, *, rings: int) -> Auto:
     rings: of free nodes that move. With more than one, what misses it still after that is followed by the worst cells
     alone, and by another try that keeps these; with more than two, Newton's sweeps on Σq over the patches come first.
     """
-    newton = Stage("Newton on q", NEWTON.create, 2, first=3, rounds=40, gain=0.006, looks=False)
     plan = WIDE if rings > 1 else NEAR if target.angle is None else GENTLE
     below = Stage("cells that miss the target", lambda: Below(target, plan, rings > 1), 1)
-    stages = [newton] if share > MANY or rings > 2 else []
+    stages = [NEWTON._replace(looks=False)] if share > MANY or rings > 2 else []
     if rings > 1:
         stages += [below._replace(looks=False), WORST._replace(looks=False)]
     return Auto([*stages, below])

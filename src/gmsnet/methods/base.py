@@ -7,6 +7,7 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,14 +54,19 @@ class Floor:
     """
 
     LOOKS, SHARE, FEWEST = 4, 16, 64
+    WATCHED = 64  # cells
 
     def __init__(self) -> None:
         self.asked = 0
         self.blocks = np.empty(0, dtype=np.int32)
 
-    def watch(self, cells: NDArray[np.int32]) -> None:
-        """From now on looks at the blocks of these cells (rows of ``Topology.changeable``), the worst being known."""
-        self.blocks = np.unique(cells // LANES)
+    def watch(self, cells: NDArray[np.int32], shape: NDArray[np.floating[Any]]) -> None:
+        """From now on looks at the blocks of the worst of these cells (rows of ``Topology.changeable``), by their 1/q.
+
+        The worst of all must be among them.
+        """
+        few = min(self.WATCHED, len(cells)) - 1
+        self.blocks = np.unique(cells[np.argpartition(shape, few)[: few + 1]] // LANES)
         self.asked = 1
 
     def of(self, points: NDArray[np.float64], topology: Topology, precision: Precision, share: Share) -> float:

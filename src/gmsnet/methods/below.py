@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from gmsnet.kernels import below as kernels
 from gmsnet.kernels import ranking
 from gmsnet.methods.base import Field, Smoother, Tally
-from gmsnet.methods.worst_first import WATCHED
 from gmsnet.target import Target
 from gmsnet.workers import Share
 
@@ -57,8 +56,7 @@ class Below(Smoother):
         shape = np.empty(len(rows))
         ranking.shapes_of(field.points, triangles, turn, rows, shape)
         if not self.limits[1]:  # of angles other cells can be the worst
-            few = min(WATCHED, len(rows)) - 1
-            field.floor.watch(rows[np.argpartition(shape, few)[: few + 1]])
+            field.floor.watch(rows, shape)
         start, ring, free = topology.near_start, topology.near_ring, topology.near_free
         if self.everywhere:
             nodes = topology.places[topology.free]

@@ -46,7 +46,6 @@ CYCLES = (
     Cycle(0.0003, 7, 12),
 )
 LAST = (Cycle(0.0003, 7, 16), Cycle(0.0003, 8, 16))
-WATCHED = 64  # cells that are looked at for the floor
 GAIN = 1e-4  # in the least 1/q: less is none
 
 
@@ -91,8 +90,7 @@ def candidates(field: Field, share: Share) -> NDArray[np.int32]:
     share(look, 0, -(-len(triangles) // LANES))
     wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * len(triangles)))
     cells: NDArray[np.int32] = ranking.worst(shape, wanted)
-    few = min(WATCHED, len(cells)) - 1
-    field.floor.watch(cells[np.argpartition(shape[cells], few)[: few + 1]])
+    field.floor.watch(cells, shape[cells])
     return cells
 
 
