@@ -35,7 +35,7 @@ from gmsnet.target import Target
 from gmsnet.workers import Share
 
 SMALL = 5000  # free nodes
-SAMPLE = 64  # blocks of cells
+SAMPLE = 32  # blocks of cells
 ALWAYS = 10**9  # sweeps
 RELAXATION = 1.6  # of the Newton steps
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, Precision, StarGuard, most_ratios, plain_guard, star_floors
+from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, MeshGuard, Precision, StarGuard, plain_guard, star_floors
+from gmsnet.methods.floor import Floor
 from gmsnet.topology import Topology
 from gmsnet.workers import Share, serial
 
@@ -29,63 +27,19 @@ class Field:
     topology: Topology
     precision: Precision
     level: int = VALID
-    floor: Floor = field(default_factory=lambda: Floor())
+    floor: Floor = field(default_factory=Floor)
 
     def guard(self, share: Share) -> Guard:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
-        guard = plain_guard(self.precision)
         if self.level == WORST:
-            floor = self.floor.of(self.points, self.topology, self.precision, share)
-            return guard._replace(floor=floor)
+            return MeshGuard(*self.precision, self.floor.of(self.points, self.topology, self.precision, share))
+        guard = plain_guard(self.precision)
         if self.level == STAR:
             floors = np.empty(len(self.points))
             triangles, turn = self.topology.changeable
             star_floors(self.points, triangles, turn, self.topology.near_ringed, guard.unit, guard.grain, floors)
             return StarGuard(*guard, floors)
         return guard
-
-
-class Floor:
-    """The floor of the level WORST. Any cell's D/L is an upper bound of the worst one's, and so a floor that keeps it.
-
-    Which blocks of triangles hold the worst changes slowly. Therefore all are looked at only every LOOKS-th time, and
-    between only those that were the worst then, one in SHARE. A floor that is too high by that holds a few stars back
-    until the next look at all. A method that knows the worst cells can name them instead (``watch``).
-    """
-
-    LOOKS, SHARE, FEWEST = 4, 16, 64
-    WATCHED = 64  # cells
-
-    def __init__(self) -> None:
-        self.asked = 0
-        self.blocks = np.empty(0, dtype=np.int32)
-
-    def watch(self, cells: NDArray[np.int32], shape: NDArray[np.floating[Any]]) -> None:
-        """From now on looks at the blocks of the worst of these cells (rows of ``Topology.changeable``), by their 1/q.
-
-        The worst of all must be among them.
-        """
-        few = min(self.WATCHED, len(cells)) - 1
-        self.blocks = np.unique(cells[np.argpartition(shape, few)[: few + 1]] // LANES)
-        self.asked = 1
-
-    def of(self, points: NDArray[np.float64], topology: Topology, precision: Precision, share: Share) -> float:
-        """An upper bound of the least D/L of the triangles with a free node, as the points are now."""
-        triangles, turn = topology.changeable
-        count = -(-len(triangles) // LANES)
-        everywhere = self.asked % self.LOOKS == 0
-        self.asked += 1
-        blocks = np.arange(count, dtype=np.int32) if everywhere else self.blocks
-        least = np.empty(len(blocks))
-
-        def look(first: int, last: int) -> None:
-            most_ratios(points, triangles, turn, blocks, precision.unit, precision.grain, first, last, least)
-
-        share(look, 0, len(blocks))
-        if everywhere:
-            worst = max(self.FEWEST, count // self.SHARE)
-            self.blocks = blocks if worst >= count else np.sort(np.argpartition(least, worst)[:worst]).astype(np.int32)
-        return float(least.min(initial=math.inf))
 
 
 class Smoother(ABC):
@@ -122,7 +76,7 @@ class StarSmoother(Smoother):
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
-        stars, guard, tally = field.topology.stars, field.guard(share), np.zeros(3, dtype=np.int64)
+        stars, guard = field.topology.stars, field.guard(share)
 
         def visit(first: int, last: int) -> Tally:
             counts = np.zeros(3, dtype=np.int64)
@@ -130,9 +84,12 @@ class StarSmoother(Smoother):
             return counts
 
         if share is serial:  # colour after colour, too: in that order the blocks stand
-            return visit(0, int(stars.first[-1]))
-        for colour in range(stars.colours):
-            tally += sum(share(visit, int(stars.first[colour]), int(stars.first[colour + 1])))
+            tally = visit(0, int(stars.first[-1]))
+        else:
+            tally = np.zeros(3, dtype=np.int64)
+            for colour in range(stars.colours):
+                tally += sum(share(visit, int(stars.first[colour]), int(stars.first[colour + 1])))
+        field.floor.swept(tally)
         return tally
 
 

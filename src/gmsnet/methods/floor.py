@@ -1,0 +1,75 @@
+"""What a sweep at the level WORST must keep: a bound of the worst cell, without a look at all of them each time."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.block import DROPPED, TRUNCATED
+from gmsnet.kernels.compile import LANES
+from gmsnet.kernels.guard import Precision, most_ratios
+from gmsnet.topology import Topology
+from gmsnet.workers import Share
+
+
+class Floor:
+    """The floor of the level WORST. Any cell's D/L is an upper bound of the worst one's, and so a floor that keeps it.
+
+    Which blocks of triangles hold the worst changes slowly. Therefore only those that were the worst, one in SHARE, are
+    looked at LOOKS times, and from then on until stars are held back, which a floor that is too high can do. A method
+    that knows the worst cells can name them (``watch``).
+    """
+
+    LOOKS, SHARE, FEWEST = 3, 16, 64
+    WATCHED = 64  # cells
+
+    def __init__(self) -> None:
+        self.blocks: NDArray[np.int32] | None = None
+        self.looks = self.unhindered = 0  # looks, and sweeps in which no star was held back, since these were chosen
+
+    def watch(self, cells: NDArray[np.int32], shape: NDArray[np.floating[Any]]) -> None:
+        """From now on looks at the blocks of the worst of these cells (rows of ``Topology.changeable``), by their 1/q.
+
+        The worst of all must be among them.
+        """
+        few = min(self.WATCHED, len(cells)) - 1
+        self._watch(np.unique(cells[np.argpartition(shape, few)[: few + 1]] // LANES))
+
+    def swept(self, tally: NDArray[np.int64]) -> None:
+        """Takes note of what happened to the shifts of a whole sweep."""
+        self.unhindered += not (tally[TRUNCATED] or tally[DROPPED])
+
+    def of(self, points: NDArray[np.float64], topology: Topology, precision: Precision, share: Share) -> float:
+        """An upper bound of the least D/L of the triangles with a free node, as the points are now."""
+        triangles, turn = topology.changeable
+        blocks = self.blocks
+        if blocks is None or self.unhindered < self.looks >= self.LOOKS:
+            count = -(-len(triangles) // LANES)
+            blocks = np.arange(count, dtype=np.int32)
+            least = _least(points, triangles, turn, blocks, precision, share)
+            worst = max(self.FEWEST, count // self.SHARE)
+            self._watch(blocks if worst >= count else np.sort(np.argpartition(least, worst)[:worst]).astype(np.int32))
+        else:
+            least = _least(points, triangles, turn, blocks, precision, share)
+        self.looks += 1
+        return float(least.min(initial=math.inf))
+
+    def _watch(self, blocks: NDArray[np.int32]) -> None:
+        self.blocks, self.looks, self.unhindered = blocks, 0, 0
+
+
+def _least(
+    points: NDArray[np.float64], triangles: NDArray[np.int32], turn: NDArray[np.int8], blocks: NDArray[np.int32],
+    precision: Precision, share: Share,
+) -> NDArray[np.float64]:  # fmt: skip
+    """An upper bound of the least D/L in each of these blocks of triangles."""
+    least = np.empty(len(blocks))
+
+    def look(first: int, last: int) -> None:
+        most_ratios(points, triangles, turn, blocks, precision.unit, precision.grain, first, last, least)
+
+    share(look, 0, len(blocks))
+    return least
