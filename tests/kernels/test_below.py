@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gmsnet
-from gmsnet.kernels import below, ranking
+from gmsnet.kernels import below, missing, ranking
+from gmsnet.kernels.block import MOVED
 from gmsnet.kernels.guard import Precision, plain_guard
 from gmsnet.target import Target
 from gmsnet.topology import Topology, near_points
@@ -38,7 +39,7 @@ def test_a_cell_misses_a_target_as_its_definition_says(a, b, c, quality, angle):
         return
     expected = shape < quality or (angle > 0.0 and (doubled <= 0.0 or least < angle))
     px, py, qx, qy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
-    assert below.missing(px, py, qx, qy, quality, math.tan(math.radians(angle))) == expected
+    assert missing.missing(px, py, qx, qy, quality, math.tan(math.radians(angle))) == expected
 
 
 @pytest.mark.parametrize("target", [Target(0.4), Target(angle=25.0), Target(0.5, 20.0)])
@@ -71,13 +72,15 @@ def test_rounds_end_where_nothing_is_missed_or_too_much_was_done():
     near, turn, may_move = topology.near, topology.near_turn, topology.near_free
     rings, ids = (topology.near_start, topology.near_ring), topology.memory
 
-    def made(plan, most):
+    def made(plan, most, everywhere=False):
         points, tally = near_points(mesh, topology), np.zeros(3, dtype=np.int64)
         rows = below.missed(points, near, turn, *target.limits)
         shape, seen = np.zeros(len(rows)), np.zeros(len(points), dtype=bool)
         nodes = ranking.free_nodes(near, rows, shape, 0.0, may_move, ids, seen)
-        limits, guard = (target.shape, *target.limits), plain_guard(Precision())
-        left = below.rounds(points, nodes, *rings, may_move, ids, guard, np.array(plan), most, limits, tally)
+        guard, scale, limits = plain_guard(Precision()), target.shape, target.limits
+        left = below.rounds(
+            points, nodes, *rings, may_move, ids, guard, np.array(plan), most, scale, limits, everywhere, tally
+        )
         rows = below.missed(points, near, turn, *target.limits)
         assert set(left.tolist()) == {i for i in near[rows].ravel().tolist() if may_move[i]}
         return points.tobytes(), tally.tolist(), len(nodes), len(left)
@@ -88,3 +91,17 @@ def test_rounds_end_where_nothing_is_missed_or_too_much_was_done():
     one, nodes = made([(2, 1)], 10**6), made([(2, 1)], 10**6)[2]
     assert made(plan, nodes - 1) == one  # the first round has made that many, so that there is no second one
     assert made(plan, nodes)[0] != one[0]
+    some, all_of_them = made([(2, 1)], 10**6)[1][MOVED], made([(2, 1)], 10**6, everywhere=True)[1][MOVED]
+    assert 0 < some < all_of_them == nodes  # the others' cells had been mended before their turn
+
+
+@given(
+    st.lists(point, min_size=3, max_size=9, unique=True), point, st.floats(0.0, 1.0), st.floats(0.0, 1.5),
+)  # fmt: skip
+def test_a_star_misses_a_target_if_one_of_its_triangles_does(corners, centre, quality, tangent):
+    ring, (x, y) = np.array(corners).ravel(), centre
+    expected = any(
+        missing.missing(a[0] - x, a[1] - y, b[0] - x, b[1] - y, quality, tangent)
+        for a, b in zip([corners[-1], *corners[:-1]], corners, strict=True)
+    )
+    assert missing.any_missing(ring, len(corners), x, y, quality, tangent) == expected

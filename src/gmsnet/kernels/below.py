@@ -6,23 +6,10 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.compile import LANES, inlined, kernel, part
-from gmsnet.kernels.quality import shape_of
+from gmsnet.kernels.compile import LANES, kernel, part
+from gmsnet.kernels.missing import ALL, missing
 from gmsnet.kernels.ranking import by_id
 from gmsnet.kernels.worst_first_cycles import visit
-
-
-@inlined
-def missing(px, py, qx, qy, quality, tangent):
-    """Does the triangle with these two sides miss a least 1/q, or the tangent of a least angle (0: none)?
-
-    Its smallest angle is where the product of two sides is largest.
-    """
-    corner = px * qx + py * qy
-    most = max(corner, max(px * px + py * py - corner, qx * qx + qy * qy - corner))
-    area = px * qy - py * qx
-    wide = tangent == 0.0 or (area > 0.0 and area >= tangent * most)
-    return not (wide and shape_of(px, py, qx, qy) >= quality)
 
 
 @kernel
@@ -52,22 +39,25 @@ def missed(points, triangles, turn, quality, tangent):
 
 
 @kernel
-def rounds(points, nodes, start, around, free, memory, guard, plan, most, target, tally):
-    """Visits the nodes, then those that have a cell yet which misses the target; returns the latter.
+def rounds(points, nodes, start, around, free, memory, guard, plan, most, scale, target, everywhere, tally):
+    """Visits the nodes around which a cell misses the target, then those that still have one; returns the latter.
 
-    nodes: (K,) int32, free ones in the order of their ids. start, around: the rings of all nodes, in CSR form.
-    free: (N,) bool. memory: (N,) ids. plan: (R, 2) of log₂ of the power p and visits, for each round. most: visits; a
-    round that would begin after so many is not made. target: the least 1/q of a cell that meets it, for the scale; then
-    what ``missing`` asks for. tally: (3,), added to.
+    nodes: (K,) int32, free ones in the order of their ids; everywhere: all of them are visited in the first round.
+    start, around: the rings of all nodes, in CSR form. free: (N,) bool. memory: (N,) ids. plan: (R, 2) of log₂ of the
+    power p and visits, for each round. most: visits; a round that would begin after so many is not made. scale: the
+    1/q from which powers are formed. target: what ``missing`` asks for. tally: (3,), added to.
     """
     mark = np.zeros(len(points), dtype=np.bool_)
     visits = 0
     for r in range(len(plan)):
         if not len(nodes) or visits > most:
             break
-        visit(points, nodes, start, around, guard, plan[r, 0], plan[r, 1], target[0] / math.sqrt(3.0), mark, tally)
+        visit(
+            points, nodes, start, around, guard, plan[r, 0], plan[r, 1], scale / math.sqrt(3.0),
+            ALL if everywhere and r == 0 else target, mark, tally,
+        )  # fmt: skip
         visits += plan[r, 1] * len(nodes)
-        nodes = still_missing(points, nodes, start, around, free, target[1], target[2], mark)
+        nodes = still_missing(points, nodes, start, around, free, target[0], target[1], mark)
         by_id(nodes, memory)
     return nodes
 

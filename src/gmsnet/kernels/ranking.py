@@ -10,6 +10,8 @@ import numpy as np
 from gmsnet.kernels.compile import LANES, kernel, part
 from gmsnet.kernels.quality import shape_of
 
+PLACE = 8  # bits of an id by which it is sorted at a time
+DIGITS = 1 << PLACE
 HALVINGS = 24  # of the interval in which a limit is looked for: single precision has no more
 
 
@@ -150,29 +152,31 @@ def free_nodes(triangles, cells, shape, limit, free, memory, seen):
 
 @part
 def by_id(nodes, memory):
-    """Puts nodes, each there once, into the order of their ids: whatever is made of them does not depend on places."""
-    count = len(nodes)
-    if count > len(memory) // 16:
-        at = np.empty(len(memory), dtype=np.int32)
-        for i in range(len(memory)):
-            at[i] = -1
-        for k in range(count):
-            at[memory[nodes[k]]] = nodes[k]
-        k = 0
-        for i in at:
-            if i >= 0:
-                nodes[k] = i
-                k += 1
-        return
-    gap = 1
-    while 3 * gap < count:
-        gap = 3 * gap + 1
-    while gap > 0:  # Shell's sort
-        for k in range(gap, count):
-            i = nodes[k]
-            j = k
-            while j >= gap and memory[nodes[j - gap]] > memory[i]:
-                nodes[j] = nodes[j - gap]
-                j -= gap
-            nodes[j] = i
-        gap //= 3
+    """Puts nodes, each there once, into the order of their ids: whatever is made of them does not depend on places.
+
+    By the digits of the ids, the last one first; the node goes with its id, below it.
+    """
+    keys, other = np.empty(len(nodes), dtype=np.int64), np.empty(len(nodes), dtype=np.int64)
+    at = np.empty(DIGITS, dtype=np.int64)  # by digit, where the next key goes
+    largest = 0
+    for k in range(len(nodes)):
+        largest = max(largest, memory[nodes[k]])
+        keys[k] = np.int64(memory[nodes[k]]) << 32 | nodes[k]
+    shift = 32
+    while largest > 0:
+        for digit in range(DIGITS):
+            at[digit] = 0
+        for k in range(len(nodes)):
+            at[keys[k] >> shift & DIGITS - 1] += 1
+        end = 0
+        for digit in range(DIGITS):
+            end, at[digit] = end + at[digit], end
+        for k in range(len(nodes)):
+            digit = keys[k] >> shift & DIGITS - 1
+            other[at[digit]] = keys[k]
+            at[digit] += 1
+        keys, other = other, keys
+        shift += PLACE
+        largest >>= PLACE
+    for k in range(len(nodes)):
+        nodes[k] = keys[k] & 0xFFFFFFFF

@@ -1,8 +1,9 @@
 """The cells below a target: Newton's method on high powers of q, at the free nodes of these cells alone.
 
 A round visits the free nodes of the cells that miss the target, the next one those that have such a cell yet, with a
-higher power, so that ever more weight is on the cells that miss it. That leaves fewer of them than sweeps over patches
-do, in a fraction of the time.
+higher power, so that ever more weight is on the cells that miss it. A node whose cells have been mended by a neighbour
+before its turn comes stays where it is. That leaves fewer cells below the target than sweeps over patches do, in a
+fraction of the time.
 """
 
 from __future__ import annotations
@@ -59,13 +60,14 @@ class Below(Smoother):
             field.floor.watch(rows, shape)
         start, ring, free = topology.near_start, topology.near_ring, topology.near_free
         if self.everywhere:
-            nodes = topology.places[topology.free]
+            places = np.flatnonzero(free).astype(np.int32)
+            nodes = places[np.argsort(topology.memory[places])]
         else:
             seen = np.zeros(len(free), dtype=np.bool_)
             nodes = ranking.free_nodes(triangles, rows, shape, np.inf, free, topology.memory, seen)
         left = kernels.rounds(
             field.points, nodes, start, ring, free, topology.memory, field.guard(share), self.plan,
-            MOST * len(topology.free), (self.least, *self.limits), tally,
+            MOST * len(topology.free), self.least, self.limits, self.everywhere, tally,
         )  # fmt: skip
         self.reached = not len(left)
         return tally
