@@ -18,7 +18,7 @@ from gmsnet.available_memory import refuse_unless_free
 from gmsnet.errors import InputError
 from gmsnet.fixed import fixed_mask
 from gmsnet.limits import Limits, limits
-from gmsnet.measure import QualityReport, measure
+from gmsnet.measure import QualityReport, Totals, measure
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Smoother, StarSmoother, smoother
 from gmsnet.methods.auto import Auto
@@ -158,6 +158,7 @@ def smooth(
     topology, notes = protection.topology, [*protection.notes, *untangling]
 
     options: dict[str, Any] = {"threads": threads, "best_by": best_by, "guard": guard}
+    totals = None  # of the best points, where they are known
     if target:
         best, stop_reason, history = reach_target(
             given, topology, None if isinstance(chosen, Auto) else create, target, start,
@@ -165,11 +166,11 @@ def smooth(
         )  # fmt: skip
     else:
         standing = Standing.of(before.totals, best_by) if start is given_points else None
-        best, stop_reason, history = _smoothed(
+        best, stop_reason, history, totals = _smoothed(
             Run(given, topology, chosen, points=start, standing=standing, **options), max_sweeps, callback
         )
         if protection.kept is not None and stop_reason in (NO_PROGRESS, NOTHING_TO_MOVE):
-            topology = protection.outer
+            topology, totals = protection.outer, None
             try:
                 best, stop_reason, history = improve_near_walls(
                     given, topology, protection.kept, best, history, max_sweeps=max_sweeps, callback=callback,
@@ -180,10 +181,10 @@ def smooth(
 
     rank = target.rank if target else rank_by(best_by)
     try:
-        points, moved, after = outcome(given, topology, best, before, rank, given_points, threads)
+        points, moved, after = outcome(given, topology, best, before, rank, given_points, threads, totals)
     except KeyboardInterrupt:  # nothing is lost by finishing what takes less than a sweep
         stop_reason = INTERRUPTED
-        points, moved, after = outcome(given, topology, best, before, rank, given_points, threads)
+        points, moved, after = outcome(given, topology, best, before, rank, given_points, threads, totals)
     del start, given_points, best  # before the copies for the result are made
     return SmoothResult(
         mesh=restore(points),
@@ -204,10 +205,10 @@ def smooth(
 
 def _smoothed(
     run: Run, max_sweeps: int, callback: Callable[[Sweep], bool | None] | None
-) -> tuple[Floats, str, list[Sweep]]:
-    """The best points of a whole run, why it ended, and its record; nothing else of it is kept."""
+) -> tuple[Floats, str, list[Sweep], Totals | None]:
+    """The best points of a whole run, why it ended, its record, and the totals of the best; nothing else is kept."""
     stop_reason = run.to_the_end(max_sweeps, None, callback)
-    return run.best, stop_reason, run.history
+    return run.best, stop_reason, run.history, run.best_standing.totals
 
 
 def check_options(

@@ -224,12 +224,13 @@ def percentile(values: Floats, percent: int) -> float:
 
 
 def measure(
-    mesh: Mesh, topology: Topology | None = None, near: Floats | None = None, threads: int = 1
-) -> QualityReport:
+    mesh: Mesh, topology: Topology | None = None, near: Floats | None = None, threads: int = 1,
+    totals: Totals | None = None,
+) -> QualityReport:  # fmt: skip
     """The measures of a mesh; ``topology`` saves building it again (it must belong to the same connectivity).
 
     The signs are those of the topology's winding, so a report on moved points sees what has turned over. near:
-    ``near_points(mesh, topology)``, where they are known.
+    ``near_points(mesh, topology)``, where they are known; totals: of a planar mesh, where they are.
     """
     topology = topology or Topology.of(mesh)
     triangles = Triangles(mesh.points, mesh.plane, mesh.single, topology.triangles, topology.turn)
@@ -242,9 +243,10 @@ def measure(
         )
         report.__dict__["_columns"] = columns
         return report
-    near = near_points(mesh, topology) if near is None else near
-    with workers(threads, -(-len(topology.near) // LANES)) as share:
-        totals = totals_of(near, topology.near, topology.near_turn, share)
+    if totals is None:
+        near = near_points(mesh, topology) if near is None else near
+        with workers(threads, -(-len(topology.near) // LANES)) as share:
+            totals = totals_of(near, topology.near, topology.near_turn, share)
     assert totals is not None
     signs = exact_signs(planar_points(mesh), topology.triangles, topology.turn) if totals.doubts else None
     return QualityReport(topology.cell, totals, triangles, signs)

@@ -16,7 +16,7 @@ from gmsnet.kernels.back import put_back
 from gmsnet.kernels.block import MOVED
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import LEVELS, Precision
-from gmsnet.measure import QualityReport, measure, totals_of
+from gmsnet.measure import QualityReport, Totals, measure, totals_of
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Field, Smoother, Tally
 from gmsnet.standing import Standing
@@ -93,7 +93,7 @@ class Run:
                     settled = self.smoother.settled or (self.smoother.idle_ends and not moved)
                     if not (self.smoother.looks or settled or self.sweeps == max_sweeps):
                         continue
-                    sweep = self._look(share)
+                    sweep = self._look(share, last=settled or self.sweeps == max_sweeps)
                     if callback is not None and callback(sweep):
                         return CALLBACK
                     if target is not None and self.best_standing.min_shape >= target:
@@ -114,10 +114,10 @@ class Run:
         self.sweeps += 1
         return int(tally[MOVED])
 
-    def _look(self, share: Share) -> Sweep:
-        """Measures the mesh as it is now, keeps it if it is the best, and writes the record."""
+    def _look(self, share: Share, *, last: bool) -> Sweep:
+        """Measures the mesh as it is now, keeps it if it is the best, and writes the record. last: nothing follows."""
         standing = self._standing(share)
-        self._keep_if_best(standing)
+        self._keep_if_best(standing, last=last)
         moved, truncated, dropped = self.tally.tolist()
         self.tally[:] = 0
         sweep = Sweep(
@@ -129,10 +129,11 @@ class Run:
         self.stages.clear()
         return sweep
 
-    def _keep_if_best(self, standing: Standing) -> bool:
+    def _keep_if_best(self, standing: Standing, *, last: bool = False) -> bool:
         better = standing.beats(self.best_standing)
         if better:
-            self.best, self.best_standing = self.field.points.copy(), standing
+            points = self.field.points
+            self.best, self.best_standing = points if last else points.copy(), standing
         return better
 
     def _standing(self, share: Share = serial) -> Standing:
@@ -163,12 +164,12 @@ def precision_of(mesh: Mesh) -> Precision:
 
 def outcome(
     mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
-    start: Floats | None = None, threads: int = 1,
+    start: Floats | None = None, threads: int = 1, totals: Totals | None = None,
 ) -> tuple[Floats, NDArray[np.bool_], QualityReport]:  # fmt: skip
     """Points (N, dim), which of them moved, and their measures; those of the input if the quick sums misjudged them.
 
     best: (N, 2) in memory order. All nodes that it does not move keep their very bits. rank: of two meshes that of the
-    lesser rank is the better. start: ``near_points`` of the mesh, where they are known.
+    lesser rank is the better. start: ``near_points`` of the mesh, totals: of ``best``, where they are known.
     """
     start = near_points(mesh, topology) if start is None else start
     plane, factors = mesh.plane, _factors(scale_exponent(mesh))
@@ -177,7 +178,8 @@ def outcome(
     count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)
     if count:
         points.flags.writeable = False  # so that the mesh need not copy them
-        after = measure(mesh.with_points(points), topology, best if exact else None, threads)
+        known = (best, threads, totals) if exact else (None, threads)
+        after = measure(mesh.with_points(points), topology, *known)
         if rank(after) <= rank(before):
             return points, moved, after
         moved[:] = False

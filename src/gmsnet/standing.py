@@ -13,13 +13,17 @@ ROUNDING = 1e-12  # a smaller gain in q̂ is no gain
 
 @dataclass(frozen=True)
 class Standing:
-    """Where a mesh stands in the comparison of meshes on the way. missed: how many cells miss the target."""
+    """Where a mesh stands in the comparison of meshes on the way.
+
+    missed: how many cells miss the target. totals: what the rest was taken from.
+    """
 
     inverted: int
     qhat: float
     min_shape: float
     mean_shape: float
     missed: int = 0
+    totals: Totals | None = None
 
     @classmethod
     def of(cls, totals: Totals | None, best_by: str, missed: int = 0) -> Standing:
@@ -27,7 +31,7 @@ class Standing:
         if totals is None:
             return cls(0, math.nan, math.inf, math.nan, missed)
         qhat = totals.qhat_aspect if best_by == ASPECT else totals.qhat
-        return cls(totals.inverted, qhat, totals.shape_min, totals.shape_mean, missed)
+        return cls(totals.inverted, qhat, totals.shape_min, totals.shape_mean, missed, totals)
 
     @property
     def rank(self) -> tuple[int, int, float]:
