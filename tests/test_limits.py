@@ -11,8 +11,8 @@ from scipy.spatial import Delaunay
 
 import gmsnet
 from gmsnet.generate import disturb
-from gmsnet.kernels.limits import CORNER, FREE_CORNER, HELD, RING, best_with_corner
 from gmsnet.limits import limits
+from gmsnet.limits.groups import CORNER, FREE_CORNER, HELD, RING, best_with_corner
 from gmsnet.mesh import CellBlock, Mesh
 from gmsnet.topology import Topology
 

@@ -34,7 +34,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import limits as kernels
+from gmsnet.limits import groups
 from gmsnet.mesh import Mesh
 from gmsnet.topology import Topology, planar_points
 
@@ -48,7 +48,7 @@ SHOWN = 4  # cells that a sentence names
 class Limits:
     """Groups of cells that cannot all be better than a bound; those with the least bounds first.
 
-    bound: (G,) of 1/q. kind: (G,) one of the kinds of kernels.limits. node: (G,) id of the node where it is, −1 for
+    bound: (G,) of 1/q. kind: (G,) one of the kinds in groups.py. node: (G,) id of the node where it is, −1 for
     held cells. angle: (G,) of a corner, in degrees. first, rows: group g has the rows rows[first[g] : first[g + 1]] of
     ``Topology.triangles``. cell: (T,) the index of each row among all cells of the mesh. points: (N, dim).
     """
@@ -76,15 +76,15 @@ class Limits:
         cells = self.cell[self.cells(group)].tolist()
         named = ", ".join(map(str, cells[:SHOWN])) + (f" and {len(cells) - SHOWN} more" if len(cells) > SHOWN else "")
         kind, bound = self.kind[group], f"{self.bound[group]:.3g}"
-        if kind == kernels.HELD:
+        if kind == groups.HELD:
             return f"cell {named}: all its nodes are held, so its 1/q stays {bound}"
         node = int(self.node[group])
         place = ", ".join(f"{x:.6g}" for x in self.points[node].tolist())
         at = f"cells {named} at node {node} ({place})"
-        if kind == kernels.FREE_CORNER:
+        if kind == groups.FREE_CORNER:
             few = "only " if len(cells) < 6 else ""
             return f"{at}: poor connectivity, the node has {few}{len(cells)} neighbours: they cannot all exceed {bound}"
-        if kind == kernels.CORNER:
+        if kind == groups.CORNER:
             held = f"a corner of {self.angle[group]:.3g}° between held edges" if self.angle[group] < 360 else "one node"
             return f"{at}: {len(cells)} cells share {held}: they cannot all exceed {bound}"
         return f"{at}: their opposite edges are held, and no place of the node lets all of them exceed {bound}"
@@ -107,30 +107,16 @@ def limits(mesh: Mesh, topology: Topology, below: float = 0.9) -> Limits:
 
     Where free nodes are has no influence.
     """
-    triangles = topology.triangles
-    nodes, room = len(topology.memory), len(triangles)
-    free = np.zeros(nodes, dtype=bool)
+    free = np.zeros(len(topology.memory), dtype=bool)
     free[topology.free] = True
-    groups = kernels.Groups(
-        kind=np.empty(5 * room + 1, dtype=np.int8),
-        node=np.empty(5 * room + 1, dtype=np.int32),
-        angle=np.empty(5 * room + 1),
-        bound=np.empty(5 * room + 1),
-        first=np.empty(5 * room + 2, dtype=np.int64),
-        cells=np.empty(8 * room + 1, dtype=np.int32),
-    )
-    used = kernels.collect(planar_points(mesh), triangles, topology.turn, free, below, groups)
-    order = np.argsort(groups.bound[:used], kind="stable")
-    count = np.diff(groups.first[: used + 1])[order]
-    first = np.concatenate([[0], np.cumsum(count)])
-    source = np.repeat(groups.first[:used][order] - first[:-1], count) + np.arange(first[-1])
+    found = groups.collect(planar_points(mesh), topology.triangles, topology.turn, free, below)
     return Limits(
-        bound=groups.bound[:used][order],
-        kind=groups.kind[:used][order],
-        node=groups.node[:used][order].astype(np.int64),
-        angle=np.degrees(groups.angle[:used][order]),
-        first=first,
-        rows=groups.cells[source].astype(np.int64),
+        bound=found.bound,
+        kind=found.kind,
+        node=found.node,
+        angle=np.degrees(found.angle),
+        first=found.first,
+        rows=found.rows,
         cell=topology.cell,
         points=mesh.points,
     )
