@@ -5,7 +5,7 @@ import math
 import naive
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import gmsnet
@@ -249,3 +249,17 @@ def test_a_mesh_without_triangles_has_an_empty_report():
     report = measure(mesh)
     assert report.summary() == {"triangles": 0, "inverted": 0}
     assert math.isnan(report.qhat)
+
+
+@settings(max_examples=300)
+@given(seed=st.integers(0, 2**32 - 1), exponent=st.sampled_from([0, 0, -40, -130, -300, 200]), bits=st.integers(1, 52))
+def test_signs_that_floats_leave_in_doubt_are_exact(seed, exponent, bits):
+    rng = np.random.default_rng(seed)
+    points = np.round(rng.random((30, 2)) * 2.0**bits) / 2.0**bits  # few bits: collinear, or nearly so
+    points[10:20] = points[:10] + np.ldexp(rng.integers(-3, 4, size=(10, 2)).astype(float), -52)
+    points[20:] = 0.5 * (points[:10] + points[10:20])
+    points = points * 10.0**exponent
+    triangles = rng.integers(30, size=(60, 3)).astype(np.int32)
+    triangles[:10] = np.arange(10)[:, None] + (0, 10, 20)
+    turn = rng.choice([-1, 1], size=60).astype(np.int8)
+    assert exact_signs(points, triangles, turn).tolist() == naive.signs(points, triangles, turn)

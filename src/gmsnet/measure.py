@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels import predicates
 from gmsnet.kernels import quality as kernels
 from gmsnet.kernels.compile import LANES
+from gmsnet.kernels.exact import exact
 from gmsnet.mesh import Mesh
 from gmsnet.topology import Topology, near_points, planar_points
 from gmsnet.workers import Share, serial, workers
@@ -270,10 +271,11 @@ def totals_of(
 
 
 def exact_signs(points: Floats, triangles: NDArray[np.int32], turn: NDArray[np.int8]) -> NDArray[np.int8]:
-    """The exact sign of turn × area of each triangle: float64 where the error bound decides, else fractions."""
+    """The exact sign of turn × area of each triangle: float64 where the error bound decides, else exact arithmetic."""
     out = np.empty(len(triangles), dtype=np.int8)
     if predicates.signs(points, triangles, turn, 0.0, out):
-        for t in np.flatnonzero(out == 0):
+        rows = np.flatnonzero(out == 0)
+        for t in rows[: exact(points, triangles, rows, turn, out)].tolist():
             (ax, ay), (bx, by), (cx, cy) = ([Fraction(v) for v in points[i].tolist()] for i in triangles[t])
             area = (ax - cx) * (by - cy) - (ay - cy) * (bx - cx)
             out[t] = int(turn[t]) * ((area > 0) - (area < 0))

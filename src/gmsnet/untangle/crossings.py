@@ -12,19 +12,26 @@ from gmsnet.measure import exact_signs
 from gmsnet.topology import Topology
 from gmsnet.untangle.patch import Floats, Ints
 
+MOST = 3_000_000  # pairs of boxes
 FLAT = 1e-9  # of the largest box: smaller ones count as that large where boxes are sorted by size
 
 
 def near_crossings(points: Floats, edges: Ints, cells: Ints) -> Floats:
     """(k, 2) for each cell the next crossing of some edges (e, 2), at most its size off along either axis; else nan."""
     found = np.full((len(cells), 2), np.nan)
+    edges = edges[(points[edges[:, 0]] != points[edges[:, 1]]).any(axis=1)]
     if not len(edges) or not len(cells):
         return found
     low, high = points[cells].min(axis=1), points[cells].max(axis=1)
     middle, reach = (low + high) / 2, 1.5 * (high - low).max(axis=1)
     left, right = points[edges].min(axis=1), points[edges].max(axis=1)
-    near = np.unique(meeting(middle - reach[:, None], middle + reach[:, None], left, right)[:, 1])
-    pairs = near[meeting(left[near], right[near], left[near], right[near])]
+    pairs = meeting(middle - reach[:, None], middle + reach[:, None], left, right)
+    if pairs is not None:
+        near = np.unique(pairs[:, 1])
+        pairs = meeting(left[near], right[near], left[near], right[near])
+    if pairs is None:  # so much lies over each other that one crossing more or less says nothing
+        return found
+    pairs = near[pairs]
     both = edges[pairs[pairs[:, 0] < pairs[:, 1]]]
     apart = ~(both[:, 0, :, None] == both[:, 1, None, :]).any(axis=(1, 2))  # edges that share a node do not cross
     places = crossings(points, both[apart])
@@ -34,15 +41,20 @@ def near_crossings(points: Floats, edges: Ints, cells: Ints) -> Floats:
     return found
 
 
-def meeting(low: Floats, high: Floats, left: Floats, right: Floats) -> NDArray[np.intp]:
-    """(p, 2) which of some boxes (lower and upper corners, (k, 2)) meet which of others.
+def meeting(low: Floats, high: Floats, left: Floats, right: Floats) -> NDArray[np.intp] | None:
+    """(p, 2) which of some boxes (lower and upper corners, (k, 2)) meet which of others; None for more than MOST pairs.
 
     By their middles, those of one size (to a factor of two) with those of one size at a time.
     """
     pairs: list[NDArray[np.intp]] = [np.empty((0, 2), dtype=np.intp)]
+    room = MOST
     for one, middle, half in by_size(low, high):
         for other, other_middle, other_half in by_size(left, right):
             tree = scipy.spatial.cKDTree(other_middle)
+            if len(one) * len(other) > MOST:  # only then is it worth counting before they are listed
+                room -= int(tree.query_ball_point(middle, half + other_half, p=np.inf, return_length=True).sum())
+                if room < 0:
+                    return None
             close = tree.query_ball_point(middle, half + other_half, p=np.inf, return_sorted=True)
             count = np.fromiter(map(len, close), dtype=np.intp, count=len(close))
             if count.any():
