@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 import stat
-import tempfile
 from collections.abc import Iterable, Mapping
 
 from gmsnet.errors import InputError
 from gmsnet.io.pieces import Piece
 from gmsnet.io.streams import is_special
+from gmsnet.io.temporary import Temporary, remove_leftovers
 
 
 def replace_files(files: Mapping[str, bytes | Iterable[Piece]]) -> None:
@@ -20,10 +19,11 @@ def replace_files(files: Mapping[str, bytes | Iterable[Piece]]) -> None:
 
     A link is followed, an existing file keeps its permissions. What is no regular file (a pipe, a device) is written
     straight. Raises InputError where a target cannot be written, BrokenPipeError where nobody reads a pipe any more;
-    then, as after any other interruption, no temporary file is left and no target is half-written.
+    then, as after any other interruption, no temporary file is left and no target is half-written. What killed
+    processes have left in the folders is removed.
     """
-    temporary: list[tuple[str, str]] = []
-    try:
+    with contextlib.ExitStack() as made:
+        finished: list[tuple[Temporary, str]] = []
         for path, contents in files.items():
             pieces = [contents] if isinstance(contents, bytes) else contents
             try:
@@ -34,24 +34,21 @@ def replace_files(files: Mapping[str, bytes | Iterable[Piece]]) -> None:
                             stream.write(piece)
                 else:
                     target = os.path.realpath(path)
-                    name = os.path.join(os.path.dirname(target), f".gmsnet-{secrets.token_hex(6)}.tmp")
-                    temporary.append((name, target))
-                    _write(name, target, pieces)
+                    remove_leftovers(os.path.dirname(target))
+                    temporary = made.enter_context(Temporary(os.path.dirname(target)))
+                    _write(temporary, target, pieces)
+                    finished.append((temporary, target))
             except BrokenPipeError:  # no fault of the user's
                 raise
             except OSError as error:
                 raise InputError(f"{path}: cannot be written: {reason(error)}") from None
-        for name, target in temporary:
+        for temporary, target in finished:
             try:
-                os.replace(name, target)
+                temporary.become(target)
             except OSError as error:
                 raise InputError(f"{target}: cannot be written: {reason(error)}") from None
-        for folder in {os.path.dirname(target) for _, target in temporary}:
+        for folder in {os.path.dirname(target) for _, target in finished}:
             _settle(folder)
-    finally:
-        for name, _ in temporary:
-            with contextlib.suppress(FileNotFoundError):  # it was renamed, or never made
-                os.unlink(name)
 
 
 def reason(error: OSError) -> str:
@@ -61,7 +58,9 @@ def reason(error: OSError) -> str:
 
 
 def refuse_folder(path: str) -> None:
-    """InputError where a path leads to a folder."""
+    """InputError where a path leads to a folder, or can lead nowhere."""
+    if "\0" in path:
+        raise InputError(f"{path!r}: names of files hold no null characters")
     if os.path.isdir(path) or path.endswith(("/", os.sep)):
         raise InputError(f"{path}: this is a folder; give the name of a file")
 
@@ -73,8 +72,8 @@ def check_writable(path: str) -> None:
         return
     folder = os.path.dirname(os.path.realpath(path))
     try:
-        with tempfile.TemporaryFile(dir=folder):
-            pass
+        with Temporary(folder) as temporary:
+            os.close(temporary.create())
     except OSError as error:
         raise InputError(f"{path}: nothing can be written in {folder}: {reason(error)}") from None
 
@@ -83,7 +82,10 @@ def _check(path: str) -> None:
     refuse_folder(path)
     if is_special(path):
         return
-    folder = os.path.dirname(os.path.realpath(path))
+    target = os.path.realpath(path)
+    folder = os.path.dirname(target)
+    if os.path.islink(target):
+        raise InputError(f"{path}: this link leads back to itself; name another output")
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise InputError(f"{path}: {folder} is not a folder")
     if not os.path.isdir(folder):
@@ -94,14 +96,13 @@ def _check(path: str) -> None:
         raise InputError(f"{path}: the folder {folder} is write-protected")
 
 
-def _write(name: str, target: str, pieces: Iterable[Piece]) -> None:
-    """A new file with the permissions and owner of the target, if that exists, on the disk when this returns.
+def _write(temporary: Temporary, target: str, pieces: Iterable[Piece]) -> None:
+    """Fills a file that has the permissions and owner of the target, if that exists; on the disk when this returns.
 
     Until it has them nobody else may open it: the target may be private.
     """
     mode = 0o600 if os.path.exists(target) else 0o666  # less what the umask or the folder takes away
-    descriptor = os.open(name, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), mode)
-    with os.fdopen(descriptor, "wb") as stream:
+    with os.fdopen(temporary.create(mode), "wb") as stream:
         for piece in pieces:
             stream.write(piece)
         stream.flush()
@@ -109,8 +110,8 @@ def _write(name: str, target: str, pieces: Iterable[Piece]) -> None:
             old = os.stat(target)
             if hasattr(os, "chown"):
                 with contextlib.suppress(PermissionError):  # only the superuser may give files away
-                    os.chown(name, old.st_uid, old.st_gid)
-            os.chmod(name, stat.S_IMODE(old.st_mode))
+                    os.chown(temporary.name, old.st_uid, old.st_gid)
+            os.chmod(temporary.name, stat.S_IMODE(old.st_mode))
         os.fsync(stream.fileno())
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.atomic import reason, refuse_folder, replace_files
@@ -28,7 +29,7 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     Raises InputError where the file cannot be opened or the format is unknown, FormatError (naming the line) where it
     is damaged or not of that format.
     """
-    name = os.fspath(path)
+    name = _name(path)
     shown = "standard input" if name in STANDARD_INPUT else name
     entry, files = _open(name, shown, format)
     if len(files) > 1:
@@ -40,6 +41,12 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
         raise InputError(f"{shown}: there is not enough memory for this mesh") from None
     except InputError as error:
         raise FormatError(f"{shown}: {error}") from None
+
+
+def _name(path: Any) -> str:
+    if not isinstance(path, (str, bytes, os.PathLike)):
+        raise InputError(f"a file is given by its path, not by {path!r}")
+    return os.fsdecode(path)
 
 
 def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, Data]]:
@@ -118,7 +125,7 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
 
     Raises InputError where the file cannot be written, FormatError where the format cannot hold the mesh.
     """
-    name = os.fspath(path)
+    name = _name(path)
     shown = "standard output" if name in STANDARD_OUTPUT else name
     entry = output_format(mesh, name, format)
     source = mesh.source
