@@ -10,12 +10,9 @@ folder; where none of them can be written, functions are compiled anew in each p
 
 from __future__ import annotations
 
-import hashlib
 import os
-import pickle
 from collections.abc import Callable
 from functools import cached_property, update_wrapper
-from pathlib import Path
 from typing import Any
 
 if folder := os.environ.get("GMSNET_CACHE"):
@@ -24,12 +21,10 @@ if folder := os.environ.get("GMSNET_CACHE"):
 import numba
 from numba.extending import typeof_impl
 
+from gmsnet.kernels.cache import make_trustworthy
+
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 LANES = 64  # stars or triangles that go through the processor abreast
-
-SOURCES = hashlib.sha256(
-    b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
-).hexdigest()  # of all kernels together
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -38,7 +33,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         compiled: Callable[..., Any] = numba.njit(cache=True, **OPTIONS)(function)
     except RuntimeError:  # no folder for the cache can be written
         return numba.njit(**OPTIONS)(function)  # type: ignore[no-any-return]
-    _outlive_changes(compiled)
+    make_trustworthy(compiled._cache)  # type: ignore[attr-defined]
     return compiled
 
 
@@ -74,23 +69,3 @@ def part(function: Callable[..., Any]) -> Callable[..., Any]:
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile into its callers, however long it is: a loop over lanes that calls something is not vectorised."""
     return update_wrapper(Part(function, forceinline=True), function)
-
-
-def _outlive_changes(compiled: Any) -> None:
-    """Takes what was cached for stale if any kernel is another now, or if it cannot be read.
-
-    Numba looks at the function's own file alone, though what it calls stands in others and is compiled into it. And it
-    asks for the age of a cache only once that is unpickled, which fails where an argument's class stood in another
-    module when it was written: after an upgrade, that is.
-    """
-    file = compiled._cache._cache_file
-    file._source_stamp = (file._source_stamp, SOURCES)
-    load = file._load_index
-
-    def load_or_start_anew() -> Any:
-        try:
-            return load()
-        except (AttributeError, ImportError, EOFError, pickle.UnpicklingError):
-            return {}
-
-    file._load_index = load_or_start_anew
