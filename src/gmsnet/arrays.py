@@ -56,11 +56,17 @@ def coordinates(thing: Any) -> NDArray[Any]:
 
 
 def float64_rows(array: NDArray[Any]) -> NDArray[np.float64]:
-    """Numbers as a read-only float64 array, row after row in memory. What is too large for one becomes infinite."""
+    """Numbers as a read-only float64 array, row after row in memory. What is too large for one becomes infinite.
+
+    Raises InputError for whole numbers so large that neighbours share a float64.
+    """
     if array.dtype == np.float64 and array.flags.c_contiguous:
         return read_only(array)
     with np.errstate(over="ignore"):
-        return _sealed(np.array(array, dtype=np.float64, order="C"))
+        rows = np.array(array, dtype=np.float64, order="C")
+    if array.size and array.dtype.kind in "iu" and array.dtype.itemsize == 8 and np.abs(rows).max() >= MOST_FLOAT:
+        raise InputError("whole numbers from 2**53 on are no exact coordinates: give floats, or less an offset")
+    return _sealed(rows)
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -70,6 +69,10 @@ class CellBlock:
         object.__setattr__(self, "nodes", nodes)
         object.__setattr__(self, "regions", regions)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle, which knows nothing of arrays that are read-only: the block is made, and checked, anew."""
+        return CellBlock, (self.kind, self.nodes, self.regions)
+
     @property
     def dimension(self) -> int:
         """0 for vertices, 1 for lines, 2 for faces, 3 for volumes."""
@@ -86,7 +89,8 @@ class Mesh:
     source: the file it was read from, None if it was made in memory. node_sets: name → node ids, named groups of nodes
     beside those that the cells make (meshio's point sets).
 
-    All arrays are read-only and share no memory with anything writable; those that are so already are not copied.
+    All arrays are read-only and share no memory with anything writable; those that are so already are not copied. So a
+    mesh is its own copy. It can be pickled, its file with it.
 
     Raises InputError where a coordinate is not finite, a cell or a node set names a node that does not exist, data do
     not have one row for each point or cell, or an argument is of the wrong type.
@@ -104,6 +108,8 @@ class Mesh:
     def __post_init__(self) -> None:
         points = _finite(self.points)
         cells = _blocks(self.cells)
+        if not isinstance(self.single, (bool, np.bool_)):
+            raise InputError(f"single must be True or False, got {self.single!r}")
         for block in cells:
             # Seen as unsigned numbers, negative ones are larger than any node.
             if block.nodes.size and block.nodes.view(np.uint64).max() >= len(points):
@@ -134,19 +140,42 @@ class Mesh:
         for field_name, value in checked.items():
             object.__setattr__(self, field_name, MappingProxyType(value))
 
+    def __copy__(self) -> Mesh:
+        """Itself: nothing can change it."""
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Mesh:
+        """Itself: nothing can change it."""
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle: the mesh is made, and checked, anew."""
+        fields = (
+            self.points, self.cells, dict(self.region_names), dict(self.point_data), dict(self.cell_data), self.single,
+            self.source, dict(self.node_sets),
+        )  # fmt: skip
+        return Mesh, fields, None if self.cells else {"plane": self.plane}
+
+    def _twin(self) -> Mesh:
+        """Another mesh that shares everything with this one."""
+        made = object.__new__(Mesh)
+        made.__dict__.update(self.__dict__)
+        return made
+
     def with_points(self, points: NDArray[np.float64]) -> Mesh:
         """The same mesh with other coordinates (same shape as ``points``)."""
-        if np.shape(points) != self.points.shape:
-            raise InputError(f"new points must have the shape {self.points.shape}, got {np.shape(points)}")
-        made = copy(self)  # all else has been checked
+        array = plain_array(points, "points")
+        if array.shape != self.points.shape:
+            raise InputError(f"new points must have the shape {self.points.shape}, got {array.shape}")
+        made = self._twin()  # all else has been checked
         if self.cells:  # without any (``without_cells``), it is the plane of those that there were
             made.__dict__.pop("plane", None)
-        object.__setattr__(made, "points", _finite(points))
+        object.__setattr__(made, "points", _finite(array))
         return made
 
     def without_cells(self) -> Mesh:
         """The points alone, in the same plane: all that is needed of a mesh once its connectivity is known."""
-        made = copy(self)
+        made = self._twin()
         nothing: dict[str, Any] = {"cells": (), "point_data": {}, "cell_data": {}, "node_sets": {}, "source": None}
         for name, value in nothing.items():
             object.__setattr__(made, name, value)

@@ -126,6 +126,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     Raises InputError where the file cannot be written, FormatError where the format cannot hold the mesh.
     """
     name = _name(path)
+    if not isinstance(mesh, Mesh):
+        raise InputError(f"only a gmsnet.Mesh can be written, no {type(mesh).__name__}: of a result, give its .mesh")
     shown = "standard output" if name in STANDARD_OUTPUT else name
     entry = output_format(mesh, name, format)
     source = mesh.source

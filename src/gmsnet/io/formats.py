@@ -88,7 +88,7 @@ def known() -> str:
 
 def entry_of(key: str) -> Entry:
     """The format with a name of the table. Raises InputError listing the names."""
-    if key.lower() not in FORMATS:
+    if not isinstance(key, str) or key.lower() not in FORMATS:
         raise InputError(f"unknown format {key!r}: known are {', '.join(FORMATS)}")
     return FORMATS[key.lower()]
 

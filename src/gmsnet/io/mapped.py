@@ -6,6 +6,8 @@ import mmap
 import os
 import stat
 
+from gmsnet.errors import InputError
+
 LEAST = 1 << 24  # bytes; smaller files are simply read, and may then change without harm
 
 Data = bytes | mmap.mmap  # a file, read or mapped into memory
@@ -47,3 +49,10 @@ def load(path: str) -> Data:
 def changed(data: Data) -> bool:
     """Whether the file behind these bytes is not what it was, so that they cannot be relied on."""
     return isinstance(data, Mapped) and data.changed()
+
+
+def held(data: Data) -> bytes:
+    """The bytes of a file in memory. Raises InputError where others have written into the file meanwhile."""
+    if isinstance(data, Mapped) and data.changed():
+        raise InputError(f"{data.path}: the file has changed since it was read: read it again")
+    return data if isinstance(data, bytes) else data[:]

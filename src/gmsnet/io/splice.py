@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.io.mapped import Data, changed
+from gmsnet.io.mapped import Data, changed, held
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Lattice, Places
 from gmsnet.io.text import Starts, Text
@@ -135,6 +135,15 @@ class FileSource:
     region_names: Mapping[tuple[int, int], str] = field(default_factory=dict)
     point_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle: the bytes themselves, wherever they are kept. Raises InputError where they are gone."""
+        files = {suffix: held(data) for suffix, data in self.companions.items()}
+        names, fields, cell_fields = (dict(each) for each in (self.region_names, self.point_data, self.cell_data))
+        return FileSource, (
+            self.format, self.main, held(self.data), self.points, self.slots, self.cells, files,
+            names, fields, cell_fields,
+        )  # fmt: skip
 
     def fits(self, mesh: Mesh) -> bool:
         """Whether the file can stand for a mesh once its coordinates are replaced: everything else is as it was read.

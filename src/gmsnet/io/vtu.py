@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NoReturn
 from xml.sax.saxutils import quoteattr
 
@@ -202,16 +203,20 @@ def _points(reader: _Reader, place: DataArray, count: int) -> tuple[NDArray[np.f
     if not encoding.compressed and not encoding.base64:
         lattice = Lattice(found.start + encoding.width, count, 3 * size, (0, size, 2 * size))
         return points, BinarySlots(Places(lattice), kind)
+    return points, EncodedSlots(partial(_rewritten, document, place, found.start, encoded, kind))
 
-    def rewrite(data: Data, old: NDArray[np.float64], new: NDArray[np.float64]) -> list[Piece]:
-        numbers = old.astype(kind)
-        before, changed = numbers.tobytes(), old != new
-        if not changed.any():
-            return [memoryview(data)]
-        numbers[changed] = new[changed]
-        return _replaced(data, document, place, found.start, encoded, encoded.written(before, numbers.tobytes()))
 
-    return points, EncodedSlots(rewrite)
+def _rewritten(
+    document: Document, place: DataArray, start: int, encoded: Encoded, kind: str, data: Data,
+    old: NDArray[np.float64], new: NDArray[np.float64],
+) -> list[Piece]:  # fmt: skip
+    """The file with other points in an array that is encoded."""
+    numbers = old.astype(kind)
+    before, changed = numbers.tobytes(), old != new
+    if not changed.any():
+        return [memoryview(data)]
+    numbers[changed] = new[changed]
+    return _replaced(data, document, place, start, encoded, encoded.written(before, numbers.tobytes()))
 
 
 def _replaced(data: Data, document: Document, place: DataArray, start: int, old: Encoded, new: bytes) -> list[Piece]:

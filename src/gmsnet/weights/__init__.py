@@ -18,6 +18,7 @@ from gmsnet.weights import shapes
 from gmsnet.weights.shapes import LEAST_HIDDEN, MOST_HIDDEN
 
 FORMAT_VERSION = "1"
+MOST_BYTES = 1 << 24  # of a file; the largest network takes a hundredth of it, the rest is room for what is said of it
 SHIPPED: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "gmsnet": MappingProxyType(
@@ -72,6 +73,8 @@ def load(path: str | os.PathLike[str] | None = None, *, model: str = "gmsnet", v
     if model not in SHIPPED:
         raise InputError(f"there are no weights for a model {model!r}; there are some for {', '.join(SHIPPED)}")
     if path is not None:
+        if not os.fspath(path):
+            raise InputError("the path of the weights is empty: name a safetensors file, or leave it out")
         return _load(Path(path), model)
     variants = SHIPPED[model]
     variant = variant or next(iter(variants))
@@ -82,8 +85,10 @@ def load(path: str | os.PathLike[str] | None = None, *, model: str = "gmsnet", v
 
 
 def _load(path: Path, model: str) -> Weights:
-    if not path.is_file():
-        raise InputError(f"{path}: {'is no file' if path.exists() else 'there is no such file of weights'}")
+    if not os.path.isfile(path):
+        raise InputError(f"{path}: {'is no file' if os.path.exists(path) else 'there is no such file of weights'}")
+    if os.path.getsize(path) > MOST_BYTES:
+        raise InputError(f"{path}: too large for weights, which take at most {MOST_BYTES >> 20} MiB")
     try:
         with safe_open(path, framework="numpy") as file:
             metadata = dict(file.metadata() or {})
