@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -8,7 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors.numpy import save
 
+import gmsnet
 from gmsnet import weights
+from gmsnet.cli import main
 from gmsnet.errors import InputError
 
 
@@ -169,6 +172,50 @@ def test_files_that_are_none(tmp_path):
     (tmp_path / "text").write_text("these are no weights, only a sentence of some length")
     with pytest.raises(InputError, match="cannot be read as safetensors weights"):
         weights.load(tmp_path / "text")
+
+
+def header(length, text=b"{}"):
+    return length.to_bytes(8, "little") + text
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"", b"\0" * 7, header(0, b""), header(2**63), header(2**64 - 1), header(10**9, b"{" * 100),
+        header(100_000, b"[" * 100_000),  # nested deeply
+        header(77, b'{"a":{"dtype":"F32","shape":[4294967295,4294967295],"data_offsets":[0,4]}}   ') + bytes(4),
+        header(72, b'{"a":{"dtype":"F32","shape":[1000000000],"data_offsets":[0,4000000000]}}'),
+        b"PK\x03\x04" + b"\0" * 100,  # an archive, as torch.save makes it
+        b"\x80\x04\x95" + b"cos\nsystem\n(S'exit 3'\ntR.",  # a pickle
+    ],
+)  # fmt: skip
+def test_headers_that_promise_what_is_not_there_are_refused_at_once(tmp_path, data):
+    (tmp_path / "w.safetensors").write_bytes(data)
+    tracemalloc.start()
+    with pytest.raises(InputError, match="cannot be read as safetensors weights"):
+        weights.load(tmp_path / "w.safetensors")
+    assert tracemalloc.get_traced_memory()[1] < 10_000_000
+    tracemalloc.stop()
+
+
+def test_a_file_that_is_too_large_is_not_read(tmp_path, monkeypatch):
+    path = written(tmp_path / "w.safetensors", random_tensors())
+    with path.open("r+b") as file:
+        file.truncate(10**12)  # which takes no room on the disk
+    monkeypatch.setattr(weights, "safe_open", None)
+    with pytest.raises(InputError, match=r"w\.safetensors: too large for weights, which take at most 16 MiB"):
+        weights.load(path)
+
+
+@pytest.mark.parametrize("value", ["", "."])
+def test_the_command_says_what_is_wrong_with_the_name(tmp_path, capsys, value):
+    (tmp_path / "in.su2").write_text("")
+    gmsnet.write(gmsnet.random_mesh(20, seed=0), tmp_path / "in.su2")
+    given = [str(tmp_path / "in.su2"), str(tmp_path / "out.su2"), "--method", "gmsnet", "--weights", value]
+    assert main(["smooth", *given]) == 2
+    said = {"": "the path of the weights is empty: name a safetensors file, or leave it out", ".": ".: is no file"}
+    assert capsys.readouterr().err == f"gmsnet: error: {said[value]}\n"
+    assert not (tmp_path / "out.su2").exists()
 
 
 @settings(max_examples=100, deadline=None)

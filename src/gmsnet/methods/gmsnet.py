@@ -36,15 +36,16 @@ def fold(trained: weights.Weights) -> NDArray[np.float32]:
     t = {name: tensor.astype(np.float64) for name, tensor in trained.tensors.items()}
     first, last = t["mlp.0.weight"], t["mlp.1.weight"]
     columns = (t["linear.weight"], t["linear.bias"], t["norm.weight"], t["norm.bias"], t["norm.mean_scale"])
-    mix = np.stack([first @ t["gcn.weight"], first], axis=2)  # (H, H, 2)
-    parts = (
-        np.column_stack(columns),
-        np.pad(mix, ((0, 0), (0, -trained.hidden % 4), (0, 0))),
-        first @ t["gcn.bias"] + t["mlp.0.bias"],
-        last,
-        t["mlp.1.bias"],
-    )
-    return np.concatenate([part.ravel() for part in parts]).astype(np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):  # what no float32 can hold: the guard drops its shifts
+        mix = np.stack([first @ t["gcn.weight"], first], axis=2)  # (H, H, 2)
+        parts = (
+            np.column_stack(columns),
+            np.pad(mix, ((0, 0), (0, -trained.hidden % 4), (0, 0))),
+            first @ t["gcn.bias"] + t["mlp.0.bias"],
+            last,
+            t["mlp.1.bias"],
+        )
+        return np.concatenate([part.ravel() for part in parts]).astype(np.float32)
 
 
 METHOD = Method(
