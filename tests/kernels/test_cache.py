@@ -73,10 +73,11 @@ def call(tmp_path):
     (tmp_path / "user.py").write_text(source)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path[1:]]), "NUMBA_CACHE_DIR": ""}
 
-    def called(cache=tmp_path / "cache", **options):
+    def called(cache=tmp_path / "cache", changes=(), **options):
         done = subprocess.run(
             [sys.executable, "-B", "-c", "import user; print(user.twice(3, 4), user.twice(3.5, 4.25))"],
-            env={**environment, "GMSNET_CACHE": str(cache)}, text=True, capture_output=True, check=False, **options,
+            env={**environment, "GMSNET_CACHE": str(cache), **dict(changes)},
+            text=True, capture_output=True, check=False, **options,
         )  # fmt: skip
         assert done.stderr == ""
         return done.stdout
@@ -202,3 +203,16 @@ def test_a_folder_that_may_only_be_read_stops_nothing(call, tmp_path):
         assert list((tmp_path / "cache").iterdir()) == []
     finally:
         subprocess.run(["umount", str(tmp_path / "cache")], check=True)
+
+
+def test_without_any_folder_to_write_in(call, tmp_path):
+    """No GMSNET_CACHE, no home, and a package that may only be read: compiled in each process."""
+    (tmp_path / "__pycache__").mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "ro", "tmpfs", str(tmp_path / "__pycache__")]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("nothing can be mounted here")
+    try:
+        assert call(cache="", changes={"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null"}) == "7 7.75\n"
+    finally:
+        subprocess.run(["umount", str(tmp_path / "__pycache__")], check=True)
+    assert {path.name for path in tmp_path.iterdir()} == {"user.py", "__pycache__"}

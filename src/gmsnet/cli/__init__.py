@@ -17,6 +17,7 @@ import typer
 
 from gmsnet.cli import generate, methods, quality, reproduce, smooth, train
 from gmsnet.cli.signals import Interrupted
+from gmsnet.cli.visible import visible
 from gmsnet.errors import GmsnetError
 
 DONE, TARGET_NOT_MET, BAD_INPUT = 0, 1, 2
@@ -99,7 +100,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except Exception as error:
         if os.environ.get("GMSNET_DEBUG"):
             raise
-        what = " ".join(f"{type(error).__name__}: {error}".split())
+        what = visible(" ".join(f"{type(error).__name__}: {error}".split()))
         print(
             f"gmsnet: internal error: {what}; please report it; GMSNET_DEBUG=1 shows the traceback",
             file=sys.stderr,
@@ -124,7 +125,7 @@ def _open_what_is_closed() -> None:
 
 
 def _interrupted(message: str) -> int:
-    print(f"gmsnet: {message}", file=sys.stderr)
+    print(f"gmsnet: {visible(message)}", file=sys.stderr)
     return INTERRUPTED
 
 
@@ -135,7 +136,7 @@ def _describe(error: Exception) -> str:
 
 
 def _fail(message: str) -> int:
-    print(f"gmsnet: error: {' '.join(message.split())}", file=sys.stderr)
+    print(f"gmsnet: error: {visible(' '.join(message.split()))}", file=sys.stderr)
     return BAD_INPUT
 
 

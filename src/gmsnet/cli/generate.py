@@ -71,7 +71,7 @@ def _read_rings(path: Path) -> list[Any]:
         given = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: no JSON: {error}") from error
     if not isinstance(given, list):
         raise InputError(f"{path}: must hold a list of rings, [[[x, y], …], …]")

@@ -12,12 +12,18 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from gmsnet.cli.visible import visible
+
 PIPE_WIDTH = 1000  # where nobody looks, nothing is wrapped
 TABLE_WIDTH = 100  # a narrower terminal wraps the lines itself: better than figures cut short
 
 
 class _Console(Console):
     """A console that leaves it to ``main`` to notice that nobody reads any more."""
+
+    def print(self, *things: Any, **options: Any) -> None:
+        """As of any console; text of files and names of files give the terminal no commands."""
+        super().print(*(visible(thing) if isinstance(thing, str) else thing for thing in things), **options)
 
     def on_broken_pipe(self) -> None:
         """Rich calls this while it handles the BrokenPipeError, which goes on from here."""

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from rich import progress as parts
 from rich.console import Console
 
+from gmsnet.cli.visible import visible
+
 if TYPE_CHECKING:
     from gmsnet.engine import Sweep
 
@@ -37,7 +39,7 @@ class Progress:
 
     def stage(self, text: str) -> None:
         """Say what begins now."""
-        self._bar.update(self._task, description=text, total=None, standing="")
+        self._bar.update(self._task, description=visible(text), total=None, standing="")
 
     def sweep(self, sweep: Sweep) -> None:
         """The callback of ``smooth``: show the sweep and the mesh after it."""

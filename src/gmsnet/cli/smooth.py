@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gmsnet.cli.signals import Deferral, Interrupted
+from gmsnet.cli.visible import visible
 from gmsnet.errors import GmsnetError, InputError
 
 if TYPE_CHECKING:
@@ -191,7 +192,7 @@ def smooth(
         raise Interrupted(f"interrupted; the mesh is written to {written}") from None
     if faults := outcome.faults():
         for fault in faults:
-            typer.echo(f"gmsnet: {fault}", err=True)
+            typer.echo(f"gmsnet: {visible(fault)}", err=True)
         raise typer.Exit(1)
 
 
