@@ -95,8 +95,11 @@ def test_the_file_goes_along(key, large, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("compressor", [None, "zlib"])
-def test_an_encoded_file_goes_along(compressor, tmp_path):
+@pytest.mark.parametrize("large", [False, True])
+def test_an_encoded_file_goes_along(compressor, large, tmp_path, monkeypatch):
     meshio = pytest.importorskip("meshio")
+    if large:
+        monkeypatch.setattr(mapped, "LEAST", 1)
     made = gmsnet.random_mesh(60, seed=2)
     points = np.column_stack([made.points, np.zeros(len(made.points))])
     meshio.vtu.write(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NoReturn
 from xml.sax.saxutils import quoteattr
@@ -196,13 +196,14 @@ def _points(reader: _Reader, place: DataArray, count: int) -> tuple[NDArray[np.f
     if not np.isfinite(found.values).all():
         reader.fail(place, "a coordinate is not a finite number")
     points = found.values.astype(np.float64, copy=False).reshape(-1, 3)
-    kind, encoded, document = reader.order + name, found.encoded, reader.document
+    kind, encoded = reader.order + name, found.encoded
     if encoded is None:  # no points, nothing to write
         return points, BinarySlots(Places(), kind)
     encoding, size = encoded.encoding, np.dtype(kind).itemsize
     if not encoding.compressed and not encoding.base64:
         lattice = Lattice(found.start + encoding.width, count, 3 * size, (0, size, 2 * size))
         return points, BinarySlots(Places(lattice), kind)
+    document = replace(reader.document, data=b"")  # the file itself is handed over with each call
     return points, EncodedSlots(partial(_rewritten, document, place, found.start, encoded, kind))
 
 
