@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -87,6 +88,29 @@ def test_without_locks_files_are_written_and_leftovers_stay(mesh: Mesh, tmp_path
     monkeypatch.setattr(temporary.fcntl, "flock", refuse)
     write(mesh, tmp_path / "out.su2")
     assert names(tmp_path) == [".gmsnet-0123456789ab.tmp", "out.su2"]
+
+
+def test_contents_reach_the_disk_before_the_name(mesh: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that after a crash of the machine the name stands for the old contents or for all of the new ones."""
+    steps: list[str] = []
+    sync, rename = os.fsync, os.replace
+
+    def synced(descriptor: int) -> None:
+        status = os.fstat(descriptor)
+        whole = status.st_size in sizes
+        steps.append("folder" if stat.S_ISDIR(status.st_mode) else "file" if whole else "part of a file")
+        sync(descriptor)
+
+    def renamed(old: str, new: str) -> None:
+        steps.append("name")
+        rename(old, new)
+
+    write(mesh, tmp_path / "expected.node")
+    sizes = [path.stat().st_size for path in tmp_path.iterdir()]
+    monkeypatch.setattr(os, "fsync", synced)
+    monkeypatch.setattr(os, "replace", renamed)
+    write(mesh, tmp_path / "out.node")
+    assert steps == ["file", "file", "name", "name", "folder"]
 
 
 def test_no_descriptors_are_left(mesh: Mesh, tmp_path: Path) -> None:
