@@ -8,8 +8,11 @@ import signal
 from contextlib import contextmanager
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import typer
+from safetensors import safe_open
+from safetensors.numpy import save
 from typer.testing import CliRunner
 
 from gmsnet import weights
@@ -191,6 +194,44 @@ def test_a_damaged_checkpoint_is_refused(tmp_path, damage):
     training.train(SHORT, tmp_path, should_stop=lambda: True)
     (tmp_path / NAME).write_bytes(damage((tmp_path / NAME).read_bytes()))
     with pytest.raises(InputError, match=f"{NAME}: this checkpoint cannot be read"):
+        training.train(SHORT, tmp_path, resume=True)
+
+
+def without(key):
+    def dropped(tensors, metadata):
+        names = [name for name in tensors if key in name]
+        assert names
+        return {name: value for name, value in tensors.items() if name != names[0]}, metadata
+
+    return dropped
+
+
+def with_shape(key, shape):
+    def reshaped(tensors, metadata):
+        names = [name for name in tensors if key in name]
+        return {**tensors, names[0]: np.zeros(shape, np.float32)}, metadata
+
+    return reshaped
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        without("history"), without("/net/"), with_shape("/net/", (3,)), with_shape("history", (2,)),
+        with_shape("history", (0, 5)), with_shape("history", (2, 9)),
+        lambda tensors, metadata: (tensors, {"options": metadata["options"]}),
+        lambda tensors, metadata: (tensors, {**metadata, "schedules": "no JSON"}),
+        lambda tensors, metadata: (tensors, {**metadata, "schedules": "[]"}),
+        lambda tensors, metadata: ({**tensors, "gmsnet/adam/x": np.zeros(1, np.float32)}, metadata),
+    ],
+)  # fmt: skip
+def test_a_checkpoint_of_something_else_is_refused(tmp_path, change):
+    training.train(SHORT, tmp_path, should_stop=lambda: True)
+    with safe_open(tmp_path / NAME, framework="numpy") as file:
+        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (not a dict)
+        tensors, metadata = change(tensors, file.metadata())
+    (tmp_path / NAME).write_bytes(save(tensors, metadata=metadata))
+    with pytest.raises(InputError, match=f"{NAME}: not the state of this training; delete it to start anew"):
         training.train(SHORT, tmp_path, resume=True)
 
 

@@ -7,7 +7,8 @@ what a trainee has made of its meshes by then is kept.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -109,6 +110,17 @@ def restore(folder: Path, members: Mapping[str, Member]) -> dict[str, torch.Tens
     for name, member in members.items():
         member.restore(_below(tensors, f"{name}/"), schedules[name])
     return _below(tensors, STATE)
+
+
+@contextmanager
+def understood(folder: Path) -> Iterator[None]:
+    """While the state in a folder is taken over: InputError where it is none of this training."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (KeyError, IndexError, ValueError, TypeError, AttributeError, RuntimeError) as error:
+        raise InputError(f"{folder / NAME}: not the state of this training; delete it to start anew") from error
 
 
 def saved_options(folder: Path) -> Options | None:

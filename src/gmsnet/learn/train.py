@@ -93,7 +93,8 @@ def train(
         trainee = _trainee(options, data.meshes(options.mesh_seed))
         members = {name: Member.of(net, options) for name, net in trainee.nets.items()}
         if resume:
-            trainee.restore(checkpoint.restore(folder, members))
+            with checkpoint.understood(folder):
+                trainee.restore(checkpoint.restore(folder, members))
         history = {name: member.history for name, member in members.items()}
         done = len(next(iter(history.values())))
         for epoch in range(done, options.epochs):
