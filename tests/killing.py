@@ -127,7 +127,7 @@ def killed_runs(folder: Path, kills: int, nodes: int, seed: int) -> Tally:
     return tally
 
 
-STEPS = ("open", "dup", "stat", "fstat", "chown", "chmod", "fsync", "replace", "unlink", "close")
+STEPS = ("open", "dup", "stat", "fstat", "fchown", "fchmod", "fsync", "replace", "unlink", "close")
 
 
 def killed_at_each_step(folder: Path, case: str, nodes: int, after: bool) -> Tally:

@@ -113,6 +113,24 @@ def test_contents_reach_the_disk_before_the_name(mesh: Mesh, tmp_path: Path, mon
     assert steps == ["file", "file", "name", "name", "folder"]
 
 
+def test_permissions_are_given_to_the_file_and_not_to_its_name(mesh: Mesh, tmp_path: Path) -> None:
+    """In a folder that others may write to, the name can lead elsewhere meanwhile."""
+    (tmp_path / "secret").write_text("secret")
+    (tmp_path / "secret").chmod(0o600)
+    (tmp_path / "out").write_text("old")
+    (tmp_path / "out").chmod(0o666)
+
+    def pieces():
+        yield b"new"
+        (name,) = tmp_path.glob(".gmsnet-*")
+        name.unlink()
+        name.symlink_to(tmp_path / "secret")
+
+    atomic.replace_files({str(tmp_path / "out"): pieces()})
+    assert stat.S_IMODE((tmp_path / "secret").stat().st_mode) == 0o600
+    assert (tmp_path / "secret").read_text() == "secret"
+
+
 def test_no_descriptors_are_left(mesh: Mesh, tmp_path: Path) -> None:
     def count() -> int:
         return len(os.listdir("/proc/self/fd"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
+import sys
 from collections.abc import Iterable, Mapping
 
 from gmsnet.errors import InputError
@@ -108,10 +109,12 @@ def _write(temporary: Temporary, target: str, pieces: Iterable[Piece]) -> None:
         stream.flush()
         if os.path.exists(target):
             old = os.stat(target)
-            if hasattr(os, "chown"):
+            if sys.platform == "win32":
+                os.chmod(temporary.name, stat.S_IMODE(old.st_mode))
+            else:  # of the file itself, whatever its name leads to by now
                 with contextlib.suppress(PermissionError):  # only the superuser may give files away
-                    os.chown(temporary.name, old.st_uid, old.st_gid)
-            os.chmod(temporary.name, stat.S_IMODE(old.st_mode))
+                    os.fchown(stream.fileno(), old.st_uid, old.st_gid)
+                os.fchmod(stream.fileno(), stat.S_IMODE(old.st_mode))
         os.fsync(stream.fileno())
 
 
