@@ -27,7 +27,7 @@ def hellish(seed: int, nodes: int) -> Mesh:
     points, triangles = _hub(rng) if perhaps(0.02) else _triangulation(rng, nodes)
     if perhaps(0.3):  # holes, bow-ties, parts
         triangles = triangles[rng.random(len(triangles)) < 0.8]
-    if perhaps(0.2):  # a second part, over the first one
+    if perhaps(0.2) and len(triangles):  # a second part, over the first one
         triangles = np.vstack([triangles, triangles[: rng.integers(1, len(triangles) + 1)] + len(points)])
         points = np.vstack([points, points + rng.normal(scale=0.5, size=2)])
     if perhaps(0.3) and len(triangles):

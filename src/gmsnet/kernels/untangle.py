@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.compile import kernel, part
+from gmsnet.kernels.guard import ratio_of, surplus_above
 from gmsnet.kernels.predicates import determinant_and_bound
 
 TINY = 1e-290  # stands in for a squared length of zero
@@ -216,7 +217,7 @@ def find_violated(points, before, triangles, turn, was_bad, floor, unit, grain, 
     """Marks the cells with a node that has moved which stand against taking the points; returns how many.
 
     Those are the cells that were positive and are not certified, and those that were not positive, are not certified,
-    and have come below floor, a least D/L (L the sum of the squared sides).
+    and not certified above floor either, a D/L of at most 0 (L the sum of the squared sides).
     """
     count = 0
     for t in range(len(triangles)):
@@ -231,7 +232,7 @@ def find_violated(points, before, triangles, turn, was_bad, floor, unit, grain, 
             b, c = c, b
         violated[t] = not surplus(points, a, b, c, unit, grain) > 0.0
         if violated[t] and was_bad[t]:
-            violated[t] = not share(points, a, b, c) >= floor
+            violated[t] = not surplus_over(points, a, b, c, unit, grain, floor) > 0.0
         count += violated[t]
     return count
 
@@ -260,13 +261,22 @@ def share(points, a, b, c):
     return (px * qy - py * qx) / lengths if lengths > 0.0 else 0.0
 
 
+@part
+def surplus_over(points, a, b, c, unit, grain, floor):
+    """By how much D of the triangle a, b, c exceeds floor·L and the bounds of both; positive: certified above it."""
+    px, py = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+    qx, qy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
+    reach = max(abs(points[a, 0]), abs(points[a, 1])) + ((abs(px) + abs(py)) + (abs(qx) + abs(qy)))
+    return surplus_above(px, py, qx, qy, unit * reach + grain, floor)
+
+
 @kernel
-def least_share(points, triangles, turn):
-    """The least D/L of the cells; 1/q is 2√3 times that."""
+def least_ratio(points, triangles, turn, unit, grain):
+    """The least that a bound of D/L from above is over the cells (kernels.guard); 1/q is 2√3 times that."""
     least = np.inf
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         if turn[t] < 0:
             b, c = c, b
-        least = min(least, share(points, a, b, c))
+        least = min(least, ratio_of(points, b, c, a, unit, grain))
     return least

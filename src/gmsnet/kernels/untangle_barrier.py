@@ -19,6 +19,7 @@ import math
 import numpy as np
 
 from gmsnet.kernels.compile import inlined, kernel, part
+from gmsnet.kernels.guard import surplus_above
 from gmsnet.kernels.predicates import determinant_and_bound
 from gmsnet.kernels.untangle import surplus
 
@@ -112,7 +113,7 @@ def is_certified(points, v, start, ring, unit, grain):
 
 @part
 def keeps(points, v, x, y, start, ring, unit, grain, floor):
-    """May v move to (x, y)? Certified cells must stay so, the others become less inverted, with D/L at least floor."""
+    """May v move to (x, y)? Certified cells must stay so, the others become less inverted, certified above floor."""
     before = ring[start[v + 1] - 1]
     for at in range(start[v], start[v + 1]):
         after = ring[at]
@@ -124,9 +125,8 @@ def keeps(points, v, x, y, start, ring, unit, grain, floor):
         value, bound = determinant_and_bound(ax, ay, bx, by, x, y, delta)
         if not value > bound:
             old, doubt = determinant_and_bound(ax, ay, bx, by, points[v, 0], points[v, 1], delta)
-            ax, ay, bx, by = ax - x, ay - y, bx - x, by - y
-            lengths = 2.0 * (ax * ax + ay * ay + bx * bx + by * by - ax * bx - ay * by)
-            if not (old < -doubt and value - bound > old + doubt and value >= floor * lengths):
+            above = surplus_above(ax - x, ay - y, bx - x, by - y, delta, floor) > 0.0
+            if not (old < -doubt and value - bound > old + doubt and above):
                 return False
         before = after
     return True

@@ -27,8 +27,8 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     mesh. precision: how exactly coordinates are known once they are written (kernels.guard).
 
     A cell counts as mended once it is certified: positive as it will be written. No cell that was positive is not so
-    afterwards, and none that stays inverted is worse (in 1/q) than the worst was. The result follows from the arguments
-    alone.
+    afterwards, and none that stays inverted is worse (in 1/q) than the worst with a free node was. The result follows
+    from the arguments alone.
     """
     topology = topology.with_rings_of_free_nodes()
     tangle = Tangle(points, topology, precision)

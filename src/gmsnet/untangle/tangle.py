@@ -33,8 +33,10 @@ class Tangle:
 
     @cached_property
     def worst(self) -> float:
-        """The least D/L of the cells at first."""
-        return float(kernels.least_share(self.before, self.topology.near, self.topology.near_turn))
+        """An upper bound of the least D/L at first of the cells that can change, 0 if none of them was inverted."""
+        triangles, turn = self.topology.changeable
+        precision = self.precision
+        return min(float(kernels.least_ratio(self.before, triangles, turn, precision.unit, precision.grain)), 0.0)
 
     def look(self) -> int:
         """Finds the bad cells of the points as they are now; returns how many there are."""
