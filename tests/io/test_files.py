@@ -125,7 +125,7 @@ SU2_TEXT = b"NDIME= 2\nNPOIN= 0\nNELEM= 0\nNMARK= 0\n"
         ("a.mesh", b"MFEM mesh v1.0\n", r"a\.mesh: this is an MFEM mesh, not Medit: convert it first"),
         ("a.mesh", b"\x01\0\0\0\x02\0\0\0\x03\0\0\0\x18\0\0\0", r"this is a binary Medit mesh"),
         ("a.su2", b"\x1f\x8b\x08\0\0\0", r"this is compressed with gzip"),
-        ("a.su2", bytes(range(256)) * 4, r"a\.su2: this is binary data, not SU2"),
+        ("a.su2", bytes(range(256)) * 4, r"a\.su2: byte 0: this is binary data, not SU2"),
         ("a.su2", "NDIME= 2\n".encode("utf-16"), r"a\.su2: the text is in UTF-16"),
         ("a.su2", b"hello world", r"a\.su2: line 1: a keyword such as NDIME= was expected, found 'hello'"),
         ("a.su2", SU2_TEXT, r"a\.su2: the file holds no points"),
@@ -145,6 +145,18 @@ def test_what_is_no_mesh_is_refused_with_its_name(name: str, data: bytes, messag
     assert str(caught.value).startswith(str(tmp_path))
     assert "\n" not in str(caught.value)
     assert (tmp_path / name).read_bytes() == data
+
+
+def test_a_zero_byte_is_refused_wherever_it_is(tmp_path: Path) -> None:
+    data = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n" + b"# \n" * 3000
+    for at in (40, len(data)):
+        (tmp_path / "a.obj").write_bytes(data[:at] + b"# \0\n" + data[at:])
+        with pytest.raises(FormatError, match=rf"a\.obj: byte {at + 2}: .* no text has a zero byte"):
+            read(tmp_path / "a.obj")
+
+
+def test_exponents_are_coordinates_at_first_sight_too() -> None:
+    assert sniff(b"v -4.9e-324 1E5 0\nv 1 0 0\n") == "obj"
 
 
 @given(st.text("%#<!->?\n\r\t vofgs01.ASU2NDIME=", max_size=300).map(str.encode) | st.binary(max_size=100))

@@ -147,7 +147,7 @@ def test_garbage_is_refused_in_words(data: bytes) -> None:
     [
         (b"Formatted 2", b"Formatted 5", r"line 1: MeshVersionFormatted 5: known are 1 to 4"),
         (b"Dimension 2", b"Dimension 4", r"line 2: Dimension 4: a mesh has 2 or 3"),
-        (b"Dimension 2\n", b"", r"line 2: Dimension is missing before Vertices"),
+        (b"Dimension 2\n", b"", r"line 2: Dimension is missing before 'Vertices'"),
         (b"Dimension 2", b"Dimension 3", r"line 6: an integer was expected, found '1.0'"),
         (b"Vertices\n5", b"Vertices\n4", r"line 9: a keyword was expected, found '-0.5'"),
         (b"Vertices\n5", b"Vertices\n6", r"line 10: a number was expected, found 'Triangles'"),

@@ -158,6 +158,16 @@ def test_what_is_wrong_is_named(old: bytes, new: bytes, message: str) -> None:
         obj.read({".obj": PLAIN.replace(old, new, 1)})
 
 
+@pytest.mark.parametrize("line", [b"# \\", b"g a\\b", b"g a \\\\ b", b"g a # \\ \\", b"g a\\#", b"g \\\\ # \\"])
+def test_only_a_backslash_that_ends_the_last_word_goes_on(line: bytes) -> None:
+    data = PLAIN.replace(b"g wall top", line)
+    if line in (b"g a\\#", b"g \\\\ # \\"):
+        with pytest.raises(FormatError, match="line 13: a line that goes on in the next one"):
+            obj.read({".obj": data})
+    else:
+        assert len(obj.read({".obj": data}).cells) == len(obj.read({".obj": PLAIN}).cells)
+
+
 def test_a_huge_word_costs_no_memory() -> None:
     data = b"v 0 0 0\n" * 50_000 + b"x" * 1_000_000
     with pytest.raises(FormatError, match="line 50001: a line that starts with 'xxx"):

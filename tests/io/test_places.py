@@ -38,6 +38,17 @@ def test_lattices_are_their_addresses(lattices: list[Lattice], by: int) -> None:
     assert list(chained([found, np.array([3, 4])])) == [*expected, 3, 4]
 
 
+@given(st.integers(0, 9), st.integers(0, 4), st.integers(0, 30), st.integers(1, 4), st.integers(0, 3))
+def test_wide_rows_are_taken_at_once(start: int, rows: int, columns: int, step: int, gap: int) -> None:
+    wide = Lattice(start, rows, columns * step + gap, range(0, columns * step, step))
+    numbers = np.arange(9 + 4 * (30 * 4 + 3), dtype=np.uint8)
+    table = wide.table(numbers, numbers.dtype) if len(wide) else None
+    assert (table is not None) == (len(wide) > 0 and columns > rows)
+    expected = numbers[one_by_one([wide])].tolist()
+    assert pick(numbers, Places(wide)).tolist() == expected
+    assert ByteWords(numbers.tobytes(), "<").values(Places(wide), "u1").tolist() == expected
+
+
 @given(LATTICES)
 def test_words_at_lattices(lattices: list[Lattice]) -> None:
     found, expected = Places(*lattices), one_by_one(lattices)

@@ -147,6 +147,20 @@ def test_any_spelling_of_the_numbers(data: st.DataObject) -> None:
 
 
 TEXT = ply_file()
+LIST_OF_X = b"""ply
+format ascii 1.0
+element vertex 3
+property list uchar double x
+property double y
+property double z
+element face 1
+property list uchar int vertex_indices
+end_header
+0 0 0
+2 0 0 0 0
+1 0 0 0
+3 0 1 2
+"""
 
 
 @pytest.mark.parametrize(
@@ -164,7 +178,8 @@ TEXT = ply_file()
         (TEXT.replace(b"element face", b"element tristrips"), "triangle strips are not supported"),
         (TEXT.replace(b"double z", b"double w"), "line 5: vertices must have the properties x, y and z"),
         (TEXT.replace(b"double z", b"float z"), "line 5: vertices must have the properties x, y and z"),
-        (TEXT.replace(b"double", b"int"), "line 5: vertices must have"),
+        (TEXT.replace(b"element edge 2", b"element " + b"e" * 9999 + b" 3"), "3 rows of the element 'e{24}', found 2"),
+        (LIST_OF_X, "line 3: vertices must have .*, and no lists"),
         (TEXT.replace(b"vertex_indices", b"corners"), "faces must have one list"),
         (TEXT.replace(b"int vertex2", b"float vertex2"), "edges must have"),
         (TEXT.replace(b"element vertex 6", b"element vertex 7"), "line 30: a row of the element 'vertex' is cut off"),

@@ -169,7 +169,7 @@ def test_garbage_is_refused_in_words(data: bytes) -> None:
         (b"1.0 1.0 2", b"1.0", r"line 8: two coordinates and an index were expected, found 1 numbers"),
         (b"1.0 1.0 2", b"1.0 1.0 0.5 2", r"line 8: an integer was expected, found '0.5'"),
         (b"NDIME= 2", b"7\nNDIME= 2", r"line 1: a keyword such as NDIME= was expected, found '7'"),
-        (b"NMARK= 2", b"WEIGHTS= 1\n0.5\nNMARK= 2", r"line 12: 1 rows follow the keyword WEIGHTS"),
+        (b"NMARK= 2", b"WEIGHTS= 1\n0.5\nNMARK= 2", r"line 12: 1 rows follow the keyword 'WEIGHTS'"),
         (b"NELEM= 2", b"NELEM= two", r"line 2: an integer was expected, found 'two'"),
         (b"NELEM= 2", b"NELEM= -2", r"line 2: the number of elements is negative: -2"),
         (b"NELEM= 2", b"NELEM=", r"line 2: one number was expected after NELEM=, found 0 words"),
@@ -179,6 +179,14 @@ def test_what_is_wrong_is_named(old: bytes, new: bytes, message: str) -> None:
     assert old in PLAIN
     with pytest.raises(FormatError, match=message):
         su2.read({".su2": PLAIN.replace(old, new, 1)})
+
+
+def test_words_of_the_file_are_short_and_printable_in_messages() -> None:
+    for key in (b"A" * 5000, b"A\x1b[2J"):
+        with pytest.raises(FormatError) as caught:
+            su2.read({".su2": PLAIN.replace(b"NMARK= 2", key + b"= 1\n0.5\nNMARK= 2")})
+        assert str(caught.value).isprintable()
+        assert len(str(caught.value)) < 200
 
 
 def test_one_marker_in_two_pieces_and_vertices() -> None:

@@ -117,6 +117,14 @@ def test_a_false_number_of_attributes_costs_no_time() -> None:
     assert not len(parsed.points)
 
 
+def test_columns_without_number_are_refused() -> None:
+    row = " ".join(["0"] * 1001)
+    with pytest.raises(FormatError, match="line 1: 1001 attributes: more than 1000 are not read"):
+        triangle.read({".node": f"1 2 1001 0\n1 0 0 {row}\n".encode(), ".ele": b"0 3 0\n"})
+    with pytest.raises(FormatError, match=r"\.ele file .* line 1: 1001 attributes"):
+        triangle.read({".node": NODE, ".ele": f"1 3 1001\n1 1 2 3 {row}\n".encode()})
+
+
 def test_numbers_without_order() -> None:
     node = b"3 2 0 0\n10 0 0\n30 1 0\n20 0 1\n"
     parsed = triangle.read({".node": node, ".ele": b"1 3 0\n1 10 30 20\n"})

@@ -21,6 +21,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io import gmsh, ply, stl, vtu
 from gmsnet.io import vtk as vtk_format
 from gmsnet.io.vtu_arrays import Encoding, decode
+from gmsnet.io.vtu_xml import Document
 from gmsnet.mesh import CellBlock, Mesh
 
 PLAIN = """<?xml version="1.0"?>
@@ -169,7 +170,75 @@ def test_sizes_that_lie_are_refused_without_memory() -> None:
     refused(vtu, _with_points(_header(1, 96, 0, 30) + base64.b64encode(bytes(30)), 4), "block 0 cannot be decompressed")
     refused(vtu, _with_points(b"AAAA", 4), "cut off")
     refused(vtu, _with_points(b"!!!!" * 20, 4), "not in base64")
-    refused(vtu, _with_points(_header(1, 96, 0, 30), points), "it has 96 bytes|cannot be in a file")
+    refused(vtu, _with_points(_header(1, 96, 0, 30), points), "it has 96 bytes|write the file without compression")
+
+
+APPENDED = PLAIN.replace(
+    """format="ascii">
+0 0 0 1 0 0 1 1 0 <!-- 7 7 7 --> 0 1 0
+""",
+    "OFFSET>",
+).replace(
+    "</VTKFile>",
+    '<AppendedData encoding="base64">_'
+    + base64.b64encode(np.array([96], "<u4").tobytes() + np.arange(12.0).tobytes()).decode()
+    + base64.b64encode(np.array([16], "<u4").tobytes() + np.arange(4, dtype="<i4").tobytes()).decode()
+    + "</AppendedData></VTKFile>",
+)
+FIELD = '<PointData><DataArray type="{}" Name="f" {}/></PointData><Cells>'
+
+
+def appended(points: str, kind: str, field: str) -> bytes:
+    """A file whose points, and a field of them, are appended, with these attributes."""
+    return (
+        APPENDED.replace("OFFSET", f'format="appended" {points}').replace("<Cells>", FIELD.format(kind, field)).encode()
+    )
+
+
+def test_offsets_are_found_where_they_are_written() -> None:
+    at = len(base64.b64encode(bytes(100)))
+    for more in (f'offset="{at}"', f"Name2=' offset=\"7\"' offset = '{at}'", f'xoffset="1" offset=" {at} "'):
+        parsed = read(vtu, appended('offset="0"', "Int32", f'format="appended" {more}'))
+        assert parsed.point_data["f"].tolist() == [0, 1, 2, 3]
+        check_splice(vtu, appended('offset="0"', "Int32", f'format="appended" {more}'))
+    refused(vtu, appended('offset="0"', "Int32", f'format="appended" offset="&#49;{at}"'), "'f': .* cannot be found")
+    kept = appended('offset="0"', "String", 'format="appended" offset="none"')  # no numbers, so nobody asks where it is
+    assert "f" not in read(vtu, kept).point_data
+    check_splice(vtu, kept)
+
+
+def test_points_that_share_their_bytes_are_refused() -> None:
+    for kind, offset in (("Int32", 0), ("String", 4), ("String", 135)):
+        shared = appended('offset="0"', kind, f'format="appended" offset="{offset}"')
+        refused(vtu, shared, "the array 'f': it (shares bytes with the points|has 96 bytes)")
+    refused(
+        vtu, appended('offset="0"', "Float64", 'NumberOfComponents="3" format="appended" offset="0"'), "shares bytes"
+    )
+
+
+def test_appended_data_may_stand_in_front_of_the_grid() -> None:
+    data = appended('offset="0"', "Int32", f'format="appended" offset="{len(base64.b64encode(bytes(100)))}"')
+    data = data.replace(b'byte_order="LittleEndian"', b'byte_order="LittleEndian" compressor="vtkZLibDataCompressor"')
+    points, field = (
+        base64.b64encode(np.array([1, len(part), 0, len(packed)], "<u4").tobytes()) + base64.b64encode(packed)
+        for part in (np.zeros(12).tobytes(), np.arange(4, dtype="<i4").tobytes())
+        for packed in [zlib.compress(part)]
+    )
+    head, rest = data.split(b"<UnstructuredGrid>")
+    grid = rest[: rest.index(b"<AppendedData")].replace(b'offset="136"', b'offset="%d"' % len(points))
+    block = b'<AppendedData encoding="base64">_' + points + field + b"</AppendedData>"
+    for file in (head + b"<UnstructuredGrid>" + grid + block + b"</VTKFile>",
+                 head + block + b"<UnstructuredGrid>" + grid + b"</VTKFile>"):  # fmt: skip
+        assert read(vtu, file).point_data["f"].tolist() == [0, 1, 2, 3]
+        check_splice(vtu, file)
+
+
+@given(st.lists(st.tuples(st.integers(0, 30), st.integers(1, 6)), max_size=6), st.integers(0, 30), st.integers(0, 30))
+def test_what_is_visible_is_not_hidden(spans: list[tuple[int, int]], one: int, two: int) -> None:
+    start, stop = sorted((one, two))
+    hidden = sorted((first, first + size) for first, size in spans if first >= start)
+    seen = {at for part in Document(b"", hidden).visible(start, stop) for at in range(*part)}
+    assert seen == {at for at in range(start, stop) if not any(first <= at < end for first, end in hidden)}
 
 
 def test_blocks_keep_their_bytes_where_nothing_changed() -> None:

@@ -66,7 +66,7 @@ SIGNS = {
     "medit": (HASH, rb"MeshVersionFormatted\b"),
     "off": (HASH, rb"(ST)?C?N?4?n?OFF\b"),
     "su2": (PERCENT, rb"(NDIME|NZONE|NELEM|NPOIN|NMARK|IZONE|NCHUNK|AOA|FFD_NBOX)\s*="),
-    "obj": (HASH, rb"((mtllib|o|g|usemtl|s)[ \t]+\S+[ \t]*[\r\n]\s*)*v[nt]?[ \t]+[-+.\d]+[ \t]+[-+.\d]"),
+    "obj": (HASH, rb"((mtllib|o|g|usemtl|s)[ \t]+\S+[ \t]*[\r\n]\s*)*v[nt]?[ \t]+[-+.\deE]+[ \t]+[-+.\d]"),
 }
 # Known by sight, but not read.
 STRANGERS = {
@@ -79,6 +79,7 @@ STRANGERS = {
     "a binary Medit mesh": rb"\x01\0\0\0[\x01-\x04]\0\0\0\x03\0\0\0|\0\0\0\x01\0\0\0[\x01-\x04]\0\0\0\x03",
 }
 HEAD = 4096  # bytes that are looked at
+MAY_BE_BINARY = ("gmsh", "vtk", "vtu", "stl", "ply")
 
 
 def known() -> str:
@@ -123,17 +124,16 @@ def check_contents(data: Data, key: str) -> None:
         raise FormatError("the file is empty")
     title = FORMATS[key].title
     shown = sniff(data)
-    if shown == key:
-        return
-    if shown is not None:
+    if shown is not None and shown != key:
         other = FORMATS[shown]
         raise FormatError(
             f"this looks like {other.title}, not {title}: rename it to {other.suffixes[0]} or pass --format {shown}"
         )
-    for what, sign in STRANGERS.items():
-        if re.match(sign, data[:HEAD]):
-            raise FormatError(f"this is {what}, not {title}: convert it first ({known()} are read)")
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise FormatError("the text is in UTF-16; save it as plain text (ASCII or UTF-8)")
-    if b"\0" in data[:HEAD]:
-        raise FormatError(f"this is binary data, not {title}")
+    if shown is None:
+        for what, sign in STRANGERS.items():
+            if re.match(sign, data[:HEAD]):
+                raise FormatError(f"this is {what}, not {title}: convert it first ({known()} are read)")
+        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            raise FormatError("the text is in UTF-16; save it as plain text (ASCII or UTF-8)")
+    if key not in MAY_BE_BINARY and (at := data.find(b"\0")) >= 0:
+        raise FormatError(f"byte {at}: this is binary data, not {title}, or damaged: no text has a zero byte")

@@ -22,6 +22,7 @@ from gmsnet.io.document import Parsed, Written
 from gmsnet.io.gmsh_sections import KINDS, Contents, Elements, Nodes, Source
 from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
+from gmsnet.io.text import quoted
 from gmsnet.mesh import Mesh
 
 name = "Gmsh"
@@ -41,7 +42,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
     while title := source.word():
         here = source.at - len(title)
         if not title.startswith(b"$") or title in seen:
-            source.fail(here, f"expected a new section, found {sections.show(title)!r}")
+            source.fail(here, f"expected a new section, found {quoted(title)}")
         if title in _READERS:
             seen.add(title)
         _section(source, title[1:], found, old)
@@ -93,7 +94,7 @@ def _section(source: Source, title: bytes, found: Contents, old: bool) -> None:
         if old and source.order:  # the count is text, and binary numbers follow
             here, text = source.at, source.word()
             if not re.fullmatch(rb"\d{1,18}", text):
-                source.fail(here, f"a count was expected, found {sections.show(text)!r}")
+                source.fail(here, f"a count was expected, found {quoted(text)}")
             count = int(text)
         words = source.words(title)
         if old and not source.order:
@@ -110,7 +111,7 @@ def _section(source: Source, title: bytes, found: Contents, old: bool) -> None:
 def _physical_names(source: Source, found: Contents) -> None:
     here, text = source.at, source.word()
     if not re.fullmatch(rb"\d{1,18}", text):
-        source.fail(here, f"a count was expected, found {sections.show(text)!r}")
+        source.fail(here, f"a count was expected, found {quoted(text)}")
     for _ in range(int(text)):
         match = _NAME.match(source.data, source.at)
         if match is None:

@@ -19,7 +19,7 @@ from gmsnet.io.cells import joined
 from gmsnet.io.mapped import Data
 from gmsnet.io.places import Addresses, Lattice, Places, chained, lists, pick, shifted
 from gmsnet.io.splice import Slots
-from gmsnet.io.text import Text, fail
+from gmsnet.io.text import Text, fail, quoted
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 from gmsnet.kernels import text as kernels
 from gmsnet.mesh import NODES
@@ -130,8 +130,8 @@ class Source:
 
 
 def show(title: bytes) -> str:
-    """The name of a section for a message."""
-    return title[:24].decode("ascii", "replace")
+    """The name of a section for a message, whatever bytes it has."""
+    return quoted(title)[1:-1]
 
 
 def ints(words: Words, count: int, kind: str = "i4") -> list[int]:

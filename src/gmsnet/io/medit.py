@@ -107,7 +107,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
         elif key in SKIPPED_VALUES:
             text.floats(stream.take(1))
         elif not dimension:
-            text.fail(at, f"Dimension is missing before {key[:24]}")
+            text.fail(at, f"Dimension is missing before {text.word(at)}")
         elif key == "Vertices":
             rows = stream.take(stream.count("vertices") * (dimension + 1)).reshape(-1, dimension + 1)
             points, ends = text.spans(starts := np.ascontiguousarray(rows[:, :dimension]))
@@ -124,7 +124,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
         elif key == "BoundingBox":
             text.floats(stream.take(2 * dimension))
         else:
-            text.fail(at, f"unknown keyword {key[:24]!r}")
+            text.fail(at, f"unknown keyword {text.word(at)}")
     if "Vertices" not in seen:
         raise FormatError("Vertices are missing: the file is cut off or no Medit mesh")
 

@@ -5,6 +5,7 @@ The region of a cell is its material (``usemtl``) together with its group (``g``
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
@@ -28,6 +29,7 @@ KEYS = (b"v", b"vt", b"vn", b"vp", b"f", b"l", b"p", b"o", b"g", b"s", b"usemtl"
 POINT, GROUP, MATERIAL = (KEYS.index(key) for key in (b"v", b"g", b"usemtl"))
 LEAST = {KEYS.index(b"f"): 3, KEYS.index(b"l"): 2, KEYS.index(b"p"): 1}  # nodes
 FACE, LINE, DOT = LEAST
+_BACKSLASH = re.compile(rb"\\(?=[\s#]|\Z)")  # at the end of a word
 KINDS = ("triangle", "quad", "polygon", "line", "vertex")
 
 
@@ -50,9 +52,9 @@ def read(files: Mapping[str, Data]) -> Parsed:
 
 def _no_broken_lines(text: Text, rows: Rows) -> None:
     last = rows.starts[rows.first[1:] - 1]
-    at = -1
-    while (at := text.data.find(b"\\", at + 1)) >= 0:
-        k = int(np.searchsorted(last, last.dtype.type(at), side="right")) - 1
+    ends = np.array([match.start() for match in _BACKSLASH.finditer(text.data)], dtype=last.dtype)
+    row, first = np.unique(np.searchsorted(last, ends, side="right") - 1, return_index=True)
+    for k, at in zip(row.tolist(), ends[first].tolist(), strict=True):  # only the first can end the row's last word
         if k >= 0 and text.next(int(last[k])) == (int(last[k]), at + 1):
             text.fail(rows.where(k), "a line that goes on in the next one (\\) cannot be read: join the two")
 

@@ -22,7 +22,7 @@ class Lattice:
     start: int
     rows: int
     stride: int
-    columns: tuple[int, ...] = (0,)
+    columns: tuple[int, ...] | range = (0,)
 
     def __len__(self) -> int:
         return self.rows * len(self.columns)
@@ -30,6 +30,16 @@ class Lattice:
     def column(self, data: Data | bytearray, column: int, dtype: str) -> NDArray[Any]:
         """(rows,) the binary numbers at one of the columns of all rows, in the memory of ``data``."""
         return np.ndarray((self.rows,), dtype, data, self.start + column, (self.stride,))
+
+    def table(self, data: Data | NDArray[Any], dtype: Any, unit: int = 1) -> NDArray[Any] | None:
+        """(rows, columns) all the numbers at once, in the memory of ``data``, where an address is ``unit`` bytes.
+
+        None where they are to be taken column by column: few columns, for which that is faster, or uneven ones.
+        """
+        if not isinstance(self.columns, range) or len(self.columns) <= self.rows:
+            return None
+        start, strides = unit * (self.start + self.columns[0]), (unit * self.stride, unit * self.columns.step)
+        return np.ndarray((self.rows, len(self.columns)), dtype, data, start, strides)
 
 
 class Places(Sequence[int]):
@@ -77,6 +87,11 @@ def pick(values: NDArray[Any], addresses: Addresses) -> NDArray[Any]:
         return values[addresses]
     parts = [values[:0]]
     for lattice in addresses.lattices:
+        if not len(lattice):
+            continue
+        if (table := lattice.table(np.ascontiguousarray(values), values.dtype, values.itemsize)) is not None:
+            parts.append(table.reshape(-1))
+            continue
         columns = [values[lattice.start + c :: lattice.stride][: lattice.rows] for c in lattice.columns]
         parts.append(columns[0] if len(columns) == 1 else np.stack(columns, axis=1).reshape(-1))
     return parts[1] if len(parts) == 2 else np.concatenate(parts)
@@ -125,7 +140,7 @@ def lists(
     found = []
     for start, end in zip([0, *cuts], [*cuts, len(first)], strict=True):
         if start < end and counts[start]:
-            columns = tuple(unit * k for k in range(int(counts[start])))
+            columns = range(0, unit * int(counts[start]), unit)
             found.append(Lattice(int(first[start] + skip[start]), end - start, int(lengths[start]), columns))
     return Places(*found)
 

@@ -49,12 +49,12 @@ def read(files: Mapping[str, Data]) -> Parsed:
     words, found = tables(data, header)
     vertex = found["vertex"]
     axes = [vertex.get(axis) for axis in "xyz"]
-    x, y, z = axes
-    if x is None or y is None or z is None or not x.property.kind == y.property.kind == z.property.kind in ("f4", "f8"):
-        message = "vertices must have the properties x, y and z, all of type float or all double"
+    kinds = {(axis.property.kind, axis.sizes is None) for axis in axes if axis is not None}
+    if None in axes or kinds not in ({("f4", True)}, {("f8", True)}):
+        message = "vertices must have the properties x, y and z, all of type float or all double, and no lists"
         fail(data, known["vertex"].at, message)
-    kind = x.property.kind
-    points, slots = words.coordinates(side_by_side(x.at, y.at, z.at), kind)
+    ((kind, _),) = kinds
+    points, slots = words.coordinates(side_by_side(*(axis.at for axis in axes if axis is not None)), kind)
     parts = [
         (key, _faces if key == "face" else _edges) for key in known if key in ("face", "edge") and known[key].count
     ]

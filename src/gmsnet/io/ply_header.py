@@ -35,6 +35,11 @@ class Element:
     at: int
     properties: list[Property] = field(default_factory=list)
 
+    @property
+    def called(self) -> str:
+        """Its name for a message."""
+        return repr(self.name[:24])
+
 
 @dataclass(frozen=True)
 class Header:
@@ -50,7 +55,7 @@ def parse(data: Data) -> Header:
     first = _FIRST.match(data)
     if first is None:
         raise FormatError("line 1: not a PLY file: it must start with a line 'ply'")
-    at, order, elements = first.end(), None, list[Element]()
+    at, order, elements, known = first.end(), None, list[Element](), set[tuple[str, ...]]()
     while True:
         stop = data.find(first[1], at)
         if stop < 0:
@@ -64,15 +69,16 @@ def parse(data: Data) -> Header:
             case ["format", name, "1.0"] if name in ORDERS and order is None:
                 order = ORDERS[name]
             case ["element", name, count] if re.fullmatch(r"\d{1,18}", count, re.ASCII):
-                if name in [element.name for element in elements]:
-                    fail(data, at, f"the element {name[:24]!r} is given twice")
+                _add(data, at, known, "element", name)
                 elements.append(Element(name, int(count), at))
             case ["property", kind, name] if kind in TYPES and elements:
-                _add(data, at, elements[-1], Property(name, TYPES[kind]))
+                _add(data, at, known, "property", name, elements[-1].name)
+                elements[-1].properties.append(Property(name, TYPES[kind]))
             case ["property", "list", length, kind, name] if (
                 kind in TYPES and elements and TYPES.get(length, "f")[0] != "f"
             ):
-                _add(data, at, elements[-1], Property(name, TYPES[kind], TYPES[length]))
+                _add(data, at, known, "property", name, elements[-1].name)
+                elements[-1].properties.append(Property(name, TYPES[kind], TYPES[length]))
             case _:
                 shown = " ".join(words)[:60].encode("ascii", "replace").decode()
                 fail(data, at, f"not a line of a PLY header, or of a type that is not supported: {shown!r}")
@@ -81,11 +87,12 @@ def parse(data: Data) -> Header:
         fail(data, at, "the header has no 'format'")
     for element in elements:
         if element.count and not element.properties:
-            fail(data, element.at, f"the element {element.name[:24]!r} has no properties")
+            fail(data, element.at, f"the element {element.called} has no properties")
     return Header(order, elements, stop + len(first[1]))
 
 
-def _add(data: Data, at: int, element: Element, new: Property) -> None:
-    if new.name in [known.name for known in element.properties]:
-        fail(data, at, f"the property {new.name[:24]!r} is given twice")
-    element.properties.append(new)
+def _add(data: Data, at: int, known: set[tuple[str, ...]], what: str, name: str, of: str = "") -> None:
+    """Notes that an element, or a property of one, has been given."""
+    if (what, name, of) in known:
+        fail(data, at, f"the {what} {name[:24]!r} is given twice")
+    known.add((what, name, of))

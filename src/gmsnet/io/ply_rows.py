@@ -48,7 +48,7 @@ def _text(data: Data, header: Header) -> tuple[Words, dict[str, Table]]:
     words, found, at = TextWords(text, rows.starts), dict[str, Table](), 0
     for element in header.elements:
         if element.count > len(rows) - at:
-            message = f"expected {element.count} rows of the element {element.name!r}, found {len(rows) - at}"
+            message = f"expected {element.count} rows of the element {element.called}, found {len(rows) - at}"
             raise FormatError(f"{message}: the file is cut off")
         first = rows.first[at : at + element.count + 1].astype(np.int64)
         lengths = np.diff(first)
@@ -59,7 +59,7 @@ def _text(data: Data, header: Header) -> tuple[Words, dict[str, Table]]:
             found[element.name], stops = _columns(words, element, first[:-1], first[1:])
             if (wrong := np.flatnonzero(stops != first[1:])).size:
                 where = int(first[wrong[0]])
-                words.fail(where, f"more numbers than the properties of the element {element.name!r}")
+                words.fail(where, f"more numbers than the properties of the element {element.called}")
         at += element.count
     if at < len(rows):
         text.fail(rows.where(at), "more rows than the header announces")
@@ -75,7 +75,7 @@ def _regular(words: Words, element: Element, rows: Lattice) -> Table:
             count = int(words.values(Places(Lattice(place, min(1, rows.rows), 1)), item.length).sum())
             sizes = np.broadcast_to(np.int64(count), rows.rows)
             place += words.size(item.length)
-        columns = tuple(words.size(item.kind) * k for k in range(count))
+        columns = range(0, words.size(item.kind) * count, words.size(item.kind))
         at = Places(Lattice(place, rows.rows, rows.stride, columns)) if count else Places()
         table[item.name] = Column(item, heads, at, sizes)
         place += words.size(item.kind) * count
@@ -105,7 +105,7 @@ def _columns(
 
 def _check(words: Words, element: Element, short: NDArray[np.bool_], starts: NDArray[np.int64]) -> None:
     if short.any():
-        words.fail(int(starts[np.argmax(short)]), f"a row of the element {element.name!r} is cut off")
+        words.fail(int(starts[np.argmax(short)]), f"a row of the element {element.called} is cut off")
 
 
 def _binary(data: Data, header: Header) -> tuple[Words, dict[str, Table]]:
@@ -114,7 +114,7 @@ def _binary(data: Data, header: Header) -> tuple[Words, dict[str, Table]]:
         least = sum(words.size(p.length or p.kind) for p in element.properties)
         if element.count * least > len(data) - at:
             fail_at(
-                at, f"the {element.count} rows of the element {element.name!r} do not fit into the rest of the file"
+                at, f"the {element.count} rows of the element {element.called} do not fit into the rest of the file"
             )
         lattice = _lattice(words, element, at)
         if lattice is not None:
@@ -141,10 +141,10 @@ def _starts(words: ByteWords, element: Element, at: int) -> tuple[NDArray[np.int
             if length:
                 count = int.from_bytes(data[at : at + length], order, signed=signed)  # type: ignore[arg-type]
                 if count < 0:
-                    fail_at(at, f"a list of the element {element.name!r} has a negative length")
+                    fail_at(at, f"a list of the element {element.called} has a negative length")
                 at += length + size * count
         if at > len(data):
-            fail_at(starts[-1], f"a row of the element {element.name!r} is cut off")
+            fail_at(starts[-1], f"a row of the element {element.called} is cut off")
     return np.array(starts, dtype=np.int64), at
 
 

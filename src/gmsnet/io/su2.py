@@ -20,7 +20,7 @@ from gmsnet.io.document import Parsed, Written
 from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
-from gmsnet.io.text import Rows, Starts, Text
+from gmsnet.io.text import Rows, Starts, Text, quoted
 from gmsnet.mesh import CellBlock, Mesh
 
 name = "SU2"
@@ -31,6 +31,7 @@ SIZES = {1: 1, 3: 2, 5: 3, 9: 4}
 COUNTS = {"NDIME": "dimensions", "NZONE": "zones", "NPOIN": "points", "NELEM": "elements", "NMARK": "markers",
           "MARKER_ELEMS": "marker elements"}  # fmt: skip
 COMMENT = b"%"
+MOST_KEYWORDS = 100_000  # each costs time; a mesh has two for each marker
 _LINE_END = re.compile(rb"[\r\n]")
 REQUIRED = ("NDIME", "NPOIN", "NELEM", "NMARK")  # SU2 wants all four; without NMARK a cut could not be seen
 ROWS = ("NPOIN", "NELEM", "MARKER_ELEMS")
@@ -73,7 +74,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
     names = {(1, number): tag for tag, number in numbers.items()}
     for tag, rows in found.markers:
         if rows is None:
-            raise FormatError(f"the marker {tag!r} has no MARKER_ELEMS: the file is cut off")
+            raise FormatError(f"the marker {tag[:24]!r} has no MARKER_ELEMS: the file is cut off")
         blocks = _cells(text, rows, len(points), numbers[tag], {1: "vertex", 3: "line"})
         names |= {(b.dimension, numbers[tag]): tag for b in blocks}
         cells += blocks
@@ -90,6 +91,8 @@ def _sections(text: Text) -> Iterator[Section]:
         end = line_end.start() if line_end else len(data)
         if data.find(COMMENT, start, at) < 0:
             heads.append((start, at, end))
+            if len(heads) > MOST_KEYWORDS:
+                text.fail(start, f"there are more than {MOST_KEYWORDS} keywords: this is no mesh")
     first = text.until(heads[0][0] if heads else len(data)).rows(0)
     if len(first):
         text.fail(first.where(0), f"a keyword such as NDIME= was expected, found {text.word(first.starts[0])}")
@@ -97,9 +100,7 @@ def _sections(text: Text) -> Iterator[Section]:
         stop = heads[k + 1][0] if k + 1 < len(heads) else len(data)
         key = data[start:equals].strip()
         if not key.replace(b"_", b"").isalnum():
-            text.fail(
-                start, f"a keyword was expected before '=', found {key[:24].decode('ascii', 'backslashreplace')!r}"
-            )
+            text.fail(start, f"a keyword was expected before '=', found {quoted(key)}")
         value = text.until(end).rows(equals + 1).starts
         yield Section(key.decode(), equals, value, text.until(stop).rows(end))
 
@@ -117,7 +118,10 @@ def _collect(text: Text) -> Contents:
         if key in COUNTS:
             _count(text, section, found)
         elif len(rows) and not key.startswith("FFD_"):
-            text.fail(rows.where(0), f"{len(rows)} rows follow the keyword {key}, which is not known to have any")
+            text.fail(
+                rows.where(0),
+                f"{len(rows)} rows follow the keyword {quoted(key.encode())}, which is not known to have any",
+            )
     return found
 
 

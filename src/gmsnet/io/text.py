@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NoReturn
@@ -109,7 +110,9 @@ class Text:
 
     def until(self, stop: int) -> Text:
         """The text as if it ended at byte ``stop``."""
-        return Text(self.data, self.comment, stop, self.ends)
+        same = copy(self)  # what is known of the bytes is shared
+        same.stop = stop
+        return same
 
     def tokens(self, at: int, count: int | None = None) -> tuple[Starts, int]:
         """The next ``count`` tokens (None: all) from byte ``at``, and the byte behind the last.
@@ -258,9 +261,7 @@ def quoted(found: bytes) -> str:
 def line_of(data: Data, offset: int) -> int:
     """The line (counted from 1) in which a byte stands; LF, CR LF and lone CR end a line."""
     before = data[:offset]
-    if data.find(b"\r") < 0:
-        return before.count(b"\n") + 1
-    return 1 + len(re.findall(rb"\r\n?|\n", before))
+    return 1 + before.count(b"\n") + before.count(b"\r") - before.count(b"\r\n")
 
 
 def fail(data: Data, offset: int, message: str) -> NoReturn:

@@ -26,6 +26,7 @@ suffixes = (".node", ".ele")
 
 MARKER = "triangle:marker"  # the point data that keeps the boundary markers
 ATTRIBUTE = "triangle:attribute"  # + its number: further attributes of points and triangles
+MOST_ATTRIBUTES = 1000  # each is an array of its own
 
 # Triangle puts the node on the side opposite corner k into place 3 + k; the order elsewhere is by side 01, 12, 20.
 TO_SIDES, FROM_SIDES = [0, 1, 2, 5, 3, 4], [0, 1, 2, 4, 5, 3]
@@ -69,6 +70,12 @@ def _width(text: Text, rows: Rows, width: int, what: str) -> None:
         text.fail(rows.where(k), f"{what} takes {width} numbers here, found {rows.lengths[k]}")
 
 
+def _few(text: Text, attributes: int) -> int:
+    if attributes > MOST_ATTRIBUTES:
+        text.fail(0, f"{attributes} attributes: more than {MOST_ATTRIBUTES} are not read")
+    return attributes
+
+
 def _points(text: Text) -> tuple[NDArray[np.float64], NDArray[np.int64], TextSlots, dict[str, NDArray[Any]]]:
     """Coordinates, numbers of the points, slots of the coordinates, point data."""
     (_, dimension, attributes, markers), rows = _header(text, 4, "points")
@@ -77,7 +84,7 @@ def _points(text: Text) -> tuple[NDArray[np.float64], NDArray[np.int64], TextSlo
     if markers > 1:
         text.fail(0, f"{markers} boundary markers a point: there can be 0 or 1")
     _width(text, rows, 3 + int(attributes) + int(markers), "a point")
-    attributes = attributes if len(rows) else 0  # nothing bounds it then
+    attributes = _few(text, attributes) if len(rows) else 0  # nothing bounds it then
     ids = text.integers(rows.column(0))
     if (twice := first_repeated(ids)) >= 0:
         text.fail(rows.where(twice), f"the point {ids[twice]} is given twice")
@@ -97,7 +104,7 @@ def _triangles(
     if size not in (3, 6):
         text.fail(0, f"triangles with {size} nodes: there can be 3 or 6")
     _width(text, rows, 1 + int(size) + int(attributes), "a triangle")
-    attributes = attributes if len(rows) else 0  # nothing bounds it then
+    attributes = _few(text, attributes) if len(rows) else 0  # nothing bounds it then
     text.integers(rows.column(0))
     starts = rows.columns(1, int(size))
     named = text.integers(starts)

@@ -153,7 +153,7 @@ def counted_lists(array: Array, count: int, key: str) -> CellLists:
     numbers = array.values()
     stride = len(numbers) // count if count else 0
     if stride and stride * count == len(numbers) and (numbers[::stride] == stride - 1).all():
-        at: Addresses = Places(Lattice(0, count, stride, tuple(range(1, stride))))
+        at: Addresses = Places(Lattice(0, count, stride, range(1, stride)))
         return CellLists(np.full(count, stride - 1), pick(numbers, at), at, array)
     none, first = np.empty(0, dtype=np.int8), np.empty(min(count, len(numbers)), dtype=np.int64)
     found, end = kernels.walk(numbers, 0, 1, -1, 0, none, none, first)
@@ -220,7 +220,7 @@ _ARRAY = "name components rows type"
 def _values(stream: Stream, line: Line, rows: int, width: int, kind: str) -> NDArray[Any]:
     """An attribute: (rows,) or (rows, width), of the type that the file declares."""
     if kind.lower() == "bit":
-        values: NDArray[Any] = stream.bits(rows * width).astype(np.uint8)
+        values: NDArray[Any] = stream.bits(rows * width)
     else:
         array = stream.array(line, rows * width, kind)
         values = typed(array.values(), array.kind)

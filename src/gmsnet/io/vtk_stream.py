@@ -114,13 +114,13 @@ class Stream:
             addresses = source.take(count, kind)
         return Array(source, addresses, kind)
 
-    def bits(self, count: int) -> NDArray[np.int64]:
+    def bits(self, count: int) -> NDArray[np.uint8]:
         """Numbers of the type ``bit``: 0 and 1 in a text, eight to a byte in a binary file."""
         here = Line(self.at, [])
         if not self.binary:
-            return self.array(here, count, "unsigned_char").values()
+            return self.array(here, count, "unsigned_char").values().astype(np.uint8)
         packed = self.array(here, (count + 7) // 8, "unsigned_char").values().astype(np.uint8)
-        return np.unpackbits(packed, count=count).astype(np.int64)
+        return np.unpackbits(packed, count=count)
 
     def skip_strings(self, count: int) -> None:
         """Goes past strings: one a line in a text, with a length in front (two bits tell its size) in a binary file."""

@@ -6,11 +6,10 @@ of the arrays behind it follow.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any, NoReturn
+from typing import NoReturn
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -23,129 +22,21 @@ from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Lattice, Places
 from gmsnet.io.splice import BinarySlots, EncodedSlots, Slots
-from gmsnet.io.text import Text, fail
-from gmsnet.io.vtu_arrays import MOST_INFLATED, Encoded, Encoding, decode
-from gmsnet.io.vtu_xml import DataArray, Document, parse
-from gmsnet.io.words import TextWords, typed
+from gmsnet.io.vtu_arrays import Encoded
+from gmsnet.io.vtu_reader import TYPES, Reader, one_word
+from gmsnet.io.vtu_xml import DataArray, Document
 from gmsnet.mesh import Mesh
 
 name = "VTU"
 suffixes = (".vtu",)
 
-TYPES = {f"{word}{8 * size}": f"{code}{size}" for word, code in (("Int", "i"), ("UInt", "u")) for size in (1, 2, 4, 8)}
-TYPES |= {"Float32": "f4", "Float64": "f8"}
 NAMES = {kind: called for called, kind in TYPES.items()}
 _IS_BLANK = np.isin(np.arange(256), list(b" \t\r\n"))
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """The values of an array, and where they stand: as words of a text or encoded."""
-
-    values: NDArray[Any]
-    words: TextWords | None
-    encoded: Encoded | None
-    start: int
-
-
-class _Reader:
-    """Decodes the arrays of one file. budget: how many bytes may still be unpacked."""
-
-    def __init__(self, data: Data) -> None:
-        self.data, self.document = data, parse(data)
-        self.budget = MOST_INFLATED * len(data)
-        root = self.document.root
-        orders = {"LittleEndian": "<", "BigEndian": ">"}
-        headers = {"UInt32": "u4", "UInt64": "u8"}
-        compressor = root.get("compressor", "")
-        if compressor not in ("", "vtkZLibDataCompressor"):
-            raise FormatError(
-                f"the compressor {compressor[:40]!r} is not supported: write the file with zlib or without"
-            )
-        order, header = root.get("byte_order", "LittleEndian"), root.get("header_type", "UInt32")
-        if order not in orders or header not in headers:
-            raise FormatError(f"unknown byte_order {order[:24]!r} or header_type {header[:24]!r}")
-        self.order, self.header, self.compressed = orders[order], orders[order] + headers[header], bool(compressor)
-
-    def count(self, attribute: str) -> int:
-        """A number of the one piece."""
-        if len(self.document.pieces) != 1:
-            raise FormatError("the file has no Piece of an UnstructuredGrid")
-        text = self.document.pieces[0].get(attribute, "").strip()
-        if not re.fullmatch(r"\d{1,18}", text, re.ASCII):
-            raise FormatError(f"the Piece has no {attribute}, or one that is no count: {text[:24]!r}")
-        return int(text)
-
-    def section(self, section: str) -> list[DataArray]:
-        """The arrays of numbers in a section."""
-        return [a for a in self.document.arrays if a.section == section and a.element == "DataArray"]
-
-    def fail(self, array: DataArray, message: str) -> NoReturn:
-        """Raises FormatError with the line and the name of an array."""
-        fail(self.data, array.tag[0], f"the array {array.attributes.get('Name', array.section)[:40]!r}: {message}")
-
-    def width(self, array: DataArray, default: int = 1) -> int:
-        """The number of components."""
-        text = array.attributes.get("NumberOfComponents", str(default)).strip()
-        if not re.fullmatch(r"\d{1,9}", text, re.ASCII):
-            self.fail(array, f"NumberOfComponents is {text[:24]!r}")
-        return max(1, int(text))
-
-    def numbers(self, array: DataArray, count: int) -> Numbers:
-        """The ``count`` numbers of an array. Raises FormatError where there are fewer or more."""
-        kind = TYPES.get(array.attributes.get("type", ""))
-        if kind is None:
-            self.fail(array, f"numbers of type {array.attributes.get('type', '')[:24]!r} are not supported")
-        how = array.attributes.get("format", "ascii")
-        if how == "ascii":
-            words = self.words(array, count)
-            return Numbers(typed(words.values(words.take(count, kind), kind, finite=False), kind), words, None, 0)
-        start, stored, in_base64 = self._stored(array, how)
-        self.budget -= count * int(kind[1])
-        if count * int(kind[1]) > MOST_INFLATED * len(self.data) or self.budget < 0:
-            self.fail(array, f"{count} numbers cannot be in a file of {len(self.data)} bytes")
-        if not count:
-            return Numbers(np.empty(0, dtype=kind), None, None, start)
-        try:
-            found, payload = decode(stored, Encoding(self.header, self.compressed, in_base64), count * int(kind[1]))
-        except FormatError as error:
-            self.fail(array, str(error))
-        if how == "binary" and found.length != len(stored):
-            self.fail(array, "more follows behind its last number")
-        return Numbers(np.frombuffer(payload, dtype=self.order + kind).astype(kind), None, found, start)
-
-    def words(self, array: DataArray, count: int) -> TextWords:
-        """The numbers of an array that is text. Raises FormatError where there are not ``count``."""
-        text = Text(self.data, stop=array.body[1], ends=b"<")
-        parts = self.document.visible(*array.body)
-        found = [text.until(stop).tokens(start)[0] for start, stop in parts]
-        starts = found[0] if len(found) == 1 else np.concatenate(found)
-        if len(starts) < count:
-            text.fail(array.body[1], f"expected {count - len(starts)} more numbers, the section ends")
-        if len(starts) > count:
-            text.fail(int(starts[count]), f"more than the expected {count} numbers")
-        return TextWords(text, starts)
-
-    def _stored(self, array: DataArray, how: str) -> tuple[int, memoryview, bool]:
-        """Where an encoded array begins, the bytes from there on, and whether they are base64."""
-        if how == "binary":
-            parts = [memoryview(self.data)[slice(*span)] for span in self.document.visible(*array.body)]
-            words = [part[slice(*span)] for part in parts if (span := _one_word(part))]
-            if len(words) < len(parts):
-                words = [memoryview(word) for part in parts for word in bytes(part).split()]
-            return array.body[0], words[0] if len(words) == 1 else memoryview(b"".join(words)), True
-        offset = array.attributes.get("offset", "").strip()
-        if how != "appended" or self.document.appended is None or not re.fullmatch(r"\d{1,18}", offset, re.ASCII):
-            self.fail(array, f"its format is {how[:24]!r} with the offset {offset[:24]!r}, which cannot be found")
-        encoding, start, stop = self.document.appended
-        if start + int(offset) > stop:
-            self.fail(array, f"its offset {offset} lies behind the end of the file")
-        return start + int(offset), memoryview(self.data)[start + int(offset) : stop], encoding == "base64"
-
-
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
-    reader = _Reader(files[".vtu"])
+    reader = Reader(files[".vtu"])
     point_count, cell_count = reader.count("NumberOfPoints"), reader.count("NumberOfCells")
     places = reader.section("Points")
     if len(places) != 1:
@@ -180,13 +71,14 @@ def read(files: Mapping[str, Data]) -> Parsed:
         ]
         for section, count in (("PointData", point_count), ("CellData", cell_count))
     ]
+    reader.check_apart(place)
     single = place.attributes["type"] == "Float32"
     return vtk_cells.parsed(
         points, slots, single, codes, sizes, nodes.values.astype(np.int64, copy=False), fields[0], fields[1], blame
     )
 
 
-def _points(reader: _Reader, place: DataArray, count: int) -> tuple[NDArray[np.float64], Slots]:
+def _points(reader: Reader, place: DataArray, count: int) -> tuple[NDArray[np.float64], Slots]:
     """The points, and the places of their coordinates in whatever form they are stored."""
     name = TYPES[place.attributes["type"]]
     if place.attributes.get("format", "ascii") == "ascii":
@@ -228,22 +120,22 @@ def _replaced(data: Data, document: Document, place: DataArray, start: int, old:
         return [whole[:first], *_refilled(whole[first:stop], document, first, stop, new), whole[stop:]]
     longer = len(new) - old.length
     assert document.appended is not None
+    changes: list[tuple[int, int, bytes]] = [(start, start + old.length, new)]
+    for array in document.arrays:
+        if longer and array.offset is not None and document.appended[1] + array.offset[0] > start:
+            offset, first, end = array.offset
+            changes.append((first, end, b"%d" % (offset + longer)))
     pieces: list[Piece] = []
     at = 0
-    for array in sorted(document.arrays, key=lambda array: array.tag):
-        offset = array.attributes.get("offset", "").strip()
-        if array.attributes.get("format") == "appended" and document.appended[1] + int(offset) > start and longer:
-            tag = data[slice(*array.tag)]
-            match = re.search(rb"\soffset\s*=\s*[\"']\s*(\d+)", tag)
-            assert match is not None  # the parser has found it in the same tag
-            pieces += [whole[at : array.tag[0] + match.start(1)], b"%d" % (int(offset) + longer)]
-            at = array.tag[0] + match.end(1)
-    return [*pieces, whole[at:start], new, whole[start + old.length :]]
+    for first, end, what in sorted(changes):
+        pieces += [whole[at:first], what]
+        at = end
+    return [*pieces, whole[at:]]
 
 
 def _refilled(body: memoryview, document: Document, first: int, stop: int, new: bytes) -> list[Piece]:
     """What an array contains, between these bytes of the file, with other base64."""
-    parts, word = document.visible(first, stop), _one_word(body)
+    parts, word = document.visible(first, stop), one_word(body)
     if len(parts) == 1 and word:
         return [body[: word[0]], new, body[word[1] :]]
     filled = np.zeros(len(body), dtype=bool)
@@ -255,13 +147,6 @@ def _refilled(body: memoryview, document: Document, first: int, stop: int, new: 
         return [old.tobytes()]
     at = int(np.argmax(filled))
     return [body[:at], new, old[at:][~filled[at:]].tobytes()]
-
-
-def _one_word(text: memoryview) -> tuple[int, int] | None:
-    """Where the one word of a text begins and ends; None if it has more, or none."""
-    visible = np.frombuffer(text, dtype=np.uint8) > ord(" ")
-    first, end = int(np.argmax(visible)), len(text) - int(np.argmax(visible[::-1]))
-    return (first, end) if np.count_nonzero(visible) == end - first > 0 else None
 
 
 def write(mesh: Mesh) -> Written:

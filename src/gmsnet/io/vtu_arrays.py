@@ -16,7 +16,7 @@ import numpy as np
 
 from gmsnet.errors import FormatError
 
-MOST_INFLATED = 1100  # times its length: more than zlib can reach (1032), and more than any file may ask for
+MOST_INFLATED = 1100  # times its length: more than zlib can reach (1032)
 _LEVELS = (1, 5, 6, 9)  # of compression, by the two bits in which zlib notes how hard it tried
 
 

@@ -6,6 +6,7 @@ Raw appended data are no XML: the parser stops where they begin, and the end tag
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from xml.parsers import expat
@@ -16,19 +17,27 @@ from gmsnet.io.text import fail
 
 SECTIONS = ("PointData", "CellData", "Points", "Cells")
 
-_TAG = re.compile(rb"<(?:[^<\"'>]|\"[^\"]*\"|'[^']*')*>")
+MOST_DEEP, MOST_ARRAYS = 100, 100_000  # elements inside one another, arrays: no grid has so many
+
+_TAG = re.compile(rb"<[^<\"'>]*(?:(?:\"[^\"]*\"|'[^']*')[^<\"'>]*)*>")
+_ATTRIBUTE = re.compile(rb"\s([^\s=]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+_OFFSET = re.compile(rb"\s*(\d{1,18})\s*")
 _TAIL = re.compile(rb"</AppendedData\s*>\s*</VTKFile\s*>\s*\Z")
 
 
 @dataclass(frozen=True)
 class DataArray:
-    """An array. tag: first byte of its start tag and the byte behind it; body: likewise of what it contains."""
+    """An array. tag: first byte of its start tag and the byte behind it; body: likewise of what it contains.
+
+    offset: of appended data, and the bytes where it is written.
+    """
 
     section: str
     element: str
     attributes: Mapping[str, str]
     tag: tuple[int, int]
     body: tuple[int, int]
+    offset: tuple[int, int, int] | None = None
 
 
 @dataclass
@@ -49,8 +58,10 @@ class Document:
     def visible(self, start: int, stop: int) -> list[tuple[int, int]]:
         """The parts of what stands between two bytes that are not hidden."""
         found = []
-        for first, end in self.hidden:
-            if start < end and first < stop:
+        for first, end in self.hidden[bisect_left(self.hidden, (start, 0)) :]:
+            if first >= stop:
+                break
+            if start < end:
                 found.append((start, first))
                 start = end
         return [*found, (start, stop)]
@@ -118,6 +129,8 @@ class _Walker:
 
     def begin(self, name: str, attributes: dict[str, str]) -> None:
         depth = len(self.path)
+        if depth == MOST_DEEP:
+            self.fail(f"elements lie more than {MOST_DEEP} deep inside one another")
         if depth == 0:
             self.document.root = attributes
             if name != "VTKFile":
@@ -152,12 +165,24 @@ class _Walker:
         if self.open is not None and self.open[3] == tag:
             section, element, attributes, _ = self.open
             self.open = None
-            self.document.arrays.append(DataArray(section, element, attributes, tag, (tag[1], first)))
+            if len(self.document.arrays) == MOST_ARRAYS:
+                self.fail(f"there are more than {MOST_ARRAYS} arrays")
+            offset = self.offset(tag) if attributes.get("format") == "appended" else None
+            self.document.arrays.append(DataArray(section, element, attributes, tag, (tag[1], first), offset))
         elif self.open is not None and self.tags[-1] == self.open[3]:
             self.document.hidden.append((tag[0], end))  # a child, and all that it contains
         elif name == "AppendedData" and self.path == ["VTKFile"] and self.document.appended is not None:
             encoding, _, _ = self.document.appended
             self.document.appended = encoding, self.underscore(tag[1], first), first
+
+    def offset(self, tag: tuple[int, int]) -> tuple[int, int, int] | None:
+        """The offset in a start tag, and the bytes where it is written: it may have to be written anew."""
+        for attribute in _ATTRIBUTE.finditer(self.data, *tag):
+            if attribute[1] == b"offset":
+                place = 2 if attribute[2] is not None else 3
+                found = _OFFSET.fullmatch(self.data, *attribute.span(place))
+                return (int(found[1]), *found.span(1)) if found else None
+        return None
 
     def find_raw_data(self) -> None:
         """Raw appended data lie between the first underscore and the last end tags."""

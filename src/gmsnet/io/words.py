@@ -125,7 +125,12 @@ class ByteWords:
         for lattice in places.lattices:
             rows = out[at : at + len(lattice)].reshape(lattice.rows, len(lattice.columns))
             at += len(lattice)
-            for k, column in enumerate(lattice.columns if lattice.rows else ()):
+            if not len(lattice):
+                continue
+            if (table := lattice.table(self.data, self.order + kind)) is not None:
+                rows[:] = table
+                continue
+            for k, column in enumerate(lattice.columns):
                 rows[:, k] = lattice.column(self.data, column, self.order + kind)
         return out
 

@@ -1,0 +1,111 @@
+"""What holds for any file: it is refused in words, or the mesh that it holds can be moved and nothing else changes."""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+import gmsnet
+from gmsnet.errors import InputError
+from gmsnet.io.formats import FORMATS
+from gmsnet.io.splice import FileSource
+from gmsnet.mesh import Mesh
+
+SECONDS = 5.0  # of the processor, for one file
+MEMORY = 200_000_000  # bytes beyond the length of the file
+LONGEST = 500  # characters of a message, without the name of the file
+PAIR = b"\0"  # between the two files of Triangle, where both are one input
+
+
+class Broken(AssertionError):
+    """A promise is broken."""
+
+
+def parts(key: str, data: bytes) -> dict[str, bytes]:
+    """The files of an input by suffix."""
+    suffixes = FORMATS[key].suffixes
+    return {suffixes[0]: data} if len(suffixes) == 1 else dict(zip(suffixes, (*data.split(PAIR, 1), b""), strict=False))
+
+
+def examine(key: str, data: bytes, folder: Path) -> str:
+    """Reads a file, moves its points, and reads it again. Returns what the file was refused with, or "".
+
+    Raises Broken, or whatever the reader lets through.
+    """
+    before, peak = time.process_time(), _peak()
+    files = parts(key, data)
+    path = _write(files, folder)
+    try:
+        mesh = gmsnet.read(path, key)
+    except InputError as error:
+        said = _checked(str(error), path)
+    else:
+        said = ""
+        _check_splice(mesh, files, folder, np.random.default_rng(len(data)))
+    if time.process_time() - before > SECONDS:
+        raise Broken(f"took {time.process_time() - before:.1f} s")
+    if _peak() - peak > MEMORY + len(data):
+        raise Broken(f"took {(_peak() - peak) / 1e6:.0f} MB")
+    return said
+
+
+def _peak() -> int:
+    """The most memory that this process has had, in bytes."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def _write(files: Mapping[str, bytes], folder: Path) -> Path:
+    for suffix, part in files.items():
+        (folder / f"mesh{suffix}").write_bytes(part)
+    return folder / f"mesh{next(iter(files))}"
+
+
+def _checked(message: str, path: Path) -> str:
+    name = f"{path}: "
+    if not message.startswith(name):
+        raise Broken(f"the message does not begin with the file: {message[:200]!r}")
+    message = message.removeprefix(name)
+    if len(message) > LONGEST or not message.isprintable():
+        raise Broken(f"the message is long or cannot be printed: {len(message)} {message[:200]!r}")
+    if "not enough memory" in message or "of memory, but" in message:
+        raise Broken(f"out of memory: {message}")
+    return message
+
+
+def _check_splice(mesh: Mesh, files: Mapping[str, bytes], folder: Path, random: np.random.Generator) -> None:
+    source = mesh.source
+    assert isinstance(source, FileSource)
+    if _spliced(source, mesh.points.copy()) != files:
+        raise Broken("the same points do not give the same file")
+    new = moved(mesh, random)
+    again = gmsnet.read(_write(_spliced(source, new), folder), source.format)
+    if again.points.tobytes() != new.tobytes():
+        raise Broken("the moved points do not read back")
+    if not source.fits(again) or again.single != mesh.single:
+        raise Broken("more than the points has changed")
+    assert isinstance(again.source, FileSource)
+    if source.format == "stl" and len(np.unique(mesh.points, axis=0)) < len(mesh.points):
+        return  # nodes that only their decimals tell apart
+    back = gmsnet.read(_write(_spliced(again.source, mesh.points), folder), source.format)
+    if not np.array_equal(back.points, mesh.points) or not source.fits(back):
+        raise Broken("points that are moved there and back are not the same")
+
+
+def _spliced(source: FileSource, points: np.ndarray) -> dict[str, bytes]:
+    return {suffix: bytes(pieces) for suffix, pieces in source.splice(points).items()}
+
+
+def moved(mesh: Mesh, random: np.random.Generator) -> np.ndarray:
+    """Points of which some are elsewhere, a few at the ends of the range of numbers."""
+    kind = np.float32 if mesh.single else np.float64
+    new = mesh.points.copy()
+    some = random.random(len(new)) < 0.5
+    some[random.integers(len(new))] = True
+    new[some] = random.normal(size=(int(some.sum()), new.shape[1])).astype(kind)
+    extremes = np.array([np.finfo(kind).max, -np.finfo(kind).smallest_subnormal, kind(1) / kind(3)], dtype=kind)
+    new[np.argmax(some), random.integers(new.shape[1])] = random.choice(extremes)
+    return new

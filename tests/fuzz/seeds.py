@@ -1,0 +1,139 @@
+"""Files of each format and variant, from which the fuzzer starts: those of the tests, of VTK and of our own writers."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from fuzz.promises import PAIR
+from gmsnet.errors import FormatError
+from gmsnet.io.formats import FORMATS
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "io"))  # the tests of the readers, and what they share
+
+import gmsh_variants
+import test_medit
+import test_obj
+import test_off
+import test_ply
+import test_stl
+import test_su2
+import test_triangle
+import test_vtk
+import test_vtu
+from damage import triangle_grid
+from vtk_variants import grid_of, legacy_variants, mixed_mesh, polydata_of, vtu_variants
+
+SU2 = b"""% made up
+NDIME= 2 % plane
+AOA= 5.0
+NELEM= 2
+5 0 1 2
+9 0 2 3 4
+NPOIN= 5 5
+0.0 0.0 0 0
+1.0 0.0 1 1
+1.0 1.0 2 2
+0.0 1.0 3 3
+-0.5 0.5 4 4
+NMARK= 2
+MARKER_TAG= wall
+MARKER_ELEMS= 2
+3 0 1 0
+3 1 2 1
+MARKER_TAG= points
+MARKER_ELEMS= 1
+1 3
+FFD_NBOX= 1
+FFD_TAG= box
+0.0 0.0
+FFD_CORNER_POINTS= 1
+1.0 1.0
+"""
+MEDIT = b"""MeshVersionFormatted 2
+Dimension 3
+Vertices 4
+0 0 0 1
+1 0 0 1
+0 1 0 2
+0 0 1 3
+Tetrahedra 1
+1 2 3 4 9
+TrianglesP2 1
+1 2 3 1 2 3 4 # flat
+Normals 1
+0 0 1
+NormalAtVertices 1
+1 1
+Ridges 1
+1
+SubDomainFromMesh 1
+3 1 1 5
+AngleOfCornerBound 40
+BoundingBox 0 0 0 1 1 1
+RequiredVertices 2
+1 2
+End
+"""
+OFF = b"# colours\nSTCNOFF 4 3 0\n0 0 0 1 2 3\n1 0 0 1 2 3\n1 1 0 1 2 3\n0 1 0 1 2 3\n1 0\n2 0 1\n5 0 1 2 3 1 0.5 0.5\n"
+VTK_OLD = (
+    "METADATA\nINFORMATION 1\nNAME L2 LOCATION vtkDataArray\nDATA 2 0 1\n\nCELL_DATA 3\n"
+    "FIELD FieldData 4\nmaterial%20id 1 3 int\n8 9 7\nMETADATA\nCOMPONENT_NAMES\na\n\n"
+    "names 1 3 string\nfirst one\n\n\nbits 1 3 bit\n1 0 1\nNULL_ARRAY\n"
+    "COLOR_SCALARS c 3\n0 .5 1 1 0 0 1 1 1\nLOOKUP_TABLE colours 2\n0 0 0 1 1 1 1 1\n"
+    "POINT_DATA 4\nSCALARS s float 1\nLOOKUP_TABLE default\n1 nan -inf 4\nNORMALS n float\n0 0 1 0 0 1 0 0 1 0 0 1\n"
+    "TEXTURE_COORDINATES t 2 float\n0 0 0 0 0 0 0 0\nTENSORS k double\n" + "0 " * 36 + "\n"
+    "GLOBAL_IDS g vtkIdType\n5 6 7 8\n"
+)
+ENTITIES = '<FieldData><Array type="String" Name="who" format="ascii">65 0</Array></FieldData>'
+
+
+def seeds() -> Iterator[tuple[str, bytes]]:
+    """(key of the format, file) of every seed."""
+    yield from (("su2", data) for data in (test_su2.PLAIN, SU2, SU2.replace(b"\n", b"\r\n")))
+    yield from (("medit", data) for data in (test_medit.PLAIN, MEDIT))
+    yield from (("gmsh", data) for data in gmsh_variants.VARIANTS.values())
+    yield "gmsh", gmsh_variants.new(groups={21: [3, 4], 22: [-4]})
+    yield from (("off", data) for data in (test_off.PLAIN, OFF))
+    yield "obj", test_obj.PLAIN
+    yield "obj", test_obj.PLAIN.replace(b"\n", b"\r")
+    yield "stl", test_stl.PLAIN
+    yield "stl", test_stl.PLAIN.replace(b"0 0 5", b"0.0 +0 5e0").replace(b"1 1 5", b"1.00000000000000000001 1 5", 1)
+    corners = np.array([[[0, 0, 1], [1, 0, 1], [1, 1, 1]], [[0, 0, 1], [1, 1, 1], [-0.0, 1, 1]]], dtype=np.float32)
+    yield "stl", test_stl.binary_stl(corners)
+    yield "triangle", PAIR.join((test_triangle.NODE, test_triangle.ELE))
+    yield "triangle", PAIR.join((test_triangle.NODE, b"1 6 0\n1 1 2 3 4 1 2\n"))
+    for form in test_ply.ORDERS:
+        for kind in ("float", "double"):
+            yield "ply", test_ply.ply_file(form, kind)
+            yield "ply", test_ply.ply_file(form, kind, [[0, 1, 4], [1, 2, 4]])
+    yield "vtk", test_vtk.PLAIN.encode()
+    yield "vtk", test_vtk.mesh_with("CELLS 3 11\n3 0 1 2 3 0 2 3 2 0 1\nCELL_TYPES 3\n5 7 4\n", VTK_OLD)
+    with tempfile.TemporaryDirectory() as folder:
+        for single in (False, True):
+            for grid in (grid_of(mixed_mesh(1), single), polydata_of(mixed_mesh(1), single)):
+                yield from (("vtk", data) for _, data in legacy_variants(grid, Path(folder)))
+    yield "vtu", test_vtu.PLAIN.encode()
+    yield "vtu", test_vtu.PLAIN.replace("<Piece", ENTITIES + "<Piece").replace("Float64", "Float32").encode()
+    for single in (False, True):
+        yield from (("vtu", data) for _, data in vtu_variants(grid_of(mixed_mesh(1), single)))
+    yield from _written()
+
+
+def _written() -> Iterator[tuple[str, bytes]]:
+    for mesh in (triangle_grid(1), triangle_grid(2, 3), mixed_mesh(1)):
+        for key, entry in FORMATS.items():
+            try:
+                written = entry.load().write(mesh)
+            except FormatError:  # cells that the format does not have
+                continue
+            yield key, PAIR.join(bytes(written.files[suffix]) for suffix in entry.suffixes)
+
+
+def seeds_of(key: str) -> list[bytes]:
+    """The seeds of one format."""
+    return [data for name, data in seeds() if name == key]
