@@ -89,6 +89,16 @@ VTK_OLD = (
     "TEXTURE_COORDINATES t 2 float\n0 0 0 0 0 0 0 0\nTENSORS k double\n" + "0 " * 36 + "\n"
     "GLOBAL_IDS g vtkIdType\n5 6 7 8\n"
 )
+PARTITIONED = b"""$PartitionedEntities
+2
+1 9 1
+1 0 1 0
+5 0 5 1 2 0.5 0.5 0 1 7
+21 2 21 2 1 2 0 0 0 1 1 0 1 3 1 5
+$EndPartitionedEntities
+"""
+ONE_CELL = b"\nCELLS 1 2\n" + bytes([0, 0, 0, 1, 0, 0, 0, 0]) + b"\nCELL_TYPES 1\n" + bytes([0, 0, 0, 1])
+VTK_STRINGS = b"FIELD data 2\nnames 1 2 string\n\xc3abc\x80\x02de\nbits 1 9 bit\n\xaa\x80\n"
 ENTITIES = '<FieldData><Array type="String" Name="who" format="ascii">65 0</Array></FieldData>'
 
 
@@ -98,6 +108,10 @@ def seeds() -> Iterator[tuple[str, bytes]]:
     yield from (("medit", data) for data in (test_medit.PLAIN, MEDIT))
     yield from (("gmsh", data) for data in gmsh_variants.VARIANTS.values())
     yield "gmsh", gmsh_variants.new(groups={21: [3, 4], 22: [-4]})
+    head, rest = gmsh_variants.new().split(b"$Entities")
+    yield "gmsh", head + PARTITIONED + b"$Entities" + rest
+    lines = gmsh_variants.old()
+    yield "gmsh", lines.replace(b"2 3 21", b"9 3 21 1 2 3 4 5 6 7").replace(b" 2 7 11", b" 0")
     yield from (("off", data) for data in (test_off.PLAIN, OFF))
     yield "obj", test_obj.PLAIN
     yield "obj", test_obj.PLAIN.replace(b"\n", b"\r")
@@ -113,6 +127,8 @@ def seeds() -> Iterator[tuple[str, bytes]]:
             yield "ply", test_ply.ply_file(form, kind, [[0, 1, 4], [1, 2, 4]])
     yield "vtk", test_vtk.PLAIN.encode()
     yield "vtk", test_vtk.mesh_with("CELLS 3 11\n3 0 1 2 3 0 2 3 2 0 1\nCELL_TYPES 3\n5 7 4\n", VTK_OLD)
+    binary = test_vtk.HEAD.format("3.0", "BINARY").encode()
+    yield "vtk", binary + VTK_STRINGS + test_vtk.ONE_POINT.split(b"_GRID\n")[1] + ONE_CELL
     with tempfile.TemporaryDirectory() as folder:
         for single in (False, True):
             for grid in (grid_of(mixed_mesh(1), single), polydata_of(mixed_mesh(1), single)):

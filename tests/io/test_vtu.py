@@ -214,6 +214,8 @@ def test_points_that_share_their_bytes_are_refused() -> None:
     refused(
         vtu, appended('offset="0"', "Float64", 'NumberOfComponents="3" format="appended" offset="0"'), "shares bytes"
     )
+    empty = appended('offset="0"', "String", 'NumberOfTuples="0" format="appended" offset="0"')
+    check_splice(vtu, empty)
 
 
 def test_appended_data_may_stand_in_front_of_the_grid() -> None:

@@ -51,8 +51,10 @@ def read(files: Mapping[str, Data]) -> Parsed:
 
 
 def _no_broken_lines(text: Text, rows: Rows) -> None:
+    if (found := text.data.find(b"\\")) < 0:
+        return
     last = rows.starts[rows.first[1:] - 1]
-    ends = np.array([match.start() for match in _BACKSLASH.finditer(text.data)], dtype=last.dtype)
+    ends = np.array([match.start() for match in _BACKSLASH.finditer(text.data, found)], dtype=last.dtype)
     row, first = np.unique(np.searchsorted(last, ends, side="right") - 1, return_index=True)
     for k, at in zip(row.tolist(), ends[first].tolist(), strict=True):  # only the first can end the row's last word
         if k >= 0 and text.next(int(last[k])) == (int(last[k]), at + 1):

@@ -21,7 +21,7 @@ TYPES |= {"Float32": "f4", "Float64": "f8"}
 
 # Encoded numbers that a file may hold, whatever its length, and for each of its bytes: a hundred bytes of zeros can be
 # unpacked from one. A regular grid with dozens of fields that are zero has about ten.
-ANYWAY, PER_BYTE = 1 << 22, 64
+ANYWAY, PER_BYTE = 1 << 22, 32
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class Reader:
         assert self.document.appended is not None
         first, end = self.spans[place.offset[1]]
         for array in self.document.arrays:
-            if array is not place and array.offset is not None:
+            if array is not place and array.offset is not None and array.attributes.get("NumberOfTuples") != "0":
                 start = self.document.appended[1] + array.offset[0]
                 start, stop = self.spans.get(array.offset[1], (start, start + 1))
                 if start < end and first < stop:
