@@ -20,7 +20,8 @@ from fuzz.lines import lines, smallest, ways
 from fuzz.promises import examine
 from gmsnet.io.formats import FORMATS
 
-LONGEST = 1 << 14  # bytes of a file that is tried
+LONGEST = 1 << 13  # bytes of a file that is tried
+AT_ONCE = 10_000  # files that one worker tries: Atheris does not let go of what a mutator of ours has returned
 
 
 def options() -> argparse.Namespace:
@@ -40,7 +41,7 @@ def hunt(key: str, folder: Path, given: argparse.Namespace) -> tuple[int, float]
     """Runs the worker on the corpus in a folder until enough is done. Returns the executions and the seconds."""
     done, start, round_ = 0, time.monotonic(), 0
     while True:
-        left = given.executions - done if given.executions else -1
+        left = min(given.executions - done, AT_ONCE) if given.executions else AT_ONCE
         time_left = given.seconds - int(time.monotonic() - start) if given.seconds else 0
         if left == 0 or (given.seconds and time_left <= 0):
             return done, time.monotonic() - start

@@ -205,3 +205,10 @@ def test_cell_data_that_say_only_the_regions_are_not_lost() -> None:
     other = tuple(block.regions + 1 for block in mesh.cells)
     written = obj.write(Mesh(mesh.points, mesh.cells, mesh.region_names, cell_data={"mat_id": regions, "p": other}))
     assert written.lost == ["OBJ cannot hold cell data: 'p' was left out"]
+
+
+def test_names_that_would_break_lines_are_changed() -> None:
+    mesh = triangle_grid(1)
+    names = {(2, 3): "a # b \\", (2, 7): "one\ntwo\0three"}
+    text = contents(obj.write(Mesh(mesh.points, mesh.cells, names)))[".obj"]
+    assert set(obj.read({".obj": text}).region_names.values()) >= {"a b /", "one two three"}

@@ -247,3 +247,8 @@ def test_vtk_reads_what_is_written(tmp_path: Path) -> None:
     points, poly = points_by_vtk(vtk.vtkPLYReader(), contents(ply.write(mesh))[".ply"], tmp_path / "a.ply")
     assert np.array_equal(points[:, :2], mesh.points.astype(np.float32))
     assert poly.GetNumberOfPolys() == len(mesh.cells[0].nodes)
+
+
+def test_a_mesh_of_vertices_alone_is_refused() -> None:
+    with pytest.raises(FormatError, match="PLY holds faces and edges only"):
+        ply.write(Mesh(np.zeros((1, 2)), (CellBlock("vertex", np.zeros((1, 1), int), np.zeros(1, int)),)))

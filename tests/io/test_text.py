@@ -270,3 +270,14 @@ def test_lines_are_counted_whatever_ends_them(end: bytes) -> None:
 def test_words_in_messages_are_short_and_printable() -> None:
     data = b"\x00\xffab" + b"c" * 100
     assert quoted(data) == r"'\x00\xffab" + "c" * 20 + "…'"
+
+
+@pytest.mark.parametrize("number", [10**18, 2**63 - 1, -(2**63), 2**63, -(2**63) - 1, 10**19])
+def test_integers_of_all_64_bits(number: int) -> None:
+    text = Text(b"7 %d -3 %d" % (number, number))
+    starts, _ = text.tokens(0)
+    if -(2**63) <= number < 2**63:
+        assert text.integers(starts).tolist() == [7, number, -3, number]
+    else:
+        with pytest.raises(FormatError, match="line 1: an integer was expected"):
+            text.integers(starts)

@@ -106,8 +106,9 @@ def regions_of(cells: Iterable[CellBlock], dimension: int) -> list[int]:
 
 
 def marker_name(mesh: Mesh, dimension: int, region: int) -> str:
-    """The name of a region, its number where it has none."""
-    return mesh.region_names.get((dimension, region), str(region))
+    """The name of a region, with blanks for what cannot be printed; its number where it has none."""
+    name = mesh.region_names.get((dimension, region), str(region))
+    return "".join(c if c.isprintable() else " " for c in name)
 
 
 def marker_names(mesh: Mesh, dimension: int) -> list[str]:

@@ -193,8 +193,13 @@ def _text(mesh: Mesh) -> Iterator[Piece]:
         for start, end in zip([0, *cuts], [*cuts, len(block.nodes)], strict=True):
             if start < end:
                 region = int(block.regions[start])
-                wanted = "g " + " ".join(convert.marker_name(mesh, block.dimension, region).split())
+                wanted = "g " + _words(convert.marker_name(mesh, block.dimension, region))
                 if wanted != group and (group or region or (block.dimension, region) in mesh.region_names):
                     yield f"{wanted}\n".encode()
                     group = wanted
                 yield from convert.rows(row, block.nodes[start:end] + 1)
+
+
+def _words(name: str) -> str:
+    """A region's name without the signs that begin a comment or join two lines."""
+    return " ".join(name.replace("#", " ").replace("\\", "/").split())

@@ -26,6 +26,7 @@ Starts = NDArray[Any]  # int32 or int64: the first byte of each token
 
 _BLANKS, _LINE_ENDS = b" \t\v\f", b"\r\n"
 _NOT_FINITE = re.compile(rb"(?i)([+-]?)(nan|inf(?:inity)?)(?:\([a-z]*\))?")
+_LONG_INTEGER = re.compile(rb"[+-]?\d{19}")
 MOST_NARROW = 2**31 - 1  # bytes of a file whose positions are int32
 MOST_ROWS = 1 << 17  # that are looked at together: what belongs to them stays in the processor's cache
 
@@ -196,15 +197,20 @@ class Text:
     def integers(self, starts: Starts, slash: bool = False) -> NDArray[np.int64]:
         """The integers of tokens (any shape). slash: those before the first slash of each token (``12/3/4`` → 12).
 
-        Raises FormatError naming the line where a token is not a plain decimal integer of at most 18 digits, or where
-        something but digits, signs and slashes follows the slash.
+        Raises FormatError naming the line where a token is not a plain decimal integer of 64 bits, or where something
+        but digits, signs and slashes follows the slash.
         """
         flat = np.ascontiguousarray(starts.reshape(-1), dtype=self._type)
         values = np.empty(len(flat), dtype=np.int64)
-        bad = kernels.parse_integers(self.raw, self._kinds, self.stop, flat, slash, values)
-        if bad >= 0:
-            what = "numbers separated by slashes were" if b"/" in self.token(flat[bad]) and slash else "an integer was"
-            self.fail(int(flat[bad]), f"{what} expected, found {self.word(flat[bad])}")
+        at = 0
+        while (bad := kernels.parse_integers(self.raw, self._kinds, self.stop, flat[at:], slash, values[at:])) >= 0:
+            at += bad  # the kernel stops at more than 18 digits
+            word = self.token(flat[at])
+            if not _LONG_INTEGER.fullmatch(word) or not -(2**63) <= int(word) < 2**63:
+                what = "numbers separated by slashes were" if b"/" in word and slash else "an integer was"
+                self.fail(int(flat[at]), f"{what} expected, found {self.word(flat[at])}")
+            values[at] = int(word)
+            at += 1
         return values.reshape(starts.shape)
 
     def count(self, start: Any, what: str) -> int:
