@@ -18,7 +18,6 @@ from gmsnet.kernels import worst_first as kernels
 from gmsnet.kernels import worst_first_cycles as cycles
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import STAR, VALID, WORST, MeshGuard, StarGuard, plain_guard
-from gmsnet.kernels.missing import ALL
 
 DOUBLINGS = (3, 4, 6)
 every_power = pytest.mark.parametrize("doublings", DOUBLINGS)
@@ -152,7 +151,7 @@ def test_the_order_within_a_colour_does_not_matter():
     for order in (np.arange(40), np.random.default_rng(7).permutation(40)):
         now, awake = points.copy(), np.zeros(len(points), dtype=np.bool_)
         cycles.visit(
-            now, order.astype(np.int32), start, around, plain_guard(), 4, 5, 1.0, ALL, awake,
+            now, order.astype(np.int32), start, around, plain_guard(), 4, 5, 1.0, None, awake,
             np.zeros(3, dtype=np.int64),
         )  # fmt: skip
         assert not awake.any()

@@ -52,10 +52,8 @@ def rounds(points, nodes, start, around, free, memory, guard, plan, most, scale,
     for r in range(len(plan)):
         if not len(nodes) or visits > most:
             break
-        visit(
-            points, nodes, start, around, guard, plan[r, 0], plan[r, 1], scale / math.sqrt(3.0),
-            ALL if everywhere and r == 0 else target, mark, tally,
-        )  # fmt: skip
+        goal = ALL if everywhere and r == 0 else target
+        visit(points, nodes, start, around, guard, plan[r, 0], plan[r, 1], scale / math.sqrt(3.0), goal, mark, tally)
         visits += plan[r, 1] * len(nodes)
         nodes = still_missing(points, nodes, start, around, free, target[0], target[1], mark)
         by_id(nodes, memory)

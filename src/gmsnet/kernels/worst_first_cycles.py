@@ -8,7 +8,7 @@ import numpy as np
 
 from gmsnet.kernels.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.compile import kernel, part
-from gmsnet.kernels.missing import ALL, any_missing
+from gmsnet.kernels.missing import any_missing
 from gmsnet.kernels.ranking import free_nodes, least, shapes_of, smallest
 from gmsnet.kernels.truncation import HALVINGS
 from gmsnet.kernels.worst_first import descend, gather, way_there
@@ -34,7 +34,7 @@ def cycles(points, triangles, turn, cells, free, memory, start, around, guard, p
         limit = smallest(shape, wanted - 1)
         scale = max(least(shape), LEAST) / math.sqrt(3.0)
         nodes = free_nodes(triangles, cells, shape, limit, free, memory, mark)
-        visit(points, nodes, start, around, guard, plan[c, 1], plan[c, 2], scale, ALL, mark, tally)
+        visit(points, nodes, start, around, guard, plan[c, 1], plan[c, 2], scale, None, mark, tally)
         shapes_of(points, triangles, turn, cells, shape)
     return before, least(shape)
 
@@ -44,8 +44,8 @@ def visit(points, nodes, start, around, guard, doublings, sweeps, scale, target,
     """Visits the nodes in their order, so many times, p = 2^doublings. tally: (3,), added to.
 
     start, around: the rings of all nodes, in CSR form. scale: see ``descend``. target: a node is left out while no
-    triangle around it misses that (kernels.missing). awake: (N,) bool, all False before and after: a node is left out
-    while neither it nor a neighbour has moved since it was found to move no more.
+    triangle around it misses that (kernels.missing), if there is one. awake: (N,) bool, all False before and after: a
+    node is left out while neither it nor a neighbour has moved since it was found to move no more.
     """
     unit, grain, single = guard.unit, guard.grain, guard.single
     most = 0
@@ -60,7 +60,7 @@ def visit(points, nodes, start, around, guard, doublings, sweeps, scale, target,
             n = gather(points, i, start, around, guard, star)
             x, y = points[i, 0], points[i, 1]
             awake[i] = False
-            if target[0] < math.inf and not any_missing(star, n, x, y, target[0], target[1]):
+            if target is not None and not any_missing(star, n, x, y, target[0], target[1]):
                 continue
             tx, ty = descend(star, n, x, y, scale, doublings)
             if tx == x and ty == y:
