@@ -127,7 +127,7 @@ def test_conversion_names_what_is_lost(dim: int) -> None:
     written = off.write(mesh)
     assert written.lost == [
         "OFF cannot hold line cells: 8 were left out (markers 'bottom wall', 'top')",
-        "OFF cannot hold cell regions: 2 regions were merged",
+        "OFF cannot hold cell regions: 2 regions were merged (among them 'steel', 'air')",
     ]
     parsed = off.read(contents(written))
     assert parsed.points[:, :dim].tobytes() == mesh.points.tobytes()

@@ -199,7 +199,7 @@ def test_one_marker_in_two_pieces_and_vertices() -> None:
 def test_conversion_keeps_markers_and_names_what_is_lost() -> None:
     mesh = triangle_grid()
     written = su2.write(mesh)
-    assert written.lost == ["SU2 cannot hold cell regions: 2 regions were merged"]
+    assert written.lost == ["SU2 cannot hold cell regions: 2 regions were merged (among them 'steel', 'air')"]
     parsed = su2.read(contents(written))
     assert parsed.points.tobytes() == mesh.points.tobytes()
     assert cells_of(parsed, "triangle") == cells_of(mesh, "triangle")

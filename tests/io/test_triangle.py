@@ -177,7 +177,7 @@ def test_conversion_keeps_regions_and_names_what_is_lost() -> None:
     mesh = triangle_grid(dim=3)
     written = triangle.write(mesh)
     assert written.lost == [
-        "Triangle cannot hold line cells: 8 were turned into markers of their nodes",
+        "Triangle cannot hold line cells: 8 were turned into markers of their nodes (1, 2)",
         "Triangle numbers its markers: the names 'bottom wall' (1), 'top' (2) were left out",
         "Triangle numbers its regions and markers: the names 'steel' (3), 'air' (7) were left out",
     ]

@@ -122,6 +122,11 @@ def first_repeated(ids: NDArray[np.int64]) -> int:
     return int(order[twice[0] + 1]) if twice.size else -1
 
 
+def counted(ids: NDArray[np.int64], base: int) -> bool:
+    """Whether the ids are base, base + 1, …"""
+    return bool((ids == np.arange(base, base + len(ids))).all())
+
+
 def check_nodes(text: Text, starts: Starts, nodes: NDArray[np.int64], count: int, base: int = 0) -> None:
     """Raises FormatError, naming the line, where one of ``nodes`` (counted from 0) is not among ``count`` points.
 

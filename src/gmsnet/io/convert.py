@@ -93,7 +93,9 @@ def lost_regions(mesh: Mesh, title: str, dimension: int = 2) -> list[str]:
     """The regions of cells of one dimension, where a format merges them; one region alone is no loss unless named."""
     found = regions_of(mesh.cells, dimension)
     if len(found) > 1:
-        return [f"{title} cannot hold cell regions: {len(found)} regions were merged"]
+        names = [repr(mesh.region_names[dimension, r]) for r in found if (dimension, r) in mesh.region_names]
+        told = f" (among them {listed(names)})" if names else ""
+        return [f"{title} cannot hold cell regions: {len(found)} regions were merged{told}"]
     if found and (dimension, found[0]) in mesh.region_names:
         name = mesh.region_names[dimension, found[0]]
         return [f"{title} cannot hold cell regions: the name {name!r} was left out"]

@@ -17,7 +17,10 @@ from gmsnet.mesh import CellBlock, Mesh
 
 @dataclass(frozen=True)
 class Parsed:
-    """The facts of a file: the fields of a Mesh, and where its coordinates stand."""
+    """The facts of a file: the fields of a Mesh, and where its coordinates stand.
+
+    unread: what else the file holds, in words; it stays in the file, but no conversion can keep it.
+    """
 
     points: NDArray[np.float64]
     cells: Sequence[CellBlock]
@@ -26,6 +29,7 @@ class Parsed:
     point_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
     single: bool = False
+    unread: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,14 @@ from typing import Any
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.atomic import reason, refuse_folder, replace_files
 from gmsnet.io.cells import sealed
+from gmsnet.io.convert import listed
 from gmsnet.io.document import Parsed
 from gmsnet.io.formats import FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
 from gmsnet.io.mapped import Data, load
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import FileSource
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_input, standard_output
-from gmsnet.mesh import Mesh
+from gmsnet.mesh import Mesh, Source
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
@@ -108,7 +109,7 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data]) -> Mesh:
     companions = {suffix: data for suffix, data in files.items() if suffix != main}
     source = FileSource(
         entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions,
-        mesh.region_names, mesh.point_data, mesh.cell_data,
+        mesh.region_names, mesh.point_data, mesh.cell_data, tuple(parsed.unread),
     )  # fmt: skip
     return replace(mesh, source=source)
 
@@ -137,9 +138,7 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
             files = source.splice(mesh.points)
         else:
             written = entry.load().write(mesh)
-            files, lost = dict(written.files), written.lost
-            if isinstance(source, FileSource) and not source.intact():
-                lost = [*lost, _CHANGED]
+            files, lost = dict(written.files), [*written.lost, *_unread(source)]
     except MemoryError:
         raise _no_memory(shown) from None
     except InputError as error:
@@ -154,7 +153,15 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     return lost
 
 
-_CHANGED = "the file that was read has changed since: what gmsnet does not know of it was left out"
+def _unread(source: Source | None) -> Iterator[str]:
+    """What a conversion leaves behind in the file that was read, in words."""
+    if not isinstance(source, FileSource):
+        return
+    if source.unread:
+        title = FORMATS[source.format].title
+        yield f"only the {title} file that was read holds {listed(source.unread)}: left out"
+    if not source.intact():
+        yield "the file that was read has changed since: what gmsnet does not know of it was left out"
 
 
 def _with_memory(shown: str, pieces: Pieces) -> Iterator[Piece]:

@@ -17,7 +17,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io import convert
 from gmsnet.io import gmsh_sections as sections
 from gmsnet.io.cell_table import table_blocks
-from gmsnet.io.cells import distinct, first_repeated, places_of
+from gmsnet.io.cells import counted, distinct, first_repeated, places_of
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.gmsh_sections import KINDS, Contents, Elements, Nodes, Source
 from gmsnet.io.mapped import Data
@@ -89,6 +89,8 @@ def _section(source: Source, title: bytes, found: Contents, old: bool) -> None:
         _physical_names(source, found)
     elif title not in (b"Entities", b"PartitionedEntities", b"Nodes", b"Elements") or (old and b"Entities" in title):
         source.skip_section(title)
+        if title != b"Comments":
+            found.others[f"${sections.show(title)}"] = None
     else:
         count = 0
         if old and source.order:  # the count is text, and binary numbers follow
@@ -144,7 +146,21 @@ def _assemble(found: Contents, nodes: Nodes, elements: Elements) -> Parsed:
         for region in np.unique(block.regions[block.regions < 0]).tolist():
             if (block.dimension, -region) in names:
                 names.setdefault((block.dimension, region), names[block.dimension, -region])
-    return Parsed(nodes.points, cells, nodes.slots, names)
+    return Parsed(nodes.points, cells, nodes.slots, names, unread=_unread(found, nodes, elements, regions))
+
+
+def _unread(found: Contents, nodes: Nodes, elements: Elements, regions: NDArray[np.int64]) -> list[str]:
+    """What the file holds besides, in words."""
+    unread = list(found.others)
+    if elements.entity is not None and elements.number is not None:
+        some = elements.number > 0
+        entities, first = elements.entity[some], (np.cumsum(elements.number) - elements.number)[some]
+        several = len(np.unique(entities, axis=0))
+        if several > len({*zip(entities[:, 0].tolist(), regions[first].tolist(), strict=True)}):
+            unread.append(f"{several} entities of the geometry, more than there are physical groups")
+    if len(nodes.tags) and not counted(nodes.tags, 1):
+        unread.append("the numbers of nodes, which have gaps or another order")
+    return unread
 
 
 def _regions(found: Contents, elements: Elements, names: dict[tuple[int, int], str]) -> NDArray[np.int64]:

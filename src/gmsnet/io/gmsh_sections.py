@@ -72,12 +72,16 @@ class Nodes:
 
 @dataclass
 class Contents:
-    """What the sections of a file add up to. physical: (dimension, entity) → its physical tags."""
+    """What the sections of a file add up to.
+
+    physical: (dimension, entity) → its physical tags. others: the titles of sections that are not read.
+    """
 
     names: dict[tuple[int, int], str] = field(default_factory=dict)
     physical: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
     nodes: Nodes | None = None
     elements: Elements | None = None
+    others: dict[str, None] = field(default_factory=dict)
 
 
 class Source:

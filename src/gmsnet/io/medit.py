@@ -130,7 +130,8 @@ def read(files: Mapping[str, Data]) -> Parsed:
 
     cells, names = _cells(text, entries, len(points))
     point_data = {REFERENCE: references} if references.any() else {}
-    return Parsed(points, cells, slots, names, point_data)
+    unread = [key for key in seen if key in (*SKIPPED, *SKIPPED_VECTORS, *SKIPPED_VALUES, "BoundingBox")]
+    return Parsed(points, cells, slots, names, point_data, unread=unread)
 
 
 def _cells(text: Text, entries: list[Entries], count: int) -> tuple[list[CellBlock], dict[tuple[int, int], str]]:

@@ -29,6 +29,8 @@ KEYS = (b"v", b"vt", b"vn", b"vp", b"f", b"l", b"p", b"o", b"g", b"s", b"usemtl"
 POINT, GROUP, MATERIAL = (KEYS.index(key) for key in (b"v", b"g", b"usemtl"))
 LEAST = {KEYS.index(b"f"): 3, KEYS.index(b"l"): 2, KEYS.index(b"p"): 1}  # nodes
 FACE, LINE, DOT = LEAST
+OTHERS = {b"vt": "texture (vt)", b"vn": "normals (vn)", b"vp": "parameters (vp)", b"o": "objects (o)",
+          b"s": "smoothing groups (s)", b"mtllib": "the library of its materials (mtllib)"}  # fmt: skip
 _BACKSLASH = re.compile(rb"\\(?=[\s#]|\Z)")  # at the end of a word
 KINDS = ("triangle", "quad", "polygon", "line", "vertex")
 
@@ -47,7 +49,14 @@ def read(files: Mapping[str, Data]) -> Parsed:
     cells = _cells(text, rows, keys, len(points), regions)
     used = {(b.dimension, r) for b in cells for r in distinct(b.regions)}
     region_names = {(dim, r): names[r] for dim, r in sorted(used) if names[r]}
-    return Parsed(points, cells, TextSlots(starts, ends), region_names)
+    return Parsed(points, cells, TextSlots(starts, ends), region_names, unread=_unread(rows, keys))
+
+
+def _unread(rows: Rows, keys: NDArray[np.int8]) -> list[str]:
+    """What the file holds besides, in words."""
+    found = set(distinct(keys))
+    unread = [words for key, words in OTHERS.items() if KEYS.index(key) in found]
+    return unread + ["weights or colours of points"] * bool((rows.lengths[keys == POINT] > 4).any())
 
 
 def _no_broken_lines(text: Text, rows: Rows) -> None:

@@ -50,10 +50,13 @@ def read(files: Mapping[str, Data]) -> Parsed:
     end = rows.end if len(rows) else end
     cell_rows = text.rows(end, faces)
     cells = _faces(text, cell_rows, number)
+    sizes = text.integers(cell_rows.column(0))
+    unread = ["normals, colours or texture of points"] * bool((rows.lengths > 3).any())
+    unread += ["colours of faces"] * bool((cell_rows.lengths > 1 + sizes).any())
     rest = text.rows(cell_rows.end if len(cell_rows) else end)
     if len(rest):
         text.fail(rest.where(0), f"the file goes on behind the {number} points and {faces} faces that it announces")
-    return Parsed(points, cells, TextSlots(starts, ends))
+    return Parsed(points, cells, TextSlots(starts, ends), unread=unread)
 
 
 def _faces(text: Text, rows: Rows, count: int) -> list[CellBlock]:

@@ -67,7 +67,15 @@ def read(files: Mapping[str, Data]) -> Parsed:
     point_data = {
         key: _values(words, column) for key, column in vertex.items() if key not in "xyz" and column.sizes is None
     }
-    return Parsed(points, cells, slots, {}, point_data, cell_data, kind == "f4")
+    return Parsed(points, cells, slots, {}, point_data, cell_data, kind == "f4", _unread(header))
+
+
+def _unread(header: ply_header.Header) -> list[str]:
+    """What the file holds besides, in words."""
+    read = ("vertex", "face", "edge")
+    lists = [f"the list {p.name!r} of each {e.name}" for e in header.elements if e.name in read for p in e.properties
+             if p.length and not (e.name == "face" and p.name in LISTS)]  # fmt: skip
+    return [f"the element {e.name!r}" for e in header.elements if e.name not in read] + lists
 
 
 _Cells = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]  # codes, sizes, nodes

@@ -122,7 +122,7 @@ class FileSource:
 
     format: its name in the table of formats. data: the file that holds the coordinates, under the suffix ``main``.
     points, cells, region_names, point_data, cell_data: as read (see Mesh). companions: other files of the same mesh by
-    suffix, which never change (Triangle's ``.ele``).
+    suffix, which never change (Triangle's ``.ele``). unread: what else there is in the file (see Parsed).
     """
 
     format: str
@@ -135,6 +135,7 @@ class FileSource:
     region_names: Mapping[tuple[int, int], str] = field(default_factory=dict)
     point_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
+    unread: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle: the bytes themselves, wherever they are kept. Raises InputError where they are gone."""
@@ -142,7 +143,7 @@ class FileSource:
         names, fields, cell_fields = (dict(each) for each in (self.region_names, self.point_data, self.cell_data))
         return FileSource, (
             self.format, self.main, held(self.data), self.points, self.slots, self.cells, files,
-            names, fields, cell_fields,
+            names, fields, cell_fields, self.unread,
         )  # fmt: skip
 
     def fits(self, mesh: Mesh) -> bool:

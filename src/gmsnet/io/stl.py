@@ -60,7 +60,9 @@ def _binary(data: Data, count: int) -> Parsed:
         some = Places(Lattice(HEAD + k * RECORD, min(_TOGETHER, count - k), RECORD, columns))
         weld.add(ByteWords(data, "<").values(some, "f4").reshape(-1, 3))
     cells = [CellBlock("triangle", sealed(weld.node).reshape(-1, 3), sealed(np.zeros(count, dtype=np.int64)))]
-    return Parsed(weld.points, cells, BinarySlots(places, "<f4", weld.node), single=True)
+    marks = np.ndarray((count, 2), np.uint8, data, HEAD + RECORD - 2, (RECORD, 1))
+    unread = ["attributes of triangles"] * bool(marks.any())
+    return Parsed(weld.points, cells, BinarySlots(places, "<f4", weld.node), single=True, unread=unread)
 
 
 def _text(data: Data) -> Parsed:

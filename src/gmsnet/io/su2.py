@@ -49,12 +49,13 @@ class Section:
 
 @dataclass
 class Contents:
-    """What the sections of a file add up to."""
+    """What the sections of a file add up to. others: keywords that do not concern the mesh, each once."""
 
     counts: dict[str, int] = field(default_factory=dict)
     points: Rows | None = None
     elements: Rows | None = None
     markers: list[tuple[str, Rows | None]] = field(default_factory=list)
+    others: dict[str, None] = field(default_factory=dict)
 
 
 def read(files: Mapping[str, Data]) -> Parsed:
@@ -78,7 +79,8 @@ def read(files: Mapping[str, Data]) -> Parsed:
         blocks = _cells(text, rows, len(points), numbers[tag], {1: "vertex", 3: "line"})
         names |= {(b.dimension, numbers[tag]): tag for b in blocks}
         cells += blocks
-    return Parsed(points, cells, TextSlots(starts, ends), names)
+    unread = [f"the keyword {key}" for key in found.others]
+    return Parsed(points, cells, TextSlots(starts, ends), names, unread=unread)
 
 
 def _sections(text: Text) -> Iterator[Section]:
@@ -115,6 +117,8 @@ def _collect(text: Text) -> Contents:
             if not len(value):
                 text.fail(at, "MARKER_TAG has no name")
             found.markers.append((b" ".join(map(text.token, value)).decode("utf-8", "backslashreplace"), None))
+        elif key not in COUNTS:
+            found.others[key] = None
         if key in COUNTS:
             _count(text, section, found)
         elif len(rows) and not key.startswith("FFD_"):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
-from gmsnet.io.cells import distinct, first_repeated, places_of, sealed
+from gmsnet.io.cells import counted, distinct, first_repeated, places_of, sealed
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
@@ -45,7 +45,9 @@ def read(files: Mapping[str, Data]) -> Parsed:
         cells.append(CellBlock("vertex", marked[:, None], markers[marked]))
         empty = np.zeros(len(marked))
         cell_data = {key: (*arrays, empty) for key, arrays in cell_data.items()}
-    return Parsed(points, cells, slots, names, data, cell_data)
+    known = counted(ids, 0) or counted(ids, 1)
+    unread = [] if known else ["the numbers of nodes, which begin elsewhere, have gaps or another order"]
+    return Parsed(points, cells, slots, names, data, cell_data, unread=unread)
 
 
 def _header(text: Text, words: int, what: str) -> tuple[NDArray[np.int64], Rows]:
@@ -163,15 +165,21 @@ def _markers(mesh: Mesh) -> tuple[NDArray[np.int64], list[str]]:
     used = sorted({(b.dimension, r) for b in mesh.cells if b.dimension < 2 for r in distinct(b.regions)})
     plain = len({r for _, r in used}) == len(used) and all(r != 0 for _, r in used)
     number = {pair: pair[1] if plain else k for k, pair in enumerate(used, 1)}
-    lines = 0
+    lines = sum(len(block.nodes) for block in mesh.cells if block.dimension == 1)
+    several = np.zeros(len(markers), dtype=bool)
     for block in mesh.cells:
         if block.dimension < 2:
-            lines += len(block.nodes) * (block.dimension == 1)
             for region in distinct(block.regions):
-                markers[block.nodes[block.regions == region]] = number[block.dimension, region]
+                nodes = block.nodes[block.regions == region]
+                several[nodes] |= ~np.isin(markers[nodes], (0, number[block.dimension, region]))
+                markers[nodes] = number[block.dimension, region]
     lost = []
     if lines:
-        lost.append(f"{name} cannot hold line cells: {lines} {convert.were(lines)} turned into markers of their nodes")
+        told = convert.listed([str(k) for (dim, _), k in number.items() if dim == 1])
+        turned = f"{lines} {convert.were(lines)} turned into markers of their nodes ({told})"
+        lost.append(f"{name} cannot hold line cells: {turned}")
+    if count := int(np.count_nonzero(several)):
+        lost.append(f"{name} cannot hold several markers of a node: of those of {count} one each was kept")
     named = [f"{mesh.region_names[pair]!r} ({k})" for pair, k in number.items() if pair in mesh.region_names]
     if named:
         lost.append(f"{name} numbers its markers: {convert.left_out('name', named)}")

@@ -63,13 +63,17 @@ class CellLists:
 
 @dataclass
 class Contents:
-    """What the sections of a file add up to. fields: of the points and of the cells, with their announced number."""
+    """What the sections of a file add up to.
+
+    fields: of the points and of the cells, with their announced number. others: what is not kept, in words.
+    """
 
     points: Array | None = None
     lists: dict[str, CellLists] = field(default_factory=dict)
     types: NDArray[np.int64] | None = None
     fields: dict[str, list[tuple[str, NDArray[Any]]]] = field(default_factory=dict)
     counts: dict[str, tuple[int, Line]] = field(default_factory=dict)
+    others: list[str] = field(default_factory=list)
 
 
 def read(files: Mapping[str, Data]) -> Parsed:
@@ -116,10 +120,10 @@ def _section(stream: Stream, line: Line, found: Contents) -> None:
     elif not found.fields:
         if key != "FIELD":
             stream.fail(line.start, f"unknown keyword {word_of(line.words[0])}")
-        _field(stream, line, None)  # facts about the whole grid
+        _field(stream, line, None, found.others)  # facts about the whole grid
     else:
         place = list(found.fields)[-1]
-        found.fields[place] += _attribute(stream, line, found.counts[place][0])
+        found.fields[place] += _attribute(stream, line, found.counts[place][0], found.others)
 
 
 def _lists(stream: Stream, line: Line) -> CellLists:
@@ -167,12 +171,14 @@ def counted_lists(array: Array, count: int, key: str) -> CellLists:
     return CellLists(sizes, pick(numbers, at), at, array)
 
 
-def _attribute(stream: Stream, line: Line, count: int) -> list[tuple[str, NDArray[Any]]]:
+def _attribute(stream: Stream, line: Line, count: int, others: list[str]) -> list[tuple[str, NDArray[Any]]]:
     key = line.key
     if key == "FIELD":
-        return _field(stream, line, count)
+        return _field(stream, line, count, others)
     if key == "LOOKUP_TABLE":  # colours, which are not kept
-        size = stream.count(line, stream.expect(line, "LOOKUP_TABLE name size")[1])
+        called, text = stream.expect(line, "LOOKUP_TABLE name size")
+        size = stream.count(line, text)
+        others.append(f"the colours {field_name(called)!r}")
         stream.array(line, 4 * size, "unsigned_char" if stream.binary else "float").values()
         return []
     kind = "unsigned_char" if stream.binary else "float"
@@ -195,8 +201,11 @@ def _attribute(stream: Stream, line: Line, count: int) -> list[tuple[str, NDArra
     return [(field_name(called), _values(stream, line, count, width, kind))]
 
 
-def _field(stream: Stream, line: Line, rows: int | None) -> list[tuple[str, NDArray[Any]]]:
-    """The arrays of a FIELD, which must have ``rows`` rows (None: any number, and they are not kept)."""
+def _field(stream: Stream, line: Line, rows: int | None, others: list[str]) -> list[tuple[str, NDArray[Any]]]:
+    """The arrays of a FIELD, which must have ``rows`` rows (None: any number, and they are not kept).
+
+    others: takes the words for those that are not kept.
+    """
     found = []
     for _ in range(stream.count(line, stream.expect(line, "FIELD name arrays")[1])):
         head = stream.line()
@@ -208,9 +217,12 @@ def _field(stream: Stream, line: Line, rows: int | None) -> list[tuple[str, NDAr
             stream.fail(head.start, f"the array {word_of(called)} has {length} rows instead of {rows}")
         if kind.lower() in ("string", "utf8_string"):
             stream.skip_strings(width * length)
+            others.append(f"the texts {field_name(called)!r}")
+        elif rows is None:
+            _values(stream, head, length, width, kind)
+            others.append(f"the field {field_name(called)!r} of the whole grid")
         else:
-            values = _values(stream, head, length, width, kind)
-            found += [] if rows is None else [(field_name(called), values)]
+            found.append((field_name(called), _values(stream, head, length, width, kind)))
     return found
 
 
@@ -266,6 +278,7 @@ def _assemble(stream: Stream, found: Contents, polygonal: bool) -> Parsed:
         found.fields.get("POINT_DATA", []),
         found.fields.get("CELL_DATA", []),
         blame,
+        found.others,
     )
 
 

@@ -49,6 +49,7 @@ def parsed(
     point_fields: Fields,
     cell_fields: Fields,
     fail: Callable[[int, str], NoReturn],
+    unread: Sequence[str],
 ) -> Parsed:
     """The facts of a VTK file. codes: (n,) VTK's types; sizes: (n,) numbers of nodes; nodes: of all cells in turn.
 
@@ -85,7 +86,7 @@ def parsed(
         if code in present:
             small[(small == code) & (sizes == count)] = CODES[kind]
     cells, cell_data = table_blocks(KINDS, small, sizes, nodes, regions, dict(cell_fields))
-    return Parsed(points, cells, slots, {}, dict(point_fields), cell_data, single)
+    return Parsed(points, cells, slots, {}, dict(point_fields), cell_data, single, unread)
 
 
 def parts(mesh: Mesh) -> Iterator[tuple[CellBlock, slice]]:

@@ -73,9 +73,14 @@ def read(files: Mapping[str, Data]) -> Parsed:
     ]
     reader.check_apart(place)
     single = place.attributes["type"] == "Float32"
-    return vtk_cells.parsed(
-        points, slots, single, codes, sizes, nodes.values.astype(np.int64, copy=False), fields[0], fields[1], blame
-    )
+    unread = [
+        f"the {'texts' if array.section else 'field'} {array.attributes.get('Name', '')!r}"
+        for array in reader.document.arrays
+        if not array.section  # facts about the whole grid
+        or (array.section in ("PointData", "CellData") and array.attributes.get("type") not in TYPES)
+    ]
+    named = nodes.values.astype(np.int64, copy=False)
+    return vtk_cells.parsed(points, slots, single, codes, sizes, named, fields[0], fields[1], blame, unread)
 
 
 def _points(reader: Reader, place: DataArray, count: int) -> tuple[NDArray[np.float64], Slots]:
