@@ -1,0 +1,211 @@
+"""Generates docs/formats.md: what of a file is kept when it is smoothed, and what of a mesh when it is converted.
+
+python docs/formats.py                    # the section about other programs stays as it is
+python docs/formats.py --peers            # that too, for the programs that are installed (VTK, Gmsh, meshlane, meshio)
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import format_conversions
+import format_peers
+import numpy as np
+from format_samples import VARIANTS, Files, Variant, points_of
+
+import gmsnet
+from gmsnet.errors import FormatError
+from gmsnet.mesh import Mesh
+
+TARGET = Path(__file__).with_name("formats.md")
+
+FORM = ("comments", "line ends", "blanks", "node numbers", "cell numbers", "cell order", "entities", "unused node",
+        "more")  # fmt: skip
+CONTENT = ("regions", "names of regions", "lines", "vertices", "markers", "names of markers", "point data",
+           "cell data", "quads", "curved", "other plane")  # fmt: skip
+NEEDS = {  # what a fact is about must be there as well
+    "names of regions": ("regions",), "markers": ("lines",), "names of markers": ("lines", "markers"),
+    "more": ("lines",),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """A sample that was read, smoothed, written and read again. same: it is the sample with other points, exactly."""
+
+    mesh: Mesh
+    result: Mesh
+    again: Mesh
+    untouched: bool
+    same: bool
+    written: Files
+
+
+def saved(files: Files, stem: Path) -> Path:
+    """Writes the files of a mesh; returns the name of the first."""
+    for suffix, data in files.items():
+        stem.with_suffix(suffix).write_bytes(data)
+    return stem.with_suffix(next(iter(files)))
+
+
+def smoothed(variant: Variant, facts: Iterable[str], folder: Path, plain: bool = False) -> Smoothed:
+    """Smooths a sample (plain: without odd spellings of numbers).
+
+    Raises FormatError where it cannot be read, AssertionError where nothing moves.
+    """
+    facts, points = frozenset(facts), points_of(facts, plain)
+    files = variant.make(facts, points)
+    path = saved(files, folder / "sample")
+    mesh = gmsnet.read(path)
+    said = gmsnet.write(mesh, folder / path.with_stem("untouched").name)
+    result = gmsnet.smooth(mesh).mesh
+    said += gmsnet.write(result, folder / path.with_stem("smoothed").name)
+    untouched, written = (_saved_as(folder / stem, files) for stem in ("untouched", "smoothed"))
+    again = gmsnet.read((folder / "smoothed").with_suffix(path.suffix))
+    moved = (mesh.points != result.points).any(axis=1)
+    assert moved.any(), f"{variant.title} with {sorted(facts)}: no node has moved"
+    expected = variant.make(facts, _moved(points, mesh, result))
+    return Smoothed(mesh, result, again, untouched == files and not said, written == expected, written)
+
+
+def _saved_as(stem: Path, files: Files) -> Files:
+    return {suffix: stem.with_suffix(suffix).read_bytes() for suffix in files}
+
+
+def _moved(points: Sequence[Sequence[str]], old: Mesh, new: Mesh) -> list[list[str]]:
+    """The decimals of the sample's points, other ones where a coordinate has changed."""
+    kind = np.float32 if old.single else np.float64
+    places = {tuple(point): k for k, point in enumerate(old.points[:, :2].astype(kind).tolist())}
+    found = []
+    for texts in points:
+        at = places.get(tuple(float(kind(text)) for text in texts))
+        if at is None:  # in no cell, in a format that has no such nodes
+            found.append(list(texts))
+            continue
+        rows = zip(texts, old.points[at], new.points[at], strict=False)
+        found.append([text if a == b else repr(float(b)) for text, a, b in rows])
+    return found
+
+
+def facts_of(mesh: Mesh) -> tuple[object, ...]:
+    """All that a mesh holds but for its points, in a form that compares."""
+    return (
+        mesh.points.shape, mesh.single,
+        [(b.kind, b.nodes.tolist(), b.regions.tolist()) for b in mesh.cells], dict(mesh.region_names),
+        {name: values.tolist() for name, values in mesh.point_data.items()},
+        {name: [part.tolist() for part in parts] for name, parts in mesh.cell_data.items()},
+    )  # fmt: skip
+
+
+def entry(variant: Variant, fact: str, folder: Path) -> str:
+    """What becomes of a fact that a file of this variant has: a word of the table."""
+    less, more = frozenset(NEEDS.get(fact, ())), frozenset((fact, *NEEDS.get(fact, ())))
+    points = points_of(less if fact == "unused node" else more)
+    if variant.make(less, points) == variant.make(more, points_of(more)):
+        return "–"
+    try:
+        found = smoothed(variant, more, folder)
+    except FormatError as error:
+        return f"refused: {str(error).partition(': ')[2]}"
+    if not found.untouched or not found.same:
+        return "**changed**"
+    if facts_of(found.again) != facts_of(found.mesh) or not np.array_equal(found.again.points, found.result.points):
+        return "**reads differently**"
+    files = variant.make(less, points_of(less))
+    without = gmsnet.read(saved(files, folder / "without"))
+    used = (facts_of(found.mesh), found.mesh.points.tolist()) != (facts_of(without), without.points.tolist())
+    return "used" if used else "kept"
+
+
+INTRODUCTION = """\
+# What each format keeps
+
+Generated by `python docs/formats.py`. Every entry was measured: a small file with that fact is written by hand
+(`docs/format_samples.py`), read, smoothed or converted, and looked at again. A test makes a part of the tables anew.
+
+What the names of facts mean that do not say it themselves:
+
+- *blanks*: tabs, several blanks, empty lines. *line ends*: CRLF. *node numbers*, *cell numbers*: with gaps or in
+  another order. *entities*: cells of one region that belong to several pieces of the geometry. *unused node*: one in no
+  cell.
+- *more*: what is not about the mesh. SU2: `AOA`, a box of free-form deformation; Gmsh: `$Periodic`; VTK, VTU: a field
+  of the whole grid; Medit: ridges; OBJ: normals, a library of materials; PLY: another element.
+- *point data*, *cell data* of OBJ and OFF: colours; of binary STL: attributes. *comments* of VTK: the title.
+- *markers*: lines in two groups. *curved*: triangles of six nodes. *other plane*: z = 5.
+
+## Smoothing: the same file with other coordinates
+
+The sample is made of the decimals of its points. It is read and written without smoothing: the same bytes. It is
+smoothed and written: exactly the bytes of the sample made again with the new points, and held nodes keep the spelling
+of their decimals (`1e0`, `+1.0`, `-0.0`, `.3`). It is read again: the same points, cells, regions, names and data.
+
+**yes**: kept, and part of the mesh that gmsnet sees. **kept**: kept in the file, byte for byte, and not looked at.
+–: the format, or this variant, has no such thing.
+"""
+CONVERTED = """\
+## Converting: into another format
+
+A mesh goes from each format that has the fact into each other format. **kept**: all of the mesh that is there because
+of the fact is there again when the new file is read. **said**: left out, and named by the list that `gmsnet.write`
+returns (the command line prints it). **kept, said**: kept, and something about it is named that is not, such as a name
+or a number. **refused**: an error names the cells that the format cannot hold, and nothing is written. Sources are
+named where they differ.
+"""
+BEYOND = """\
+### What is in the file and not in the mesh
+
+Into whatever other format, such facts cannot be kept. **said**: the list names them.
+
+**silent** are only: comments, line ends and blanks; the numbers of cells, which are counted anew in the same order; the
+indices behind points and cells of SU2 files, which mean nothing to SU2; the elementary entities of Gmsh 2.2.
+"""
+
+
+def rows_of(variants: Iterable[Variant], facts: Sequence[str], folder: Path) -> list[str]:
+    """The rows of these variants in the table of these facts."""
+    shown = {"used": "yes"}
+    return [
+        " | ".join(["", variant.title, *(shown.get(word, word) for word in words), ""]).strip()
+        for variant in variants
+        for words in [[entry(variant, fact, folder) for fact in facts]]
+    ]
+
+
+def head_of(columns: Sequence[str]) -> list[str]:
+    return [f"| {' | '.join(columns)} |", "|" + "---|" * len(columns)]
+
+
+def own_format(folder: Path) -> list[str]:
+    lines = [INTRODUCTION]
+    for title, facts in (("The form of the file", FORM), ("The mesh", CONTENT)):
+        lines += [f"### {title}", "", *head_of(["", *facts]), *rows_of(VARIANTS, facts, folder), ""]
+    return lines
+
+
+def page(folder: Path) -> str:
+    """All but what other programs read."""
+    facts = (*FORM, *CONTENT, *format_conversions.SAMPLE)
+    found = list(format_conversions.measured(facts, NEEDS, folder))
+    lines = [*own_format(folder), CONVERTED, *format_conversions.table(found), "", BEYOND]
+    return "\n".join([*lines, *format_conversions.beyond(found), ""]) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--peers", action="store_true", help="let other programs read the smoothed files, too")
+    with tempfile.TemporaryDirectory() as folder:
+        text = page(Path(folder))
+        if parser.parse_args().peers:
+            peers = format_peers.section(smoothed, Path(folder))
+        else:
+            old = TARGET.read_text(encoding="utf-8") if TARGET.exists() else ""
+            peers = "".join(old.partition(format_peers.TITLE)[1:])
+    TARGET.write_text(text + peers, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
