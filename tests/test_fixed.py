@@ -141,3 +141,14 @@ def test_an_empty_mesh():
         fixed_mask(empty, [0])
     with pytest.raises(InputError, match="the mesh has no markers"):
         fixed_mask(empty, "inlet")
+
+
+@pytest.mark.parametrize("kind", [int, np.int8, np.uint64, float])
+def test_a_mask_of_numbers_is_not_taken_for_the_nodes_0_and_1(kind):
+    with pytest.raises(InputError, match=r"a 0 or a 1 for each of the 5 nodes: give a mask as bools"):
+        fixed_mask(mesh_with(), np.array([0, 0, 1, 1, 1], dtype=kind))
+    with pytest.raises(InputError, match="give a mask as bools"):
+        fixed_mask(mesh_with(), [0, 0, 0, 0, 0])
+    assert ids_of(mesh_with(), np.array([0, 1, 1, 4, 4])) == [0, 1, 4]
+    two = Mesh(POINTS[:2], ())
+    assert ids_of(two, [0, 1]) == [0, 1]

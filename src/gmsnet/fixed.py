@@ -23,9 +23,9 @@ def fixed_mask(mesh: Mesh, fixed: Any = None) -> NDArray[np.bool_]:
     Several may be an array, a list, a tuple, a set or a range. Point data ``fixed`` may have several columns, of which
     one that is not zero will do; a nan is not zero.
 
-    Raises InputError for ids out of range, masks of another length, names that the mesh does not have, anything else
-    than these forms, and point data ``fixed`` that are no numbers: what they mean cannot be told, and to move nodes
-    that are meant to stay would be worse than to stop.
+    Raises InputError for ids out of range, masks of another length, masks of numbers (of which zeros and ones might be
+    ids), names that the mesh does not have, anything else than these forms, and point data ``fixed`` that are no
+    numbers: what they mean cannot be told, and to move nodes that are meant to stay would be worse than to stop.
     """
     mask = _own(mesh)
     if fixed is None:
@@ -38,6 +38,11 @@ def fixed_mask(mesh: Mesh, fixed: Any = None) -> NDArray[np.bool_]:
         if values.shape != mask.shape:
             raise InputError(f"a mask of fixed nodes needs one value per node, {mask.shape}, got shape {values.shape}")
         mask |= values
+    elif _is_mask_of_numbers(values, mask):
+        raise InputError(
+            f"fixed has a 0 or a 1 for each of the {len(mask):,} nodes: give a mask as bools, such as .astype(bool), "
+            "or ids without repetition"
+        )
     elif values.dtype.kind in "iu":
         wrong = values[(values < 0) | (values >= len(mask))]
         if wrong.size:
@@ -47,6 +52,16 @@ def fixed_mask(mesh: Mesh, fixed: Any = None) -> NDArray[np.bool_]:
         mend = ": give integers, as by .astype(int)" if values.dtype.kind == "f" else ""
         raise InputError(f"{FORMS}, got {values.dtype} values{mend}")
     return mask
+
+
+def _is_mask_of_numbers(values: NDArray[Any], mask: NDArray[np.bool_]) -> bool:
+    """Zeros and ones, one per node: more than the two nodes 0 and 1 could be meant by."""
+    return (
+        values.dtype.kind in "iuf"
+        and values.shape == mask.shape
+        and len(mask) > 2
+        and bool(((values == 0) | (values == 1)).all())
+    )
 
 
 def _own(mesh: Mesh) -> NDArray[np.bool_]:

@@ -49,11 +49,13 @@ def test_a_marker_that_is_a_number_goes_before_a_node(run, tmp_path):
         ("@{folder}/words.txt", "words.txt, line 2: 'left' is not a node: give whole numbers"),
         ("@{folder}/far.txt", "far.txt, line 1: there is no node 123456"),
         ("@{folder}/binary.txt", "this is not a list of nodes"),
+        ("@{folder}/none.txt", "none.txt: the list names no node: leave out --fix"),
     ],
 )
 def test_wrong_fixed_nodes(run, square, tmp_path, value, message):
     (tmp_path / "words.txt").write_text("1 2\nleft\n")
     (tmp_path / "far.txt").write_text("123456")
+    (tmp_path / "none.txt").write_text("# 1 2\n\n")
     (tmp_path / "binary.txt").write_bytes(b"\xff\xfe\x00")
     done = run("smooth", square, tmp_path / "out.su2", "--fix", value.format(folder=tmp_path))
     assert done.code == 2
@@ -74,3 +76,19 @@ def test_a_number_is_no_region_of_cells_without_a_name(run, tmp_path, name):
         assert document["free"] > 30
     done = run("smooth", path, tmp_path / f"out-{name}", "--fix", "wall")
     assert "there is no marker 'wall' to hold: the mesh has no markers" in done.err
+
+
+def test_a_file_with_a_mask_is_not_taken_for_the_nodes_0_and_1(run, square, tmp_path):
+    count = len(gmsnet.read(square).points)
+    (tmp_path / "mask.txt").write_text("0\n1\n" * (count // 2) + "0\n" * (count % 2))
+    done = run("smooth", square, tmp_path / "out.su2", "--fix", f"@{tmp_path / 'mask.txt'}")
+    assert done.code == 2
+    assert f"a 0 or a 1 for each of the {count} nodes" in done.err
+    assert not (tmp_path / "out.su2").exists()
+
+
+def test_nodes_that_are_held_anyway_are_told(run, square, tmp_path):
+    done = run("smooth", square, tmp_path / "out.su2", "--fix", "left")
+    left = len(gmsnet.read(square).markers["left"])
+    assert f"fixed: {left} nodes are named, and held for other reasons anyway" in done.out
+    assert "fixed:" not in run("smooth", square, tmp_path / "out.su2").out

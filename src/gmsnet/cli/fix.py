@@ -45,11 +45,14 @@ def _from_file(path: str, count: int) -> list[int]:
         raise InputError(f"{path}: the list of nodes cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: this is not a list of nodes: give whole numbers, counted from 0") from error
-    return [
+    ids = [
         _node(text, count, f"{path}, line {number}")
         for number, line in enumerate(lines, start=1)
         for text in line.partition("#")[0].replace(",", " ").split()
     ]
+    if not ids:
+        raise InputError(f"{path}: the list names no node: leave out --fix, or put ids into it")
+    return ids
 
 
 def _node(text: str, count: int, where: str) -> int:
