@@ -127,11 +127,11 @@ class FileSource:
 
     format: str
     main: str
-    data: Data
-    points: Points
-    slots: Slots
+    data: Data = field(repr=False)
+    points: Points = field(repr=False)
+    slots: Slots = field(repr=False)
     cells: tuple[CellBlock, ...] = ()
-    companions: Mapping[str, Data] = field(default_factory=dict)
+    companions: Mapping[str, Data] = field(default_factory=dict, repr=False)
     region_names: Mapping[tuple[int, int], str] = field(default_factory=dict)
     point_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
