@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+import gmsnet
 from gmsnet.arrays import read_only
 from gmsnet.errors import InputError
 from gmsnet.mesh import CellBlock, Mesh
@@ -256,3 +257,12 @@ def test_other_points_change_nothing_else():
     }
     with pytest.raises(InputError, match=r"node 2 .* not finite"):
         mesh.with_points(np.where(np.arange(4)[:, None] == 2, np.nan, mesh.points))
+
+
+def test_a_mesh_is_shown_without_its_file(tmp_path):
+    gmsnet.write(gmsnet.random_mesh(2000, seed=0), tmp_path / "a.su2")
+    mesh = gmsnet.read(tmp_path / "a.su2")
+    assert "NDIME" not in repr(mesh)
+    assert "NDIME" not in repr(mesh.source)
+    assert len(repr(mesh)) < 5000, "arrays are shortened"
+    assert len(repr(gmsnet.smooth(mesh))) < 20000

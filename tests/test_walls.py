@@ -11,6 +11,7 @@ from gmsnet.generate import Curve, disturb, good_mesh, layered_mesh
 from gmsnet.layers import stretched_layers
 from gmsnet.mesh import CellBlock, Mesh
 from gmsnet.paper.cases import CASES
+from gmsnet.preserve import WALL
 from gmsnet.topology import Topology
 from gmsnet.walls import NEAR, near_walls
 
@@ -45,6 +46,20 @@ def test_a_hole_that_the_mesh_is_refined_towards(ring):
     assert flags[triangles[near]].all()
     assert set(np.flatnonzero(flags).tolist()) == set(triangles[near].ravel().tolist())
     assert 200 < near.sum() < len(triangles) / 2
+
+
+def test_what_becomes_of_the_nodes_near_walls_is_told(ring):
+    count = int(kept(ring).sum()) - len(ring.markers["hole"])
+    told = f"the mesh is refined towards its walls: the {count:,} nodes next to them"
+    moved = gmsnet.smooth(ring)
+    assert moved.notes == [f"{told} move only as far as the areas of their cells stay within 10% (preserve='shape')"]
+    assert WALL not in moved.held
+    least = float(moved.before.shape.min())
+    for options in ({"max_sweeps": 1}, {"target_quality": least * 1.01}, {"target_quality": least * 0.9}):
+        held = gmsnet.smooth(ring, **options)
+        assert held.notes == [f"{told} are held in this run (preserve='shape'); preserve='none' lets them move"]
+        assert len(held.held[WALL]) == count
+        assert not held.moved[kept(ring)].any()
 
 
 def test_it_moves_turns_and_scales_with_the_mesh(ring):

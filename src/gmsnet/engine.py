@@ -17,13 +17,15 @@ from gmsnet.arguments import check_arguments
 from gmsnet.available_memory import refuse_unless_free
 from gmsnet.errors import InputError
 from gmsnet.fixed import fixed_mask
+from gmsnet.held import REASONS
+from gmsnet.kernels.connectivity import CHOSEN
 from gmsnet.limits import Limits, limits
 from gmsnet.measure import QualityReport, Totals, measure
-from gmsnet.mesh import Mesh
+from gmsnet.mesh import CORNERS, Mesh, unmeasured
 from gmsnet.methods import Smoother, StarSmoother, smoother
 from gmsnet.methods.auto import Auto
 from gmsnet.patches import reach_target
-from gmsnet.preserve import Protection, method_for, protected
+from gmsnet.preserve import WALL, Protection, method_for, protected, wall_note
 from gmsnet.run import CALLBACK as CALLBACK
 from gmsnet.run import INTERRUPTED as INTERRUPTED
 from gmsnet.run import MAX_SWEEPS as MAX_SWEEPS
@@ -129,11 +131,13 @@ def smooth(
     )  # fmt: skip
     target, chosen = Target(target_quality, target_angle), create()
     given, restore = to_mesh(mesh)
-    refuse_unless_planar(given)
+    check_mesh(given, target)
+    others = unmeasured(given) if target else ""
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     threads = threads or available_threads()
     apart = threads if len(given.points) >= MANY else 1
-    topology = Topology.of(given, fixed_mask(given, fixed), apart)
+    asked = fixed_mask(given, fixed)
+    topology = Topology.of(given, asked, apart)
     given = given.without_cells()  # whatever was copied of them is given back
 
     def looked_at() -> tuple[Floats, QualityReport, Protection]:
@@ -156,6 +160,12 @@ def smooth(
             untangling.append(first)
         untangling.append(note)
     topology, notes = protection.topology, [*protection.notes, *untangling]
+    if asked.any() and REASONS[CHOSEN] not in topology.held:
+        count = np.count_nonzero(asked)
+        named = "1 node is" if count == 1 else f"{count:,} nodes are"
+        notes.append(f"fixed: {named} named, and held for other reasons anyway")
+    if others:
+        notes.append(f"the target is asked of triangles alone, not of {others}")
 
     options: dict[str, Any] = {"threads": threads, "best_by": best_by, "guard": guard}
     totals = None  # of the best points, where they are known
@@ -178,6 +188,10 @@ def smooth(
                 )  # fmt: skip
             except KeyboardInterrupt:  # what was made before it is kept
                 stop_reason = INTERRUPTED
+
+    if protection.kept is not None:
+        near_wall = len(protection.topology.held.get(WALL, ()))
+        notes.insert(len(protection.notes), wall_note(near_wall, moved=topology is protection.outer))
 
     rank = target.rank if target else rank_by(best_by)
     try:
@@ -229,8 +243,11 @@ def quality(mesh: Any) -> QualityReport:
     return measure(to_mesh(mesh)[0])
 
 
-def refuse_unless_planar(mesh: Mesh) -> None:
-    """InputError for volume meshes and curved surfaces, which cannot be smoothed yet."""
+def check_mesh(mesh: Mesh, target: Target) -> None:
+    """InputError for volume meshes and curved surfaces, which cannot be smoothed yet, and targets of no triangle."""
+    others = unmeasured(mesh) if target else ""
+    if others and not any(len(block.nodes) for block in mesh.cells if CORNERS.get(block.kind) == 3):
+        raise InputError(f"a target is asked of triangles, and this mesh has none: {others} cannot be measured so far")
     volumes = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
     if mesh.plane is None and volumes:
         raise InputError(

@@ -102,7 +102,7 @@ class Mesh:
     point_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
     single: bool = False
-    source: Source | None = None
+    source: Source | None = field(default=None, repr=False)
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -217,6 +217,15 @@ class Mesh:
                     continue
                 nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
         return {name: np.unique(np.concatenate(ids)) for name, ids in nodes.items()}
+
+
+def unmeasured(mesh: Mesh) -> str:
+    """How many faces of which kind are no triangles, in words: no quality is known of them. "" if there are none."""
+    counts: dict[str, int] = {}
+    for block in mesh.cells:
+        if block.dimension == 2 and CORNERS.get(block.kind) != 3 and len(block.nodes):
+            counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
+    return ", ".join(f"{count:,} {kind} cell{'s' if count > 1 else ''}" for kind, count in counts.items())
 
 
 def in_words(nodes: int) -> str:

@@ -82,13 +82,14 @@ def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, n
         return protection
     kept = near_walls(mesh, protection.outer, survey)
     walled = Protection(topology, notes, layers, kept)
-    if not kept.any() or WALL not in walled.topology.held:
-        return protection
-    notes.append(
-        f"the mesh is refined towards its walls: the {len(walled.topology.held[WALL]):,} nodes next to them move only "
-        f"as far as the areas of their cells stay within {BAND:.0%} (preserve={preserve!r})"
-    )
-    return walled
+    return walled if kept.any() and WALL in walled.topology.held else protection
+
+
+def wall_note(nodes: int, moved: bool) -> str:
+    """What to say of so many nodes next to walls that the mesh is refined towards. moved: in a stage of their own."""
+    so = f"move only as far as the areas of their cells stay within {BAND:.0%}" if moved else "are held in this run"
+    mend = "" if moved else "; preserve='none' lets them move"
+    return f"the mesh is refined towards its walls: the {nodes:,} nodes next to them {so} (preserve={SHAPE!r}){mend}"
 
 
 def _amount(count: int) -> str:

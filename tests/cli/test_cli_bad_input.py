@@ -204,3 +204,10 @@ def test_a_picture_over_the_input(run, folder, command):
 def test_a_threshold_out_of_range(run, folder, value):
     before = contents(folder)
     check(run("quality", folder / "square.su2", "--threshold", value), folder, before, ["--threshold", "between"])
+
+
+def test_more_nodes_than_there_is_memory_for(run, tmp_path):
+    done = run("generate", tmp_path / "out.su2", "--nodes", 10**14)
+    assert done.code == 2
+    assert done.err.startswith("gmsnet: error: the memory does not suffice: ")
+    assert not list(tmp_path.iterdir())

@@ -115,3 +115,43 @@ def test_layers_are_told_and_held(run, tmp_path):
     np.testing.assert_array_equal(gmsnet.read(out).points[still, :2], mesh.points[still])
     assert "nothing is held" in run("smooth", path, out, "--preserve", "none").out
     assert "(fix_layers)" in run("smooth", path, out, "--preserve", "none", "--fix-layers").out
+
+
+def test_no_target_is_met_where_there_is_nothing_to_measure(run, quads, tmp_path):
+    for option in (["--target-quality", 0.3], ["--target-angle", 20]):
+        done = run("smooth", quads, tmp_path / "out.vtk", *option)
+        assert done.code == 2
+        assert "quads.vtk: a target is asked of triangles, and this mesh has none: 4 quad cells cannot be" in done.err
+        assert not (tmp_path / "out.vtk").exists()
+    done = run("quality", quads, "--threshold", 0.3)
+    assert done.code == 2
+    assert "a threshold is asked of triangles, and this mesh has none: 4 quad cells cannot be measured" in done.err
+
+
+def test_cells_that_a_target_is_not_asked_of_are_told(run, tmp_path):
+    path = tmp_path / "mixed.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0.5 0\nf 1 2 3 4\nf 2 5 3\n")
+    done = run("smooth", path, tmp_path / "out.obj", "--target-quality", 0.3)
+    assert done.code == 0
+    assert "the target is asked of triangles alone, not of 1 quad cell" in done.out
+    assert "not of" not in run("smooth", path, tmp_path / "out.obj").out
+    assert "not measured: 1 quad cell" in run("quality", path).out
+
+
+def test_held_cells_that_miss_an_angle_are_said_to_be_held(run, tmp_path):
+    path = tmp_path / "one.off"
+    path.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0.9 0.45 0\n3 0 1 2\n")
+    done = run("smooth", path, tmp_path / "out.off", "--target-angle", 30)
+    assert done.code == 1
+    assert "1 cell misses it" in done.err
+    assert "cell 0: all its nodes are held, so it stays as it is" in done.err
+    assert "no bound known" not in done.err
+
+
+def test_figures_of_patches_are_not_taken_for_those_of_the_mesh(run, square, tmp_path):
+    assert (
+        "stage, in the patches that are smoothed" in run("smooth", square, tmp_path / "o.su2", "--target-angle", 9).out
+    )
+    done = run("smooth", square, tmp_path / "o.su2")
+    assert "stage" in done.out
+    assert "in the patches" not in done.out

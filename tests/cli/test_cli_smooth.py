@@ -233,7 +233,7 @@ def test_the_target_is_judged_by_the_cells_and_not_by_the_reason_to_stop(square)
     ):
         outcome = Outcome("in", "out", "gmsnet", mesh, replace(result, stop_reason=reason), Target(target), [], None)
         assert outcome.target_met is met
-    assert "1 cell miss it" in Outcome("", "", "", mesh, result, Target(np.nextafter(least, 1)), [], None).shortfall()
+    assert "1 cell misses it" in Outcome("", "", "", mesh, result, Target(np.nextafter(least, 1)), [], None).shortfall()
 
 
 def test_a_bug_is_one_line_and_a_traceback_on_demand(run, square, tmp_path, monkeypatch):

@@ -97,6 +97,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         return _interrupted(str(interruption))
     except (KeyboardInterrupt, typer.Abort):
         return _interrupted("interrupted; nothing was written")
+    except MemoryError as error:
+        return _fail(f"the memory does not suffice: {str(error) or 'what is asked for is too large'}")
     except Exception as error:
         if os.environ.get("GMSNET_DEBUG"):
             raise

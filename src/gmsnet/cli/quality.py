@@ -30,6 +30,7 @@ def quality(
     from gmsnet import io
     from gmsnet.cli import output, report
     from gmsnet.engine import quality as measure
+    from gmsnet.mesh import unmeasured
 
     mesh = io.read(input, format)
     volumes = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
@@ -39,7 +40,12 @@ def quality(
         )
     if plot is not None:
         check_drawable(mesh, input)
-    found = measure(mesh)
+    found, others = measure(mesh), unmeasured(mesh)
+    if threshold is not None and others and not len(found.cell):
+        raise InputError(
+            f"{shown(input)}: a threshold is asked of triangles, and this mesh has none: "
+            f"{others} cannot be measured so far"
+        )
     worst = report.worst_cells(mesh, found)
     if plot is not None:
         from gmsnet.plot import plot_quality
@@ -61,6 +67,8 @@ def quality(
             console.print(report.worst_table(worst))
         else:
             console.print("there are no triangles to measure")
+        if others and len(found.cell):
+            console.print(f"not measured: {others}")
         if mesh.plane is None:
             console.print("the mesh is a surface in space: its cells have no sign, none counts as inverted")
         if plot is not None:

@@ -96,13 +96,14 @@ def worst_table(cells: Sequence[Mapping[str, Any]]) -> Table:
     return table([*columns, *(["held corners"] if with_held else [])], rows)
 
 
-def stage_table(stages: Sequence[tuple[str, int, Sweep]]) -> Table:
-    """What was done one after the other: its name, how many sweeps, and the mesh after it."""
+def stage_table(stages: Sequence[tuple[str, int, Sweep]], patches: bool) -> Table:
+    """What was done one after the other: its name, how many sweeps, and the mesh after it, or the patches of it."""
     rows = [
         [name, f"{sweeps}", f"{sweep.min_shape:.4f}", f"{sweep.mean_shape:.4f}", f"{sweep.qhat:.4f}"]
         for name, sweeps, sweep in stages
     ]
-    return table(["stage", "sweeps", "1/q, least", "1/q, mean", "q-hat"], rows)
+    where = ", in the patches that are smoothed" if patches else ""
+    return table([f"stage{where}", "sweeps", "1/q, least", "1/q, mean", "q-hat"], rows)
 
 
 def corners_of(mesh: Mesh, cell: int) -> NDArray[np.int64]:

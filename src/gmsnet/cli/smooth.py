@@ -127,7 +127,7 @@ def smooth(
     from gmsnet.cli.fix import fixed_nodes
     from gmsnet.cli.progress import Progress
     from gmsnet.cli.smooth_report import Outcome
-    from gmsnet.engine import check_options, refuse_unless_planar
+    from gmsnet.engine import check_mesh, check_options
     from gmsnet.engine import smooth as run
     from gmsnet.target import Target
 
@@ -151,7 +151,7 @@ def smooth(
             progress.stage(f"reading {shown(input)}")
             mesh = io.read(input, format)
             try:
-                refuse_unless_planar(mesh)
+                check_mesh(mesh, Target(target_quality, target_angle))
             except InputError as error:
                 raise InputError(f"{shown(input)}: {error}") from error
             if plot is not None:

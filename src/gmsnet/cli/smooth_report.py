@@ -79,8 +79,9 @@ class Outcome:
             figures.append(f"the least angle is {angle:.4g}°, {wanted.angle - angle:.4g}° below {wanted.angle:g}°")
         cells = self.missed[: report.NAMED]
         why = self.result.limits.reasons(cells, self.target.shape)
+        miss = "misses it" if len(self.missed) == 1 else "miss it"
         reasons = "".join(f"\n  cell {after.cell[row]}: {why[row]}" for row in cells.tolist())
-        return f"{'; '.join(figures)}; {report.named_cells(after, self.missed, 'miss it')}{reasons}"
+        return f"{'; '.join(figures)}; {report.named_cells(after, self.missed, miss)}{reasons}"
 
     def stages(self) -> list[tuple[str, int, Sweep]]:
         """What the method did one after the other, with how many sweeps, and the mesh then; empty if all was one."""
@@ -134,7 +135,7 @@ class Outcome:
             console.print(report.worst_table(self.worst))
             console.print()
         if stages := self.stages():
-            console.print(report.stage_table(stages))
+            console.print(report.stage_table(stages, bool(self.target)))
             console.print()
         console.print(self.verdict())
         for note in self.result.notes:

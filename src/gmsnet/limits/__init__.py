@@ -50,7 +50,8 @@ class Limits:
 
     bound: (G,) of 1/q. kind: (G,) one of the kinds in groups.py. node: (G,) id of the node where it is, −1 for
     held cells. angle: (G,) of a corner, in degrees. first, rows: group g has the rows rows[first[g] : first[g + 1]] of
-    ``Topology.triangles``. cell: (T,) the index of each row among all cells of the mesh. points: (N, dim).
+    ``Topology.triangles``. cell: (T,) the index of each row among all cells of the mesh. held: (T,) bool, whose nodes
+    are all held. points: (N, dim).
     """
 
     bound: Floats
@@ -60,6 +61,7 @@ class Limits:
     first: Ints
     rows: Ints
     cell: Ints
+    held: NDArray[np.bool_]
     points: Floats
 
     @property
@@ -92,14 +94,19 @@ class Limits:
     def reasons(self, rows: Ints, target: float) -> dict[int, str]:
         """For each of these rows of triangles, why it may miss a target of 1/q: the tightest of its groups below it.
 
-        "no bound known" where there is none: it may be that the target can be reached, or that nothing says why not.
+        Of a cell whose nodes are all held, that is said whatever its 1/q: the target may be one of angles. "no bound
+        known" where there is none: it may be that the target can be reached, or that nothing says why not.
         """
         told = dict.fromkeys(map(int, rows), "")
         for group in np.flatnonzero(self.bound <= target * (1.0 + 1e-9)).tolist():
             for row in self.cells(group).tolist():
                 if told.get(row) == "":
                     told[row] = self.describe(group)
-        return {row: reason or "no bound known" for row, reason in told.items()}
+        return {row: reason or self._otherwise(row) for row, reason in told.items()}
+
+    def _otherwise(self, row: int) -> str:
+        held = f"cell {self.cell[row]}: all its nodes are held, so it stays as it is"
+        return held if self.held[row] else "no bound known"
 
 
 def limits(mesh: Mesh, topology: Topology, below: float = 0.9) -> Limits:
@@ -118,5 +125,6 @@ def limits(mesh: Mesh, topology: Topology, below: float = 0.9) -> Limits:
         first=found.first,
         rows=found.rows,
         cell=topology.cell,
+        held=np.all(~free[topology.triangles], axis=1),
         points=mesh.points,
     )
