@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from vtk_variants import mixed_mesh
 
+import gmsnet
 from gmsnet.errors import FormatError
 from gmsnet.io import gmsh
 from gmsnet.mesh import CellBlock, Mesh
@@ -223,6 +224,7 @@ def test_conversion_keeps_cells_regions_and_names() -> None:
         for kind in ("triangle", "line", "quad", "vertex"):
             was = sorted(zip(regions_of(mesh, kind), cells_of(mesh, kind), strict=True))
             assert sorted(zip(regions_of(back, kind), cells_of(back, kind), strict=True)) == was
+        lost = [text for text in lost if "another order" not in text]
         assert len(lost) == 2 * bool(mesh.point_data)
         assert not lost or ("'weights'" in lost[1] and "material" not in lost[1])  # materials are the physical groups
 
@@ -265,3 +267,16 @@ def test_real_files(
         assert dict(zip(*map(np.ndarray.tolist, found), strict=True)) == expected
     assert parsed.region_names == names
     check_splice(gmsh, data)
+
+
+@pytest.mark.parametrize(("regions", "told"), [([1, 2, 1], True), ([1, 1, 2], False), ([7, 7, 7], False)])
+@pytest.mark.parametrize("suffix", [".msh", ".stl"])
+def test_cells_that_get_another_order_are_told(tmp_path, suffix, regions, told):
+    points = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [2.0, 0.0]]
+    nodes = np.array([[0, 1, 2], [1, 3, 2], [1, 4, 3]])
+    mesh = gmsnet.Mesh(points, [gmsnet.CellBlock("triangle", nodes, regions)])
+    lost = gmsnet.write(mesh, tmp_path / f"a{suffix}")
+    back = gmsnet.read(tmp_path / f"a{suffix}")
+    assert any("they were put in another order" in text for text in lost) is told
+    centres = [m.points[np.concatenate([b.nodes for b in m.cells]), :2].mean(axis=1) for m in (mesh, back)]
+    assert np.array_equal(*centres) is not told

@@ -70,6 +70,14 @@ def _says_regions(mesh: Mesh, name: str) -> bool:
     return all(np.array_equal(a, b.regions) for a, b in zip(mesh.cell_data[name], mesh.cells, strict=True))
 
 
+def lost_order(mesh: Mesh, title: str) -> list[str]:
+    """That faces get other numbers in a format that keeps them by their regions, where that is so."""
+    regions = [block.regions for block in mesh.cells if block.dimension == 2]
+    if not regions or (np.diff(np.concatenate(regions)) >= 0).all():
+        return []
+    return [f"{title} keeps cells region by region: they were put in another order"]
+
+
 def lost_names(mesh: Mesh, title: str, dimensions: Collection[int] = (0, 1, 2, 3)) -> list[str]:
     """The names of regions and markers that a format keeps as mere numbers."""
     names = [f"{name!r} ({number})" for (dim, number), name in mesh.region_names.items() if dim in dimensions]

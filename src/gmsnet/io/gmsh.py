@@ -189,6 +189,7 @@ def write(mesh: Mesh) -> Written:
     physical, renumbered = _physical_tags(groups)
     if renumbered:
         lost.append(f"{name} cannot hold these region numbers, they got others: {', '.join(map(str, renumbered))}")
+    lost += convert.lost_order(mesh, name)
     return Written({".msh": Pieces(lambda: _text(mesh, points, groups, physical))}, lost)
 
 

@@ -206,6 +206,7 @@ def write(mesh: Mesh) -> Written:
         lost.append(f"{name} cannot tell apart nodes at the same place: they were joined")
     if known not in ([0], list(range(1, len(known) + 1))):
         lost.append(f"{name} counts its solids from 1: region numbers remain only in the names of the solids")
+    lost += convert.lost_order(mesh, name)
     return Written({".stl": Pieces(lambda: _solids(mesh, points, nodes, regions, known))}, lost)
 
 
