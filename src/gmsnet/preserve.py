@@ -87,7 +87,11 @@ def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, n
 
 def wall_note(nodes: int, moved: bool) -> str:
     """What to say of so many nodes next to walls that the mesh is refined towards. moved: in a stage of their own."""
-    so = f"move only as far as the areas of their cells stay within {BAND:.0%}" if moved else "are held in this run"
+    so = (
+        f"move only as far as the areas of their cells stay within {BAND:.0%} of the input's"
+        if moved
+        else "are held in this run"
+    )
     mend = "" if moved else "; preserve='none' lets them move"
     return f"the mesh is refined towards its walls: the {nodes:,} nodes next to them {so} (preserve={SHAPE!r}){mend}"
 
