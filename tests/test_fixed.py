@@ -105,7 +105,10 @@ def test_everything_else_is_refused(form, message):
 
 @given(st.lists(st.integers(-2, 7)))
 def test_ids_are_held_or_refused(ids):
-    if all(0 <= i < 5 for i in ids):
+    if len(ids) == 5 and set(ids) <= {0, 1}:
+        with pytest.raises(InputError, match="give a mask as bools"):
+            fixed_mask(mesh_with(), ids)
+    elif all(0 <= i < 5 for i in ids):
         assert ids_of(mesh_with(), ids) == sorted(set(ids))
     else:
         with pytest.raises(InputError, match="fixed names the node"):
