@@ -185,8 +185,9 @@ def test_reasons():
     assert found.reasons([0], 0.3) == {0: "no bound known"}
     wide = bounds(mesh_of([[0, 0], [1, 0], [0, 0.05]], [[0, 1, 2]]))
     (text,) = wide.reasons(np.array([0]), 0.5).values()
-    assert text == f"cell 0: all its nodes are held, so its 1/q stays {wide.bound[0]:.3g}"
-    assert wide.reasons([0], 0.01) == {0: "cell 0: all its nodes are held, so it stays as it is"}
+    assert text == f"all its nodes are held, so its 1/q stays {wide.bound[0]:.3g}"
+    assert wide.describe(0) == f"cell 0: {text}"
+    assert wide.reasons([0], 0.01) == {0: "all its nodes are held, so it stays as it is"}
     many = bounds(gmsnet.random_mesh(500, seed=0))
     told = many.reasons(np.arange(len(many.cell)), 0.8)
     assert sum("poor connectivity, the node has only 3 neighbours" in text for text in told.values()) >= 3

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import stat
 import subprocess
-import sys
 import threading
 from pathlib import Path
 
 import pytest
+from folder import SMOOTH, names
 
 import gmsnet
 from gmsnet.cli import main
@@ -18,16 +18,9 @@ from gmsnet.io import read, write
 from gmsnet.mesh import Mesh
 
 
-def names(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir())
-
-
 @pytest.fixture(scope="module")
 def mesh() -> Mesh:
     return gmsnet.random_mesh(300, seed=0)
-
-
-SMOOTH = [sys.executable, "-m", "gmsnet", "smooth"]
 
 
 NAMES = [

@@ -11,6 +11,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from folder import SMOOTH, names
 
 import gmsnet
 from gmsnet.errors import InputError
@@ -20,16 +21,9 @@ from gmsnet.mesh import Mesh
 IS_ROOT = os.geteuid() == 0
 
 
-def names(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir())
-
-
 @pytest.fixture(scope="module")
 def mesh() -> Mesh:
     return gmsnet.random_mesh(300, seed=0)
-
-
-SMOOTH = [sys.executable, "-m", "gmsnet", "smooth"]
 
 
 def few_bytes() -> None:

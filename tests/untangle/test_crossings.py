@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gmsnet.untangle import crossings
 from gmsnet.untangle.crossings import meeting, near_crossings
 
 
@@ -38,3 +39,13 @@ def test_edges_that_share_a_node_do_not_cross():
     assert crossed.tolist() == [[1.0, 0.0]]
     apart = near_crossings(points, np.array([[0, 1], [0, 3], [0, 4]], dtype=np.int32), cells)
     assert np.isnan(apart).all()
+
+
+def test_where_too_many_boxes_meet_none_is_looked_for(monkeypatch):
+    points = np.array([[0.0, 0.0], [2.0, 0.0], [1.0, -1.0], [1.0, 1.0], [0.0, 2.0]])
+    cells, edges = np.array([[0, 1, 3]], dtype=np.int32), np.array([[0, 1], [2, 3]], dtype=np.int32)
+    monkeypatch.setattr(crossings, "MOST", 3)  # two edges, each of which meets both
+    assert meeting(*[np.zeros((2, 2))] * 4) is None
+    assert np.isnan(near_crossings(points, edges, cells)).all()
+    monkeypatch.setattr(crossings, "MOST", 4)
+    assert near_crossings(points, edges, cells).tolist() == [[1.0, 0.0]]

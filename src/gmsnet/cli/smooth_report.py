@@ -80,10 +80,7 @@ class Outcome:
         cells = self.missed[: report.NAMED]
         why = self.result.limits.reasons(cells, self.target.shape)
         miss = "misses it" if len(self.missed) == 1 else "miss it"
-        reasons = "".join(
-            f"\n  {why[row] if why[row].startswith(cell) else cell + why[row]}"
-            for row, cell in ((row, f"cell {after.cell[row]}: ") for row in cells.tolist())
-        )
+        reasons = "".join(f"\n  cell {after.cell[row]}: {why[row]}" for row in cells.tolist())
         return f"{'; '.join(figures)}; {report.named_cells(after, self.missed, miss)}{reasons}"
 
     def stages(self) -> list[tuple[str, int, Sweep]]:

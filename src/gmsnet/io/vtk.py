@@ -22,8 +22,8 @@ from gmsnet.io.document import Parsed, Written
 from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Addresses, Lattice, Places, lists, pick
-from gmsnet.io.vtk_stream import TYPES, Array, Line, Stream, field_name, word_of
-from gmsnet.io.words import typed
+from gmsnet.io.vtk_fields import attribute, field_arrays, keyword
+from gmsnet.io.vtk_stream import TYPES, Array, Line, Stream, word_of
 from gmsnet.kernels import text as kernels
 from gmsnet.mesh import Mesh
 
@@ -31,15 +31,6 @@ name = "VTK"
 suffixes = (".vtk",)
 
 LISTS = {"VERTICES": vtk_cells.POLYVERTEX, "LINES": vtk_cells.POLYLINE, "POLYGONS": vtk_cells.POLYGON}
-ATTRIBUTES = {  # keyword: how its line goes on, components
-    "VECTORS": ("VECTORS name type", 3),
-    "NORMALS": ("NORMALS name type", 3),
-    "TENSORS": ("TENSORS name type", 9),
-    "TENSORS6": ("TENSORS6 name type", 6),
-    "GLOBAL_IDS": ("GLOBAL_IDS name type", 1),
-    "PEDIGREE_IDS": ("PEDIGREE_IDS name type", 1),
-    "EDGE_FLAGS": ("EDGE_FLAGS name type", 1),
-}
 TYPE_NAMES = {kind: called for called, kind in TYPES.items() if called not in ("vtkidtype", "signed_char")} | {
     "i8": "long",
     "u8": "unsigned_long",
@@ -120,10 +111,10 @@ def _section(stream: Stream, line: Line, found: Contents) -> None:
     elif not found.fields:
         if key != "FIELD":
             stream.fail(line.start, f"unknown keyword {word_of(line.words[0])}")
-        _field(stream, line, None, found.others)  # facts about the whole grid
+        field_arrays(stream, line, None, found.others)  # facts about the whole grid
     else:
         place = list(found.fields)[-1]
-        found.fields[place] += _attribute(stream, line, found.counts[place][0], found.others)
+        found.fields[place] += attribute(stream, line, found.counts[place][0], found.others)
 
 
 def _lists(stream: Stream, line: Line) -> CellLists:
@@ -134,7 +125,7 @@ def _lists(stream: Stream, line: Line) -> CellLists:
     offsets, nodes = (
         stream.array(part, length, stream.expect(part, f"{key} type")[0])
         for key, length in (("OFFSETS", count), ("CONNECTIVITY", size))
-        for part in [_keyword(stream, key)]
+        for part in [keyword(stream, key)]
     )
     first = offsets.values()
     if not count:
@@ -143,13 +134,6 @@ def _lists(stream: Stream, line: Line) -> CellLists:
     if first[0] or first[-1] != size or wrong.size:
         offsets.fail(int(wrong[0]) if wrong.size else 0, f"OFFSETS must rise from 0 to the {size} of CONNECTIVITY")
     return CellLists(np.diff(first), nodes.values(), Places(Lattice(0, size, 1)), nodes)
-
-
-def _keyword(stream: Stream, key: str) -> Line:
-    line = stream.line()
-    if line.key != key:
-        stream.fail(line.start, f"expected {key}")
-    return line
 
 
 def counted_lists(array: Array, count: int, key: str) -> CellLists:
@@ -169,74 +153,6 @@ def counted_lists(array: Array, count: int, key: str) -> CellLists:
     sizes = numbers[first]
     at = lists(first, sizes + 1, np.ones_like(sizes), sizes)
     return CellLists(sizes, pick(numbers, at), at, array)
-
-
-def _attribute(stream: Stream, line: Line, count: int, others: list[str]) -> list[tuple[str, NDArray[Any]]]:
-    key = line.key
-    if key == "FIELD":
-        return _field(stream, line, count, others)
-    if key == "LOOKUP_TABLE":  # colours, which are not kept
-        called, text = stream.expect(line, "LOOKUP_TABLE name size")
-        size = stream.count(line, text)
-        others.append(f"the colours {field_name(called)!r}")
-        stream.array(line, 4 * size, "unsigned_char" if stream.binary else "float").values()
-        return []
-    kind = "unsigned_char" if stream.binary else "float"
-    if key == "SCALARS":
-        called, kind, *more = stream.expect(line, "SCALARS name type components", 1)
-        width = stream.count(line, more[0]) if more else 1
-        table = _keyword(stream, "LOOKUP_TABLE")
-        stream.expect(table, "LOOKUP_TABLE name")
-    elif key == "COLOR_SCALARS":
-        called, text = stream.expect(line, "COLOR_SCALARS name components")
-        width = stream.count(line, text)
-    elif key == "TEXTURE_COORDINATES":
-        called, text, kind = stream.expect(line, "TEXTURE_COORDINATES name components type")
-        width = stream.count(line, text)
-    elif key in ATTRIBUTES:
-        usage, width = ATTRIBUTES[key]
-        called, kind = stream.expect(line, usage)
-    else:
-        stream.fail(line.start, f"unknown keyword {word_of(line.words[0])}")
-    return [(field_name(called), _values(stream, line, count, width, kind))]
-
-
-def _field(stream: Stream, line: Line, rows: int | None, others: list[str]) -> list[tuple[str, NDArray[Any]]]:
-    """The arrays of a FIELD, which must have ``rows`` rows (None: any number, and they are not kept).
-
-    others: takes the words for those that are not kept.
-    """
-    found = []
-    for _ in range(stream.count(line, stream.expect(line, "FIELD name arrays")[1])):
-        head = stream.line()
-        if head.key == "NULL_ARRAY":
-            continue
-        called, components, tuples, kind = [head.words[0] if head.words else "", *stream.expect(head, _ARRAY)]
-        width, length = stream.count(head, components), stream.count(head, tuples)
-        if rows is not None and length != rows:
-            stream.fail(head.start, f"the array {word_of(called)} has {length} rows instead of {rows}")
-        if kind.lower() in ("string", "utf8_string"):
-            stream.skip_strings(width * length)
-            others.append(f"the texts {field_name(called)!r}")
-        elif rows is None:
-            _values(stream, head, length, width, kind)
-            others.append(f"the field {field_name(called)!r} of the whole grid")
-        else:
-            found.append((field_name(called), _values(stream, head, length, width, kind)))
-    return found
-
-
-_ARRAY = "name components rows type"
-
-
-def _values(stream: Stream, line: Line, rows: int, width: int, kind: str) -> NDArray[Any]:
-    """An attribute: (rows,) or (rows, width), of the type that the file declares."""
-    if kind.lower() == "bit":
-        values: NDArray[Any] = stream.bits(rows * width)
-    else:
-        array = stream.array(line, rows * width, kind)
-        values = typed(array.values(), array.kind)
-    return values if width == 1 else values.reshape(rows, width)
 
 
 def _assemble(stream: Stream, found: Contents, polygonal: bool) -> Parsed:

@@ -79,7 +79,7 @@ class Limits:
         named = ", ".join(map(str, cells[:SHOWN])) + (f" and {len(cells) - SHOWN} more" if len(cells) > SHOWN else "")
         kind, bound = self.kind[group], f"{self.bound[group]:.3g}"
         if kind == groups.HELD:
-            return f"cell {named}: all its nodes are held, so its 1/q stays {bound}"
+            return f"cell {named}: {self._held(group)}"
         node = int(self.node[group])
         place = ", ".join(f"{x:.6g}" for x in self.points[node].tolist())
         at = f"cells {named} at node {node} ({place})"
@@ -101,12 +101,14 @@ class Limits:
         for group in np.flatnonzero(self.bound <= target * (1.0 + 1e-9)).tolist():
             for row in self.cells(group).tolist():
                 if told.get(row) == "":
-                    told[row] = self.describe(group)
+                    told[row] = self._held(group) if self.kind[group] == groups.HELD else self.describe(group)
         return {row: reason or self._otherwise(row) for row, reason in told.items()}
 
+    def _held(self, group: int) -> str:
+        return f"all its nodes are held, so its 1/q stays {self.bound[group]:.3g}"
+
     def _otherwise(self, row: int) -> str:
-        held = f"cell {self.cell[row]}: all its nodes are held, so it stays as it is"
-        return held if self.held[row] else "no bound known"
+        return "all its nodes are held, so it stays as it is" if self.held[row] else "no bound known"
 
 
 def limits(mesh: Mesh, topology: Topology, below: float = 0.9) -> Limits:

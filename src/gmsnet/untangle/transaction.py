@@ -37,7 +37,8 @@ def take(tangle: Tangle) -> str:
             break
         first = first or count
         back = free_nodes_of(topology, violated) & moved(tangle)
-        assert back.any(), "cells are violated of which no node has moved"
+        if not back.any():  # else this would never end
+            raise RuntimeError("cells are violated of which no node has moved")
         put_back(tangle, back)
     tangle.look()
     keep_gains(tangle, tangle.before, tangle.was_bad)
