@@ -71,7 +71,7 @@ class Timed:
         run = Run(self.mesh, self.topology, self.create(), 1, "shape", self.guard)
         moments = []
         began = time.thread_time()
-        run.to_the_end(self.sweeps, None, lambda sweep: moments.append(time.thread_time()))
+        run.to_the_end(self.sweeps, lambda sweep: moments.append(time.thread_time()))
         self.seconds.append(time.thread_time() - began)
         self.history, self.moments = run.history, [*self.moments, [moment - began for moment in moments]]
         self.best = run.best

@@ -39,7 +39,7 @@ from gmsnet.kernels.guard import LARGEST, STAR, Precision, StarGuard
 from gmsnet.measure import measure
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Field, smoother
-from gmsnet.topology import Topology, planar_points, scale_exponent
+from gmsnet.topology import Topology, planar_points
 from gmsnet.workers import Share, workers
 
 RECIPE = " ".join(__doc__[__doc__.index("*Reference*") :].split())
@@ -75,7 +75,7 @@ class Plane:
         points = self.mesh.points.copy()
         free = self.problem.free
         ids = self.topology.memory[free]
-        points[np.ix_(ids, self.topology.plane)] = np.ldexp(planar[free], scale_exponent(self.mesh))
+        points[np.ix_(ids, self.topology.plane)] = np.ldexp(planar[free], self.mesh.exponent)
         return points
 
     def read(self, points: np.ndarray) -> np.ndarray:

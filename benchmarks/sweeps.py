@@ -1,9 +1,11 @@
 """Nanoseconds per node and sweep, and for the set-up, beside a SciPy sparse-matrix Laplacian sweep in the same run.
 
-    python benchmarks/sweeps.py [--nodes 1e4 1e5 1e6] [--threads 1 2] [--repeats 9] [--json FILE]
+    python benchmarks/sweeps.py [--nodes 1e4 1e5 1e6] [--threads 1 2] [--methods laplacian …] [--guards worst valid]
+        [--repeats 9] [--json FILE]
 
 L is the unit: one product of the averaging matrix with the coordinates, on one thread, nodes in the same memory order.
-All are timed in turns, and medians are printed, because machines are noisy. The mesh is a random square (Delaunay of
+All are timed in turns, and medians are printed, because machines are noisy. What finds the floor of the guard ``worst``
+is part of a sweep. The mesh is a random square (Delaunay of
 uniform points) whose nodes stand in the file in random order.
 """
 
@@ -13,6 +15,7 @@ import argparse
 import json
 import time
 from contextlib import ExitStack
+from itertools import product
 from statistics import median
 
 import numpy as np
@@ -20,7 +23,7 @@ import scipy.sparse
 from machine import describe
 
 import gmsnet
-from gmsnet.kernels.guard import Precision
+from gmsnet.kernels.guard import LEVELS, Precision
 from gmsnet.measure import totals_of
 from gmsnet.methods import METHODS, Field, smoother
 from gmsnet.topology import Topology, planar_points
@@ -45,7 +48,7 @@ def timed(work):
     return time.perf_counter() - began
 
 
-def measure(nodes, threads, repeats):
+def measure(nodes, threads, repeats, methods, guards):
     mesh = gmsnet.random_mesh(nodes, seed=0)
     topology = Topology.of(mesh)
     stars = topology.stars
@@ -58,19 +61,19 @@ def measure(nodes, threads, repeats):
     }
     stack = ExitStack()
     for name, method in METHODS.items():
-        if name == "auto":  # a plan of sweeps of others, which ends
+        if name == "auto" or (methods and name not in methods):  # a plan of sweeps of others, which ends
             continue
         for variant in method.variants or [None]:
-            for count in threads:
+            for count, guard in product(threads, guards):
                 share = stack.enter_context(workers(count, len(stars.blocks.filled)))
                 chosen = smoother(name, variant=variant)
-                field = Field(points.copy(), topology, Precision())
+                field = Field(points.copy(), topology, Precision(), LEVELS.index(guard))
 
                 def sweep(chosen=chosen, share=share, field=field):
                     chosen.sweep(field, share, lambda: True)
 
                 label = f"{name} {variant}" if variant else name
-                jobs[f"{label}, {count} thread{'s' * (count > 1)}"] = sweep
+                jobs[f"{label}, {guard}, {count} thread{'s' * (count > 1)}"] = sweep
     seconds = {name: [] for name in jobs}
     for _ in range(repeats + 1):
         for name, job in jobs.items():
@@ -83,6 +86,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--nodes", nargs="+", type=float, default=[1e4, 1e5, 1e6])
     parser.add_argument("--threads", nargs="+", type=int, default=[1, 2])
+    parser.add_argument("--methods", nargs="+", choices=sorted(METHODS))
+    parser.add_argument("--guards", nargs="+", choices=LEVELS, default=["worst", "valid"])
     parser.add_argument("--repeats", type=int, default=9)
     parser.add_argument("--json")
     options = parser.parse_args()
@@ -90,10 +95,10 @@ def main():
     print(f"medians of {options.repeats} runs in turns; ns per node (per sweep), and in units of L")
     results = {}
     for nodes in map(int, options.nodes):
-        results[nodes] = figures = measure(nodes, options.threads, options.repeats)
+        results[nodes] = figures = measure(nodes, options.threads, options.repeats, options.methods, options.guards)
         print(f"\n{nodes:,} nodes")
         for name, value in figures.items():
-            print(f"  {name:32} {value:8.1f} ns   {value / figures['L']:6.2f} L")
+            print(f"  {name:44} {value:8.1f} ns   {value / figures['L']:6.2f} L")
     if options.json:
         with open(options.json, "w", encoding="utf-8") as file:
             json.dump({"machine": describe(), "ns_per_node": results}, file, indent=1)

@@ -78,7 +78,7 @@ class Subject:
 
     def smoothed(self, objective, sizes, sweeps):
         run = Run(self.mesh, self.topology, Adam(objective, sizes), 1, "aspect", "valid")
-        run.to_the_end(sweeps, None, None)
+        run.to_the_end(sweeps)
         return outcome(self.mesh, self.topology, run.best, self.before, rank_by("aspect"))[2]
 
 

@@ -25,7 +25,7 @@ import gmsnet
 from gmsnet.generate import disturb
 from gmsnet.kernels.guard import Precision
 from gmsnet.measure import exact_signs
-from gmsnet.topology import Topology, planar_points, scale_exponent
+from gmsnet.topology import Topology, planar_points
 from gmsnet.untangle import untangle
 from gmsnet.untangle.lbfgs import whole
 from gmsnet.untangle.patch import Patch, in_order
@@ -80,7 +80,7 @@ def timed(work):
 def one(name, mesh, severity, seed, repeats):
     topology = Topology.of(mesh)
     thrown = tangled(mesh, topology, severity, seed)
-    precision = Precision.of(single=mesh.single, exponent=scale_exponent(thrown))
+    precision = Precision.of(single=mesh.single, exponent=thrown.exponent)
     points = planar_points(thrown)[topology.memory]
     ours, theirs = [], []
     for _ in range(repeats):

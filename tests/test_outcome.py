@@ -9,7 +9,7 @@ import gmsnet
 from gmsnet.measure import measure
 from gmsnet.mesh import Mesh
 from gmsnet.run import outcome, rank_by
-from gmsnet.topology import Topology, near_points, scale_exponent
+from gmsnet.topology import Topology, near_points
 
 BEST = rank_by("shape")
 
@@ -35,7 +35,7 @@ def test_nodes_that_do_not_move_keep_their_bits(size, axis):
     assert sorted(np.flatnonzero(moved)) == sorted(ids)
     assert points[~moved].tobytes() == mesh.points[~moved].tobytes()
     plane = list(mesh.plane)
-    wanted = np.ldexp(best[chosen], scale_exponent(mesh))
+    wanted = np.ldexp(best[chosen], mesh.exponent)
     assert points[np.ix_(ids, plane)].tobytes() == wanted.tobytes()
     if axis is not None:
         assert (points[:, axis] == 0.1).all()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import gmsnet
-from gmsnet.topology import Topology, planar_points, scale_exponent
+from gmsnet.topology import Topology, planar_points
 from gmsnet.wall_stage import improve_near_walls
 from gmsnet.walls import near_walls
 
@@ -30,7 +30,7 @@ def test_the_airfoil_of_the_real_meshes(real_meshes):
     assert cells.sum() > 1600
     assert np.abs(ratio[cells] - 1.0).max() <= 0.1
     points = mesh.points.copy()
-    points[np.ix_(topology.memory, mesh.plane)] = np.ldexp(best, scale_exponent(mesh))
+    points[np.ix_(topology.memory, mesh.plane)] = np.ldexp(best, mesh.exponent)
     near = kept[topology.triangles].all(axis=1)
     before, after = (gmsnet.quality(m).shape[near] for m in (mesh, mesh.with_points(points)))
     assert before.min() < 0.56

@@ -46,6 +46,6 @@ class Smooth:
         for _ in range(2):  # what is made when it is first asked for is made in the first
             run = Run(mesh, topology, smoother(self.method, **names), self.threads, "shape", guard)
             began = clock()
-            run.to_the_end(effort, None, None)
+            run.to_the_end(effort)
             seconds.append(clock() - began)
         return seconds[-1]

@@ -6,7 +6,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,7 @@ from gmsnet.run import Sweep as Sweep
 from gmsnet.standing import Standing
 from gmsnet.tangles import UnmendedCell, beside, mended, still_inverted
 from gmsnet.target import Target
-from gmsnet.topology import Topology, near_points
+from gmsnet.topology import Topology
 from gmsnet.wall_stage import improve_near_walls
 from gmsnet.workers import available_threads, side_by_side
 
@@ -137,17 +137,16 @@ def smooth(
     threads = threads or available_threads()
     apart = threads if len(given.points) >= MANY else 1
     asked = fixed_mask(given, fixed)
-    topology = Topology.of(given, asked, apart)
+    topology, start = Topology.and_points(given, asked, apart)
     given = given.without_cells()  # whatever was copied of them is given back
 
-    def looked_at() -> tuple[Floats, QualityReport, Protection]:
-        near = near_points(given, topology)
-        return near, measure(given, topology, near), protected(given, topology, preserve, fix_layers, near)
+    def looked_at(near: Floats) -> tuple[QualityReport, Protection]:
+        return measure(given, topology, near), protected(given, topology, preserve, fix_layers, near)
 
     if apart == 1 or target or not isinstance(chosen, Auto | StarSmoother):
-        start, before, protection = looked_at()
+        before, protection = looked_at(start)
     else:  # most often nothing is protected, and these are the stars that are smoothed
-        (start, before, protection), _ = side_by_side(apart, looked_at, lambda: topology.stars)
+        (before, protection), _ = side_by_side(apart, partial(looked_at, start), lambda: topology.stars)
     given_points = start
     reasons: dict[tuple[int, ...], str] = {}
     untangling: list[str] = []
@@ -221,7 +220,7 @@ def _smoothed(
     run: Run, max_sweeps: int, callback: Callable[[Sweep], bool | None] | None
 ) -> tuple[Floats, str, list[Sweep], Totals | None]:
     """The best points of a whole run, why it ended, its record, and the totals of the best; nothing else is kept."""
-    stop_reason = run.to_the_end(max_sweeps, None, callback)
+    stop_reason = run.to_the_end(max_sweeps, callback)
     return run.best, stop_reason, run.history, run.best_standing.totals
 
 

@@ -15,7 +15,7 @@ from gmsnet.kernels import predicates
 from gmsnet.kernels import quality as kernels
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.exact import exact
-from gmsnet.mesh import Mesh
+from gmsnet.mesh import Mesh, exponent_of
 from gmsnet.topology import Topology, near_points, planar_points
 from gmsnet.workers import Share, serial, workers
 
@@ -95,6 +95,11 @@ class Triangles:
     single: bool
     corners: NDArray[np.int32]
     turn: NDArray[np.int8]
+
+    @cached_property
+    def exponent(self) -> int:
+        """See ``exponent_of``."""
+        return exponent_of(self.points, self.plane, self.single)
 
     def columns(self, rows: NDArray[np.int32] | None = None) -> Floats:
         """Smallest and largest angle, shape and aspect of each: (4, T), or of some of them, the same bits."""

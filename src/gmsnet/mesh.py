@@ -170,6 +170,7 @@ class Mesh:
         made = self._twin()  # all else has been checked
         if self.cells:  # without any (``without_cells``), it is the plane of those that there were
             made.__dict__.pop("plane", None)
+        made.__dict__.pop("exponent", None)
         object.__setattr__(made, "points", _finite(array))
         return made
 
@@ -203,6 +204,11 @@ class Mesh:
                 return {2: (0, 1), 1: (0, 2), 0: (1, 2)}[flat]
         return None
 
+    @cached_property
+    def exponent(self) -> int:
+        """See ``exponent_of``."""
+        return exponent_of(self.points, self.plane, self.single)
+
     @property
     def markers(self) -> dict[str, NDArray[np.int64]]:
         """Name of each marker, region and node set → its node ids.
@@ -217,6 +223,24 @@ class Mesh:
                     continue
                 nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
         return {name: np.unique(np.concatenate(ids)) for name, ids in nodes.items()}
+
+
+def in_plane(points: NDArray[np.float64], plane: tuple[int, int] | None) -> NDArray[np.float64]:
+    """A view (N, 2) of points (N, dim) along two axes; the first two where they are in no plane."""
+    first, second = plane or (0, 1)
+    return points[:, first : second + 1 : second - first]
+
+
+def exponent_of(points: NDArray[np.float64], plane: tuple[int, int] | None, single: bool) -> int:
+    """The power of two that brings the largest coordinate in the plane near 1.
+
+    0 in single precision, where no product of coordinates can under- or overflow.
+    """
+    if single:
+        return 0
+    coordinates = in_plane(points, plane)
+    largest = max(-float(coordinates.min(initial=0.0)), float(coordinates.max(initial=0.0)))
+    return int(np.frexp(largest)[1])
 
 
 def unmeasured(mesh: Mesh) -> str:

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.below import missed
 from gmsnet.kernels.patch import around
-from gmsnet.measure import QualityReport
+from gmsnet.measure import QualityReport, totals_of
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.methods.auto import for_target
 from gmsnet.run import INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED, Run, Sweep, precision_of
+from gmsnet.standing import Standing
 from gmsnet.target import Target
 from gmsnet.topology import Topology
 
@@ -42,15 +43,16 @@ def reach_target(
     """
     history: list[Sweep] = []
     rows = rows_missing(points, topology, target)
-    corners = topology.near[rows]
-    if report is not None and not target.clearly_missed(points, corners, topology.near_turn[rows]):
+    corners = topology.near.take(rows, axis=0)
+    if report is not None and not target.clearly_missed(points, corners, topology.near_turn.take(rows)):
         corners = topology.places[topology.triangles[target.missed_in(report)]]
     if not len(corners):
         return points, TARGET_REACHED, history
-    changeable = topology.near_free[corners].any(axis=1)
+    changeable = topology.near_free.take(corners).any(axis=1)
     hopeless = not changeable.all()  # cells that miss it and cannot change
     corners = corners[changeable]
     idle, at_first, precision = 0, len(corners), precision_of(mesh)
+    positive = report is not None and report.signs is None
     try:
         for rings in RINGS if create else NARROW:
             if not len(corners):
@@ -61,15 +63,16 @@ def reach_target(
             patch = topology.restricted(active)
             share = len(corners) / len(patch.near)
             smoother = create() if create else for_target(target, share, rings=rings)
+            missing = partial(rows_missing, topology=patch, target=target)
+            rows = missing(points)
+            before = Standing(partial(totals_of, points, patch.near, patch.near_turn), best_by, rows, positive)
             run = Run(
-                mesh, patch, smoother, threads, best_by, guard, points, history, precision,
-                count_missed=partial(how_many, topology=patch, target=target),
+                mesh, patch, smoother, threads, best_by, guard, points, history, precision, before, missing
             )  # fmt: skip
-            before = run.best_standing
-            reason = run.to_the_end(max_sweeps, target.sure if target.angle is None else None, callback)
+            reason = run.to_the_end(max_sweeps, callback)
             after = run.best_standing
-            if after.rank < before.rank:
-                points = run.best
+            if after.nearer(before):
+                points, rows = run.best, after.missing
             if not after.missed:
                 return points, NO_PROGRESS if hopeless else TARGET_REACHED, history
             if reason not in (NO_PROGRESS, TARGET_REACHED):  # stopped from outside, or at the most sweeps
@@ -79,7 +82,7 @@ def reach_target(
             idle = idle + 1 if after.missed > FEWER * before.missed else 0
             if idle == IDLE:
                 break
-            corners = patch.near[rows_missing(points, patch, target)]
+            corners = patch.near.take(rows, axis=0)
     except KeyboardInterrupt:  # in a round itself the run has caught it
         return points, INTERRUPTED, history
     return points, NO_PROGRESS, history
@@ -95,8 +98,3 @@ def rows_missing(points: Floats, topology: Topology, target: Target) -> NDArray[
     """The cells in ``near`` that miss the target, or are not clear of it."""
     rows: NDArray[np.int32] = missed(points, topology.near, topology.near_turn, *target.limits)
     return rows
-
-
-def how_many(points: Floats, topology: Topology, target: Target) -> int:
-    """How many cells in ``near`` miss the target, or are not clear of it."""
-    return len(rows_missing(points, topology, target))

@@ -19,8 +19,8 @@ from gmsnet.kernels.guard import LEVELS, Precision
 from gmsnet.measure import QualityReport, Totals, measure, totals_of
 from gmsnet.mesh import Mesh
 from gmsnet.methods import Field, Smoother, Tally
-from gmsnet.standing import Standing
-from gmsnet.topology import Topology, near_points, scale_exponent
+from gmsnet.standing import NONE, Standing
+from gmsnet.topology import Topology, near_points
 from gmsnet.workers import Share, serial, workers
 
 Floats = NDArray[np.float64]
@@ -59,19 +59,19 @@ class Run:
     """The state of one run: coordinates in memory order, the best so far, and the record.
 
     points: to start from, in memory order (default: the mesh's own). history: to go on with. precision: of
-    the mesh, where it is known; standing: of those points, where it is. count_missed: the cells of points that miss a
-    target.
+    the mesh, where it is known; standing: of those points, where it is. missing: the rows of the triangles that miss
+    a target at given points; the run ends when there is none.
     """
 
     def __init__(
         self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str, guard: str,
         points: Floats | None = None, history: list[Sweep] | None = None, precision: Precision | None = None,
-        standing: Standing | None = None, count_missed: Callable[[Floats], int] | None = None,
+        standing: Standing | None = None, missing: Callable[[Floats], NDArray[np.int32]] | None = None,
     ) -> None:  # fmt: skip
         self.topology, self.smoother, self.best_by = topology, smoother, best_by
         start = near_points(mesh, topology) if points is None else points
         self.field = Field(start.copy(), topology, precision or precision_of(mesh), LEVELS.index(guard))
-        self.threads, self.count_missed = threads, count_missed
+        self.threads, self.missing = threads, missing
         self.fewest: list[int] = []  # cells that missed the target, up to each look
         self.history: list[Sweep] = [] if history is None else history
         self.sweeps = self.history[-1].index if self.history else 0
@@ -80,11 +80,11 @@ class Run:
         self.stages: dict[str, None] = {}  # since the last look, in their order
         self.best, self.best_standing = start, standing or self._standing()
 
-    def to_the_end(self, max_sweeps: int, target: float | None, callback: Callable[[Sweep], bool | None] | None) -> str:
-        """Sweeps until a stop rule says why to stop. target: the least 1/q of a cell that is enough."""
+    def to_the_end(self, max_sweeps: int, callback: Callable[[Sweep], bool | None] | None = None) -> str:
+        """Sweeps until a stop rule says why to stop."""
         if not len(self.topology.free):
             return NOTHING_TO_MOVE
-        if target is not None and self.best_standing.min_shape >= target:
+        if self._reached():
             return TARGET_REACHED
         try:
             with workers(self.threads, len(self.topology.free) // LANES) as share:
@@ -96,7 +96,7 @@ class Run:
                     sweep = self._look(share, last=settled or self.sweeps == max_sweeps)
                     if callback is not None and callback(sweep):
                         return CALLBACK
-                    if target is not None and self.best_standing.min_shape >= target:
+                    if self._reached():
                         return TARGET_REACHED
                     if settled or self.smoother.settled or self._stalled():
                         return NO_PROGRESS
@@ -105,6 +105,9 @@ class Run:
                 self._keep_if_best(self._standing())
             return INTERRUPTED
         return MAX_SWEEPS
+
+    def _reached(self) -> bool:
+        return self.missing is not None and not self.best_standing.missed
 
     def _sweep(self, share: Share) -> int:
         """One sweep; returns how many nodes moved."""
@@ -139,8 +142,7 @@ class Run:
     def _standing(self, share: Share = serial) -> Standing:
         """The sums over all triangles of the coordinates as they are."""
         totals = totals_of(self.field.points, self.topology.near, self.topology.near_turn, share)
-        missed = self.count_missed(self.field.points) if self.count_missed else 0
-        return Standing.of(totals, self.best_by, missed)
+        return Standing.of(totals, self.best_by, self.missing(self.field.points) if self.missing else NONE)
 
     def _stalled(self) -> bool:
         """Has nothing been gained for PATIENCE looks?"""
@@ -159,7 +161,7 @@ class Run:
 
 def precision_of(mesh: Mesh) -> Precision:
     """How exactly the coordinates of a mesh are known, in the units of ``planar_points``."""
-    return Precision.of(single=mesh.single, exponent=scale_exponent(mesh))
+    return Precision.of(single=mesh.single, exponent=mesh.exponent)
 
 
 def outcome(
@@ -172,7 +174,7 @@ def outcome(
     lesser rank is the better. start: ``near_points`` of the mesh, totals: of ``best``, where they are known.
     """
     start = near_points(mesh, topology) if start is None else start
-    plane, factors = mesh.plane, _factors(scale_exponent(mesh))
+    plane, factors = mesh.plane, _factors(mesh.exponent)
     assert plane is not None
     points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
     count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)

@@ -3,43 +3,83 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet.arguments import ASPECT
 from gmsnet.measure import Totals
 
 ROUNDING = 1e-12  # a smaller gain in q̂ is no gain
+NONE = np.empty(0, dtype=np.int32)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Standing:
     """Where a mesh stands in the comparison of meshes on the way.
 
-    missed: how many cells miss the target. totals: what the rest was taken from.
+    measure: the sums over all triangles, None where there are none; asked for when they first matter. missing: the rows
+    of the triangles that miss the target, if there is one. positive: all triangles are known to be.
     """
 
-    inverted: int
-    qhat: float
-    min_shape: float
-    mean_shape: float
-    missed: int = 0
-    totals: Totals | None = None
+    measure: Callable[[], Totals | None]
+    best_by: str
+    missing: NDArray[np.int32] = field(default_factory=lambda: NONE)
+    positive: bool = False
 
     @classmethod
-    def of(cls, totals: Totals | None, best_by: str, missed: int = 0) -> Standing:
+    def of(cls, totals: Totals | None, best_by: str, missing: NDArray[np.int32] = NONE) -> Standing:
         """From the sums over all triangles; None where there are none."""
-        if totals is None:
-            return cls(0, math.nan, math.inf, math.nan, missed)
-        qhat = totals.qhat_aspect if best_by == ASPECT else totals.qhat
-        return cls(totals.inverted, qhat, totals.shape_min, totals.shape_mean, missed, totals)
+        return cls(lambda: totals, best_by, missing)
+
+    @cached_property
+    def totals(self) -> Totals | None:
+        """What the rest is taken from."""
+        return self.measure()
 
     @property
-    def rank(self) -> tuple[int, int, float]:
-        """Of two meshes that of the lesser rank is nearer to the target; the worst cell decides, not q̂."""
-        return self.inverted, self.missed, -self.min_shape
+    def missed(self) -> int:
+        """How many cells miss the target."""
+        return len(self.missing)
+
+    @property
+    def inverted(self) -> int:
+        """How many are."""
+        return 0 if self.positive or self.totals is None else self.totals.inverted
+
+    @property
+    def qhat(self) -> float:
+        """q̂ with 1/q or 1/q_V, as asked for."""
+        if self.totals is None:
+            return math.nan
+        return self.totals.qhat_aspect if self.best_by == ASPECT else self.totals.qhat
+
+    @property
+    def min_shape(self) -> float:
+        """The least 1/q."""
+        return math.inf if self.totals is None else self.totals.shape_min
+
+    @property
+    def mean_shape(self) -> float:
+        """The mean 1/q."""
+        return math.nan if self.totals is None else self.totals.shape_mean
+
+    def nearer(self, other: Standing) -> bool:
+        """Nearer to the target: fewer inverted cells, then fewer that miss it, then a better worst cell, not q̂."""
+        if self.counts != other.counts:
+            return self.counts < other.counts
+        return self.min_shape > other.min_shape
 
     def beats(self, other: Standing) -> bool:
         """Fewer inverted cells first, then fewer that miss the target, then a larger q̂, by more than rounding."""
-        if (self.inverted, self.missed) != (other.inverted, other.missed):
-            return (self.inverted, self.missed) < (other.inverted, other.missed)
+        if self.counts != other.counts:
+            return self.counts < other.counts
         return self.qhat > other.qhat + ROUNDING
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Inverted cells, and those that miss the target."""
+        return self.inverted, self.missed

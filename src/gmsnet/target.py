@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.below import missed
-from gmsnet.kernels.quality import LOW, SHAPE, per_cell
 from gmsnet.measure import QualityReport
 from gmsnet.topology import planar_points
 
@@ -62,9 +61,8 @@ class Target:
 
     def clearly_missed(self, points: Floats, corners: NDArray[np.int32], turn: NDArray[np.int8]) -> bool:
         """Do all these triangles (T, 3) miss it, however they are measured? points: (N, 2). turn: (T,) ±1."""
-        columns = np.empty((4, len(corners)))
-        per_cell(points, corners, turn, columns)
-        return bool(self.missed(columns[SHAPE] * SURE, columns[LOW] * SURE).all())
+        quality, tangent = self.limits
+        return len(missed(points, corners, turn, quality / SURE**2, tangent / SURE**2)) == len(corners)
 
     def rank(self, report: QualityReport) -> tuple[int, int, float]:
         """Of two meshes that of the lesser rank is nearer: by inverted cells, cells that miss it, the worst one."""
@@ -86,8 +84,3 @@ class Target:
             long = 2.0 * math.cos(alpha)  # the sides are 1, 1 and this, the height is sin α
             least = max(least, 2.0 * math.sqrt(3.0) * long * math.sin(alpha) / (2.0 + long * long))
         return least
-
-    @property
-    def sure(self) -> float | None:
-        """The least 1/q at which no way to measure it leaves a doubt."""
-        return None if self.quality is None else self.quality * SURE

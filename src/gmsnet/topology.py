@@ -21,7 +21,7 @@ from gmsnet.held import MOST_NEIGHBOURS, known_marks, sorted_out
 from gmsnet.kernels import connectivity, layout, patch
 from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.compile import LANES
-from gmsnet.mesh import Mesh
+from gmsnet.mesh import Mesh, in_plane
 from gmsnet.workers import side_by_side
 
 Ints = NDArray[np.int32]
@@ -101,6 +101,13 @@ class Topology:
 
         Raises InputError for more nodes or faces than int32 can number, and where memory does not suffice.
         """
+        return cls.and_points(mesh, fixed, threads)[0]
+
+    @classmethod
+    def and_points(
+        cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1
+    ) -> tuple[Topology, NDArray[np.float64]]:
+        """The same, and the mesh's ``near_points``, which were needed for it."""
         nodes, corners = len(mesh.points), check_size(mesh)
         refuse_unless_free(nodes * PER_NODE + corners * PER_CORNER, f"the connectivity of {nodes:,} nodes")
         planar = planar_points(mesh)
@@ -116,7 +123,7 @@ class Topology:
         if (turn != turn[:1]).any():
             turn = np.empty_like(near_turn)
             turn[faces.origin] = near_turn
-        return cls(
+        topology = cls(
             plane=mesh.plane,
             triangles=triangles,
             cell=written.cell[three],
@@ -131,6 +138,7 @@ class Topology:
             near_free=marks == 0,
             colouring=Colouring(places, start, ring),
         )
+        return topology, planar
 
     def holding(self, chosen: Flags, reason: str) -> Topology:
         """The same, with the free nodes among the chosen (N,) by id held for this reason."""
@@ -258,21 +266,21 @@ class Flat(Protocol):
         ...
 
     @property
-    def single(self) -> bool:
-        """Are they in single precision?"""
+    def exponent(self) -> int:
+        """The power of two by which ``planar_points`` divides them."""
         ...
 
 
 def planar_points(mesh: Flat) -> NDArray[np.float64]:
-    """The points in the plane of the mesh (N, 2), divided by 2 to the power of ``scale_exponent``, which is exact.
+    """The points in the plane of the mesh (N, 2), divided by 2 to the power of its ``exponent``, which is exact.
 
     The largest coordinate is then near 1, so that products of tiny or huge ones neither under- nor overflow. Of a mesh
     that is not planar, the first two coordinates.
     """
-    exponent = scale_exponent(mesh)
-    if abs(exponent) < 1000:
-        return np.ascontiguousarray(_in_plane(mesh) * 2.0**-exponent)
-    return np.ldexp(_in_plane(mesh), -exponent)
+    points = in_plane(mesh.points, mesh.plane)
+    if abs(mesh.exponent) < 1000:
+        return np.ascontiguousarray(points * 2.0**-mesh.exponent)
+    return np.ldexp(points, -mesh.exponent)
 
 
 def near_points(mesh: Flat, topology: Topology) -> NDArray[np.float64]:
@@ -282,18 +290,3 @@ def near_points(mesh: Flat, topology: Topology) -> NDArray[np.float64]:
 
 def _taken(points: NDArray[np.float64], memory: Ints) -> NDArray[np.float64]:
     return np.take(points, memory, axis=0)
-
-
-def scale_exponent(mesh: Flat) -> int:
-    """The power of two by which ``planar_points`` divides: none in single precision, where nothing can overflow."""
-    if mesh.single:
-        return 0
-    points = _in_plane(mesh)
-    largest = max(-float(points.min(initial=0.0)), float(points.max(initial=0.0)))
-    return int(np.frexp(largest)[1])
-
-
-def _in_plane(mesh: Flat) -> NDArray[np.float64]:
-    """(N, 2) view."""
-    first, second = mesh.plane or (0, 1)
-    return mesh.points[:, first : second + 1 : second - first]

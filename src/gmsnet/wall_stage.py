@@ -36,7 +36,7 @@ def improve_near_walls(
     smoother = banded(near_points(mesh, topology), kept[topology.memory])
     smoother.stage = STAGE
     run = Run(mesh, zone, smoother, threads, best_by, guard, points=points, history=history)
-    stop_reason = run.to_the_end(min(run.sweeps + SWEEPS, max_sweeps), None, callback)
+    stop_reason = run.to_the_end(min(run.sweeps + SWEEPS, max_sweeps), callback)
     if stop_reason == MAX_SWEEPS and run.sweeps < max_sweeps:
         stop_reason = NO_PROGRESS  # of the stage's own sweeps
     return run.best, stop_reason, run.history

@@ -17,7 +17,7 @@ from gmsnet.topology import Topology
 
 def runs(mesh, stages, guard="worst"):
     run = Run(mesh, Topology.of(mesh), Auto(stages), 1, "shape", guard)
-    run.to_the_end(200, None, None)
+    run.to_the_end(200)
     return run
 
 

@@ -14,7 +14,7 @@ from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import Precision
 from gmsnet.methods import Field, smoother
 from gmsnet.paper import plain
-from gmsnet.topology import Topology, planar_points, scale_exponent
+from gmsnet.topology import Topology, planar_points
 
 ROW = np.empty(3 * LANES)
 TWINS = {  # method and variant → (compiled proposal, plain one)
@@ -150,7 +150,7 @@ def test_a_sweep_is_the_plain_sweep_in_the_order_of_the_colours(method, tangle):
     name, variant = method
     smoother(name, variant=variant).sweep(field, lambda work, first, last: [work(first, last)], lambda: True)
     compiled = np.empty_like(field.points)
-    compiled[topology.memory] = np.ldexp(field.points, scale_exponent(mesh))
+    compiled[topology.memory] = np.ldexp(field.points, mesh.exponent)
 
     blocks = topology.stars.blocks
     lanes = [b * LANES + lane for b, filled in enumerate(blocks.filled) for lane in range(filled)]

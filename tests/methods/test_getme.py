@@ -17,7 +17,7 @@ from gmsnet.methods import getme
 from gmsnet.methods.base import Field
 from gmsnet.paper import plain_getme
 from gmsnet.paper.plain import PlainMesh
-from gmsnet.topology import Topology, planar_points, scale_exponent
+from gmsnet.topology import Topology, planar_points
 
 SETTINGS = {  # θ, λ, ρ, η
     "sequential": (math.pi / 3, 0.0, 1.0, 0),
@@ -40,7 +40,7 @@ def tangled(nodes, seed):
 
 def field_of(mesh):
     topology = Topology.of(mesh)
-    precision = Precision.of(single=mesh.single, exponent=scale_exponent(mesh))
+    precision = Precision.of(single=mesh.single, exponent=mesh.exponent)
     return Field(planar_points(mesh)[topology.memory], topology, precision)
 
 
@@ -50,7 +50,7 @@ def guard_of(field):
 
 def in_file_order(field, mesh):
     points = np.empty_like(field.points)
-    points[field.topology.memory] = np.ldexp(field.points, scale_exponent(mesh))
+    points[field.topology.memory] = np.ldexp(field.points, mesh.exponent)
     return points
 
 

@@ -19,7 +19,7 @@ import gmsnet
 from gmsnet.kernels.guard import LEVELS, STAR, VALID
 from gmsnet.methods import Field, smoother
 from gmsnet.run import precision_of
-from gmsnet.topology import Topology, planar_points, scale_exponent
+from gmsnet.topology import Topology, planar_points
 
 EXAMPLES = int(os.environ.get("GMSNET_GUARD_EXAMPLES", "6"))
 SWEEPS = 3
@@ -88,7 +88,7 @@ def test_each_sweep_keeps_what_the_level_promises(method, level, seed, nodes, ta
     field = Field(start.copy(), topology, precision_of(mesh), number)
     triangles, turn = topology.changeable
     rows = {node: np.flatnonzero((triangles == node).any(axis=1)) for node in np.flatnonzero(topology.near_free)}
-    scale = scale_exponent(mesh)
+    scale = mesh.exponent
     readings = [Fraction] if single else [Fraction, as_written]
 
     def exact():

@@ -6,7 +6,7 @@ import numpy as np
 
 from gmsnet import CellBlock, Mesh
 from gmsnet.kernels.guard import Precision
-from gmsnet.topology import Topology, planar_points, scale_exponent
+from gmsnet.topology import Topology, planar_points
 from gmsnet.untangle import untangle
 
 
@@ -50,7 +50,7 @@ def moved(mesh, nodes, places):
 def prepared(mesh, topology=None):
     """Points in memory order, topology and precision of a mesh."""
     topology = topology or Topology.of(mesh)
-    precision = Precision.of(single=mesh.single, exponent=scale_exponent(mesh))
+    precision = Precision.of(single=mesh.single, exponent=mesh.exponent)
     return planar_points(mesh)[topology.memory], topology, precision
 
 

@@ -12,7 +12,7 @@ from tangles import annulus, grid, mesh_of, moved, prepared, untangled
 
 import gmsnet
 from gmsnet.generate import disturb
-from gmsnet.topology import Topology, scale_exponent
+from gmsnet.topology import Topology
 from gmsnet.untangle import ALL, NOTHING, PART, untangle
 
 
@@ -182,7 +182,7 @@ def test_turning_mirroring_scaling_and_translating_commute(change):
         assert result.after == 0
         points = np.empty_like(result.points)
         points[topology.memory] = result.points
-        return np.ldexp(points, scale_exponent(mesh))
+        return np.ldexp(points, mesh.exponent)
 
     one = change(tangled.with_points(by_id(tangled))).points
     other = by_id(change(tangled))

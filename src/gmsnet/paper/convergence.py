@@ -45,7 +45,7 @@ def record(context: Context, case: str) -> Result:
             qhat.append(sweep.qhat)
             mean_shape.append(sweep.mean_shape)
 
-        run.to_the_end(sweeps, None, take_down)
+        run.to_the_end(sweeps, take_down)
         return {"seconds": seconds, "qhat": qhat, "mean_shape": mean_shape}
 
     records = {}
