@@ -58,12 +58,14 @@ def test_rows_and_nodes_against_a_slow_twin(target):
     free = ranking.free_nodes(near, rows, np.zeros(len(rows)), 0.0, may_move, topology.memory, seen)
     assert len(set(free.tolist())) == len(free)
     assert set(free.tolist()) == {i for i in near[rows].ravel().tolist() if may_move[i]}
-    chosen = free[: len(free) // 2]
-    around = {t for t in rows.tolist() if set(near[t].tolist()) & set(chosen.tolist())}
-    found = below.still_missing(points, chosen, topology.near_start, topology.near_ring, may_move, *target.limits, seen)
+    chosen, tried = free[: len(free) // 2], np.zeros(len(points), dtype=bool)
+    tried[chosen[::3]] = True
+    around = {t for t in rows.tolist() if tried[near[t]].any()}
+    rings = topology.near_start, topology.near_ring
+    found = below.still_missing(points, chosen, *rings, may_move, *target.limits, tried, seen)
     assert len(set(found.tolist())) == len(found)
     assert set(found.tolist()) == {i for t in around for i in near[t].tolist() if may_move[i]}
-    assert not seen.any()
+    assert not seen.any() and not tried.any()
 
 
 def test_rounds_end_where_nothing_is_missed_or_too_much_was_done():

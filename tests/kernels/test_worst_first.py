@@ -151,7 +151,7 @@ def test_the_order_within_a_colour_does_not_matter():
     for order in (np.arange(40), np.random.default_rng(7).permutation(40)):
         now, awake = points.copy(), np.zeros(len(points), dtype=np.bool_)
         cycles.visit(
-            now, order.astype(np.int32), start, around, plain_guard(), 4, 5, 1.0, None, awake,
+            now, order.astype(np.int32), start, around, plain_guard(), 4, 5, 1.0, None, awake, None,
             np.zeros(3, dtype=np.int64),
         )  # fmt: skip
         assert not awake.any()

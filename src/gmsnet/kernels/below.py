@@ -47,31 +47,36 @@ def rounds(points, nodes, start, around, free, memory, guard, plan, most, scale,
     power p and visits, for each round. most: visits; a round that would begin after so many is not made. scale: the
     1/q from which powers are formed. target: what ``missing`` asks for. tally: (3,), added to.
     """
-    mark = np.zeros(len(points), dtype=np.bool_)
-    visits = 0
+    mark, tried = np.zeros(len(points), dtype=np.bool_), np.zeros(len(points), dtype=np.bool_)
+    visits, unit = 0, scale / math.sqrt(3.0)
     for r in range(len(plan)):
         if not len(nodes) or visits > most:
             break
         goal = ALL if everywhere and r == 0 else target
-        visit(points, nodes, start, around, guard, plan[r, 0], plan[r, 1], scale / math.sqrt(3.0), goal, mark, tally)
-        visits += plan[r, 1] * len(nodes)
-        nodes = still_missing(points, nodes, start, around, free, target[0], target[1], mark)
+        power, sweeps = plan[r, 0], plan[r, 1]
+        visit(points, nodes, start, around, guard, power, sweeps, unit, goal, mark, tried, tally)
+        visits += sweeps * len(nodes)
+        nodes = still_missing(points, nodes, start, around, free, target[0], target[1], tried, mark)
         by_id(nodes, memory)
     return nodes
 
 
 @part
-def still_missing(points, nodes, start, around, free, quality, tangent, seen):
+def still_missing(points, nodes, start, around, free, quality, tangent, tried, seen):
     """The free nodes (int32) of the cells around these nodes that miss the target, as they come.
 
-    seen: (N,) bool, all False before and after.
+    tried: (N,) bool, which of the nodes have been, for a cell around them missed it; only beside those can one miss it
+    now. All False after it. seen: (N,) bool, all False before and after.
     """
     most = 0
     for i in nodes:
-        most += start[i + 1] - start[i] + 1
+        most += tried[i] * (start[i + 1] - start[i] + 1)
     found = np.empty(min(most, len(points)), dtype=np.int32)
     count = 0
     for i in nodes:
+        if not tried[i]:
+            continue
+        tried[i] = False
         x, y = points[i, 0], points[i, 1]
         before = around[start[i + 1] - 1]
         px, py = points[before, 0] - x, points[before, 1] - y

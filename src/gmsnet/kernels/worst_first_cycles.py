@@ -34,18 +34,19 @@ def cycles(points, triangles, turn, cells, free, memory, start, around, guard, p
         limit = smallest(shape, wanted - 1)
         scale = max(least(shape), LEAST) / math.sqrt(3.0)
         nodes = free_nodes(triangles, cells, shape, limit, free, memory, mark)
-        visit(points, nodes, start, around, guard, plan[c, 1], plan[c, 2], scale, None, mark, tally)
+        visit(points, nodes, start, around, guard, plan[c, 1], plan[c, 2], scale, None, mark, None, tally)
         shapes_of(points, triangles, turn, cells, shape)
     return before, least(shape)
 
 
 @part
-def visit(points, nodes, start, around, guard, doublings, sweeps, scale, target, awake, tally):
+def visit(points, nodes, start, around, guard, doublings, sweeps, scale, target, awake, tried, tally):
     """Visits the nodes in their order, so many times, p = 2^doublings. tally: (3,), added to.
 
     start, around: the rings of all nodes, in CSR form. scale: see ``descend``. target: a node is left out while no
     triangle around it misses that (kernels.missing), if there is one. awake: (N,) bool, all False before and after: a
-    node is left out while neither it nor a neighbour has moved since it was found to move no more.
+    node is left out while neither it nor a neighbour has moved since it was found to move no more. tried: (N,) bool, to
+    become True of the nodes that the target has not left out, if there is one.
     """
     unit, grain, single = guard.unit, guard.grain, guard.single
     most = 0
@@ -60,8 +61,10 @@ def visit(points, nodes, start, around, guard, doublings, sweeps, scale, target,
             n = gather(points, i, start, around, guard, star)
             x, y = points[i, 0], points[i, 1]
             awake[i] = False
-            if target is not None and not any_missing(star, n, x, y, target[0], target[1]):
-                continue
+            if target is not None:
+                if not any_missing(star, n, x, y, target[0], target[1]):
+                    continue
+                tried[i] = True
             tx, ty = descend(star, n, x, y, scale, doublings)
             if tx == x and ty == y:
                 continue

@@ -153,14 +153,16 @@ def to_come(before: float, gained: float) -> float:
 def for_target(target: Target, share: float, *, rings: int) -> Auto:
     """The plan for patches around the cells that miss a target. share: these, of the patches' cells.
 
-    rings: of free nodes that move. With more than one, what misses it still after that is followed by the worst cells
-    alone, and by another try that keeps these; with more than two, Newton's sweeps on Σq over the patches come first.
+    rings: of free nodes that move. With more than one, all of them move at first, for the cells that miss it; then come
+    the worst cells alone, and another try that keeps these; with more than two, Newton's sweeps on Σq over the patches
+    come before all.
     """
     plan = WIDE if rings > 1 else NEAR if target.angle is None else GENTLE
-    below = Stage("cells that miss the target", lambda: Below(target, plan, rings > 1), 1)
+    below = Stage("cells that miss the target", lambda: Below(target, plan, everywhere=False), 1)
     stages = [NEWTON._replace(looks=False)] if share > MANY or rings > 2 else []
     if rings > 1:
-        stages += [below._replace(looks=False), WORST._replace(looks=False)]
+        wide = below._replace(create=lambda: Below(target, plan, everywhere=True), looks=False)
+        stages += [wide, WORST._replace(looks=False)]
     return Auto([*stages, below])
 
 
