@@ -44,7 +44,8 @@ def reach_target(
     history: list[Sweep] = []
     rows = rows_missing(points, topology, target)
     corners = topology.near.take(rows, axis=0)
-    if report is not None and not target.clearly_missed(points, corners, topology.near_turn.take(rows)):
+    clear = report is None or target.clearly_missed(points, corners, topology.near_turn.take(rows))
+    if report is not None and not clear:
         corners = topology.places[topology.triangles[target.missed_in(report)]]
     if not len(corners):
         return points, TARGET_REACHED, history
@@ -63,16 +64,16 @@ def reach_target(
             patch = topology.restricted(active)
             share = len(corners) / len(patch.near)
             smoother = create() if create else for_target(target, share, rings=rings)
-            missing = partial(rows_missing, topology=patch, target=target)
-            rows = missing(points)
-            before = Standing(partial(totals_of, points, patch.near, patch.near_turn), best_by, rows, positive)
+            missing = partial(corners_missing, topology=patch, target=target)
+            measure = partial(totals_of, points, patch.near, patch.near_turn)
+            before = Standing(measure, best_by, corners if clear else missing(points), positive)
             run = Run(
                 mesh, patch, smoother, threads, best_by, guard, points, history, precision, before, missing
             )  # fmt: skip
             reason = run.to_the_end(max_sweeps, callback)
             after = run.best_standing
             if after.nearer(before):
-                points, rows = run.best, after.missing
+                points, corners, clear = run.best, after.missing, True
             if not after.missed:
                 return points, NO_PROGRESS if hopeless else TARGET_REACHED, history
             if reason not in (NO_PROGRESS, TARGET_REACHED):  # stopped from outside, or at the most sweeps
@@ -82,7 +83,6 @@ def reach_target(
             idle = idle + 1 if after.missed > FEWER * before.missed else 0
             if idle == IDLE:
                 break
-            corners = patch.near.take(rows, axis=0)
     except KeyboardInterrupt:  # in a round itself the run has caught it
         return points, INTERRUPTED, history
     return points, NO_PROGRESS, history
@@ -98,3 +98,8 @@ def rows_missing(points: Floats, topology: Topology, target: Target) -> NDArray[
     """The cells in ``near`` that miss the target, or are not clear of it."""
     rows: NDArray[np.int32] = missed(points, topology.near, topology.near_turn, *target.limits)
     return rows
+
+
+def corners_missing(points: Floats, topology: Topology, target: Target) -> NDArray[np.int32]:
+    """The corners (K, 3) of these."""
+    return topology.near.take(rows_missing(points, topology, target), axis=0)

@@ -14,15 +14,15 @@ from gmsnet.arguments import ASPECT
 from gmsnet.measure import Totals
 
 ROUNDING = 1e-12  # a smaller gain in q̂ is no gain
-NONE = np.empty(0, dtype=np.int32)
+NONE = np.empty((0, 3), dtype=np.int32)
 
 
 @dataclass(frozen=True, eq=False)
 class Standing:
     """Where a mesh stands in the comparison of meshes on the way.
 
-    measure: the sums over all triangles, None where there are none; asked for when they first matter. missing: the rows
-    of the triangles that miss the target, if there is one. positive: all triangles are known to be.
+    measure: the sums over all triangles, None where there are none; asked for when they first matter. missing: the
+    corners (K, 3) of the triangles that miss the target, if there is one. positive: all triangles are known to be.
     """
 
     measure: Callable[[], Totals | None]
