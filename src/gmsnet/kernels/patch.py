@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.prefetch import prefetch
 
 
 @kernel
@@ -46,15 +47,17 @@ def triangles_around(nodes, active, start, ring):
     """
     most = 0
     for i in nodes:
+        prefetch(ring, np.uint64(start[i]))
         most += start[i + 1] - start[i]
-    triangles = np.empty((most, 3), dtype=np.int32)
+    triangles = np.empty((most + 1, 3), dtype=np.int32)  # what is written last may not count
     count = 0
     for i in nodes:
         before = ring[start[i + 1] - 1]
+        earlier = active[before] & (before < i)  # its own turn has come
         for place in range(start[i], start[i + 1]):
             after = ring[place]
-            if not ((active[before] and before < i) or (active[after] and after < i)):
-                triangles[count, 0], triangles[count, 1], triangles[count, 2] = i, before, after
-                count += 1
-            before = after
+            also = active[after] & (after < i)
+            triangles[count, 0], triangles[count, 1], triangles[count, 2] = i, before, after
+            count += not (earlier | also)
+            before, earlier = after, also
     return triangles[:count].copy()
