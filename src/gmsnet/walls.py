@@ -46,6 +46,8 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
     survey = survey or Survey.of(mesh, topology)
     points = survey.points
     largest = REFINED * float(_edge(survey.double))
+    if not (_edge(_double(points, triangles.take(survey.beside, axis=0))) <= largest).any():
+        return kept  # so it is with most meshes
     chosen, rough = np.zeros(len(triangles), dtype=bool), None
     for wall, cells in _walls(triangles, survey):
         size = _edge(_double(points, triangles[cells]))
