@@ -4,11 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import gmsnet
 from gmsnet import engine
 from gmsnet.generate import disturb
 from gmsnet.kernels.patch import around
+from gmsnet.measure import measure
+from gmsnet.patches import rows_missing
 from gmsnet.target import Target
 from gmsnet.topology import Topology, near_points
 
@@ -261,3 +265,23 @@ def test_targets_on_cells_wound_both_ways_and_in_any_plane(good):
         for threads in (1, 3):
             moved = gmsnet.smooth((points, corners), target_quality=0.5, threads=threads).points
             np.testing.assert_allclose(np.delete(moved, axis, axis=1), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("target", [Target(0.4), Target(angle=25.0), Target(0.2, 30.0), Target(0.6, 10.0), Target(1.0)])
+def test_cells_that_miss_a_target_are_found_among_those_whose_shape_allows_it(target):
+    mesh = gmsnet.random_mesh(3000, seed=6)
+    topology, points = Topology.and_points(mesh)
+    shapes = np.empty(len(topology.near), dtype=np.float32)
+    report = measure(mesh, topology, points, shapes=shapes)
+    np.testing.assert_allclose(np.sort(shapes), np.sort(report.shape), rtol=1e-7)
+    rows = rows_missing(points, topology, target)
+    assert rows_missing(points, topology, target, shapes).tolist() == rows.tolist()
+    assert len(rows) == np.count_nonzero(target.missed(report.shape, report.min_angle))
+
+
+@given(st.floats(1e-3, 60.0), st.floats(0.05, 20.0))
+def test_no_triangle_with_a_smaller_angle_has_a_larger_shape_than_a_target_allows(angle, ratio):
+    alpha = math.radians(angle)
+    report = gmsnet.quality(([[0, 0], [1, 0], [ratio * math.cos(alpha), ratio * math.sin(alpha)]], [[0, 1, 2]]))
+    assert report.min_angle[0] <= angle * (1 + 1e-9)
+    assert report.shape[0] <= Target(angle=angle).most_shape * (1 + 1e-12)

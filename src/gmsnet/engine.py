@@ -140,8 +140,10 @@ def smooth(
     topology, start = Topology.and_points(given, asked, apart)
     given = given.without_cells()  # whatever was copied of them is given back
 
+    shapes = np.empty(len(topology.near) if target else 0, dtype=np.float32)
+
     def looked_at(near: Floats) -> tuple[QualityReport, Protection]:
-        return measure(given, topology, near), protected(given, topology, preserve, fix_layers, near)
+        return measure(given, topology, near, shapes=shapes), protected(given, topology, preserve, fix_layers, near)
 
     if apart == 1 or target or not isinstance(chosen, Auto | StarSmoother):
         before, protection = looked_at(start)
@@ -171,7 +173,8 @@ def smooth(
     if target:
         best, stop_reason, history = reach_target(
             given, topology, None if isinstance(chosen, Auto) else create, target, start,
-            max_sweeps=max_sweeps, callback=callback, report=None if before.inverted else before, **options,
+            max_sweeps=max_sweeps, callback=callback, report=None if before.inverted else before,
+            shapes=shapes if start is given_points else None, **options,
         )  # fmt: skip
     else:
         standing = Standing.of(before.totals, best_by) if start is given_points else None

@@ -21,6 +21,7 @@ from gmsnet.workers import Share, serial, workers
 
 Floats = NDArray[np.float64]
 
+NOWHERE = np.empty(0, dtype=np.float32)
 THRESHOLDS = {"min_angle": (5.0, 10.0, 20.0, 30.0), "max_angle": (120.0, 150.0, 170.0), "shape": (0.1, 0.2, 0.3, 0.5)}
 
 
@@ -231,12 +232,13 @@ def percentile(values: Floats, percent: int) -> float:
 
 def measure(
     mesh: Mesh, topology: Topology | None = None, near: Floats | None = None, threads: int = 1,
-    totals: Totals | None = None,
+    totals: Totals | None = None, shapes: NDArray[np.float32] = NOWHERE,
 ) -> QualityReport:  # fmt: skip
     """The measures of a mesh; ``topology`` saves building it again (it must belong to the same connectivity).
 
     The signs are those of the topology's winding, so a report on moved points sees what has turned over. near:
-    ``near_points(mesh, topology)``, where they are known; totals: of a planar mesh, where they are.
+    ``near_points(mesh, topology)``, where they are known; totals: of a planar mesh, where they are. shapes: see
+    ``totals_of``.
     """
     topology = topology or Topology.of(mesh)
     triangles = Triangles(mesh.points, mesh.plane, mesh.single, topology.triangles, topology.turn)
@@ -252,24 +254,27 @@ def measure(
     if totals is None:
         near = near_points(mesh, topology) if near is None else near
         with workers(threads, -(-len(topology.near) // LANES)) as share:
-            totals = totals_of(near, topology.near, topology.near_turn, share)
+            totals = totals_of(near, topology.near, topology.near_turn, share, shapes)
     assert totals is not None
     signs = exact_signs(planar_points(mesh), topology.triangles, topology.turn) if totals.doubts else None
     return QualityReport(topology.cell, totals, triangles, signs)
 
 
 def totals_of(
-    points: Floats, corners: NDArray[np.int32], turn: NDArray[np.int8], share: Share = serial
+    points: Floats,
+    corners: NDArray[np.int32],
+    turn: NDArray[np.int8],
+    share: Share = serial,
+    shapes: NDArray[np.float32] = NOWHERE,
 ) -> Totals | None:
     """Means and extremes of some triangles (T, 3) of planar points; None where there are none.
 
-    share: how blocks of LANES triangles are shared out to threads.
+    share: how blocks of LANES triangles are shared out to threads. shapes: (T,), for 1/q of each, if it is wanted.
     """
-
     grids = kernels.grids(len(corners))
 
     def part(first: int, last: int) -> Floats:
-        figures: Floats = kernels.summarise(points, corners, turn, first, last, *grids)
+        figures: Floats = kernels.summarise(points, corners, turn, first, last, *grids, shapes)
         return figures
 
     return Totals.of(share(part, 0, -(-len(corners) // LANES)), len(corners)) if len(corners) else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ Flags = NDArray[np.bool_]
 RINGS = (1, 2, 4, 8)  # of free nodes that move with the corners of a cell that misses the target
 NARROW = (1, 2, 4)  # those where the method looks for the cells itself
 LARGE, SMALL = 0.25, 1000  # no larger patches around the cells that are left: of all free nodes, or so many
+SINGLE = 1.0 + 1e-6  # times a 1/q: what is above it in single precision is above it
 FEW = 0.02  # of the cells that missed it at first: for so few that are left, the largest patches are tried
 FEWER, IDLE = 0.9, 2  # a round that leaves more of the cells below the target is idle; so many in a row are the last
 
@@ -32,17 +34,18 @@ FEWER, IDLE = 0.9, 2  # a round that leaves more of the cells below the target i
 def reach_target(
     mesh: Mesh, topology: Topology, create: Callable[[], Smoother] | None, target: Target, points: Floats, *,
     threads: int, best_by: str, guard: str, max_sweeps: int, callback: Callable[[Sweep], bool | None] | None,
-    report: QualityReport | None = None,
+    report: QualityReport | None = None, shapes: NDArray[np.float32] | None = None,
 ) -> tuple[Floats, str, list[Sweep]]:  # fmt: skip
     """Smooths patches around the cells that miss the target until none does, or nothing is gained any more.
 
     create: makes a method ready for a run on one set of patches; None for ``methods.auto``, which has a plan for each.
-    points: (N, 2) in memory order, not changed. report: the measures of these points, if they are known. Returns the
-    new points, why it ended, and the record. A patch's result is taken if fewer of its cells are inverted, or as many
-    and fewer miss the target, or as many and the worst of them is better.
+    points: (N, 2) in memory order, not changed. report: the measures of these points, if they are known; shapes: 1/q of
+    the triangles in ``topology.near``, if it is. Returns the new points, why it ended, and the record. A patch's result
+    is taken if fewer of its cells are inverted, or as many and fewer miss the target, or as many and the worst of them
+    is better.
     """
     history: list[Sweep] = []
-    rows = rows_missing(points, topology, target)
+    rows = rows_missing(points, topology, target, shapes)
     corners = topology.near.take(rows, axis=0)
     clear = report is None or target.clearly_missed(points, corners, topology.near_turn.take(rows))
     if report is not None and not clear:
@@ -94,9 +97,17 @@ def too_large(rings: int, active: Flags, left: float, topology: Topology) -> boo
     return bool(count > SMALL and (count > LARGE * len(topology.free) or (rings == NARROW[-1] and left > FEW)))
 
 
-def rows_missing(points: Floats, topology: Topology, target: Target) -> NDArray[np.int32]:
-    """The cells in ``near`` that miss the target, or are not clear of it."""
-    rows: NDArray[np.int32] = missed(points, topology.near, topology.near_turn, *target.limits)
+def rows_missing(
+    points: Floats, topology: Topology, target: Target, shapes: NDArray[np.float32] | None = None
+) -> NDArray[np.integer[Any]]:
+    """The cells in ``near`` that miss the target, or are not clear of it. shapes: their 1/q, where it is known."""
+    near, turn = topology.near, topology.near_turn
+    rows: NDArray[np.integer[Any]]
+    if shapes is None:
+        rows = missed(points, near, turn, *target.limits)
+    else:
+        some = np.flatnonzero(~(shapes > target.most_shape * SINGLE))
+        rows = some[missed(points, near.take(some, axis=0), turn.take(some), *target.limits)]
     return rows
 
 

@@ -76,6 +76,15 @@ class Target:
         return (self.quality or 0.0) * SURE, tangent * SURE
 
     @property
+    def most_shape(self) -> float:
+        """The largest 1/q of a cell that misses it: of all triangles with an angle of α, (α, (π − α)/2, (π − α)/2)."""
+        most = self.quality or 0.0
+        if self.angle is not None:
+            alpha = math.radians(self.angle)
+            most = max(most, math.sqrt(3.0) * math.sin(alpha) / (2.0 - math.cos(alpha)))
+        return most
+
+    @property
     def shape(self) -> float:
         """The least 1/q that a cell has which meets it: of all triangles with angles of α or more, (α, α, π − 2α)."""
         least = self.quality or 0.0

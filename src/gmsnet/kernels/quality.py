@@ -137,11 +137,12 @@ def grids(count: int) -> tuple[float, float]:
 
 
 @kernel
-def summarise(points, triangles, turn, first, last, coarse, fine):
+def summarise(points, triangles, turn, first, last, coarse, fine, shapes):
     """The figures (FIGURES,) named above over the blocks first…last of LANES triangles. coarse, fine: their ``grids``.
 
     The sums of all blocks follow from those of parts exactly, so they do not depend on how the blocks are shared out,
-    nor on the order of the triangles, or of a triangle's corners but for the rounding of its own measures.
+    nor on the order of the triangles, or of a triangle's corners but for the rounding of its own measures. shapes: (T,)
+    float32, for 1/q of each triangle, or (0,).
     """
     work = np.empty(ROOM)
     for k in range(ROOM):
@@ -167,6 +168,10 @@ def summarise(points, triangles, turn, first, last, coarse, fine):
             work[k + ASPECT * LANES] = min(work[k + ASPECT * LANES], aspect)
             work[at + INVERTED * LANES] += 1.0 if shape <= 0.0 else 0.0
             work[at + DOUBTS * LANES] += 1.0 if doubt else 0.0
+            work[lane] = shape  # its edges are not needed any more
+        if len(shapes):
+            for lane in range(count):
+                shapes[start + lane] = work[lane]
     out = np.empty(FIGURES)
     for figure in range(FIGURES):
         value = work[TOTALS + figure * LANES]
