@@ -147,6 +147,20 @@ def test_what_is_no_mesh_is_refused_with_its_name(name: str, data: bytes, messag
     assert (tmp_path / name).read_bytes() == data
 
 
+@pytest.mark.parametrize("key", TEXT_FORMATS)
+def test_a_byte_order_mark_is_named_where_it_is_the_reason(key: str, tmp_path: Path) -> None:
+    path = tmp_path / f"mesh{FORMATS[key].suffixes[0]}"
+    write(triangle_grid(), path, format=key)
+    contents = path.read_bytes()
+    path.write_bytes(b"\xef\xbb\xbf" + contents)
+    with pytest.raises(FormatError, match="byte-order mark"):
+        read(path, format=key)
+    path.write_bytes(b"\xef" + contents)
+    with pytest.raises(FormatError) as caught:
+        read(path, format=key)
+    assert "byte-order mark" not in str(caught.value)
+
+
 def test_a_zero_byte_is_refused_wherever_it_is(tmp_path: Path) -> None:
     data = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n" + b"# \n" * 3000
     for at in (40, len(data)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from codecs import BOM_UTF8
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -41,7 +42,14 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     except MemoryError:
         raise InputError(f"{shown}: there is not enough memory for this mesh") from None
     except InputError as error:
-        raise FormatError(f"{shown}: {error}") from None
+        raise FormatError(f"{shown}: {error}{_of_mark(files)}") from None
+
+
+def _of_mark(files: Mapping[str, Data]) -> str:
+    """What to add to the reason why files cannot be read if one begins with a byte-order mark."""
+    if not any(data[: len(BOM_UTF8)] == BOM_UTF8 for data in files.values()):
+        return ""
+    return " (the file begins with a byte-order mark, which some editors add: save it as UTF-8 without one)"
 
 
 def _name(path: Any) -> str:
