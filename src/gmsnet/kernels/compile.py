@@ -19,6 +19,8 @@ if folder := os.environ.get("GMSNET_CACHE"):
     os.environ.setdefault("NUMBA_CACHE_DIR", folder)  # Numba reads it when it is imported
 
 import numba
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.extending import typeof_impl
 
 from gmsnet.kernels.cache import make_trustworthy
@@ -37,15 +39,53 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     return compiled
 
 
+class PartLibrary(JITCodeLibrary):
+    """What a part is compiled to: LLVM's form, which kernels take up; machine code is made of the kernels alone."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+    @property
+    def codegen(self) -> PartLibrary:
+        """Who is told where the machine code finds its constants in Python. There is none."""
+        return self
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """See ``codegen``."""
+
+
+class PartCompiler(CompilerBase):
+    """Compiles a part.
+
+    That Python cannot call it is set here, as it is not for kernels: so what Numba compiles of its own (``max``,
+    ``numpy.empty``), once for each set of options, serves parts and kernels.
+    """
+
+    into_callers = False  # compile it into its callers, however long it is
+
+    def define_pipelines(self) -> list[Any]:
+        """See CompilerBase."""
+        state = self.state
+        state.library = PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_cpython_wrapper, state.flags.forceinline = True, self.into_callers
+        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+
+
+class InlinedCompiler(PartCompiler):
+    """Compiles a part into its callers."""
+
+    into_callers = True
+
+
 class Part:
     """A function that kernels call.
 
     What Python needs to call a function takes longer to compile than most parts do: it is made where Python calls one.
     """
 
-    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+    def __init__(self, function: Callable[..., Any], compiler: type[PartCompiler]) -> None:
         self.py_func = function
-        self.inside = numba.njit(**{**OPTIONS, "no_cpython_wrapper": True, **options})(function)
+        self.inside = numba.njit(pipeline_class=compiler, **OPTIONS)(function)
 
     def __call__(self, *arguments: Any) -> Any:
         """For Python, compiled apart from what kernels call."""
@@ -63,9 +103,9 @@ def _inside(part: Part, _: Any) -> Any:
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile for kernels to call."""
-    return update_wrapper(Part(function), function)
+    return update_wrapper(Part(function, PartCompiler), function)
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile into its callers, however long it is: a loop over lanes that calls something is not vectorised."""
-    return update_wrapper(Part(function, forceinline=True), function)
+    return update_wrapper(Part(function, InlinedCompiler), function)
