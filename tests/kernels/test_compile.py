@@ -2,9 +2,10 @@
 
 import numba
 import numpy as np
+import pytest
 from numba.core import event
 
-from gmsnet.kernels.compile import OPTIONS, KernelCompiler, inlined, part
+from gmsnet.kernels.compile import KERNEL, KNOWN, Part, inlined, options, part
 
 
 @part
@@ -17,7 +18,7 @@ def twice(x):
     return 2.0 * max(x, 0.0)
 
 
-@numba.njit(pipeline_class=KernelCompiler, **OPTIONS)  # a kernel that is not kept on disk
+@numba.njit(**KERNEL)  # a kernel that is not kept on disk
 def summed(values):
     total = 0.0
     for k in range(len(values)):
@@ -38,6 +39,7 @@ class Names(event.Listener):
         pass
 
 
+@pytest.mark.skipif(numba.version_info.short > KNOWN, reason="Numba's own compiler is taken")
 def test_machine_code_is_made_of_kernels_alone_and_what_numba_compiles_of_its_own_serves_parts_too():
     values, found = np.array([-1.0, 2.0, 5.0]), Names()
     with event.install_listener("numba:compile", found):
@@ -48,3 +50,16 @@ def test_machine_code_is_made_of_kernels_alone_and_what_numba_compiles_of_its_ow
     for each, machine_code in ((summed, True), (larger.inside, False), (twice.inside, False)):
         (result,) = each.overloads.values()
         assert engine.is_symbol_defined(result.fndesc.llvm_func_name) == machine_code
+
+
+def test_with_a_later_numba_its_own_compiler_does_the_same():
+    kernel, *others = options((KNOWN[0], KNOWN[1] + 1))
+    first, second = (Part(each.py_func, chosen) for each, chosen in zip((larger, twice), others, strict=True))
+
+    @numba.njit(**kernel)
+    def total(values):
+        return first(values[0], 1.0) + second(values[1])
+
+    values = np.array([-1.0, 2.5])
+    assert total(values) == 6.0
+    assert all("pipeline_class" not in each for each in (kernel, *others))

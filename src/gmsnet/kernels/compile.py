@@ -19,88 +19,49 @@ if folder := os.environ.get("GMSNET_CACHE"):
     os.environ.setdefault("NUMBA_CACHE_DIR", folder)  # Numba reads it when it is imported
 
 import numba
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.typed_passes import NopythonRewrites
-from numba.core.untyped_passes import InlineClosureLikes
 from numba.extending import typeof_impl
 
 from gmsnet.kernels.cache import make_trustworthy
 
+KNOWN = (0, 68)  # the last version of Numba of which it is known that kernels.compilers fits it
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 LANES = 64  # stars or triangles that go through the processor abreast
+
+
+def options(version: tuple[int, ...]) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """What to tell Numba of kernels, of parts and of what is inlined. Our own compilers change nothing but the time."""
+    if version > KNOWN:
+        unseen = {**OPTIONS, "no_cpython_wrapper": True}
+        return OPTIONS, unseen, {**unseen, "forceinline": True}
+    from gmsnet.kernels.compilers import InlinedCompiler, KernelCompiler, PartCompiler
+
+    first, second, third = ({**OPTIONS, "pipeline_class": c} for c in (KernelCompiler, PartCompiler, InlinedCompiler))
+    return first, second, third
+
+
+KERNEL, PART, INLINED = options(numba.version_info.short)
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile for Python to call, releasing the GIL, and keep on disk."""
     try:
-        compiled: Callable[..., Any] = numba.njit(cache=True, pipeline_class=KernelCompiler, **OPTIONS)(function)
+        compiled: Callable[..., Any] = numba.njit(cache=True, **KERNEL)(function)
     except RuntimeError:  # no folder for the cache can be written
-        return numba.njit(pipeline_class=KernelCompiler, **OPTIONS)(function)  # type: ignore[no-any-return]
+        return numba.njit(**KERNEL)(function)  # type: ignore[no-any-return]
     make_trustworthy(compiled._cache)  # type: ignore[attr-defined]
     return compiled
-
-
-class PartLibrary(JITCodeLibrary):
-    """What a part is compiled to: LLVM's form, which kernels take up; machine code is made of the kernels alone."""
-
-    def _finalize_final_module(self) -> None:
-        self._finalized = True
-
-    @property
-    def codegen(self) -> PartLibrary:
-        """Who is told where the machine code finds its constants in Python. There is none."""
-        return self
-
-    def set_env(self, name: str, environment: Any) -> None:
-        """See ``codegen``."""
-
-
-class KernelCompiler(CompilerBase):
-    """Compiles without those of Numba's passes that change no function here, but take a thirtieth of the time.
-
-    They fuse arithmetic on whole arrays into one loop, and work comprehensions and inner functions into their places.
-    """
-
-    def define_pipelines(self) -> list[Any]:
-        """See CompilerBase."""
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.passes = [each for each in passes.passes if each[0] not in (NopythonRewrites, InlineClosureLikes)]
-        return [passes]
-
-
-class PartCompiler(KernelCompiler):
-    """Compiles a part.
-
-    That Python cannot call it is set here, as it is not for kernels: so what Numba compiles of its own (``max``,
-    ``numpy.empty``), once for each set of options, serves parts and kernels.
-    """
-
-    into_callers = False  # compile it into its callers, however long it is
-
-    def define_pipelines(self) -> list[Any]:
-        """See CompilerBase."""
-        state = self.state
-        state.library = PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.flags.no_cpython_wrapper, state.flags.forceinline = True, self.into_callers
-        return super().define_pipelines()
-
-
-class InlinedCompiler(PartCompiler):
-    """Compiles a part into its callers."""
-
-    into_callers = True
 
 
 class Part:
     """A function that kernels call.
 
     What Python needs to call a function takes longer to compile than most parts do: it is made where Python calls one.
+    A part must not print, nor raise an error with computed values in it: that needs Python.
     """
 
-    def __init__(self, function: Callable[..., Any], compiler: type[PartCompiler]) -> None:
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         self.py_func = function
-        self.inside = numba.njit(pipeline_class=compiler, **OPTIONS)(function)
+        self.inside = numba.njit(**options)(function)
 
     def __call__(self, *arguments: Any) -> Any:
         """For Python, compiled apart from what kernels call."""
@@ -118,9 +79,9 @@ def _inside(part: Part, _: Any) -> Any:
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile for kernels to call."""
-    return update_wrapper(Part(function, PartCompiler), function)
+    return update_wrapper(Part(function, PART), function)
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile into its callers, however long it is: a loop over lanes that calls something is not vectorised."""
-    return update_wrapper(Part(function, InlinedCompiler), function)
+    return update_wrapper(Part(function, INLINED), function)
