@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_stars import star
 
-from gmsnet.kernels import barrier, block, certificate
+from gmsnet.kernels import barrier, block, certificate, laplacian, laplacian_plain
 from gmsnet.kernels import stars as kernels
 from gmsnet.kernels.barrier_star import Power
 from gmsnet.kernels.compile import LANES
@@ -83,6 +83,30 @@ def from_sums(place, ring, shift, guard):
     return results(work)
 
 
+def from_the_mean(place, ring, _, guard):
+    """The same by kernels.laplacian_plain, which has a shift of its own."""
+    n, pairs, work = *block_of(place, ring), np.zeros((block.FLOORS + len(ring)) * LANES)
+    local, sums = np.empty(2 * n * LANES, dtype=np.float32), np.empty(2 * LANES, dtype=np.float32)
+    laplacian_plain.aim(pairs, n, guard.single, np.empty(2 * LANES), work)
+    laplacian_plain.relate(pairs, n, work, np.empty(2 * LANES, dtype=np.float32), local)
+    doubtful = laplacian_plain.certify(local, n, max(guard.floor, 0.0), guard.unit, guard.grain, work, sums)
+    assert doubtful == (~(work[block.MARGIN * LANES :][:LANES] > 0)).sum()
+    targets = work[laplacian_plain.TARGETS * LANES :][: 2 * LANES].reshape(LANES, 2)
+    work[block.TARGET * LANES :][: 2 * LANES] = targets.T.ravel()
+    return results(work)
+
+
+def from_judgement(place, ring, _, guard):
+    """The same by kernels.laplacian in its smart form, which goes to the mean or stays."""
+    n, pairs, work = *block_of(place, ring), np.zeros((block.FLOORS + len(ring)) * LANES)
+    local, row, shifts = np.empty(2 * n * LANES), np.empty(laplacian.ROWS * LANES), np.empty(2 * LANES)
+    kernels.localise(pairs, n, work, local)
+    laplacian.smart_mean(local, n, max(guard.floor, 0.0), row, shifts)
+    kernels.aim(work, shifts, guard.single)
+    laplacian.certify_smart(row, guard.unit, guard.grain, work)
+    return results(work)
+
+
 def block_of(place, ring):
     """Degree, and the star in all lanes."""
     return len(ring), np.vstack([place, ring]).repeat(LANES, axis=0).ravel()
@@ -96,7 +120,10 @@ def results(work):
     return margin[0], target[:, 0]
 
 
-@pytest.mark.parametrize("certify", [from_shifts, from_coordinates, from_sums])
+OF_SHIFTS = [from_shifts, from_coordinates, from_sums]
+
+
+@pytest.mark.parametrize("certify", [*OF_SHIFTS, from_the_mean, from_judgement])
 @given(
     seed=st.integers(0, 2**32 - 1), degree=st.integers(3, 9), scale=st.sampled_from([2.0**-40, 1e-3, 1.0]),
     offset=st.sampled_from([0.0, 1.0, 1e5]), digits=st.integers(2, 12), above=st.booleans(), single=st.booleans(),
@@ -124,7 +151,7 @@ def test_what_is_certified_is_so(certify, seed, degree, scale, offset, digits, a
             ) > max(Fraction(floor), 0)
 
 
-@pytest.mark.parametrize("certify", [from_shifts, from_coordinates, from_sums])
+@pytest.mark.parametrize("certify", [*OF_SHIFTS, from_the_mean, from_judgement])
 def test_a_sound_star_is_certified(certify):
     """With room to the floor, whatever the scale: the slow way is for the few."""
     angle = np.pi / 3 * np.arange(6)
@@ -138,9 +165,28 @@ def test_a_sound_star_is_certified(certify):
         assert not margin > 0
 
 
-@pytest.mark.parametrize("certify", [from_shifts, from_coordinates, from_sums])
+@pytest.mark.parametrize("certify", OF_SHIFTS)
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e30])
 def test_what_is_no_number_is_not_certified(certify, bad):
     centre, ring = star(np.random.default_rng(0), 6)
     margin, _ = certify(np.asarray(centre, dtype=float), ring, np.array([bad, 0.0]), plain_guard())
+    assert not margin > 0
+
+
+@pytest.mark.parametrize("certify", [from_the_mean, from_judgement])
+@pytest.mark.parametrize("size", [0.0, 5e-324, 1e-300, 1e-200, 1e20, 1e160, 1e308])
+@pytest.mark.parametrize("every", [True, False])
+def test_what_float32_cannot_hold_is_not_certified_by_mistake(certify, size, every):
+    """Rings of one point, too small or too large to be squared; not every: rings whose first spoke alone is so."""
+    angle = np.pi / 3 * np.arange(6)
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    ring[slice(None) if every else slice(1)] *= size
+    margin, target = certify(np.zeros(2), ring, None, plain_guard())
+    if margin > 0:
+        assert exact_least(target, ring) > 0
+
+
+def test_a_ring_that_crosses_itself_around_the_mean_is_not_certified():
+    ring = np.array([(1.0, 0.0), (-1.0, 1.0), (1.0, 1.0), (-1.0, 0.0)])
+    margin, _ = from_the_mean(np.array([0.1, 0.2]), ring, None, plain_guard())
     assert not margin > 0

@@ -9,29 +9,37 @@ from random_stars import proposed, size, star
 
 import gmsnet
 from gmsnet.generate import disturb
-from gmsnet.kernels import angle, cvt, laplacian
+from gmsnet.kernels import angle, block, cvt, laplacian, laplacian_plain
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.guard import Precision
 from gmsnet.methods import Field, smoother
 from gmsnet.paper import plain
 from gmsnet.topology import Topology, planar_points
 
-ROW = np.empty(3 * LANES)
+ROW = np.empty(laplacian.ROWS * LANES)
+
+
+def plain_mean(local, n, shift):
+    """The plain form knows no local coordinates: pairs that have their free node at the origin."""
+    star = np.zeros((n + 1, LANES, 2))
+    star[1:] = local.reshape(n, 2, LANES).swapaxes(1, 2)
+    pairs = np.empty(2 * LANES)
+    laplacian_plain.aim(star.ravel(), n, False, pairs, np.empty(block.FLOORS * LANES))
+    shift[:] = pairs.reshape(LANES, 2).T.ravel()
+
+
 TWINS = {  # method and variant → (compiled proposal, plain one)
     ("laplacian", "smart"): (
-        lambda local, n, shift: laplacian.propose(local, n, laplacian.SMART, ROW, shift),
+        lambda local, n, shift: laplacian.propose(local, n, laplacian.SMART, 0.0, ROW, shift),
         plain.smart_laplacian,
     ),
-    ("laplacian", "plain"): (
-        lambda local, n, shift: laplacian.propose(local, n, laplacian.PLAIN, ROW, shift),
-        plain.laplacian,
-    ),
+    ("laplacian", "plain"): (plain_mean, plain.laplacian),
     ("laplacian", "inverse-length"): (
-        lambda local, n, shift: laplacian.propose(local, n, laplacian.INVERSE_LENGTH, ROW, shift),
+        lambda local, n, shift: laplacian.propose(local, n, laplacian.INVERSE_LENGTH, 0.0, ROW, shift),
         plain.inverse_length_laplacian,
     ),
     ("laplacian", "area"): (
-        lambda local, n, shift: laplacian.propose(local, n, laplacian.AREA, ROW, shift),
+        lambda local, n, shift: laplacian.propose(local, n, laplacian.AREA, 0.0, ROW, shift),
         plain.area_laplacian,
     ),
     ("angle", None): (angle.propose, plain.angle),

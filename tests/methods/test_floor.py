@@ -77,16 +77,43 @@ def test_all_are_looked_at_again_only_where_stars_were_held_back(looks):
     looks.look(HELD_BACK)
     looks.look(ALL_MOVED)
     assert looks.blocks[6:] == [few, count]  # at once, for LOOKS have passed
-    for tally in [HELD_BACK, ALL_MOVED, ALL_MOVED, ALL_MOVED]:
+    for tally in [HELD_BACK, *[ALL_MOVED] * 6]:
         looks.look(tally)
-    assert looks.blocks[8:] == [few, few, count, few]
+    assert looks.blocks[8:] == [*[few] * 5, count, few]  # twice as many, for the worst was where it was looked for
+
+
+def at_all(looks):
+    """The numbers of the looks at all."""
+    return [number for number, blocks in enumerate(looks.blocks) if blocks == looks.blocks[0]]
+
+
+def test_the_longer_the_worst_stays_where_it_is_looked_for_the_rarer_are_looks_at_all(looks):
+    for _ in range(46):
+        looks.look(HELD_BACK)
+    assert Floor.LOOKS == 3
+    assert Floor.MOST_LOOKS == 12
+    assert at_all(looks) == [0, 3, 9, 21, 33, 45]
+
+
+def test_a_worst_cell_that_was_overlooked_makes_looks_at_all_as_frequent_as_at_first(looks):
+    for _ in range(20):
+        looks.look(HELD_BACK)
+    triangles, _ = looks.topology.changeable
+    elsewhere = np.setdiff1d(np.arange(len(triangles) // module.LANES), looks.floor.blocks)
+    free = looks.topology.near_free[triangles]
+    cell = next(t for t in elsewhere * module.LANES if free[t].any())
+    corner = int(np.argmax(free[cell]))
+    a, b, c = (looks.points[triangles[cell, (corner + k) % 3]] for k in range(3))
+    a[:] = 4 * ((b + c) / 2) - 3 * a  # over the opposite side: inverted, and far the worst
+    for _ in range(8):
+        looks.look(HELD_BACK)
+    assert at_all(looks) == [0, 3, 9, 21, 24]
 
 
 def test_a_method_that_does_not_tell_what_a_sweep_did_counts_as_held_back(looks):
-    for _ in range(2 * Floor.LOOKS + 1):
+    for _ in range(10):
         looks.look()
-    count = looks.blocks[0]
-    assert [blocks == count for blocks in looks.blocks] == [True, *[False] * (Floor.LOOKS - 1)] * 2 + [True]
+    assert at_all(looks) == [0, 3, 9]
 
 
 def test_the_worst_cells_that_a_method_names_are_looked_at_from_then_on(looks):

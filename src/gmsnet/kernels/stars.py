@@ -140,6 +140,8 @@ def store(points, blocks, block, room, shift, guard, tally):
             if work[MARGIN * LANES + lane] > 0.0:
                 points[i, 0] = work[TARGET * LANES + lane]
                 points[i, 1] = work[(TARGET + 1) * LANES + lane]
+            elif shift[lane] == 0.0 and shift[LANES + lane] == 0.0:
+                continue  # nothing is held back
             elif to_the_star and work[MARGIN * LANES + lane] == -np.inf:
                 tally[DROPPED] += 1
             else:

@@ -19,15 +19,18 @@ class Floor:
     """The floor of the level WORST. Any cell's D/L is an upper bound of the worst one's, and so a floor that keeps it.
 
     Which blocks of triangles hold the worst changes slowly. Therefore only those that were the worst, one in SHARE, are
-    looked at LOOKS times, and from then on until stars are held back, which a floor that is too high can do. A method
-    that knows the worst cells can name them (``watch``).
+    looked at LOOKS times, and from then on until stars are held back, which a floor that is too high can do. Some
+    methods always hold some back: a look at all that finds the worst where it was looked for anyway doubles the number
+    of looks before the next one, up to MOST_LOOKS; one that does not brings it back to LOOKS. A method that knows the
+    worst cells can name them (``watch``).
     """
 
-    LOOKS, SHARE, FEWEST = 3, 16, 64
+    LOOKS, MOST_LOOKS, SHARE, FEWEST = 3, 12, 16, 64
     WATCHED = 64  # cells
 
     def __init__(self) -> None:
         self.blocks: NDArray[np.int32] | None = None
+        self.enough = self.LOOKS  # with that many looks the blocks may be chosen anew
         self.looks = self.unhindered = 0  # looks, and sweeps in which no star was held back, since these were chosen
 
     def watch(self, cells: NDArray[np.int32], shape: NDArray[np.floating[Any]]) -> None:
@@ -36,6 +39,7 @@ class Floor:
         The worst of all must be among them.
         """
         few = min(self.WATCHED, len(cells)) - 1
+        self.enough = self.LOOKS
         self._watch(np.unique(cells[np.argpartition(shape, few)[: few + 1]] // LANES))
 
     def swept(self, tally: NDArray[np.int64]) -> None:
@@ -46,10 +50,13 @@ class Floor:
         """An upper bound of the least D/L of the triangles with a free node, as the points are now."""
         triangles, turn = topology.changeable
         blocks = self.blocks
-        if blocks is None or self.unhindered < self.looks >= self.LOOKS:
-            count = -(-len(triangles) // LANES)
+        if blocks is None or self.unhindered < self.looks >= self.enough:
+            count, watched = -(-len(triangles) // LANES), blocks
             blocks = np.arange(count, dtype=np.int32)
             least = _least(points, triangles, turn, blocks, precision, share)
+            if watched is not None:
+                there = least[watched].min(initial=math.inf) == least.min(initial=math.inf)
+                self.enough = min(2 * self.enough, self.MOST_LOOKS) if there else self.LOOKS
             worst = max(self.FEWEST, count // self.SHARE)
             self._watch(blocks if worst >= count else np.sort(np.argpartition(least, worst)[:worst]).astype(np.int32))
         else:

@@ -1,4 +1,4 @@
-"""Laplacian smoothing, in four variants. The formulas stand in kernels/laplacian.py.
+"""Laplacian smoothing, in four variants. The formulas stand in kernels/laplacian.py and kernels/laplacian_plain.py.
 
 - smart: to the mean of the ring, if that makes the mean q (the aspect ratio) of the star smaller and inverts no
   triangle; else no move. So a move that would invert is left out, not truncated. A tangled star, whose mean q is
@@ -19,13 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels import laplacian as kernels
+from gmsnet.kernels import laplacian_plain
 from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.guard import Guard
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
-VARIANTS = {
+VARIANTS = {  # None: the plain form, which has a kernel of its own
     "smart": kernels.SMART,
-    "plain": kernels.PLAIN,
+    "plain": None,
     "inverse-length": kernels.INVERSE_LENGTH,
     "area": kernels.AREA,
 }
@@ -41,7 +42,10 @@ class Laplacian(StarSmoother):
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, guard, self.variant, tally)
+        if self.variant is None:
+            laplacian_plain.sweep(points, blocks, first, last, guard, tally)
+        else:
+            kernels.sweep(points, blocks, first, last, guard, self.variant, tally)
 
 
 METHOD = Method(
