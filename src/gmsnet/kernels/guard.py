@@ -143,23 +143,24 @@ def permitted(was, now, delta, floor):
 @kernel
 def most_ratios(points, triangles, turn, blocks, unit, grain, first, last, least):
     """The least ``most_of`` over each of the blocks of LANES triangles with the places first…last, into ``least``."""
-    corners, ratio = np.empty(6 * LANES), np.empty(LANES)  # of each corner the pairs [lane][axis]
+    block, ratio = np.empty(6 * LANES), np.empty(LANES)
     for number in range(first, last):
         start = blocks[number] * LANES
         for lane in range(LANES):
             t = min(start + lane, len(triangles) - 1)
             a, b, c = np.uint32(triangles[t, 0]), np.uint32(triangles[t, 1]), np.uint32(triangles[t, 2])
-            ax, ay, bx, by, cx, cy = points[a, 0], points[a, 1], points[b, 0], points[b, 1], points[c, 0], points[c, 1]
-            corners[2 * lane], corners[2 * lane + 1] = ax, ay
-            corners[2 * (LANES + lane)], corners[2 * (LANES + lane) + 1] = bx, by
-            corners[2 * (2 * LANES + lane)], corners[2 * (2 * LANES + lane) + 1] = cx, cy
+            block[lane], block[LANES + lane] = points[a, 0], points[a, 1]
+            block[2 * LANES + lane], block[3 * LANES + lane] = points[b, 0], points[b, 1]
+            block[4 * LANES + lane], block[5 * LANES + lane] = points[c, 0], points[c, 1]
             ratio[lane] = turn[t]
         for lane in range(LANES):
-            cx, cy = corners[2 * (2 * LANES + lane)], corners[2 * (2 * LANES + lane) + 1]
-            px, py = corners[2 * lane] - cx, corners[2 * lane + 1] - cy
-            qx, qy = corners[2 * (LANES + lane)] - cx, corners[2 * (LANES + lane) + 1] - cy
+            px, py = block[lane] - block[4 * LANES + lane], block[LANES + lane] - block[5 * LANES + lane]
+            qx, qy = (
+                block[2 * LANES + lane] - block[4 * LANES + lane],
+                block[3 * LANES + lane] - block[5 * LANES + lane],
+            )
             size = (abs(px) + abs(py)) + (abs(qx) + abs(qy))
-            reach = max(abs(cx), abs(cy)) + size
+            reach = max(abs(block[4 * LANES + lane]), abs(block[5 * LANES + lane])) + size
             # Turned over, the triangle has −D: the components of one side change sides.
             forth = ratio[lane] > 0.0
             ratio[lane] = most_of(
