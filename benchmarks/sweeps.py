@@ -4,9 +4,9 @@
         [--repeats 9] [--json FILE]
 
 L is the unit: one product of the averaging matrix with the coordinates, on one thread, nodes in the same memory order.
-All are timed in turns, and medians are printed, because machines are noisy. Medians do
-not show the looks at all cells that the guard ``worst`` takes in one sweep of three to twelve. The mesh is a random square (Delaunay of
-uniform points) whose nodes stand in the file in random order.
+All are timed in turns, and medians are printed, because machines are noisy. Medians do not show the looks at all cells
+that the guard ``worst`` takes in one sweep of three to twelve. The mesh is a random square (Delaunay of uniform points)
+whose nodes stand in the file in random order.
 """
 
 from __future__ import annotations
