@@ -15,7 +15,8 @@ from gmsnet.kernels import predicates
 from gmsnet.kernels import quality as kernels
 from gmsnet.kernels.compile import LANES
 from gmsnet.kernels.exact import exact
-from gmsnet.mesh import Mesh, exponent_of
+from gmsnet.mesh import Mesh
+from gmsnet.plane import exponent_of
 from gmsnet.topology import Topology, near_points, planar_points
 from gmsnet.workers import Share, serial, workers
 

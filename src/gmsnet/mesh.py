@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gmsnet.arrays import coordinates, float64_rows, plain_array, read_only, whole_numbers
 from gmsnet.errors import InputError
+from gmsnet.plane import exponent_of
 
 DIMENSION = {  # of the cell types that are known by name (meshio's names); all others count as volumes
     "vertex": 0,
@@ -223,24 +224,6 @@ class Mesh:
                     continue
                 nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
         return {name: np.unique(np.concatenate(ids)) for name, ids in nodes.items()}
-
-
-def in_plane(points: NDArray[np.float64], plane: tuple[int, int] | None) -> NDArray[np.float64]:
-    """A view (N, 2) of points (N, dim) along two axes; the first two where they are in no plane."""
-    first, second = plane or (0, 1)
-    return points[:, first : second + 1 : second - first]
-
-
-def exponent_of(points: NDArray[np.float64], plane: tuple[int, int] | None, single: bool) -> int:
-    """The power of two that brings the largest coordinate in the plane near 1.
-
-    0 in single precision, where no product of coordinates can under- or overflow.
-    """
-    if single:
-        return 0
-    coordinates = in_plane(points, plane)
-    largest = max(-float(coordinates.min(initial=0.0)), float(coordinates.max(initial=0.0)))
-    return int(np.frexp(largest)[1])
 
 
 def unmeasured(mesh: Mesh) -> str:

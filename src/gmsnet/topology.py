@@ -21,7 +21,8 @@ from gmsnet.held import MOST_NEIGHBOURS, known_marks, sorted_out
 from gmsnet.kernels import connectivity, layout, patch
 from gmsnet.kernels.block import Blocks
 from gmsnet.kernels.compile import LANES
-from gmsnet.mesh import Mesh, in_plane
+from gmsnet.mesh import Mesh
+from gmsnet.plane import in_plane
 from gmsnet.workers import side_by_side
 
 Ints = NDArray[np.int32]

@@ -1,0 +1,24 @@
+"""The coordinates of points along the two axes of their plane, and how large they are."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def in_plane(points: NDArray[np.float64], plane: tuple[int, int] | None) -> NDArray[np.float64]:
+    """A view (N, 2) of points (N, dim) along two axes; the first two where they are in no plane."""
+    first, second = plane or (0, 1)
+    return points[:, first : second + 1 : second - first]
+
+
+def exponent_of(points: NDArray[np.float64], plane: tuple[int, int] | None, single: bool) -> int:
+    """The power of two that brings the largest coordinate in the plane near 1.
+
+    0 in single precision, where no product of coordinates can under- or overflow.
+    """
+    if single:
+        return 0
+    coordinates = in_plane(points, plane)
+    largest = max(-float(coordinates.min(initial=0.0)), float(coordinates.max(initial=0.0)))
+    return int(np.frexp(largest)[1])
