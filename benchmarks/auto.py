@@ -31,11 +31,11 @@ from reference import figures, stored
 from sweeps import averaging_matrix
 
 import gmsnet
-from gmsnet.measure import measure
+from gmsnet.measure.report import measure
 from gmsnet.methods import smoother
 from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, Auto
-from gmsnet.run import Run, outcome, rank_by
-from gmsnet.topology import Topology, planar_points
+from gmsnet.run.run import Run, outcome, rank_by
+from gmsnet.topology.topology import Topology, planar_points
 
 LESS_MEAN, BELOW_CEILING = 0.004, 0.005
 ROUNDING = 1e-9

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gmsnet.kernels.compile import kernel
+from gmsnet.kernels.jit.compile import kernel
 
 KAPPA = 1.0 / math.sqrt(3.0)
 PAIRS = 12  # steps that L-BFGS remembers

@@ -13,13 +13,13 @@ import sys
 
 import numpy as np
 
-from gmsnet.measure import QualityReport, measure
-from gmsnet.mesh import Mesh
+from gmsnet.measure.report import QualityReport, measure
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.paper import printed
 from gmsnet.paper.cases import CASES
 from gmsnet.paper.plain import PlainMesh
 from gmsnet.paper.plain_getme import SUCCESS, PlainGetme
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 PERIOD, PATIENCE, SWEEPS = 100, 20, 100
 READINGS = {  # what a transformation takes off a penalty, and after how many tests without gain a run stops

@@ -21,7 +21,7 @@ from machine import describe
 
 import gmsnet
 from gmsnet.generate import disturb, layered_mesh
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 NEAR, THROW = 0.02, 0.5
 LAYERS, AROUND = 20, 120

@@ -34,8 +34,8 @@ from gmsnet.generate.graded import graded_mesh
 from gmsnet.methods import smoother
 from gmsnet.methods.base import Smoother
 from gmsnet.plot.figure import new_figure, png_bytes
-from gmsnet.run import Run
-from gmsnet.topology import Topology, planar_points
+from gmsnet.run.run import Run
+from gmsnet.topology.topology import Topology, planar_points
 
 KINDS = {"random": gmsnet.random_mesh, "graded": graded_mesh}
 SWEEPS, SHOWN = 20, (1, 3, 5, 10, 20)

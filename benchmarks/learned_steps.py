@@ -18,12 +18,12 @@ from learned import KINDS, alone
 from machine import describe
 from scipy.optimize import differential_evolution
 
-from gmsnet.kernels import barrier as kernels
-from gmsnet.kernels.guard import WORST, Precision
-from gmsnet.measure import measure
+from gmsnet.kernels.methods import barrier as kernels
+from gmsnet.kernels.star.guard import WORST, Precision
+from gmsnet.measure.report import measure
 from gmsnet.methods.barrier import RELAXATION, STRETCH, Barrier
 from gmsnet.methods.base import Field
-from gmsnet.topology import Topology, planar_points
+from gmsnet.topology.topology import Topology, planar_points
 
 SWEEPS, STEPS = 8, 5
 BOUNDS = [(0.0, 1.5), *[(0.8, 2.2)] * STEPS]

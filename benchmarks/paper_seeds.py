@@ -13,7 +13,7 @@ import sys
 
 import numpy as np
 
-from gmsnet.measure import QualityReport, measure
+from gmsnet.measure.report import QualityReport, measure
 from gmsnet.paper import printed
 from gmsnet.paper.cases import CASES
 

@@ -35,12 +35,12 @@ from barrier import Minimum, Problem, aspects, minimise
 from machine import describe
 
 import gmsnet
-from gmsnet.kernels.guard import LARGEST, STAR, Precision, StarGuard
-from gmsnet.measure import measure
-from gmsnet.mesh import Mesh
+from gmsnet.kernels.star.guard import LARGEST, STAR, Precision, StarGuard
+from gmsnet.measure.report import measure
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, smoother
-from gmsnet.topology import Topology, planar_points
-from gmsnet.workers import Share, workers
+from gmsnet.parallel.threads import Share, workers
+from gmsnet.topology.topology import Topology, planar_points
 
 RECIPE = " ".join(__doc__[__doc__.index("*Reference*") :].split())
 KEYS = ("qhat", "min_shape", "mean_shape")

@@ -18,14 +18,14 @@ from machine import describe
 from sweeps import averaging_matrix
 
 import gmsnet
-from gmsnet.kernels.guard import LEVELS, Precision
-from gmsnet.measure import totals_of
+from gmsnet.kernels.star.guard import LEVELS, Precision
+from gmsnet.measure.report import totals_of
 from gmsnet.methods import smoother
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field
 from gmsnet.methods.worst_first import CYCLES, Cycle, WorstFirst
-from gmsnet.standing import Standing
-from gmsnet.topology import Topology, planar_points
+from gmsnet.run.standing import Standing
+from gmsnet.topology.topology import Topology, planar_points
 
 LONG = tuple(
     Cycle(share, power, sweeps)

@@ -34,12 +34,12 @@ from machine import describe, others_use
 from set_up import RESET, status
 
 import gmsnet
-from gmsnet.adapters import to_mesh
-from gmsnet.kernels.compile import LANES, kernel
-from gmsnet.kernels.guard import Precision
+from gmsnet.kernels.jit.compile import LANES, kernel
+from gmsnet.kernels.star.guard import Precision
+from gmsnet.mesh.adapters import to_mesh
 from gmsnet.methods import Field, smoother
-from gmsnet.topology import Topology, near_points
-from gmsnet.workers import workers
+from gmsnet.parallel.threads import workers
+from gmsnet.topology.topology import Topology, near_points
 
 METHODS = ("laplacian", "barrier", "gmsnet")
 TILE, LINE = 10**6, 64  # nodes; bytes

@@ -24,12 +24,12 @@ import numpy as np
 from machine import describe
 
 import gmsnet
-from gmsnet import workers
 from gmsnet.errors import InputError
 from gmsnet.generate import disturb
 from gmsnet.io import FORMATS
 from gmsnet.methods import METHODS
-from gmsnet.topology import Topology
+from gmsnet.parallel import threads as workers
+from gmsnet.topology.topology import Topology
 
 WARM = 3  # tenths of the meshes, in which kernels are compiled and libraries loaded
 MOST_GROWTH = 8.0  # MB of resident memory

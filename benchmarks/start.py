@@ -26,9 +26,9 @@ import numpy as np  # noqa: E402
 from numba.core import event  # noqa: E402
 
 import gmsnet  # noqa: E402
-from gmsnet.kernels import barrier  # noqa: E402
-from gmsnet.kernels.barrier_star import Power  # noqa: E402
-from gmsnet.kernels.compile import LANES, OPTIONS  # noqa: E402
+from gmsnet.kernels.jit.compile import LANES, OPTIONS  # noqa: E402
+from gmsnet.kernels.methods import barrier  # noqa: E402
+from gmsnet.kernels.methods.barrier_star import Power  # noqa: E402
 
 DEGREES, REPEATS = range(3, 12), 100
 

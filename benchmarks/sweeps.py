@@ -23,11 +23,11 @@ import scipy.sparse
 from machine import describe
 
 import gmsnet
-from gmsnet.kernels.guard import LEVELS, Precision
-from gmsnet.measure import totals_of
+from gmsnet.kernels.star.guard import LEVELS, Precision
+from gmsnet.measure.report import totals_of
 from gmsnet.methods import METHODS, Field, smoother
-from gmsnet.topology import Topology, planar_points
-from gmsnet.workers import workers
+from gmsnet.parallel.threads import workers
+from gmsnet.topology.topology import Topology, planar_points
 
 
 def averaging_matrix(topology):

@@ -24,9 +24,9 @@ import numpy as np
 from machine import describe
 
 import gmsnet
-from gmsnet import engine
 from gmsnet.generate.disturb import disturb
-from gmsnet.topology import Topology
+from gmsnet.run import api as engine
+from gmsnet.topology.topology import Topology
 
 TIMES = 5.0
 

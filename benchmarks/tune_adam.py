@@ -21,15 +21,16 @@ import numpy as np
 from machine import describe
 
 import gmsnet
-from gmsnet.kernels import adam, stars
-from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.objectives import NAMES, OUT
-from gmsnet.measure import measure
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods import adam
+from gmsnet.kernels.simplex.objectives import NAMES, OUT
+from gmsnet.kernels.star import stars
+from gmsnet.measure.report import measure
 from gmsnet.methods.optimize import Adam
 from gmsnet.paper.cases import CASES
-from gmsnet.run import Run, outcome, rank_by
-from gmsnet.topology import Topology
-from gmsnet.workers import workers
+from gmsnet.parallel.threads import workers
+from gmsnet.run.run import Run, outcome, rank_by
+from gmsnet.topology.topology import Topology
 
 RATES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.2)
 STEPS = np.arange(adam.STEPS)

@@ -23,9 +23,9 @@ from machine import describe
 
 import gmsnet
 from gmsnet.generate import disturb
-from gmsnet.kernels.guard import Precision
-from gmsnet.measure import exact_signs
-from gmsnet.topology import Topology, planar_points
+from gmsnet.kernels.star.guard import Precision
+from gmsnet.measure.report import exact_signs
+from gmsnet.topology.topology import Topology, planar_points
 from gmsnet.untangle import untangle
 from gmsnet.untangle.lbfgs import whole
 from gmsnet.untangle.patch import Patch, in_order

@@ -15,7 +15,8 @@ from format_samples import VARIANTS, Variant, points_of
 import gmsnet
 from gmsnet.errors import FormatError
 from gmsnet.io import FORMATS
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 SOURCES = ("SU2", "Gmsh 2.2, text", "Gmsh 4.1, text", "VTK 4.2, text", "VTU, text", "Medit, 3D", "Triangle",
            "STL, text", "STL, binary", "OBJ", "OFF", "PLY, text")  # fmt: skip

@@ -19,7 +19,7 @@ from format_samples import VARIANTS, Files, Variant, points_of
 
 import gmsnet
 from gmsnet.errors import FormatError
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 TARGET = Path(__file__).with_name("formats.md")
 

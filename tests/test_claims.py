@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from reference import metric_loss_optimum
+from support.reference import metric_loss_optimum
 
 import gmsnet
 

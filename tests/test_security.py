@@ -24,7 +24,7 @@ MODULES = {  # that nothing imports
     "ensurepip", "yaml",
 }  # fmt: skip
 EXCEPTIONS = {
-    ("kernels/cache.py", "pickle"),  # to know how an index of Numba's begins: it makes bytes, and reads none
+    ("kernels/jit/cache.py", "pickle"),  # to know how an index of Numba's begins: it makes bytes, and reads none
     ("io/formats.py", "import_module"),  # of the formats in its own table alone
     ("paper/units.py", "multiprocessing"),  # ``gmsnet reproduce`` shares its work among processes of its own
     ("paper/units.py", "multiprocessing.synchronize"),

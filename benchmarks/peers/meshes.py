@@ -10,7 +10,7 @@ import gmsnet
 from gmsnet.generate import disturb
 from gmsnet.generate.delaunay import labelled, triangulate, unique_edges
 from gmsnet.generate.outline import SHAPES, divide
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 NAMES = {"random": "random square", "jittered": "jittered good mesh"}
 SEED = 0

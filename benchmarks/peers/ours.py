@@ -8,10 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 import gmsnet
-from gmsnet.adapters import to_mesh
+from gmsnet.mesh.adapters import to_mesh
 from gmsnet.methods import smoother
-from gmsnet.run import Run
-from gmsnet.topology import Topology
+from gmsnet.run.run import Run
+from gmsnet.topology.topology import Topology
 from peers.peer import Plane
 
 EVERY, APART, MOST = 12, 1.25, 400  # efforts one by one up to EVERY, then each APART times the last; sweeps at most

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.adapters import to_mesh
+from gmsnet.mesh.adapters import to_mesh
 from gmsnet.paper import plain
 from peers.peer import Plane
 

@@ -6,7 +6,7 @@ import numpy as np
 from barrier import minimise
 from reference import Plane as Whole
 
-from gmsnet.adapters import to_mesh
+from gmsnet.mesh.adapters import to_mesh
 from peers.peer import Plane
 
 

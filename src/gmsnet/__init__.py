@@ -16,19 +16,22 @@ from importlib import import_module as _import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gmsnet.engine import SmoothResult, Sweep, quality, smooth
     from gmsnet.errors import FormatError, GmsnetError, InputError, MissingExtraError
     from gmsnet.generate import random_mesh
     from gmsnet.io import read, write
-    from gmsnet.measure import QualityReport
-    from gmsnet.mesh import CellBlock, Mesh
+    from gmsnet.measure.report import QualityReport
+    from gmsnet.mesh.cell_block import CellBlock
+    from gmsnet.mesh.mesh import Mesh
     from gmsnet.methods import METHODS
+    from gmsnet.run.api import quality, smooth
+    from gmsnet.run.result import SmoothResult
+    from gmsnet.run.sweep import Sweep
 
 _HOME = {
-    "SmoothResult": "engine",
-    "Sweep": "engine",
-    "quality": "engine",
-    "smooth": "engine",
+    "SmoothResult": "run.result",
+    "Sweep": "run.sweep",
+    "quality": "run.api",
+    "smooth": "run.api",
     "FormatError": "errors",
     "GmsnetError": "errors",
     "InputError": "errors",
@@ -36,9 +39,9 @@ _HOME = {
     "random_mesh": "generate",
     "read": "io",
     "write": "io",
-    "QualityReport": "measure",
-    "CellBlock": "mesh",
-    "Mesh": "mesh",
+    "QualityReport": "measure.report",
+    "CellBlock": "mesh.cell_block",
+    "Mesh": "mesh.mesh",
     "METHODS": "methods",
 }
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from hand_made import vtk_text
+from support.hand_made import vtk_text
 
 from gmsnet.cli import main
 from gmsnet.generate import random_mesh

@@ -6,7 +6,7 @@ import os
 import sys
 
 import pytest
-from hand_made import vtk_text
+from support.hand_made import vtk_text
 
 TRIANGLES = [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
 FLAT = [(0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 2.0, 0.0), (0.0, 2.0, 0.0), (0.9, 1.2, 0.0)]
@@ -188,7 +188,7 @@ def test_a_format_that_cannot_hold_the_cells_is_found_before_the_smoothing(run, 
     def never(*arguments, **options):
         raise AssertionError("the smoothing began")
 
-    monkeypatch.setattr("gmsnet.engine.smooth", never)
+    monkeypatch.setattr("gmsnet.run.api.smooth", never)
     before = contents(folder)
     check(run("smooth", quads, folder / "out.stl"), folder, before, ["out.stl", "STL"])
 

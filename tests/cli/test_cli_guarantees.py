@@ -9,7 +9,7 @@ import pytest
 
 import gmsnet
 from gmsnet.generate import disturb
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 
 @pytest.fixture

@@ -9,10 +9,10 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 import gmsnet
-from gmsnet import engine
 from gmsnet.cli.progress import Progress
 from gmsnet.cli.signals import Deferral
 from gmsnet.io import write
+from gmsnet.run import stop
 
 
 def listing(folder):
@@ -29,7 +29,7 @@ def test_ctrl_c_writes_the_best_mesh_so_far(run, square, tmp_path, monkeypatch):
     done = run("smooth", square, out, "--method", "gmsnet")
     assert done.code == 0
     assert "2 sweeps" in done.out
-    assert engine.INTERRUPTED in done.out
+    assert stop.INTERRUPTED in done.out
     expected = gmsnet.smooth(gmsnet.read(square), "gmsnet", max_sweeps=2)
     assert gmsnet.read(out).points.tolist() == expected.points.tolist()
 
@@ -56,7 +56,7 @@ def test_a_signal_between_sweeps_writes_the_best_mesh_so_far(run, square, tmp_pa
     monkeypatch.setattr(Progress, "sweep", interrupted)
     out = tmp_path / "out.su2"
     document = json.loads(run("smooth", square, out, "--method", "gmsnet", "--json").out)
-    assert (document["sweeps"], document["stop_reason"]) == (2, engine.INTERRUPTED)
+    assert (document["sweeps"], document["stop_reason"]) == (2, stop.INTERRUPTED)
     expected = gmsnet.smooth(gmsnet.read(square), "gmsnet", max_sweeps=2)
     assert gmsnet.read(out).points.tolist() == expected.points.tolist()
     assert signal.getsignal(number) is handler
@@ -72,7 +72,7 @@ def test_a_signal_while_writing_waits(run, square, tmp_path, monkeypatch, argume
     monkeypatch.setattr("gmsnet.io.write", interrupted)
     done = run("smooth", square, tmp_path / "out.su2", *arguments)
     assert (done.code, done.err) == (0, "")
-    assert engine.INTERRUPTED not in done.out, "the sweeps were over"
+    assert stop.INTERRUPTED not in done.out, "the sweeps were over"
     assert (tmp_path / "out.su2").read_bytes() == (tmp_path / "plain.su2").read_bytes()
 
 

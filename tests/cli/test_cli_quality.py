@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from hand_made import vtk_text
+from support.hand_made import vtk_text
 
 import gmsnet
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet import engine
 from gmsnet.cli.smooth_report import Outcome
-from gmsnet.target import Target
+from gmsnet.measure.target import Target
+from gmsnet.run import stop
 
 
 def listing(folder):
@@ -72,7 +72,7 @@ def test_json_holds_everything(run, square, tmp_path):
     assert document["held"] == {reason: len(ids) for reason, ids in result.held.items()}
     assert [sweep["qhat"] for sweep in document["history"]] == [sweep.qhat for sweep in result.history]
     assert document["output"] == str(out)
-    assert document["stop_reason"] == engine.MAX_SWEEPS
+    assert document["stop_reason"] == stop.MAX_SWEEPS
     assert len(document["worst"]) == 5
     assert any("bottom" in loss for loss in document["lost"])
     assert document["target_met"] is True
@@ -89,7 +89,7 @@ def test_a_target_that_is_met(run, square, tmp_path):
     target = (result.before.shape.min() + result.after.shape.min()) / 2
     done = run("smooth", square, tmp_path / "out.su2", "--target-quality", target)
     assert (done.code, done.err) == (0, "")
-    assert engine.TARGET_REACHED in done.out
+    assert stop.TARGET_REACHED in done.out
 
 
 def test_a_target_that_is_met_already(run, square, tmp_path):
@@ -228,8 +228,8 @@ def test_the_target_is_judged_by_the_cells_and_not_by_the_reason_to_stop(square)
     result = gmsnet.smooth(mesh, max_sweeps=2)
     least = result.after.shape.min()
     for target, reason, met in (
-        (np.nextafter(least, 1), engine.TARGET_REACHED, False),
-        (least, engine.MAX_SWEEPS, True),
+        (np.nextafter(least, 1), stop.TARGET_REACHED, False),
+        (least, stop.MAX_SWEEPS, True),
     ):
         outcome = Outcome("in", "out", "gmsnet", mesh, replace(result, stop_reason=reason), Target(target), [], None)
         assert outcome.target_met is met

@@ -9,7 +9,7 @@ import pytest
 
 import gmsnet
 from gmsnet.cli.visible import visible
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 HARM = "\x1b]0;title\x07\x1b[2J\x9b31m\u202etxt.\x7f"
 CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")

@@ -17,7 +17,7 @@ from gmsnet.errors import InputError
 from gmsnet.io import cells, gmsh_sections, mapped, places, splice, stl, text
 from gmsnet.io.formats import FORMATS
 from gmsnet.io.splice import FileSource
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 SECONDS = 5.0  # of the processor, for one file
 MEMORY = 200_000_000  # bytes beyond the length of the file

@@ -15,7 +15,6 @@ from gmsnet.io.formats import FORMATS
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "io"))  # the tests of the readers, and what they share
 
-import gmsh_variants
 import test_medit
 import test_obj
 import test_off
@@ -25,8 +24,9 @@ import test_su2
 import test_triangle
 import test_vtk
 import test_vtu
-from damage import triangle_grid
-from vtk_variants import grid_of, legacy_variants, mixed_mesh, polydata_of, vtu_variants
+from support import gmsh_variants
+from support.damage import triangle_grid
+from support.vtk_variants import grid_of, legacy_variants, mixed_mesh, polydata_of, vtu_variants
 
 SU2 = b"""% made up
 NDIME= 2 % plane

@@ -15,8 +15,8 @@ from random import Random
 
 import atheris
 
-import gmsnet.kernels.text
-import gmsnet.kernels.weld  # noqa: F401 - kernels are compiled as they are, before anything is instrumented
+import gmsnet.kernels.text.text
+import gmsnet.kernels.topology.weld  # noqa: F401 - kernels are compiled as they are, before anything is instrumented
 
 with atheris.instrument_imports(include=["gmsnet.io"]):
     from fuzz.corpus import name_of, stored

@@ -6,7 +6,7 @@ import pytest
 import gmsnet
 from gmsnet.errors import InputError
 from gmsnet.generate.graded import graded_mesh
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 
 @pytest.mark.parametrize("ratio", [2.0, 100.0])

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 import gmsnet
 from gmsnet.errors import InputError
 from gmsnet.generate import layered_mesh
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 
 @pytest.mark.parametrize(("layers", "aspect", "around"), [(20, 1000.0, 120), (1, 1.0, 20), (8, 50.0, 61)])

@@ -6,7 +6,8 @@ import pytest
 import gmsnet
 from gmsnet.errors import InputError
 from gmsnet.generate import settle
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -9,13 +9,13 @@ import threading
 from pathlib import Path
 
 import pytest
-from folder import SMOOTH, names
+from support.folder import SMOOTH, names
 
 import gmsnet
 from gmsnet.cli import main
 from gmsnet.errors import InputError
 from gmsnet.io import read, write
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 
 @pytest.fixture(scope="module")

@@ -12,14 +12,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damage import cells_of, triangle_grid
 from hypothesis import given
 from hypothesis import strategies as st
+from support.damage import cells_of, triangle_grid
 
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io import FORMATS, atomic, read, streams, write
 from gmsnet.io.formats import sniff
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 TEXT_FORMATS = ("su2", "medit", "triangle", "obj", "off")
 

@@ -5,21 +5,22 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import gmsh_variants
 import meshio
 import numpy as np
 import pytest
-from contracts import check_all_cuts_refused, check_conversion, check_splice, contents, read, refused
-from damage import ENDS, GAPS, NUMBERS, cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
-from gmsh_variants import VARIANTS
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vtk_variants import mixed_mesh
+from support import gmsh_variants
+from support.contracts import check_all_cuts_refused, check_conversion, check_splice, contents, read, refused
+from support.damage import ENDS, GAPS, NUMBERS, cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
+from support.gmsh_variants import VARIANTS
+from support.vtk_variants import mixed_mesh
 
 import gmsnet
 from gmsnet.errors import FormatError
 from gmsnet.io import gmsh
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 OLD, NEW = VARIANTS["2.2 text"], VARIANTS["4.1 text"]
 

@@ -14,7 +14,7 @@ SCRIPT = Path(__file__).parents[1] / "killing.py"
 
 @pytest.mark.skipif(os.name != "posix", reason="only POSIX systems fork and kill")
 def test_nothing_is_damaged_missing_or_left() -> None:
-    """``python tests/killing.py`` alone kills more often; so few kills at random rarely hit each moment."""
+    """``python tests/support/killing.py`` alone kills more often; so few kills at random rarely hit each moment."""
     command = [sys.executable, str(SCRIPT), "--kills", "48", "--whole", "2", "--nodes", "1000"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -14,7 +14,7 @@ import pytest
 import gmsnet
 from gmsnet.errors import InputError
 from gmsnet.io import atomic, temporary, write
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 
 def names(folder: Path) -> list[str]:

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damage import facts, triangle_grid
 from hypothesis import given
 from hypothesis import strategies as st
+from support.damage import facts, triangle_grid
 
 from gmsnet import io
 from gmsnet.io import FORMATS, convert, mapped, splice
 from gmsnet.io.pieces import Pieces
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="files are mapped where that does not lock them")
 

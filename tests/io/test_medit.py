@@ -6,8 +6,10 @@ import re
 
 import numpy as np
 import pytest
-from contracts import contents, spliced
-from damage import (
+from hypothesis import given
+from hypothesis import strategies as st
+from support.contracts import contents, spliced
+from support.damage import (
     ENDS,
     FEW,
     GAPS,
@@ -20,12 +22,11 @@ from damage import (
     regions_of,
     triangle_grid,
 )
-from hypothesis import given
-from hypothesis import strategies as st
 
 from gmsnet.errors import FormatError
 from gmsnet.io import medit
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 PLAIN = b"""MeshVersionFormatted 2
 Dimension 2

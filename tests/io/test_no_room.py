@@ -11,12 +11,12 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from folder import SMOOTH, names
+from support.folder import SMOOTH, names
 
 import gmsnet
 from gmsnet.errors import InputError
 from gmsnet.io import write
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 IS_ROOT = os.geteuid() == 0
 

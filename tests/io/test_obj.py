@@ -6,14 +6,15 @@ import itertools
 
 import numpy as np
 import pytest
-from contracts import contents, spliced
-from damage import ENDS, GAPS, NUMBERS, cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
 from hypothesis import given
 from hypothesis import strategies as st
+from support.contracts import contents, spliced
+from support.damage import ENDS, GAPS, NUMBERS, cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
 
 from gmsnet.errors import FormatError
 from gmsnet.io import obj
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 PLAIN = b"""# made up
 mtllib some.mtl

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contracts import contents, spliced
-from damage import (
+from hypothesis import given
+from hypothesis import strategies as st
+from support.contracts import contents, spliced
+from support.damage import (
     ENDS,
     FEW,
     GAPS,
@@ -18,12 +20,11 @@ from damage import (
     read_or_refuse,
     triangle_grid,
 )
-from hypothesis import given
-from hypothesis import strategies as st
 
 from gmsnet.errors import FormatError
 from gmsnet.io import off
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 PLAIN = b"""OFF
 # made up

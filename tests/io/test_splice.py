@@ -8,16 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from contracts import spliced
-from damage import triangle_grid
 from hypothesis import given
 from hypothesis import strategies as st
+from support.contracts import spliced
+from support.damage import triangle_grid
 
 from gmsnet.io import FORMATS, read, write
 from gmsnet.io.places import Lattice, Places
 from gmsnet.io.splice import BinarySlots, FileSource, TextSlots
 from gmsnet.io.text import Text
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 TEXT = b"head 1.50 2e0 | +3.25\t.5\r\n7. 1E1 1.50 tail"
 STARTS = Text(TEXT).tokens(0, 10)[0][[1, 2, 4, 5, 6, 7]].reshape(3, 2)

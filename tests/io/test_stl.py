@@ -8,15 +8,24 @@ import numpy as np
 import pytest
 import pyvista
 import vtk
-from contracts import check_all_cuts_refused, check_conversion, check_splice, contents, moved_points, read, refused
-from damage import ENDS, GAPS, NUMBERS, damaged, facts, read_or_refuse, regions_of, triangle_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vtk_variants import mixed_mesh, points_by_vtk
+from support.contracts import (
+    check_all_cuts_refused,
+    check_conversion,
+    check_splice,
+    contents,
+    moved_points,
+    read,
+    refused,
+)
+from support.damage import ENDS, GAPS, NUMBERS, damaged, facts, read_or_refuse, regions_of, triangle_grid
+from support.vtk_variants import mixed_mesh, points_by_vtk
 
 from gmsnet.errors import FormatError
 from gmsnet.io import stl
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 
 def text_stl(solids: dict[str, list[list[str]]]) -> bytes:

@@ -14,7 +14,7 @@ import pytest
 
 import gmsnet
 from gmsnet.io import read, write
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from contracts import contents, spliced
-from damage import (
+from hypothesis import given
+from hypothesis import strategies as st
+from support.contracts import contents, spliced
+from support.damage import (
     ENDS,
     FEW,
     GAPS,
@@ -19,12 +21,11 @@ from damage import (
     regions_of,
     triangle_grid,
 )
-from hypothesis import given
-from hypothesis import strategies as st
 
 from gmsnet.errors import FormatError
 from gmsnet.io import triangle
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 NODE = b"""4 2 1 1
 1 0.0 0.0 0.5 1

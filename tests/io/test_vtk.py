@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import vtk
-from contracts import (
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.contracts import (
     check_all_cuts_refused,
     check_conversion,
     check_splice,
@@ -19,14 +21,13 @@ from contracts import (
     read,
     refused,
 )
-from damage import ENDS, GAPS, NUMBERS, cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from vtk_variants import grid_of, legacy_variants, mixed_mesh, points_by_vtk, polydata_of
+from support.damage import ENDS, GAPS, NUMBERS, cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
+from support.vtk_variants import grid_of, legacy_variants, mixed_mesh, points_by_vtk, polydata_of
 
 from gmsnet.errors import FormatError
 from gmsnet.io import vtk as vtk_format
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 HEAD = "# vtk DataFile Version {}\ntitle\n{}\nDATASET UNSTRUCTURED_GRID\n"
 PLAIN = (

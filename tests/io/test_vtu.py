@@ -11,18 +11,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 import vtk
-from contracts import check_all_cuts_refused, check_conversion, check_splice, contents, moved_points, read, refused
-from damage import cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vtk_variants import grid_of, mixed_mesh, points_by_vtk, vtu_variants
+from support.contracts import (
+    check_all_cuts_refused,
+    check_conversion,
+    check_splice,
+    contents,
+    moved_points,
+    read,
+    refused,
+)
+from support.damage import cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
+from support.vtk_variants import grid_of, mixed_mesh, points_by_vtk, vtu_variants
 
 from gmsnet.errors import FormatError
 from gmsnet.io import gmsh, ply, stl, vtu
 from gmsnet.io import vtk as vtk_format
 from gmsnet.io.vtu_arrays import Encoding, decode
 from gmsnet.io.vtu_xml import Document
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 PLAIN = """<?xml version="1.0"?>
 <VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">

@@ -7,15 +7,16 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from contracts import contents
-from damage import facts, triangle_grid
-from gmsh_variants import VARIANTS
 from hypothesis import given
 from hypothesis import strategies as st
+from support.contracts import contents
+from support.damage import facts, triangle_grid
+from support.gmsh_variants import VARIANTS
 
 from gmsnet.io import FORMATS, convert, gmsh, gmsh_sections, obj, places, stl, su2, text, vtk_cells
-from gmsnet.kernels import weld as kernels
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.kernels.topology import weld as kernels
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_stars import compiled_shifts, random_weights, star
+from support.random_stars import compiled_shifts, random_weights, star
 
 from gmsnet import weights
 from gmsnet.learn.data import Stars

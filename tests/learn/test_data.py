@@ -5,7 +5,8 @@ import pytest
 
 from gmsnet.generate import random_mesh
 from gmsnet.learn import data
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 
 def test_twenty_squares_of_differing_size_and_density():

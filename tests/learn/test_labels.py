@@ -10,8 +10,8 @@ from gmsnet.learn.backend import torch
 from gmsnet.learn.data import Stars
 from gmsnet.learn.losses import doubled_areas, metric_loss
 from gmsnet.learn.optimum import optimal_position
-from gmsnet.mesh import Mesh
-from gmsnet.topology import Topology
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.topology import Topology
 
 
 @pytest.fixture(scope="module")

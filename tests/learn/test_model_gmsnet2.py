@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from naive_gmsnet2 import shift as naive_shift
-from random_stars import compiled_gmsnet2_shifts, random_gmsnet2_weights, star
+from support.naive_gmsnet2 import shift as naive_shift
+from support.random_stars import compiled_gmsnet2_shifts, random_gmsnet2_weights, star
 
 from gmsnet import weights
 from gmsnet.learn.backend import torch

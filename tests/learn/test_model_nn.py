@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from naive import nn_shift
-from random_stars import compiled_nn_shifts, random_nn_weights, star
+from support.naive import nn_shift
+from support.random_stars import compiled_nn_shifts, random_nn_weights, star
 
 from gmsnet import weights
 from gmsnet.learn.backend import torch

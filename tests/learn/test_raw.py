@@ -13,8 +13,8 @@ from gmsnet.learn import raw
 from gmsnet.learn.backend import torch
 from gmsnet.learn.data import Stars
 from gmsnet.learn.model import GMSNet
-from gmsnet.measure import measure
-from gmsnet.topology import Topology
+from gmsnet.measure.report import measure
+from gmsnet.topology.topology import Topology
 
 MESH = random_mesh(150, seed=3)
 TRAINED = GMSNet.from_tensors(weights.load().tensors)

@@ -11,8 +11,8 @@ import pytest
 import gmsnet
 from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, Auto, to_come
 from gmsnet.paper.cases import CASES
-from gmsnet.run import Run
-from gmsnet.topology import Topology
+from gmsnet.run.run import Run
+from gmsnet.topology.topology import Topology
 
 
 def runs(mesh, stages, guard="worst"):

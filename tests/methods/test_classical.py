@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import naive
 import numpy as np
 import pytest
-from random_stars import proposed, size, star
+from support import naive
+from support.random_stars import proposed, size, star
 
 import gmsnet
 from gmsnet.generate import disturb
-from gmsnet.kernels import angle, block, cvt, laplacian, laplacian_plain
-from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.guard import Precision
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods import angle, cvt, laplacian, laplacian_plain
+from gmsnet.kernels.star import block
+from gmsnet.kernels.star.guard import Precision
 from gmsnet.methods import Field, smoother
 from gmsnet.paper import plain
-from gmsnet.topology import Topology, planar_points
+from gmsnet.topology.topology import Topology, planar_points
 
 ROW = np.empty(laplacian.ROWS * LANES)
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.kernels.guard import Precision
+from gmsnet.kernels.star.guard import Precision
 from gmsnet.methods import floor as module
 from gmsnet.methods.floor import Floor
-from gmsnet.topology import Topology, near_points
-from gmsnet.workers import serial
+from gmsnet.parallel.threads import serial
+from gmsnet.topology.topology import Topology, near_points
 
 HELD_BACK, ALL_MOVED = np.array([9, 1, 0]), np.array([10, 0, 0])
 

@@ -13,7 +13,7 @@ from safetensors.numpy import save
 import gmsnet
 from gmsnet import weights
 from gmsnet.generate import disturb
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 SHAPES = {"gmsnet": weights.shapes.gmsnet(8), "gmsnet2": weights.shapes.gmsnet2(8), "nn": weights.shapes.nn()}
 EXTREMES = np.array([0.0, -0.0, 1.0, -1.0, 1e-45, 1e-38, 1e10, -1e10, 1e30, -1e30, 3.4e38, -3.4e38], dtype=np.float32)

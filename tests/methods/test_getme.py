@@ -10,14 +10,14 @@ import pytest
 import gmsnet
 from gmsnet import CellBlock, Mesh
 from gmsnet.generate import disturb
-from gmsnet.kernels import getme as kernels
-from gmsnet.kernels.block import DROPPED, MOVED
-from gmsnet.kernels.guard import Precision, plain_guard
+from gmsnet.kernels.methods import getme as kernels
+from gmsnet.kernels.star.block import DROPPED, MOVED
+from gmsnet.kernels.star.guard import Precision, plain_guard
 from gmsnet.methods import getme
 from gmsnet.methods.base import Field
 from gmsnet.paper import plain_getme
 from gmsnet.paper.plain import PlainMesh
-from gmsnet.topology import Topology, planar_points
+from gmsnet.topology.topology import Topology, planar_points
 
 SETTINGS = {  # θ, λ, ρ, η
     "sequential": (math.pi / 3, 0.0, 1.0, 0),

@@ -8,18 +8,18 @@ from __future__ import annotations
 import os
 from fractions import Fraction
 
-import naive
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import naive
 from test_properties import every_method, mesh_of, triangulation
 
 import gmsnet
-from gmsnet.kernels.guard import LEVELS, STAR, VALID
+from gmsnet.kernels.star.guard import LEVELS, STAR, VALID
 from gmsnet.methods import Field, smoother
-from gmsnet.run import precision_of
-from gmsnet.topology import Topology, planar_points
+from gmsnet.run.run import precision_of
+from gmsnet.topology.topology import Topology, planar_points
 
 EXAMPLES = int(os.environ.get("GMSNET_GUARD_EXAMPLES", "6"))
 SWEEPS = 3

@@ -8,17 +8,18 @@ from __future__ import annotations
 import os
 from fractions import Fraction
 
-import naive
 import numpy as np
 import pytest
-from hell import hellish
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import naive
+from support.hell import hellish
 from test_guard_levels import as_written, check, ratios
 from test_properties import every_method
 
 import gmsnet
-from gmsnet.kernels.guard import LEVELS, STAR
+from gmsnet.kernels.star.guard import LEVELS, STAR
+from gmsnet.run import stop
 
 EXAMPLES = int(os.environ.get("GMSNET_HELL_EXAMPLES", "3"))
 
@@ -98,9 +99,9 @@ def test_nothing_to_do_is_said(method, level):
     points = np.random.default_rng(0).random((5, 2))
     for cells in (np.empty((0, 3), dtype=int), np.array([[0, 1, 2]]), np.array([[0, 1, 2], [1, 2, 3]])):
         result = gmsnet.smooth((points, cells), **method, guard=level)
-        assert result.stop_reason == gmsnet.engine.NOTHING_TO_MOVE
+        assert result.stop_reason == stop.NOTHING_TO_MOVE
         assert not result.moved.any()
     square = gmsnet.random_mesh(60, seed=0)
     result = gmsnet.smooth(square, **method, guard=level, fixed=np.arange(len(square.points)))
-    assert result.stop_reason == gmsnet.engine.NOTHING_TO_MOVE
+    assert result.stop_reason == stop.NOTHING_TO_MOVE
     assert not result.moved.any()

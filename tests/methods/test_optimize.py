@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import naive_objectives
 import numpy as np
 import pytest
-from random_stars import proposed, size, star
 from scipy.optimize import minimize
+from support import naive_objectives
+from support.random_stars import proposed, size, star
 
 import gmsnet
-from gmsnet.kernels import adam, newton
-from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.objectives import METRIC, NAMES, OUT
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods import adam, newton
+from gmsnet.kernels.simplex.objectives import METRIC, NAMES, OUT
 from gmsnet.methods.optimize import Adam, step_sizes
 
 every_objective = pytest.mark.parametrize("name", NAMES)

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-import naive
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
+from support import naive
 
 import gmsnet
-from gmsnet import METHODS, CellBlock, Mesh, workers
+from gmsnet import METHODS, CellBlock, Mesh
 from gmsnet.generate import disturb
-from gmsnet.topology import Topology
+from gmsnet.parallel import threads as workers
+from gmsnet.topology.topology import Topology
 
 
 def name_of(method):

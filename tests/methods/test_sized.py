@@ -7,11 +7,11 @@ import pytest
 
 import gmsnet
 from gmsnet.generate import disturb
-from gmsnet.kernels import sized
-from gmsnet.kernels.compile import LANES
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods import sized
 from gmsnet.methods.sized import BAND, WEIGHT, Sized, banded
 from gmsnet.paper.cases import CASES
-from gmsnet.topology import Topology, planar_points
+from gmsnet.topology.topology import Topology, planar_points
 
 
 def doubles(points, triangles):
@@ -148,9 +148,9 @@ def test_disturbed_meshes_get_their_areas_and_shapes_back(name, amount):
 
 def test_the_areas_are_those_at_the_first_sweep():
     """A run of twenty sweeps in two halves by one smoother is the run in one; a new smoother takes the areas anew."""
-    from gmsnet.kernels.guard import Precision
+    from gmsnet.kernels.star.guard import Precision
     from gmsnet.methods import Field
-    from gmsnet.workers import workers
+    from gmsnet.parallel.threads import workers
 
     mesh = gmsnet.random_mesh(200, seed=1)
     topology = Topology.of(mesh)
@@ -170,9 +170,9 @@ def test_the_areas_are_those_at_the_first_sweep():
 
 def test_bands_hold_whatever_the_smoother_wants():
     """Areas of kept cells stay within a tenth of those of the start, sweep after sweep; shapes gain all the same."""
-    from gmsnet.kernels.guard import Precision
+    from gmsnet.kernels.star.guard import Precision
     from gmsnet.methods import Field
-    from gmsnet.workers import workers
+    from gmsnet.parallel.threads import workers
 
     mesh = gmsnet.random_mesh(400, seed=2)
     topology = Topology.of(mesh)

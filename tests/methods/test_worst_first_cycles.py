@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 import gmsnet
-from gmsnet.kernels.guard import VALID, WORST, Precision
+from gmsnet.kernels.star.guard import VALID, WORST, Precision
 from gmsnet.methods.base import Field
 from gmsnet.methods.worst_first import CYCLES, WorstFirst
-from gmsnet.topology import Topology, planar_points
+from gmsnet.topology.topology import Topology, planar_points
 
 
 def field_of(mesh, level):

@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 
-import naive
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_stars import star
+from support import naive
+from support.random_stars import star
 
 import gmsnet
 from gmsnet import CellBlock, Mesh
 from gmsnet.generate import disturb
 from gmsnet.paper import plain
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 MOVES = [
     plain.laplacian,

@@ -6,19 +6,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from random_stars import proposed, size, star
+from support.random_stars import proposed, size, star
 
 import gmsnet
 from gmsnet import weights
-from gmsnet.kernels import adam
-from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.objectives import METRIC, OUT
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods import adam
+from gmsnet.kernels.simplex.objectives import METRIC, OUT
 from gmsnet.learn.backend import torch
 from gmsnet.learn.data import Stars
 from gmsnet.learn.model import GMSNet
 from gmsnet.methods.optimize import step_sizes
 from gmsnet.paper import plain, plain_torch
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 
 def stars_of(rng):

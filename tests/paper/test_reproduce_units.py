@@ -6,7 +6,7 @@ import json
 import os
 
 import pytest
-import reproduce_work as work
+from support import reproduce_work as work
 
 from gmsnet.errors import InputError
 from gmsnet.paper.plan import Plan

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tangles import annulus, grid, moved, prepared, untangled
+from support.tangles import annulus, grid, moved, prepared, untangled
 
 import gmsnet
 from gmsnet.generate import disturb
 from gmsnet.generate.layered import layered_mesh
-from gmsnet.kernels import untangle as kernels
-from gmsnet.topology import Topology
+from gmsnet.kernels.untangle import mending as kernels
+from gmsnet.topology.topology import Topology
 from gmsnet.untangle.guarded import culprits, what_is_left
 from gmsnet.untangle.harmonic import harmonic
 from gmsnet.untangle.patch import Patch, in_order

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tangles import grid, mesh_of, moved, untangled
+from support.tangles import grid, mesh_of, moved, untangled
 
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 from gmsnet.untangle.reasons import CROSSING, EMPTY, HELD, kernel_depth
 
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import naive
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
-from tangles import annulus, grid, mesh_of, moved, prepared, untangled
+from support import naive
+from support.tangles import annulus, grid, mesh_of, moved, prepared, untangled
 
 import gmsnet
 from gmsnet.generate import disturb
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 from gmsnet.untangle import ALL, NOTHING, PART, untangle
 
 

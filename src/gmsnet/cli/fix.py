@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from gmsnet.mesh import Mesh
+    from gmsnet.mesh.mesh import Mesh
 
 
 def fixed_nodes(mesh: Mesh, given: Sequence[str]) -> NDArray[np.bool_]:
@@ -24,7 +24,7 @@ def fixed_nodes(mesh: Mesh, given: Sequence[str]) -> NDArray[np.bool_]:
     """
     import numpy as np
 
-    from gmsnet.fixed import fixed_mask
+    from gmsnet.mesh.selection import fixed_mask
 
     mask = np.zeros(len(mesh.points), dtype=bool)
     for value in given:

@@ -12,7 +12,7 @@ from rich.console import Console
 from gmsnet.cli.visible import visible
 
 if TYPE_CHECKING:
-    from gmsnet.engine import Sweep
+    from gmsnet.run.sweep import Sweep
 
 
 class Progress:

@@ -29,8 +29,8 @@ def quality(
 
     from gmsnet import io
     from gmsnet.cli import output, report
-    from gmsnet.engine import quality as measure
-    from gmsnet.mesh import unmeasured
+    from gmsnet.mesh.mesh import unmeasured
+    from gmsnet.run.api import quality as measure
 
     mesh = io.read(input, format)
     volumes = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})

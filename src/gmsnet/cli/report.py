@@ -9,13 +9,14 @@ import numpy as np
 from rich.table import Table
 
 from gmsnet.cli.output import table
-from gmsnet.mesh import CORNERS, Mesh
+from gmsnet.mesh.cell_block import CORNERS
+from gmsnet.mesh.mesh import Mesh
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from gmsnet.measure import QualityReport
-    from gmsnet.run import Sweep
+    from gmsnet.measure.report import QualityReport
+    from gmsnet.run.sweep import Sweep
 
 WORST = 5  # cells are shown
 NAMED = 10  # cells are named in one line

@@ -13,8 +13,8 @@ from gmsnet.errors import GmsnetError, InputError
 
 if TYPE_CHECKING:
     from gmsnet.cli.target import Target as Output
-    from gmsnet.engine import Sweep
-    from gmsnet.mesh import Mesh
+    from gmsnet.mesh.mesh import Mesh
+    from gmsnet.run.sweep import Sweep
 
 
 def _method_names() -> list[str]:
@@ -127,9 +127,9 @@ def smooth(
     from gmsnet.cli.fix import fixed_nodes
     from gmsnet.cli.progress import Progress
     from gmsnet.cli.smooth_report import Outcome
-    from gmsnet.engine import check_mesh, check_options
-    from gmsnet.engine import smooth as run
-    from gmsnet.target import Target
+    from gmsnet.measure.target import Target
+    from gmsnet.run.api import check_mesh, check_options
+    from gmsnet.run.api import smooth as run
 
     choice: dict[str, Any] = {"variant": variant, "objective": objective, "weights": weights, "seed": seed}
     options: dict[str, Any] = {

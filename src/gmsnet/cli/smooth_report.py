@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet import engine
 from gmsnet.cli import output, report
 from gmsnet.cli.target import shown
-from gmsnet.engine import SmoothResult, Sweep
-from gmsnet.mesh import Mesh
-from gmsnet.preserve import LAYER
-from gmsnet.target import Target
+from gmsnet.measure.target import Target
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.preserve.protection import LAYER
+from gmsnet.run import stop
+from gmsnet.run.result import SmoothResult
+from gmsnet.run.sweep import Sweep
 
 UNKNOWN = "not mended, or untangling was off"
 
@@ -157,15 +158,15 @@ class Outcome:
     def verdict(self) -> str:
         """One honest sentence on what was gained and why the run ended."""
         result = self.result
-        if result.stop_reason == engine.NOTHING_TO_MOVE and self.free:
+        if result.stop_reason == stop.NOTHING_TO_MOVE and self.free:
             return f"nothing to move: of the cells that miss the target all nodes are held ({self._reasons()})"
-        if result.stop_reason == engine.NOTHING_TO_MOVE:
+        if result.stop_reason == stop.NOTHING_TO_MOVE:
             return f"nothing to move: all {report.amount(len(self.mesh.points), 'node')} are held ({self._reasons()})"
         given = [self.choice.get(key) for key in ("variant", "objective", "weights")]
         method = " ".join([self.method, *(each for each in given if each is not None)])
         run = f"{method}, {report.amount(result.sweeps, 'sweep')} in {result.seconds:.3g} s: {result.stop_reason}"
         if not result.moved.any():
-            if result.stop_reason == engine.TARGET_REACHED and self.target_met:
+            if result.stop_reason == stop.TARGET_REACHED and self.target_met:
                 return "nothing was moved: the target is met already"
             return f"no gain: no mesh on the way was better than the input ({run})"
         return f"{int(result.moved.sum()):,} of {report.amount(self.free, 'free node')} moved ({run})"

@@ -15,7 +15,7 @@ from gmsnet.io.formats import BY_SUFFIX, FORMATS, entry_of, format_of_suffix
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, is_standard_output, standard_output
 
 if TYPE_CHECKING:
-    from gmsnet.mesh import Mesh
+    from gmsnet.mesh.mesh import Mesh
 
 
 @dataclass(frozen=True)

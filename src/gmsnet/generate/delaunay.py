@@ -13,7 +13,8 @@ from scipy.spatial import Delaunay, QhullError
 
 from gmsnet.errors import InputError
 from gmsnet.generate.outline import inside
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.generate.random import generator
-from gmsnet.kernels.predicates import signs
-from gmsnet.mesh import CORNERS, Mesh
+from gmsnet.kernels.simplex.predicates import signs
+from gmsnet.mesh.cell_block import CORNERS
+from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -17,7 +17,7 @@ from gmsnet.errors import InputError
 from gmsnet.generate.curves import Boundary, Curve, Size, boundary
 from gmsnet.generate.delaunay import Triangulation, labelled, triangulate, unique_edges
 from gmsnet.generate.outline import inside
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -7,7 +7,7 @@ import numpy as np
 from gmsnet.errors import InputError
 from gmsnet.generate.delaunay import labelled, triangulate
 from gmsnet.generate.random import generator
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 SIDES = ("bottom", "right", "top", "left")
 

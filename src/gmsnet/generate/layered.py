@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 from gmsnet.errors import InputError
 from gmsnet.generate.curves import Curve
 from gmsnet.generate.good import good_mesh
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

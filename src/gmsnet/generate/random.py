@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from gmsnet.errors import InputError
 from gmsnet.generate.delaunay import labelled, triangulate
 from gmsnet.generate.outline import SHAPES, area, divide, polygon, uniform_inside
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 
 def random_mesh(

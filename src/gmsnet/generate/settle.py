@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from gmsnet.errors import InputError
 from gmsnet.generate.delaunay import unique_edges
 from gmsnet.generate.disturb import keep_orientation
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.generate.random import generator
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 Ints = NDArray[np.int64]
 

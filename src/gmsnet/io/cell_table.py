@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gmsnet.errors import FormatError
 from gmsnet.io.cells import Small, cell_blocks, distinct
 from gmsnet.io.places import ranges
-from gmsnet.mesh import NODES, CellBlock
+from gmsnet.mesh.cell_block import NODES, CellBlock
 
 
 class Kind(NamedTuple):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gmsnet.io.places import ranges
 from gmsnet.io.text import Starts, Text
-from gmsnet.mesh import CellBlock
+from gmsnet.mesh.cell_block import CellBlock
 
 Small = NDArray[np.int64] | NDArray[np.int32] | NDArray[np.int8]  # types and sizes of cells
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from gmsnet.errors import FormatError
 from gmsnet.io.cells import distinct
 from gmsnet.io.pieces import Piece
-from gmsnet.kernels import text as kernels
-from gmsnet.kernels.decimals import WIDEST
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.kernels.text import text as kernels
+from gmsnet.kernels.text.decimals import WIDEST
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 _PIECE = 1 << 20  # bytes that are made at once
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Pieces
 from gmsnet.io.splice import Slots
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 
 @dataclass(frozen=True)

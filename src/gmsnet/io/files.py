@@ -18,7 +18,7 @@ from gmsnet.io.mapped import Data, load
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import FileSource
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_input, standard_output
-from gmsnet.mesh import Mesh, Source
+from gmsnet.mesh.mesh import Mesh, Source
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:

@@ -23,7 +23,7 @@ from gmsnet.io.gmsh_sections import KINDS, Contents, Elements, Nodes, Source
 from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.text import quoted
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 name = "Gmsh"
 suffixes = (".msh",)

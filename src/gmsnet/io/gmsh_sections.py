@@ -21,8 +21,8 @@ from gmsnet.io.places import Addresses, Lattice, Places, chained, lists, pick, s
 from gmsnet.io.splice import Slots
 from gmsnet.io.text import Text, fail, quoted
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
-from gmsnet.kernels import text as kernels
-from gmsnet.mesh import NODES
+from gmsnet.kernels.text import text as kernels
+from gmsnet.mesh.cell_block import NODES
 
 # Gmsh's types of elements: the name, the number of nodes and, where Gmsh's order differs, the places of Mesh's nodes.
 KINDS = {

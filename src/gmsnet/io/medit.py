@@ -20,7 +20,8 @@ from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Starts, Text
-from gmsnet.mesh import NODES, CellBlock, Mesh
+from gmsnet.mesh.cell_block import NODES, CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 name = "Medit"
 suffixes = (".mesh",)

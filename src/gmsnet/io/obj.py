@@ -20,7 +20,8 @@ from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import ranges
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Rows, Starts, Text
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 name = "OBJ"
 suffixes = (".obj",)

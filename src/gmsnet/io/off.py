@@ -16,7 +16,8 @@ from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import ranges
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Rows, Text
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 name = "OFF"
 suffixes = (".off",)

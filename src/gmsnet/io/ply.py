@@ -23,8 +23,8 @@ from gmsnet.io.places import side_by_side
 from gmsnet.io.ply_rows import Column, Table, tables
 from gmsnet.io.text import fail
 from gmsnet.io.words import Words, typed
-from gmsnet.mesh import Mesh
-from gmsnet.region_fields import names_a_region, regions_of
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.region_fields import names_a_region, regions_of
 
 name = "PLY"
 suffixes = (".ply",)

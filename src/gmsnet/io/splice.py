@@ -18,8 +18,9 @@ from gmsnet.io.mapped import Data, changed, held
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Lattice, Places
 from gmsnet.io.text import Starts, Text
-from gmsnet.kernels import text as kernels
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.kernels.text import text as kernels
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 _PIECE = 1 << 20  # bytes that are written at once
 _ROWS = 1 << 15  # of slots that are looked at together

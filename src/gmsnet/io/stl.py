@@ -23,8 +23,9 @@ from gmsnet.io.places import Lattice, Places
 from gmsnet.io.splice import BinarySlots, TextSlots
 from gmsnet.io.text import Starts, Text
 from gmsnet.io.words import ByteWords
-from gmsnet.kernels import weld as kernels
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.kernels.topology import weld as kernels
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 name = "STL"
 suffixes = (".stl",)

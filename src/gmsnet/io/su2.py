@@ -21,7 +21,8 @@ from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Rows, Starts, Text, quoted
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 name = "SU2"
 suffixes = (".su2",)

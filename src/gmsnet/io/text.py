@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from gmsnet.errors import FormatError
 from gmsnet.io.mapped import Data
 from gmsnet.io.places import ranges
-from gmsnet.kernels import text as kernels
-from gmsnet.kernels.weld import match_words
+from gmsnet.kernels.text import text as kernels
+from gmsnet.kernels.topology.weld import match_words
 
 Starts = NDArray[Any]  # int32 or int64: the first byte of each token
 

@@ -24,8 +24,8 @@ from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Addresses, Lattice, Places, lists, pick
 from gmsnet.io.vtk_fields import attribute, field_arrays, keyword
 from gmsnet.io.vtk_stream import TYPES, Array, Line, Stream, word_of
-from gmsnet.kernels import text as kernels
-from gmsnet.mesh import Mesh
+from gmsnet.kernels.text import text as kernels
+from gmsnet.mesh.mesh import Mesh
 
 name = "VTK"
 suffixes = (".vtk",)

@@ -15,8 +15,9 @@ from gmsnet.io.cells import distinct
 from gmsnet.io.document import Parsed
 from gmsnet.io.pieces import Piece
 from gmsnet.io.splice import Slots
-from gmsnet.mesh import CellBlock, Mesh
-from gmsnet.region_fields import names_a_region, regions_of
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.region_fields import names_a_region, regions_of
 
 Fields = Sequence[tuple[str, NDArray[Any]]]  # name and values, in the order of the file
 

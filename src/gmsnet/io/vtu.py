@@ -25,7 +25,7 @@ from gmsnet.io.splice import BinarySlots, EncodedSlots, Slots
 from gmsnet.io.vtu_arrays import Encoded
 from gmsnet.io.vtu_reader import TYPES, Reader, one_word
 from gmsnet.io.vtu_xml import DataArray, Document
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 name = "VTU"
 suffixes = (".vtu",)

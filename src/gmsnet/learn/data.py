@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.generate import random_mesh
-from gmsnet.mesh import Mesh
-from gmsnet.topology import Topology
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.topology import Topology
 
 SPLIT = (12, 4, 4)  # meshes for training, validation and testing
 NODES = (250, 2000)  # least and most nodes inside a mesh

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.guard import Precision
+from gmsnet.kernels.star.guard import Precision
 from gmsnet.learn.data import Stars, joined
-from gmsnet.mesh import CellBlock, Mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, Smoother, smoother
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 STATES = (0, 1, 2, 5, 20)  # sweeps before the stars are looked at
 END = 100  # sweeps until a mesh is taken for smoothed to the end; random squares take 20 to 60

@@ -1,6 +1,7 @@
 """GMSNet 2 in PyTorch: messages per triangle, trained against a barrier through whole sweeps.
 
-The formulas, and what each letter means, stand in kernels/gmsnet2.py. B stars, M the largest degree, H hidden features.
+The formulas, and what each letter means, stand in kernels/methods/gmsnet2.py. B stars, M the largest degree, H hidden
+features.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from gmsnet.learn.backend import torch
 from gmsnet.learn.data import Stars
 from gmsnet.weights import shapes
 
-LEAST, CLIP, TINY = 1e-5, 40.0, 1e-30  # as in kernels.gmsnet2
+LEAST, CLIP, TINY = 1e-5, 40.0, 1e-30  # as in kernels.methods.gmsnet2
 ACTIVATIONS = {"silu": torch.nn.functional.silu, "relu": torch.relu}
 
 

@@ -14,8 +14,8 @@ from gmsnet.learn.backend import torch
 from gmsnet.learn.data import Stars
 from gmsnet.learn.losses import truncation
 from gmsnet.learn.model import GMSNet
-from gmsnet.mesh import Mesh
-from gmsnet.topology import Topology
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.topology import Topology
 
 
 @dataclass(frozen=True, eq=False)

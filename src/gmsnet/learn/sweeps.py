@@ -15,8 +15,8 @@ import numpy as np
 
 from gmsnet.learn.backend import torch
 from gmsnet.learn.losses import truncation
-from gmsnet.mesh import Mesh
-from gmsnet.topology import Topology
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.topology import Topology
 
 MOST_Q = 1e4  # q in a loss, so that its powers stay finite in float32; beyond there is no gradient
 

@@ -25,7 +25,7 @@ from gmsnet.learn.train_gmsnet import GMSNetTrainee
 from gmsnet.learn.train_gmsnet2 import GMSNet2Trainee
 from gmsnet.learn.train_nn import NNTrainee
 from gmsnet.learn.trainee import Row, Trainee
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 CHECKPOINT_EVERY = 200  # epochs
 

@@ -15,7 +15,7 @@ from gmsnet.learn.model import GMSNet
 from gmsnet.learn.optimum import optimal_position
 from gmsnet.learn.options import TrainOptions
 from gmsnet.learn.trainee import Trainee
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 
 @dataclass(frozen=True)

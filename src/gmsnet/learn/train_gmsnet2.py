@@ -24,7 +24,7 @@ from gmsnet.learn.model_gmsnet2 import GMSNet2
 from gmsnet.learn.options import GMSNet2Options
 from gmsnet.learn.sweeps import Meshes, proposal, star_loss, sweep
 from gmsnet.learn.trainee import Trainee
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 GROUPS = 4  # of the first stage
 SMALL_GROUPS, SMALL_MESHES = 24, 6  # of the second stage, and meshes in each

@@ -20,7 +20,7 @@ from gmsnet.learn.losses import metric_loss, truncation
 from gmsnet.learn.model_nn import NNSmoothing, frame
 from gmsnet.learn.options import NNOptions
 from gmsnet.learn.trainee import Trainee
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.weights.shapes import NN_HIDDEN
 
 

@@ -1,13 +1,13 @@
-"""Angle-based smoothing, averaged. The formula stands in kernels/angle.py."""
+"""Angle-based smoothing, averaged. The formula stands in kernels/methods/angle.py."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import angle as kernels
-from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.methods import angle as kernels
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 

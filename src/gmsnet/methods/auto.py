@@ -23,16 +23,16 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from gmsnet.kernels.block import MOVED
-from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.quality import glance
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.simplex.measures import glance
+from gmsnet.kernels.star.block import MOVED
+from gmsnet.measure.target import Target
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.optimize import Newton
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
-from gmsnet.target import Target
-from gmsnet.workers import Share
+from gmsnet.parallel.threads import Share
 
 SMALL = 5000  # free nodes
 SAMPLE = 32  # blocks of cells

@@ -1,4 +1,4 @@
-"""Newton's method on a barrier, one step a visit. The formulas stand in kernels/barrier.py.
+"""Newton's method on a barrier, one step a visit. The formulas stand in kernels/methods/barrier.py.
 
 The objective is the sum of q^p over the star, p = 1, 2 or 4, q the inverse of the shape metric: infinite where a
 triangle of the star degenerates, so that no cell is given up for the mean of the others. ``q`` gives the best mean of
@@ -18,12 +18,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import barrier as kernels
-from gmsnet.kernels.barrier_star import Power
-from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.methods import barrier as kernels
+from gmsnet.kernels.methods.barrier_star import Power
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Field, Method, StarSmoother, Tally
-from gmsnet.workers import Share
+from gmsnet.parallel.threads import Share
 
 POWERS = {"q2": 2, "q": 1, "q4": 4}
 RELAXATION, RELAXED = 1.6, 8  # ω, and for how many sweeps

@@ -10,13 +10,23 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.guard import STAR, VALID, WORST, Guard, MeshGuard, Precision, StarGuard, plain_guard, star_floors
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.guard import (
+    STAR,
+    VALID,
+    WORST,
+    Guard,
+    MeshGuard,
+    Precision,
+    StarGuard,
+    plain_guard,
+    star_floors,
+)
 from gmsnet.methods.floor import Floor
-from gmsnet.topology import Topology
-from gmsnet.workers import Share, serial
+from gmsnet.parallel.threads import Share, serial
+from gmsnet.topology.topology import Topology
 
-Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.stars)
+Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.star.stars)
 
 
 @dataclass(eq=False)

@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import below as kernels
-from gmsnet.kernels import ranking
+from gmsnet.kernels.methods import below as kernels
+from gmsnet.kernels.methods import ranking
+from gmsnet.measure.target import Target
 from gmsnet.methods.base import Field, Smoother, Tally
-from gmsnet.target import Target
-from gmsnet.workers import Share
+from gmsnet.parallel.threads import Share
 
 MANY = 0.25  # of the cells: where more miss the target, most of them cannot be had, and others would be lost for them
 SMALL = 1000  # cells: so few cost nothing

@@ -1,4 +1,4 @@
-"""Centroidal patch triangulation: equation 1 with centroids in the place of circumcentres (kernels/cvt.py).
+"""Centroidal patch triangulation: equation 1 with centroids in the place of circumcentres (kernels/methods/cvt.py).
 
 The centroid of a triangle holds a third of the node itself, so this is the ``area`` variant of the Laplacian with two
 thirds of its shift.
@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import cvt as kernels
-from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.methods import cvt as kernels
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 

@@ -1,4 +1,4 @@
-"""The paper's CVT smoothing: its equation 1, circumcentres weighted by areas (kernels/cvt.py).
+"""The paper's CVT smoothing: its equation 1, circumcentres weighted by areas (kernels/methods/cvt.py).
 
 Elsewhere the formula goes by the name of optimal Delaunay triangulation (ODT) smoothing; the centroid of a Voronoi
 region, from which CVT has its name, weights otherwise.
@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import cvt as kernels
-from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.methods import cvt as kernels
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 

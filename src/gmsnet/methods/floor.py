@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.block import DROPPED, TRUNCATED
-from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.guard import Precision, most_ratios
-from gmsnet.topology import Topology
-from gmsnet.workers import Share
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.star.block import DROPPED, TRUNCATED
+from gmsnet.kernels.star.guard import Precision, most_ratios
+from gmsnet.parallel.threads import Share
+from gmsnet.topology.topology import Topology
 
 
 class Floor:

@@ -1,4 +1,4 @@
-"""GETMe, the geometric element transformation method. The formulas stand in kernels/getme.py.
+"""GETMe, the geometric element transformation method. The formulas stand in kernels/methods/getme.py.
 
 The paper runs the sequential variant with θ = π/3, λ = 0, ρ = 1. The book's setting for triangles is θ = π/4, λ = ½;
 with ρ = 0.01 in the sequential variant, where the worst elements' neighbours are easily broken, and with ρ = 1 and
@@ -19,14 +19,14 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import getme as kernels
-from gmsnet.kernels import getme_simultaneous
-from gmsnet.kernels.block import MOVED
-from gmsnet.kernels.compile import LANES
-from gmsnet.kernels.getme import Elements, Queue, Transformation
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods import getme as kernels
+from gmsnet.kernels.methods import getme_simultaneous
+from gmsnet.kernels.methods.getme import Elements, Queue, Transformation
+from gmsnet.kernels.star.block import MOVED
 from gmsnet.methods.base import Field, Method, Options, Smoother, Tally
-from gmsnet.topology import Topology
-from gmsnet.workers import Share
+from gmsnet.parallel.threads import Share
+from gmsnet.topology.topology import Topology
 
 PERIOD = 100  # steps between tests
 PERIODS = 10  # of a sweep, at most: on large meshes a test after each hundred steps would be most of the work

@@ -1,5 +1,6 @@
-"""GMSNet, the paper's graph neural network, compiled. The formulas stand in kernels/gmsnet.py, the model as the paper
-prints it in learn/model.py. The variants are weights that were trained with different losses (learn/losses.py)."""
+"""GMSNet, the paper's graph neural network, compiled. The formulas stand in kernels/methods/gmsnet.py, the model as
+the paper prints it in learn/model.py. The variants are weights that were trained with different losses
+(learn/losses.py)."""
 
 from __future__ import annotations
 
@@ -7,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet import weights
-from gmsnet.kernels import gmsnet as kernels
-from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.methods import gmsnet as kernels
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 

@@ -1,5 +1,5 @@
-"""GMSNet 2, the learned smoother that is trained against a barrier, compiled. The formulas stand in kernels/gmsnet2.py,
-the model in learn/model_gmsnet2.py."""
+"""GMSNet 2, the learned smoother that is trained against a barrier, compiled. The formulas stand in
+kernels/methods/gmsnet2.py, the model in learn/model_gmsnet2.py."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet import weights
-from gmsnet.kernels import gmsnet2 as kernels
-from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.methods import gmsnet2 as kernels
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 ACTIVATIONS = {"silu": kernels.SILU, "relu": kernels.RELU}

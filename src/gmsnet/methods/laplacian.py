@@ -1,4 +1,5 @@
-"""Laplacian smoothing, in four variants. The formulas stand in kernels/laplacian.py and kernels/laplacian_plain.py.
+"""Laplacian smoothing, in four variants. The formulas stand in kernels/methods/laplacian.py and
+kernels/methods/laplacian_plain.py.
 
 - smart: to the mean of the ring, if that makes the mean q (the aspect ratio) of the star smaller and inverts no
   triangle; else no move. So a move that would invert is left out, not truncated. A tangled star, whose mean q is
@@ -18,10 +19,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import laplacian as kernels
-from gmsnet.kernels import laplacian_plain
-from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.methods import laplacian as kernels
+from gmsnet.kernels.methods import laplacian_plain
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Method, StarSmoother, Tally
 
 VARIANTS = {  # None: the plain form, which has a kernel of its own

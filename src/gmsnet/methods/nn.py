@@ -1,7 +1,7 @@
 """NN-Smoothing, compiled: for each degree from 3 to 9 a small network that has learnt where optimisation puts a node.
 
-The formulas stand in kernels/nn.py, the model in learn/model_nn.py. Other degrees go to the mean of the ring, as in the
-paper of GMSNet. A ring begins at its smallest node id: the networks see their input in order.
+The formulas stand in kernels/methods/nn.py, the model in learn/model_nn.py. Other degrees go to the mean of the ring,
+as in the paper of GMSNet. A ring begins at its smallest node id: the networks see their input in order.
 
 The variants are weights that were taught differently (learn/labels.py): "mesh" by where nodes lie when whole meshes
 were optimised, as the paper has it; "star" by where optimisation puts the node of a star as it stands, which follows
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet import weights
-from gmsnet.kernels import nn as kernels
-from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.methods import nn as kernels
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Method, StarSmoother, Tally
 from gmsnet.weights.shapes import NN_HIDDEN
 
@@ -37,7 +37,7 @@ class NNSmoothing(StarSmoother):
 def fold(trained: weights.Weights) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """The weights as the kernel reads them: the table by degree (10 × 3) and all numbers, flat float32.
 
-    Of each layer row by row: the bias, then the weights of the row, padded with zeros (kernels.nn.padded).
+    Of each layer row by row: the bias, then the weights of the row, padded with zeros (kernels.methods.nn.padded).
     """
     table = np.full((max(NN_HIDDEN) + 1, 3), -1, dtype=np.int64)
     parts: list[NDArray[np.float32]] = []

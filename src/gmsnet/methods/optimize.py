@@ -1,14 +1,14 @@
 """Optimisation-based smoothing: each node goes to where an objective of its star is least, found by descent.
 
 - adam: at most 20 Adam steps from where the node is, of MetricLoss by default: the paper's OptimSmoothing, with a step
-  size tuned in its favour. kernels/adam.py
+  size tuned in its favour. kernels/methods/adam.py
 - newton: safeguarded Newton steps, to the end; bounded objectives may not make a triangle smaller than a tenth of its
-  star's mean. kernels/newton.py
+  star's mean. kernels/methods/newton.py
 
-The objectives stand in kernels/objectives.py. ``q`` and ``q2`` are barriers, and good for the worst cell; the other
-three are bounded, so that their minimisers give up single cells for the mean of the rest: on random squares of 1,000
-nodes the least angle ends at 20° and 21° with the barriers and at about 1° with the others, the mean of 1/q at 0.896,
-0.895 and, with MetricLoss, 0.897.
+The objectives stand in kernels/simplex/objectives.py. ``q`` and ``q2`` are barriers, and good for the worst cell; the
+other three are bounded, so that their minimisers give up single cells for the mean of the rest: on random squares of
+1,000 nodes the least angle ends at 20° and 21° with the barriers and at about 1° with the others, the mean of 1/q at
+0.896, 0.895 and, with MetricLoss, 0.897.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import adam, newton, objectives
-from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.guard import LARGEST, Guard
+from gmsnet.kernels.methods import adam, newton
+from gmsnet.kernels.simplex import objectives
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.guard import LARGEST, Guard
 from gmsnet.methods.base import Method, Options, StarSmoother, Tally
 
 

@@ -1,6 +1,6 @@
 """Shape and size: each node goes to where its cells are good and as large as they were, by Newton steps.
 
-The objective stands in kernels/sized.py. WEIGHT says how much size counts beside shape.
+The objective stands in kernels/methods/sized.py. WEIGHT says how much size counts beside shape.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import sized as kernels
-from gmsnet.kernels.bands import Bands, no_bands
-from gmsnet.kernels.block import Blocks
-from gmsnet.kernels.guard import Guard
+from gmsnet.kernels.methods import sized as kernels
+from gmsnet.kernels.methods.bands import Bands, no_bands
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Field, Method, StarSmoother, Tally
-from gmsnet.topology import Topology
-from gmsnet.workers import Share
+from gmsnet.parallel.threads import Share
+from gmsnet.topology.topology import Topology
 
 WEIGHT = 4.0
 BAND = 0.099  # a tenth, and room for the rounding of what is written

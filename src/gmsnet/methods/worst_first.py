@@ -1,7 +1,7 @@
 """The worst cells first: Newton's method on high powers of q, at the free nodes of the worst cells alone.
 
-A cycle ranks the cells, takes a share of them, and visits their free nodes a number of times (kernels/worst_first.py),
-in the order of their ids. Cells are ranked among the candidates, which are the
+A cycle ranks the cells, takes a share of them, and visits their free nodes a number of times
+(kernels/methods/worst_first.py), in the order of their ids. Cells are ranked among the candidates, which are the
 worst of all when the list of cycles begins: a cell next to a mended one can become the worst, and is one of them.
 
 A sweep is one cycle of CYCLES; after the last of them LAST goes on, with new candidates each time, until the worst cell
@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels import ranking
-from gmsnet.kernels import worst_first_cycles as kernels
-from gmsnet.kernels.compile import LANES
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods import ranking
+from gmsnet.kernels.methods import worst_first_cycles as kernels
 from gmsnet.methods.base import Field, Method, Options, Smoother, Tally
-from gmsnet.workers import Share
+from gmsnet.parallel.threads import Share
 
 
 class Cycle(NamedTuple):

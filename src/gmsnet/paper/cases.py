@@ -21,7 +21,7 @@ import numpy as np
 
 from gmsnet.errors import InputError
 from gmsnet.generate import random_mesh
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.paper import domains
 from gmsnet.paper.disturbance import Disturbance
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gmsnet.arguments import ASPECT
-from gmsnet.engine import SmoothResult, smooth
-from gmsnet.mesh import Mesh
+from gmsnet.measure.report import ASPECT
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import METHODS, Smoother, smoother
+from gmsnet.run.api import smooth
+from gmsnet.run.result import SmoothResult
 
 
 @dataclass(frozen=True)

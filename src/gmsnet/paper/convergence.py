@@ -6,14 +6,15 @@ import statistics
 import time
 from typing import Any
 
-from gmsnet.arguments import ASPECT
+from gmsnet.measure.report import ASPECT
 from gmsnet.paper.cases import CASES
 from gmsnet.paper.contenders import Contender, papers
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.store import Result
 from gmsnet.paper.units import Context, Unit
-from gmsnet.run import Run, Sweep
-from gmsnet.topology import Topology
+from gmsnet.run.run import Run
+from gmsnet.run.sweep import Sweep
+from gmsnet.topology.topology import Topology
 
 SHOWN = ("square", "pipe")
 REPEATS = 5  # medians of their times are taken

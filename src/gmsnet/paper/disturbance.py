@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.generate import disturb
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

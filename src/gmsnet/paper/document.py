@@ -17,7 +17,7 @@ from gmsnet.paper.claims import claims
 from gmsnet.paper.figures import PICTURES
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.store import Store, strict
-from gmsnet.workers import available_threads
+from gmsnet.parallel.threads import available_threads
 
 PACKAGES = ("gmsnet", "numpy", "scipy", "numba", "torch", "torch_geometric", "matplotlib")
 

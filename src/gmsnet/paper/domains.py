@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from gmsnet.generate import Curve, good_mesh, settle, split_edges
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 

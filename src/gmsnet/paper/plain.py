@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.mesh import Mesh
-from gmsnet.topology import Topology
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.topology import Topology
 
 Point = tuple[float, float]
 Move = Callable[[Point, list[Point]], Point]  # the new position of a free node, from its position and its ring

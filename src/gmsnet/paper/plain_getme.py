@@ -1,4 +1,5 @@
-"""GETMe in plain Python, one element at a time: the twin of kernels/getme.py, and what the paper's timing of it times.
+"""GETMe in plain Python, one element at a time: the twin of kernels/methods/getme.py, and what the paper's timing of
+it times.
 
 Vartziotis, Wipper: The GETMe Mesh Smoothing Framework (2018), sections 6.1.2 (simultaneous) and 6.1.3 (sequential).
 """

@@ -11,7 +11,7 @@ import os
 from functools import cache
 
 from gmsnet import weights
-from gmsnet.kernels.adam import BETA_1, BETA_2, EPSILON
+from gmsnet.kernels.methods.adam import BETA_1, BETA_2, EPSILON
 from gmsnet.learn.backend import torch
 from gmsnet.methods.optimize import step_sizes
 from gmsnet.paper.plain import Move, Point, laplacian
@@ -100,8 +100,9 @@ class MetricLoss:
 def optim_smoothing(dtype: torch.dtype = torch.float32) -> Move:
     """Twenty Adam steps on MetricLoss, the gradient by automatic differentiation.
 
-    The step sizes, and what counts as the best place, are those of the compiled method (kernels.adam). Adam is written
-    out: with torch.optim.Adam a node takes half as long again, and twice as long with MetricLoss in terms of edges.
+    The step sizes, and what counts as the best place, are those of the compiled method (kernels.methods.adam). Adam is
+    written out: with torch.optim.Adam a node takes half as long again, and twice as long with MetricLoss in terms of
+    edges.
     """
     sizes = step_sizes().tolist()
     corrections = [(1.0 - BETA_1**t, 1.0 - BETA_2**t) for t in range(1, len(sizes) + 1)]

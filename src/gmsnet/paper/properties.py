@@ -16,7 +16,7 @@ from gmsnet.paper.contenders import GMSNET, NN, OPTIM, papers
 from gmsnet.paper.plain import Move, Point
 from gmsnet.paper.store import Result, Store
 from gmsnet.paper.units import Context, Unit
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 SHOWN = (OPTIM, NN, GMSNET)
 NN_DEGREES = range(3, 10)  # each with a network of its own

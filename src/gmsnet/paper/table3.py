@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from gmsnet.arguments import ASPECT
-from gmsnet.engine import smooth
+from gmsnet.measure.report import ASPECT
 from gmsnet.paper import printed, trainings
 from gmsnet.paper.cases import CASES
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.qualities import PLACES, Spread, figure
 from gmsnet.paper.store import Result, Store
 from gmsnet.paper.units import Context, Unit
+from gmsnet.run.api import smooth
 
 SHOWN = ("pipe", "square")
 LOSSES = ("cosine", "metric")

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from gmsnet.arguments import ASPECT
-from gmsnet.mesh import Mesh
+from gmsnet.measure.report import ASPECT
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.paper import plain, plain_torch
 from gmsnet.paper.cases import CASES
 from gmsnet.paper.contenders import GETME, GMSNET, LAPLACIAN, NN, OPTIM, Contender, beyond, papers, papers_own
@@ -23,9 +23,9 @@ from gmsnet.paper.plain_getme import PlainGetme
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.store import Result, Store
 from gmsnet.paper.units import Context, Unit
-from gmsnet.run import Run
-from gmsnet.topology import Topology
-from gmsnet.workers import workers
+from gmsnet.parallel.threads import workers
+from gmsnet.run.run import Run
+from gmsnet.topology.topology import Topology
 
 MOST_TESTS = 1000  # of a sweep
 CHUNK = 30  # nodes that a method visits before it is the next one's turn

@@ -18,7 +18,7 @@ from typing import Any
 from gmsnet.errors import InputError
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.store import Result, Store
-from gmsnet.workers import available_threads
+from gmsnet.parallel.threads import available_threads
 
 MOST_PROCESSES = 8
 LOOK = 0.2  # seconds between two looks at whether to stop

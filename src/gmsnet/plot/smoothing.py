@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.io.atomic import replace_files
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.plot.figure import AFTER, BEFORE, check_target, file_bytes, new_figure
 from gmsnet.plot.histogram import histogram
 from gmsnet.plot.view import View, add_colour_bar, check_mesh, draw
 from gmsnet.plot.zoom import RING_BELOW, frame, surroundings
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
-from gmsnet.measure import QualityReport, measure
-from gmsnet.mesh import CORNERS, CellBlock, Mesh
+from gmsnet.measure.report import QualityReport, measure
+from gmsnet.mesh.cell_block import CORNERS, CellBlock
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.plot.figure import AFTER
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from gmsnet.kernels.guard import Precision
-from gmsnet.measure import exact_signs
-from gmsnet.topology import Topology
+from gmsnet.kernels.star.guard import Precision
+from gmsnet.measure.report import exact_signs
+from gmsnet.topology.topology import Topology
 from gmsnet.untangle.guarded import what_is_left
 from gmsnet.untangle.newton import polish
 from gmsnet.untangle.patch import Floats
@@ -24,7 +24,7 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     """Moves free nodes until no cell is inverted, or as few as can be; held nodes and what is far off keep their bits.
 
     points: (N, 2) float64 by places in memory (``planar_points(mesh)[topology.memory]``); not changed. topology: of the
-    mesh. precision: how exactly coordinates are known once they are written (kernels.guard).
+    mesh. precision: how exactly coordinates are known once they are written (kernels.star.guard).
 
     A cell counts as mended once it is certified: positive as it will be written. No cell that was positive is not so
     afterwards, and none that stays inverted is worse (in 1/q) than the worst with a free node was. The result follows

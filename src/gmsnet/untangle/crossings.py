@@ -8,8 +8,8 @@ import numpy as np
 import scipy.spatial
 from numpy.typing import NDArray
 
-from gmsnet.measure import exact_signs
-from gmsnet.topology import Topology
+from gmsnet.measure.report import exact_signs
+from gmsnet.topology.topology import Topology
 from gmsnet.untangle.patch import Floats, Ints
 
 MOST = 3_000_000  # pairs of boxes

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels import untangle_barrier as barrier
+from gmsnet.kernels.untangle import barrier
 from gmsnet.untangle.newton import AVERAGING, closing, keep_gains, sweep
 from gmsnet.untangle.patch import Ints, Patch, in_order
 from gmsnet.untangle.result import Stage

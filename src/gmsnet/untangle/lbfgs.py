@@ -8,7 +8,7 @@ import numpy as np
 import scipy.optimize
 from numpy.typing import NDArray
 
-from gmsnet.kernels import untangle_barrier as barrier
+from gmsnet.kernels.untangle import barrier
 from gmsnet.untangle.newton import AVERAGING, closing
 from gmsnet.untangle.patch import Patch
 from gmsnet.untangle.tangle import Tangle

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels import untangle as kernels
-from gmsnet.kernels import untangle_barrier as barrier
-from gmsnet.kernels.quality import TWO_SQRT3
+from gmsnet.kernels.simplex.measures import TWO_SQRT3
+from gmsnet.kernels.untangle import barrier
+from gmsnet.kernels.untangle import mending as kernels
 from gmsnet.untangle.patch import Flags, Floats, Patch, free_nodes_of, in_order
 from gmsnet.untangle.result import Stage
 from gmsnet.untangle.tangle import Tangle

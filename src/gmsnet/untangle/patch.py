@@ -9,8 +9,8 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from gmsnet.kernels import untangle as kernels
-from gmsnet.topology import Topology
+from gmsnet.kernels.untangle import mending as kernels
+from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

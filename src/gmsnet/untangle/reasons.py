@@ -6,8 +6,8 @@ import numpy as np
 import scipy.optimize
 import scipy.sparse
 
-from gmsnet.measure import exact_signs
-from gmsnet.topology import Topology
+from gmsnet.measure.report import exact_signs
+from gmsnet.topology.topology import Topology
 from gmsnet.untangle.crossings import held_edges, near_crossings
 from gmsnet.untangle.patch import Flags, Floats, free_nodes_of
 from gmsnet.untangle.result import Unmended

@@ -6,18 +6,18 @@ from functools import cached_property
 
 import numpy as np
 
-from gmsnet.kernels import untangle as kernels
-from gmsnet.kernels.guard import Precision
-from gmsnet.measure import exact_signs
-from gmsnet.topology import Topology
+from gmsnet.kernels.star.guard import Precision
+from gmsnet.kernels.untangle import mending as kernels
+from gmsnet.measure.report import exact_signs
+from gmsnet.topology.topology import Topology
 from gmsnet.untangle.patch import Flags, Floats, Ints, Patch, free_nodes_of, in_order
 
 
 class Tangle:
     """points: (N, 2) in memory order, of which free nodes are moved. before: the same at first, not changed.
 
-    signs: (T,) exact signs at first. bad: (T,) which cells are to be mended: not certified (kernels.untangle), and
-    inverted at first or with a node that has moved. left: how many. frozen: (N,) free nodes that stand
+    signs: (T,) exact signs at first. bad: (T,) which cells are to be mended: not certified (kernels.untangle.mending),
+    and inverted at first or with a node that has moved. left: how many. frozen: (N,) free nodes that stand
     still all the same. work: iterations of L-BFGS so far, times nodes.
     """
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels import untangle as kernels
-from gmsnet.kernels.quality import TWO_SQRT3
+from gmsnet.kernels.simplex.measures import TWO_SQRT3
+from gmsnet.kernels.untangle import mending as kernels
 from gmsnet.untangle.newton import keep_gains
 from gmsnet.untangle.patch import Flags, free_nodes_of, in_order
 from gmsnet.untangle.result import Stage

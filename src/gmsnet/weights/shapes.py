@@ -34,7 +34,7 @@ def gmsnet(hidden: int) -> dict[str, tuple[int, ...]]:
 
 
 def gmsnet2(hidden: int) -> dict[str, tuple[int, ...]]:
-    """GMSNet 2 with H hidden features: W₁ to W₅ of kernels/gmsnet2.py, in that order."""
+    """GMSNet 2 with H hidden features: W₁ to W₅ of kernels/methods/gmsnet2.py, in that order."""
     h = hidden
     return {
         "encode.weight": (h, 5),

@@ -8,7 +8,7 @@ from gmsnet.paper.contenders import GMSNET, NN, papers_own
 from gmsnet.paper.figures.picture import Drawn
 from gmsnet.paper.units import Context
 from gmsnet.plot import AFTER, BEFORE, View
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 RUN = 0  # is shown
 DETAIL = 60  # cells around the worst one

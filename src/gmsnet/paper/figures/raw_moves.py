@@ -14,10 +14,10 @@ from gmsnet.learn.checkpoint import Member
 from gmsnet.learn.model import GMSNet
 from gmsnet.learn.options import TrainOptions
 from gmsnet.learn.train import train
-from gmsnet.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.paper.figures.picture import Drawn
 from gmsnet.paper.units import Context
-from gmsnet.topology import Topology
+from gmsnet.topology.topology import Topology
 
 EPOCHS = (1, 10)
 

@@ -1,0 +1,1 @@
+"""The compiled part of each smoother, one method a file."""

@@ -1,0 +1,74 @@
+"""Areas that are kept within a band around those of the input: shifts are shortened so that no cell leaves it.
+
+Of a triangle (p, r_{i−1}, r_i) with the ring fixed, D is an affine function of the free node's place p. So the places
+where D lies in a band form a strip, and those where all triangles of a star do form a convex polygon. A shift that ends
+outside ends where it leaves the polygon instead; what is halved after that remains inside.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.jit.compile import LANES, part
+
+
+class Bands(NamedTuple):
+    """Which triangles keep their areas: those whose three corners are ``kept``, if they were positive.
+
+    start: (N, 2) the points of the input, in memory order. kept: (N,) bool; both empty where there are none. width:
+    the band is [1 − width, 1 + width] times D of the input.
+    """
+
+    start: NDArray[np.float64]
+    kept: NDArray[np.bool_]
+    width: float
+
+
+def no_bands() -> Bands:
+    """No triangle has one."""
+    return Bands(np.empty((0, 2)), np.empty(0, dtype=np.bool_), 0.0)
+
+
+@part
+def shorten(bands, blocks, block, star, sizes, shift):
+    """Shortens the shifts (2·LANES, over the stars' sizes) of a block so that they end inside all bands.
+
+    star: as ``block.gather`` leaves it; sizes: (LANES,).
+    """
+    n, offset = blocks.degree[block], blocks.offset[block]
+    for lane in range(LANES):
+        c = blocks.centre[block * LANES + lane]
+        if not bands.kept[c]:
+            continue
+        size, share = sizes[lane], 1.0
+        dx, dy = size * shift[lane], size * shift[LANES + lane]
+        for j in range(n):
+            i = n - 1 if j == 0 else j - 1
+            a, b = blocks.rings[offset + i * LANES + lane], blocks.rings[offset + j * LANES + lane]
+            x, y, p, q = star[2 * lane], star[2 * lane + 1], 2 * ((i + 1) * LANES + lane), 2 * ((j + 1) * LANES + lane)
+            px, py, qx, qy = star[p] - x, star[p + 1] - y, star[q] - x, star[q + 1] - y
+            share = min(share, share_inside(bands, c, a, b, px, py, qx, qy, dx, dy))
+        shift[lane] *= share
+        shift[LANES + lane] *= share
+
+
+@part
+def share_inside(bands, c, a, b, px, py, qx, qy, dx, dy):
+    """How much of the shift (dx, dy) of node c keeps the triangle c, a, b (counter-clockwise) in its band, 0 to 1.
+
+    p, q: the nodes a and b minus c, as they are now. A triangle that has left its band, by rounding, may go back but
+    no further away. A shift that is not finite is none of this function's business.
+    """
+    if not (bands.kept[a] and bands.kept[b] and bands.kept[c]):
+        return 1.0
+    start = bands.start
+    d = (start[a, 0] - start[c, 0]) * (start[b, 1] - start[c, 1])
+    d -= (start[a, 1] - start[c, 1]) * (start[b, 0] - start[c, 0])
+    slope = dx * (py - qy) + dy * (qx - px)  # D along the shift: D + s·slope
+    if not (d > 0.0 and abs(slope) > 0.0 and abs(slope) < np.inf):
+        return 1.0
+    end = (1.0 + bands.width if slope > 0.0 else 1.0 - bands.width) * d
+    return min(max((end - (px * qy - py * qx)) / slope, 0.0), 1.0)

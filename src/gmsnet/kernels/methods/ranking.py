@@ -1,0 +1,182 @@
+"""Which cells are the worst, and which free nodes they have.
+
+Selection is exact, and does not depend on the order of the cells: all those up to a limit are taken, equal ones too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmsnet.kernels.jit.compile import LANES, kernel, part
+from gmsnet.kernels.simplex.measures import shape_of
+
+PLACE = 8  # bits of an id by which it is sorted at a time
+DIGITS = 1 << PLACE
+HALVINGS = 24  # of the interval in which a limit is looked for: single precision has no more
+
+
+@kernel
+def shapes(points, triangles, turn, first, last, shape):
+    """1/q of the triangles in the blocks first…last of LANES, with the sign of their area, into shape (T,)."""
+    edges, row = np.empty(4 * LANES), np.empty(LANES)
+    for block in range(first, last):
+        start = block * LANES
+        count = min(LANES, len(triangles) - start)
+        for lane in range(count):
+            t = start + lane
+            # Unsigned, so that nothing is compared with zero.
+            a, b, c = np.uint32(triangles[t, 0]), np.uint32(triangles[t, 1]), np.uint32(triangles[t, 2])
+            x, y = points[a, 0], points[a, 1]
+            edges[lane] = points[b, 0] - x
+            edges[LANES + lane] = points[b, 1] - y
+            edges[2 * LANES + lane] = points[c, 0] - x
+            edges[3 * LANES + lane] = points[c, 1] - y
+        for lane in range(count, LANES):
+            edges[lane] = edges[LANES + lane] = edges[2 * LANES + lane] = edges[3 * LANES + lane] = 0.0
+        for lane in range(LANES):
+            px, py, qx, qy = edges[lane], edges[LANES + lane], edges[2 * LANES + lane], edges[3 * LANES + lane]
+            row[lane] = shape_of(px, py, qx, qy)
+        for lane in range(count):
+            shape[start + lane] = turn[start + lane] * row[lane]
+
+
+@kernel
+def shapes_of(points, triangles, turn, cells, shape):
+    """1/q of some of the triangles, into shape (len(cells),)."""
+    for k in range(len(cells)):
+        t = cells[k]
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        x, y = points[a, 0], points[a, 1]
+        shape[k] = turn[t] * shape_of(points[b, 0] - x, points[b, 1] - y, points[c, 0] - x, points[c, 1] - y)
+
+
+@part
+def count_up_to(shape, limit):
+    """How many of the values are at most the limit."""
+    count = 0
+    for t in range(len(shape)):
+        count += shape[t] <= limit
+    return count
+
+
+@kernel
+def worst(shape, wanted):
+    """Indices (int32) of the worst cells, as many as are wanted or a quarter more, or any number if many are equal.
+
+    shape: (T,) between −1 and 1. They are all those up to a limit, which is found by halving.
+    """
+    low, high = -1.0, 1.0 + 1e-6
+    count = len(shape)
+    for _ in range(HALVINGS):
+        if count <= wanted + wanted // 4:
+            break
+        middle = 0.5 * (low + high)
+        fewer = count_up_to(shape, shape.dtype.type(middle))
+        if fewer < wanted:
+            low = middle
+        else:
+            high, count = middle, fewer
+    limit = shape.dtype.type(high)
+    cells = np.empty(count, dtype=np.int32)
+    found = 0
+    for t in range(len(shape)):
+        if shape[t] <= limit:
+            cells[found] = t
+            found += 1
+    return cells
+
+
+@part
+def least(values):
+    """The least of them; NumPy's takes a third of a second to compile."""
+    found = np.inf
+    for k in range(len(values)):
+        found = min(found, values[k])
+    return found
+
+
+@part
+def smallest(values, rank):
+    """The value that would stand at the place ``rank`` if the values were sorted (Hoare's selection).
+
+    NumPy's partition does the same, but takes three seconds to compile.
+    """
+    some = np.empty(len(values))
+    for k in range(len(values)):
+        some[k] = values[k]
+    low, high = 0, len(some) - 1
+    while low < high:
+        pivot = some[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while some[i] < pivot:
+                i += 1
+            while some[j] > pivot:
+                j -= 1
+            if i <= j:
+                some[i], some[j] = some[j], some[i]
+                i += 1
+                j -= 1
+        if rank <= j:
+            high = j
+        elif rank >= i:
+            low = i
+        else:
+            break
+    return some[rank]
+
+
+@kernel
+def free_nodes(triangles, cells, shape, limit, free, memory, seen):
+    """The free nodes (int32) of those of the cells whose shape is at most the limit, in the order of their ids.
+
+    shape: (len(cells),). free: (N,) bool. memory: (N,) the id of each node. seen: (N,) bool, all False before and
+    after.
+    """
+    found = np.empty(3 * len(cells), dtype=np.int32)
+    count = 0
+    for k in range(len(cells)):
+        if shape[k] <= limit:
+            for m in range(3):
+                i = triangles[cells[k], m]
+                if free[i] and not seen[i]:
+                    seen[i] = True
+                    found[count] = i
+                    count += 1
+    for k in range(count):
+        seen[found[k]] = False
+    nodes = found[:count].copy()
+    by_id(nodes, memory)
+    return nodes
+
+
+@part
+def by_id(nodes, memory):
+    """Puts nodes, each there once, into the order of their ids: whatever is made of them does not depend on places.
+
+    By the digits of the ids, the last one first; the node goes with its id, below it.
+    """
+    keys, other = np.empty(len(nodes), dtype=np.int64), np.empty(len(nodes), dtype=np.int64)
+    at = np.empty(DIGITS, dtype=np.int64)  # by digit, where the next key goes
+    largest = 0
+    for k in range(len(nodes)):
+        largest = max(largest, memory[nodes[k]])
+        keys[k] = np.int64(memory[nodes[k]]) << 32 | nodes[k]
+    shift = 32
+    while largest > 0:
+        for digit in range(DIGITS):
+            at[digit] = 0
+        for k in range(len(nodes)):
+            at[keys[k] >> shift & DIGITS - 1] += 1
+        end = 0
+        for digit in range(DIGITS):
+            end, at[digit] = end + at[digit], end
+        for k in range(len(nodes)):
+            digit = keys[k] >> shift & DIGITS - 1
+            other[at[digit]] = keys[k]
+            at[digit] += 1
+        keys, other = other, keys
+        shift += PLACE
+        largest >>= PLACE
+    for k in range(len(nodes)):
+        nodes[k] = keys[k] & 0xFFFFFFFF

@@ -1,0 +1,84 @@
+"""Cycles of ranking the worst cells and visiting their free nodes: see methods/worst_first.py."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.methods.missing import any_missing
+from gmsnet.kernels.methods.ranking import free_nodes, least, shapes_of, smallest
+from gmsnet.kernels.methods.worst_first import descend, gather, way_there
+from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
+from gmsnet.kernels.star.truncation import HALVINGS
+
+STILL = 1e-8  # of a spoke's square: a move of less leaves a star be
+LEAST = 1e-6  # of 1/q, where cells are inverted: the scale of q is taken from there
+
+
+@kernel
+def cycles(points, triangles, turn, cells, free, memory, start, around, guard, plan, tally):
+    """Makes the cycles of a plan among the cells; returns the least 1/q of these before and after it.
+
+    cells: indices of triangles. free: (N,) bool. memory: (N,) ids. start, around: the rings of all nodes, in CSR form.
+    plan: (C, 3) of cells to take, log₂ of the power p, and visits to their free nodes. tally: (3,), added to.
+    """
+    shape, mark = np.empty(len(cells)), np.empty(len(points), dtype=np.bool_)
+    for i in range(len(points)):
+        mark[i] = False
+    shapes_of(points, triangles, turn, cells, shape)
+    before = least(shape)
+    for c in range(len(plan)):
+        wanted = min(plan[c, 0], len(cells))
+        limit = smallest(shape, wanted - 1)
+        scale = max(least(shape), LEAST) / math.sqrt(3.0)
+        nodes = free_nodes(triangles, cells, shape, limit, free, memory, mark)
+        visit(points, nodes, start, around, guard, plan[c, 1], plan[c, 2], scale, None, mark, None, tally)
+        shapes_of(points, triangles, turn, cells, shape)
+    return before, least(shape)
+
+
+@part
+def visit(points, nodes, start, around, guard, doublings, sweeps, scale, target, awake, tried, tally):
+    """Visits the nodes in their order, so many times, p = 2^doublings. tally: (3,), added to.
+
+    start, around: the rings of all nodes, in CSR form. scale: see ``descend``. target: a node is left out while no
+    triangle around it misses that (kernels.methods.missing), if there is one. awake: (N,) bool, all False before and
+    after: a node is left out while neither it nor a neighbour has moved since it was found to move no more. tried:
+    (N,) bool, to become True of the nodes that the target has not left out, if there is one.
+    """
+    unit, grain, single = guard.unit, guard.grain, guard.single
+    most = 0
+    for i in nodes:
+        most = max(most, start[i + 1] - start[i])
+        awake[i] = True
+    star = np.empty(3 * most + 1)
+    for _ in range(sweeps):
+        for i in nodes:
+            if not awake[i]:
+                continue
+            n = gather(points, i, start, around, guard, star)
+            x, y = points[i, 0], points[i, 1]
+            awake[i] = False
+            if target is not None:
+                if not any_missing(star, n, x, y, target[0], target[1]):
+                    continue
+                tried[i] = True
+            tx, ty = descend(star, n, x, y, scale, doublings)
+            if tx == x and ty == y:
+                continue
+            tx, ty, halvings = way_there(star, n, x, y, tx, ty, unit, grain, single)
+            tally[DROPPED] += halvings == HALVINGS
+            tally[TRUNCATED] += 0 < halvings < HALVINGS
+            tally[MOVED] += halvings < HALVINGS
+            points[i, 0], points[i, 1] = tx, ty
+            dx, dy, sx, sy = tx - x, ty - y, star[0] - x, star[1] - y
+            if dx * dx + dy * dy > STILL * (sx * sx + sy * sy):
+                awake[i] = True
+                for k in range(start[i], start[i + 1]):
+                    awake[around[k]] = True
+    for i in nodes:
+        awake[i] = False
+        for k in range(start[i], start[i + 1]):
+            awake[around[k]] = False

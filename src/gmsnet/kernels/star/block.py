@@ -1,0 +1,91 @@
+"""A block of stars: LANES of one colour and degree n, and the arrays that one is worked on in.
+
+Coordinates stand as [node][lane][axis], flat, the free nodes first and then the rings: a pair is loaded and stored at
+once. Stars of one colour share no cell.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.jit.compile import LANES, inlined, part
+from gmsnet.kernels.jit.prefetch import prefetch
+
+MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
+COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
+# Rows of a block's work array. CENTRE, TARGET and KEPT have two, one an axis; PAIRS four, two [lane][axis]; FLOORS n.
+SIZE, REACH, CENTRE, TARGET, MARGIN, SHARE, KEPT, PAIRS, FLOORS = 0, 1, 2, 4, 6, 7, 8, 10, 14
+SURPLUS, WIDTH = range(2)  # rows of what a certificate is made of
+FAR = 2**18  # nodes: the coordinates of more (4 MiB) do not stay in the second-level cache
+
+
+class Blocks(NamedTuple):
+    """The free nodes with their rings in blocks of LANES of one colour and degree (see
+    kernels.topology.layout.fill_blocks).
+
+    filled: how many of the lanes hold stars of their own. most: the largest degree.
+    """
+
+    centre: NDArray[np.int32]
+    rings: NDArray[np.int32]
+    offset: NDArray[np.int64]
+    degree: NDArray[np.int32]
+    filled: NDArray[np.int32]
+    most: int
+
+
+class Room(NamedTuple):
+    """The arrays that a sweep works in. star: coordinates. work: rows of LANES. sums: for a certificate."""
+
+    star: NDArray[np.float64]
+    work: NDArray[np.float64]
+    sums: NDArray[np.float32]
+    counts: NDArray[np.int64]
+
+
+@part
+def room_for(most):
+    """For stars of up to so many nodes."""
+    counts = np.empty(COUNTERS, dtype=np.int64)
+    for k in range(COUNTERS):
+        counts[k] = 0
+    star, work = np.empty(2 * (1 + most) * LANES), np.empty((FLOORS + most) * LANES)
+    return Room(star, work, np.empty(2 * LANES, dtype=np.float32), counts)
+
+
+@part
+def gather(points, blocks, block, n, star):
+    """Coordinates of the stars of a block, as they stand now."""
+    gather_row(points, blocks.centre[block * LANES : (block + 1) * LANES], star[: 2 * LANES])
+    offset = blocks.offset[block]
+    for j in range(n):
+        nodes = blocks.rings[offset + j * LANES : offset + (j + 1) * LANES]
+        gather_row(points, nodes, ring_row(star, j))
+
+
+@part
+def ask_ahead(points, blocks, block):
+    """Has the coordinates that a block will gather fetched, if there is one, and a mesh of more than FAR nodes."""
+    if len(points) > FAR and block < len(blocks.degree):
+        low = blocks.offset[block]
+        for k in range(low, low + LANES * blocks.degree[block]):
+            prefetch(points, np.uint32(blocks.rings[k]))
+
+
+@inlined
+def gather_row(points, nodes, row):
+    """x and y of a node, and so on."""
+    for lane in range(LANES):
+        i = np.uint32(nodes[lane])  # an index that may be negative is looked at twice
+        x, y = points[i, 0], points[i, 1]
+        row[2 * lane] = x
+        row[2 * lane + 1] = y
+
+
+@inlined
+def ring_row(star, j):
+    """The j-th ring nodes, [lane][axis]."""
+    return star[2 * (j + 1) * LANES : 2 * (j + 2) * LANES]

@@ -1,0 +1,151 @@
+"""What every smoother shares: gather a block of stars, judge the proposed shifts, commit those that break nothing.
+
+Stars of one colour share no cell, so a block (kernels.star.block) may be committed at once. The rule of the guard
+stands in kernels.star.guard.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmsnet.kernels.jit.compile import LANES, part
+from gmsnet.kernels.star.block import (
+    CENTRE,
+    DROPPED,
+    MARGIN,
+    MOVED,
+    PAIRS,
+    REACH,
+    SHARE,
+    SIZE,
+    TARGET,
+    TRUNCATED,
+    gather,
+    ring_row,
+)  # fmt: skip
+from gmsnet.kernels.star.block import Blocks as Blocks
+from gmsnet.kernels.star.block import room_for as room_for
+from gmsnet.kernels.star.certificate import certify, certify_stars, gather_floors
+from gmsnet.kernels.star.guard import WITH_FLOORS
+from gmsnet.kernels.star.truncation import halve_abreast, truncate
+
+
+@part
+def fetch(points, blocks, block, room, local):
+    """Gathers a block and brings it to the size of the star (``localise``); returns the degree."""
+    n = blocks.degree[block]
+    gather(points, blocks, block, n, room.star)
+    localise(room.star, n, room.work, local)
+    return n
+
+
+@part
+def localise(star, n, work, local):
+    """Ring minus centre over the size of the star, in the type of ``local``, as [ring node][axis][lane].
+
+    This is the paper's normalisation: one factor d = max(Δx, Δy), the larger side of the bounding box of the n + 1
+    nodes, the free node at the origin. d goes to row SIZE of ``work`` (rows of LANES), the centres to the rows CENTRE,
+    the largest absolute coordinate of the star to row REACH.
+    """
+    low, high = PAIRS * LANES, (PAIRS + 2) * LANES
+    for k in range(2 * LANES):
+        work[low + k] = work[high + k] = star[k]
+    for j in range(n):
+        p = ring_row(star, j)
+        for k in range(2 * LANES):
+            work[low + k] = min(work[low + k], p[k])
+            work[high + k] = max(work[high + k], p[k])
+    inverse = high
+    for lane in range(LANES):
+        left, right = work[low + 2 * lane], work[high + 2 * lane]
+        bottom, top = work[low + 2 * lane + 1], work[high + 2 * lane + 1]
+        size = max(right - left, top - bottom)
+        work[SIZE * LANES + lane] = size
+        work[REACH * LANES + lane] = max(max(-left, right), max(-bottom, top))
+        work[inverse + 2 * lane] = work[inverse + 2 * lane + 1] = 1.0 / size if size > 0.0 else 0.0
+    take_centres(star, work)
+    for j in range(n):
+        p = ring_row(star, j)
+        q = local[2 * j * LANES : 2 * (j + 1) * LANES]
+        for k in range(2 * LANES):
+            work[low + k] = (p[k] - star[k]) * work[inverse + k]
+        for lane in range(LANES):
+            q[lane] = work[low + 2 * lane]
+            q[LANES + lane] = work[low + 2 * lane + 1]
+
+
+@part
+def take_centres(star, work):
+    """The rows CENTRE."""
+    for lane in range(LANES):
+        work[CENTRE * LANES + lane] = star[2 * lane]
+        work[(CENTRE + 1) * LANES + lane] = star[2 * lane + 1]
+
+
+@part
+def commit(points, blocks, block, room, local, shift, guard, tally):
+    """Moves the free nodes of a block by size·shift, truncated by the guard; counts what happened in ``tally``.
+
+    room, local: as ``fetch`` leaves them; shift: (2·LANES,), [axis][lane], over the star's size.
+    """
+    n, work = blocks.degree[block], room.work
+    aim(work, shift, guard.single)
+    if len(guard) == WITH_FLOORS:
+        gather_floors(blocks, block, guard, work)
+        certify_stars(room.star, n, 1.0, guard.unit, guard.grain, work)
+        halve_abreast(n, room, shift, guard)
+    else:
+        certify(local, n, shift, max(guard.floor, 0.0), guard.unit, guard.grain, work, room.sums)
+    store(points, blocks, block, room, shift, guard, tally)
+
+
+@part
+def aim(work, shift, single):
+    """The targets: the free nodes plus size·shift."""
+    for lane in range(LANES):
+        size = work[SIZE * LANES + lane]
+        work[TARGET * LANES + lane] = work[CENTRE * LANES + lane] + size * shift[lane]
+        work[(TARGET + 1) * LANES + lane] = work[(CENTRE + 1) * LANES + lane] + size * shift[LANES + lane]
+    if single:
+        for k in range(TARGET * LANES, (TARGET + 2) * LANES):
+            work[k] = np.float64(np.float32(work[k]))
+
+
+@part
+def store(points, blocks, block, room, shift, guard, tally):
+    """Moves the free nodes whose row MARGIN is positive to their targets, and tries the others one by one.
+
+    At the level STAR, row SHARE: how much is left of the shift.
+    """
+    n, count, work = blocks.degree[block], blocks.filled[block], room.work
+    to_the_star = len(guard) == WITH_FLOORS
+    centre = blocks.centre[block * LANES : (block + 1) * LANES]
+    refused, moved = 0, 0
+    for lane in range(LANES):
+        refused += not work[MARGIN * LANES + lane] > 0.0
+    for lane in range(count):
+        elsewhere = work[TARGET * LANES + lane] != work[CENTRE * LANES + lane]
+        elsewhere |= work[(TARGET + 1) * LANES + lane] != work[(CENTRE + 1) * LANES + lane]
+        moved += elsewhere & (work[MARGIN * LANES + lane] > 0.0)
+    tally[MOVED] += moved
+    if refused == 0:
+        for lane in range(count):
+            i = np.uint32(centre[lane])
+            points[i, 0] = work[TARGET * LANES + lane]
+            points[i, 1] = work[(TARGET + 1) * LANES + lane]
+    else:
+        gather_floors(blocks, block, guard, work)
+        for lane in range(count):
+            i = centre[lane]
+            if work[MARGIN * LANES + lane] > 0.0:
+                points[i, 0] = work[TARGET * LANES + lane]
+                points[i, 1] = work[(TARGET + 1) * LANES + lane]
+            elif shift[lane] == 0.0 and shift[LANES + lane] == 0.0:
+                continue  # nothing is held back
+            elif to_the_star and work[MARGIN * LANES + lane] == -np.inf:
+                tally[DROPPED] += 1
+            else:
+                truncate(points, i, n, lane, room, shift, guard, tally)
+    if len(guard) == WITH_FLOORS:
+        for lane in range(count):
+            tally[TRUNCATED] += (work[MARGIN * LANES + lane] > 0.0) & (work[SHARE * LANES + lane] < 1.0)

@@ -1,0 +1,1 @@
+"""Numbers as text: compiled parsing and printing, both exact."""

@@ -1,0 +1,1 @@
+"""What follows from connectivity: rings, winding, colours, memory order."""

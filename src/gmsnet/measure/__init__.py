@@ -1,0 +1,1 @@
+"""How good a mesh is: measures per cell, reports, targets, bounds."""

@@ -1,0 +1,1 @@
+"""Upper bounds of the worst cells with this connectivity and these held nodes."""

@@ -1,0 +1,132 @@
+"""How good the cells of a mesh can become at most, with its connectivity and its held nodes; what stands in the way.
+
+Each bound is for a group of cells: in no mesh without inverted cells are all of them better. So the least bound of all
+groups, the *ceiling*, is an upper bound of the mesh's worst 1/q. With D twice the area and L the sum of the squared
+sides, 1/q = 2√3·D/L.
+
+*Held cells.* All three nodes are held: its 1/q is what it is.
+
+*Corners.* k cells share a corner of Θ at a node: at a held one between two neighbouring held edges, whose angle is
+fixed, or all around a node, Θ = 2π, whether it is held or not. A triangle with sides u, v around an angle θ has D = uv
+sin θ and L = 2(u² + v² − uv cos θ) ≥ 2uv(2 − cos θ), with equality for u = v, so that
+
+    1/q ≤ f(θ) = √3 sin θ/(2 − cos θ).
+
+f rises up to 60°, where it is 1, and falls from there on, so that f(θ) ≥ t means θ ∈ [α, β] for some α, β. If k
+angles of the sum Θ all lie there, so does their mean, hence f(Θ/k) ≥ t: they cannot all be better than f(Θ/k). (That
+the angles of a fan of positive triangles add up to Θ, and not to a full turn more, is so in every mesh without inverted
+cells whose boundary does not cross itself.)
+
+*Held edges around a free node.* With a held edge of length c along the x-axis, its middle the origin, and the apex at
+(x, y), D = cy and L = 2x² + 2y² + 3c²/2. So 1/q ≥ t holds where
+
+    x² + (y − √3 c/2t)² ≤ (3c²/4)(1/t² − 1):
+
+the apex lies in a disc over the edge. The largest t for which the discs of all held edges of a star have a point in
+common bounds those cells. Discs that meet do so in a centre or in a point shared by two of their circles; t is found by
+bisection, and rounded up by 1e-6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.measure.bounds import groups
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.topology import Topology, planar_points
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+SHOWN = 4  # cells that a sentence names
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Groups of cells that cannot all be better than a bound; those with the least bounds first.
+
+    bound: (G,) of 1/q. kind: (G,) one of the kinds in groups.py. node: (G,) id of the node where it is, −1 for
+    held cells. angle: (G,) of a corner, in degrees. first, rows: group g has the rows rows[first[g] : first[g + 1]] of
+    ``Topology.triangles``. cell: (T,) the index of each row among all cells of the mesh. held: (T,) bool, whose nodes
+    are all held. points: (N, dim).
+    """
+
+    bound: Floats
+    kind: NDArray[np.int8]
+    node: Ints
+    angle: Floats
+    first: Ints
+    rows: Ints
+    cell: Ints
+    held: NDArray[np.bool_]
+    points: Floats
+
+    @property
+    def ceiling(self) -> float:
+        """No mesh with this connectivity and these held nodes has a worst 1/q above it; 1 where there are no groups."""
+        return float(self.bound[0]) if len(self.bound) else 1.0
+
+    def cells(self, group: int) -> Ints:
+        """The rows of triangles of a group."""
+        return self.rows[self.first[group] : self.first[group + 1]]
+
+    def describe(self, group: int) -> str:
+        """What keeps the cells of a group from being better, where, and than what."""
+        cells = self.cell[self.cells(group)].tolist()
+        named = ", ".join(map(str, cells[:SHOWN])) + (f" and {len(cells) - SHOWN} more" if len(cells) > SHOWN else "")
+        kind, bound = self.kind[group], f"{self.bound[group]:.3g}"
+        if kind == groups.HELD:
+            return f"cell {named}: {self._held(group)}"
+        node = int(self.node[group])
+        place = ", ".join(f"{x:.6g}" for x in self.points[node].tolist())
+        at = f"cells {named} at node {node} ({place})"
+        if kind == groups.FREE_CORNER:
+            few = "only " if len(cells) < 6 else ""
+            return f"{at}: poor connectivity, the node has {few}{len(cells)} neighbours: they cannot all exceed {bound}"
+        if kind == groups.CORNER:
+            held = f"a corner of {self.angle[group]:.3g}° between held edges" if self.angle[group] < 360 else "one node"
+            return f"{at}: {len(cells)} cells share {held}: they cannot all exceed {bound}"
+        return f"{at}: their opposite edges are held, and no place of the node lets all of them exceed {bound}"
+
+    def reasons(self, rows: Ints, target: float) -> dict[int, str]:
+        """For each of these rows of triangles, why it may miss a target of 1/q: the tightest of its groups below it.
+
+        Of a cell whose nodes are all held, that is said whatever its 1/q: the target may be one of angles. "no bound
+        known" where there is none: it may be that the target can be reached, or that nothing says why not.
+        """
+        told = dict.fromkeys(map(int, rows), "")
+        for group in np.flatnonzero(self.bound <= target * (1.0 + 1e-9)).tolist():
+            for row in self.cells(group).tolist():
+                if told.get(row) == "":
+                    told[row] = self._held(group) if self.kind[group] == groups.HELD else self.describe(group)
+        return {row: reason or self._otherwise(row) for row, reason in told.items()}
+
+    def _held(self, group: int) -> str:
+        return f"all its nodes are held, so its 1/q stays {self.bound[group]:.3g}"
+
+    def _otherwise(self, row: int) -> str:
+        return "all its nodes are held, so it stays as it is" if self.held[row] else "no bound known"
+
+
+def limits(mesh: Mesh, topology: Topology, below: float = 0.9) -> Limits:
+    """The bounds less than ``below`` for a planar mesh. topology: of this mesh; which nodes it holds is what counts.
+
+    Where free nodes are has no influence.
+    """
+    free = np.zeros(len(topology.memory), dtype=bool)
+    free[topology.free] = True
+    found = groups.collect(planar_points(mesh), topology.triangles, topology.turn, free, below)
+    return Limits(
+        bound=found.bound,
+        kind=found.kind,
+        node=found.node,
+        angle=np.degrees(found.angle),
+        first=found.first,
+        rows=found.rows,
+        cell=topology.cell,
+        held=np.all(~free[topology.triangles], axis=1),
+        points=mesh.points,
+    )

@@ -1,0 +1,95 @@
+"""What every cell of a mesh is to reach."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.methods.below import missed
+from gmsnet.measure.report import QualityReport
+from gmsnet.topology.topology import planar_points
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+SURE = 1.0 + 1e-12  # times the target: what is above it is so however it is measured
+
+
+@dataclass(frozen=True)
+class Target:
+    """What every cell is to reach. quality: the least 1/q. angle: the least angle in degrees. None: no matter."""
+
+    quality: float | None = None
+    angle: float | None = None
+
+    def __post_init__(self) -> None:
+        """Takes any number for a float64: of single precision, SURE would be 1."""
+        for name in ("quality", "angle"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, float(getattr(self, name)))
+
+    def __bool__(self) -> bool:
+        return self.quality is not None or self.angle is not None
+
+    def missed(self, shape: Floats, min_angle: Floats) -> Flags:
+        """Which cells miss it, by their 1/q and their smallest angles in degrees."""
+        missed: Flags = np.zeros(len(shape), dtype=bool)
+        if self.quality is not None:
+            missed |= ~(shape >= self.quality)
+        if self.angle is not None:
+            missed |= ~((min_angle >= self.angle) & (shape > 0.0))
+        return missed
+
+    def missed_in(self, report: QualityReport) -> NDArray[np.int32]:
+        """The rows of the cells of a planar mesh that miss it.
+
+        What the report says of a cell decides; of those that are clear of the target it need not be asked.
+        """
+        return self._missed_in(report)[0]
+
+    def _missed_in(self, report: QualityReport) -> tuple[NDArray[np.int32], Floats]:
+        """And their 1/q."""
+        triangles = report.triangles
+        points = planar_points(triangles)
+        rows = missed(points, triangles.corners, triangles.turn, *self.limits)
+        low, _, shape, _ = triangles.columns(rows)
+        chosen = self.missed(shape, low)
+        return rows[chosen], shape[chosen]
+
+    def clearly_missed(self, points: Floats, corners: NDArray[np.int32], turn: NDArray[np.int8]) -> bool:
+        """Do all these triangles (T, 3) miss it, however they are measured? points: (N, 2). turn: (T,) ±1."""
+        quality, tangent = self.limits
+        return len(missed(points, corners, turn, quality / SURE**2, tangent / SURE**2)) == len(corners)
+
+    def rank(self, report: QualityReport) -> tuple[int, int, float]:
+        """Of two meshes that of the lesser rank is nearer: by inverted cells, cells that miss it, the worst one."""
+        rows, shape = self._missed_in(report)
+        return report.inverted, len(rows), -float(shape.min(initial=np.inf))
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The least 1/q and the tangent of the least angle at which no way to measure leaves a doubt; 0 for none."""
+        tangent = 0.0 if self.angle is None else math.tan(math.radians(self.angle))
+        return (self.quality or 0.0) * SURE, tangent * SURE
+
+    @property
+    def most_shape(self) -> float:
+        """The largest 1/q of a cell that misses it: of all triangles with an angle of α, (α, (π − α)/2, (π − α)/2)."""
+        most = self.quality or 0.0
+        if self.angle is not None:
+            alpha = math.radians(self.angle)
+            most = max(most, math.sqrt(3.0) * math.sin(alpha) / (2.0 - math.cos(alpha)))
+        return most
+
+    @property
+    def shape(self) -> float:
+        """The least 1/q that a cell has which meets it: of all triangles with angles of α or more, (α, α, π − 2α)."""
+        least = self.quality or 0.0
+        if self.angle is not None:
+            alpha = math.radians(self.angle)
+            long = 2.0 * math.cos(alpha)  # the sides are 1, 1 and this, the height is sin α
+            least = max(least, 2.0 * math.sqrt(3.0) * long * math.sin(alpha) / (2.0 + long * long))
+        return least

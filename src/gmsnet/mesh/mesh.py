@@ -1,0 +1,195 @@
+"""The mesh as every part of the package sees it: points, cells by type, regions, markers. Frozen; operations copy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import InputError
+from gmsnet.mesh.arrays import plain_array
+from gmsnet.mesh.cell_block import CORNERS, CellBlock
+from gmsnet.mesh.checks import (
+    arrays_per_block,
+    cell_blocks,
+    finite_points,
+    in_words,
+    items_of,
+    node_set_of,
+    region_names_of,
+    rows_of,
+)
+from gmsnet.mesh.plane import exponent_of
+
+
+class Source(Protocol):
+    """The file that a mesh was read from: it can write itself again with new coordinates and nothing else changed."""
+
+    @property
+    def format(self) -> str:
+        """Its name in the table of formats."""
+        ...
+
+    def splice(self, points: NDArray[np.float64]) -> Mapping[str, Iterable[bytes | memoryview]]:
+        """The files (suffix → pieces) with the coordinates of ``points`` (N×dim) where they differ from the file's."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """An unstructured mesh.
+
+    points: (N × 2 or N × 3) float64. cells: blocks in file order. region_names: (dimension, region) → name, the
+    dimension 1 for markers made of lines, 2 for regions made of faces. point_data: name → (N, …). cell_data: name →
+    one array per block. single: the file keeps coordinates in single precision, so results must be exact in float32.
+    source: the file it was read from, None if it was made in memory. node_sets: name → node ids, named groups of nodes
+    beside those that the cells make (meshio's point sets).
+
+    All arrays are read-only and share no memory with anything writable; those that are so already are not copied. So a
+    mesh is its own copy. It can be pickled, its file with it.
+
+    Raises InputError where a coordinate is not finite, a cell or a node set names a node that does not exist, data do
+    not have one row for each point or cell, or an argument is of the wrong type.
+    """
+
+    points: NDArray[np.float64]
+    cells: tuple[CellBlock, ...]
+    region_names: Mapping[tuple[int, int], str] = field(default_factory=dict)
+    point_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
+    single: bool = False
+    source: Source | None = field(default=None, repr=False)
+    node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        points = finite_points(self.points)
+        cells = cell_blocks(self.cells)
+        if not isinstance(self.single, (bool, np.bool_)):
+            raise InputError(f"single must be True or False, got {self.single!r}")
+        for block in cells:
+            # Seen as unsigned numbers, negative ones are larger than any node.
+            if block.nodes.size and block.nodes.view(np.uint64).max() >= len(points):
+                wrong = ((block.nodes < 0) | (block.nodes >= len(points))).any(axis=1)
+                row = int(np.flatnonzero(wrong)[0])
+                raise InputError(
+                    f"{block.kind} {row} (counted from 0) names the nodes {block.nodes[row].tolist()}, "
+                    f"but the mesh has {in_words(len(points))}"
+                )
+        counts = [len(block.nodes) for block in cells]
+        checked: dict[str, Mapping[Any, Any]] = {
+            "region_names": region_names_of(self.region_names),
+            "point_data": {
+                name: rows_of(values, f"point data {name!r}", len(points))
+                for name, values in items_of(self.point_data, "point_data")
+            },
+            "cell_data": {
+                name: arrays_per_block(arrays, f"cell data {name!r}", counts)
+                for name, arrays in items_of(self.cell_data, "cell_data")
+            },
+            "node_sets": {
+                name: node_set_of(ids, f"node set {name!r}", len(points))
+                for name, ids in items_of(self.node_sets, "node_sets")
+            },
+        }
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "cells", cells)
+        for field_name, value in checked.items():
+            object.__setattr__(self, field_name, MappingProxyType(value))
+
+    def __copy__(self) -> Mesh:
+        """Itself: nothing can change it."""
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Mesh:
+        """Itself: nothing can change it."""
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle: the mesh is made, and checked, anew."""
+        fields = (
+            self.points, self.cells, dict(self.region_names), dict(self.point_data), dict(self.cell_data), self.single,
+            self.source, dict(self.node_sets),
+        )  # fmt: skip
+        return Mesh, fields, None if self.cells else {"plane": self.plane}
+
+    def _twin(self) -> Mesh:
+        """Another mesh that shares everything with this one."""
+        made = object.__new__(Mesh)
+        made.__dict__.update(self.__dict__)
+        return made
+
+    def with_points(self, points: NDArray[np.float64]) -> Mesh:
+        """The same mesh with other coordinates (same shape as ``points``)."""
+        array = plain_array(points, "points")
+        if array.shape != self.points.shape:
+            raise InputError(f"new points must have the shape {self.points.shape}, got {array.shape}")
+        made = self._twin()  # all else has been checked
+        if self.cells:  # without any (``without_cells``), it is the plane of those that there were
+            made.__dict__.pop("plane", None)
+        made.__dict__.pop("exponent", None)
+        object.__setattr__(made, "points", finite_points(array))
+        return made
+
+    def without_cells(self) -> Mesh:
+        """The points alone, in the same plane: all that is needed of a mesh once its connectivity is known."""
+        made = self._twin()
+        nothing: dict[str, Any] = {"cells": (), "point_data": {}, "cell_data": {}, "node_sets": {}, "source": None}
+        for name, value in nothing.items():
+            object.__setattr__(made, name, value)
+        made.__dict__["plane"] = self.plane
+        return made
+
+    @cached_property
+    def plane(self) -> tuple[int, int] | None:
+        """The two axes in which a planar mesh varies, or None if no coordinate is constant.
+
+        Constant means: up to 1e-9 of the largest extent, over the nodes that cells use.
+        """
+        if self.points.shape[1] == 2:
+            return (0, 1)
+        if (self.points[:, 2] == self.points[:1, 2]).all():  # quickly told: so it is in most files
+            return (0, 1)
+        used = np.zeros(len(self.points), dtype=bool)
+        for block in self.cells:
+            used[block.nodes] = True
+        if not used.any():
+            return (0, 1)
+        extent = np.ptp(0.25 * self.points[used], axis=0)  # a quarter, lest it overflow
+        for flat in (2, 1, 0):
+            if extent[flat] <= 1e-9 * extent.max():
+                return {2: (0, 1), 1: (0, 2), 0: (1, 2)}[flat]
+        return None
+
+    @cached_property
+    def exponent(self) -> int:
+        """See ``exponent_of``."""
+        return exponent_of(self.points, self.plane, self.single)
+
+    @property
+    def markers(self) -> dict[str, NDArray[np.int64]]:
+        """Name of each marker, region and node set → its node ids.
+
+        A marker of lines or vertices without a name goes by its number; regions of faces and volumes need a name.
+        """
+        nodes: dict[str, list[NDArray[np.int64]]] = {name: [ids] for name, ids in self.node_sets.items()}
+        for block in self.cells:
+            for region in np.unique(block.regions).tolist():
+                name = self.region_names.get((block.dimension, region), str(region) if block.dimension < 2 else None)
+                if name is None:  # most often 0, the region of all cells: holding it would hold the whole mesh
+                    continue
+                nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
+        return {name: np.unique(np.concatenate(ids)) for name, ids in nodes.items()}
+
+
+def unmeasured(mesh: Mesh) -> str:
+    """How many faces of which kind are no triangles, in words: no quality is known of them. "" if there are none."""
+    counts: dict[str, int] = {}
+    for block in mesh.cells:
+        if block.dimension == 2 and CORNERS.get(block.kind) != 3 and len(block.nodes):
+            counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
+    return ", ".join(f"{count:,} {kind} cell{'s' if count > 1 else ''}" for kind, count in counts.items())

@@ -1,0 +1,1 @@
+"""Ranges of work on threads, and how much memory there is."""

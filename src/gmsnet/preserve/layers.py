@@ -1,0 +1,186 @@
+"""Which cells are stretched on purpose: boundary layers, wakes, and meshes that are anisotropic as a whole.
+
+A sliver is stretched, too. What tells a layer from slivers is that its cells are stretched in one direction over a
+neighbourhood. So the vector v of kernels.simplex.stretch, no longer than log 4, so that one sliver cannot outvote its
+neighbours, is averaged over the two rings around each node: on random Delaunay meshes the mean is 1.25 (as a stretch
+exp |v|), and hardly ever above 2.6; in layers it is the stretch itself, or 4. From where it is SEED or more, a layer
+extends over the neighbours whose stars have a mean stretch of REACH or more, whatever its direction, or ALIKE or more
+in one direction: so it goes around corners, where directions change, and up to where its cells are no longer stretched.
+
+Cells at the boundary, or at an interface, do not count for a seed: where the nodes there are closer together, or
+further apart, than those inside, one row of cells is stretched alike without anybody's intent. A layer has at least two
+rows of cells.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.simplex import stretch
+from gmsnet.kernels.topology import connectivity
+from gmsnet.kernels.topology.components import pieces, surroundings
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.parallel.memory import refuse_unless_free
+from gmsnet.preserve.survey import FEW, MOST, SEED, Survey
+from gmsnet.topology.topology import Topology, planar_points
+
+Flags = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+
+REACH = math.log(2.5)  # the mean stretch of a star to which a layer extends; right triangles with legs 1 and 2 have it
+ALIKE = math.log(1.8)  # the same of the mean of v, if in little: the halves of squares have 1.73
+FEWEST = 6  # nodes above SEED that hang together
+RINGS = 4  # how far a layer extends beyond those, in edges
+EVEN = 0.2  # of the mean area of a star: the least of its areas where a layer goes around a corner
+NEXT = 3.0  # how many times the area of a cell's neighbour in a layer its own may be, or the other way round
+BYTES_PER_NODE = 600  # that the layers of a mesh that has some take to be told, measured where all cells are in one
+BROKEN = 0.05  # of the mean area around: a cell of less is damaged, and its nodes are not held
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """Cells that are stretched on purpose.
+
+    nodes: (N,) bool by node id, the corners of those cells, but for damaged places. cells: (T,) bool by row of
+    ``Topology.triangles``. median, largest: stretch of those cells, the ratio of the longer to the shorter axis of
+    their Steiner ellipse (1 where there are none). damaged: how many of those cells are inverted, or have less than a
+    twentieth of the area of those around; their nodes are left out of ``nodes``, so that they can be mended.
+    """
+
+    nodes: Flags
+    cells: Flags
+    median: float
+    largest: float
+    damaged: int
+
+    def __bool__(self) -> bool:
+        return bool(self.cells.any())
+
+    @property
+    def summary(self) -> str:
+        """One sentence for a warning; "" where there are no layers."""
+        if not self:
+            return ""
+        count, share = int(self.cells.sum()), self.cells.mean()
+        where = "all cells" if share == 1.0 else f"{count:,} cells ({max(100.0 * share, 0.1):.2g} %)"
+        damaged = f"; {self.damaged:,} of them are damaged" if self.damaged else ""
+        return (
+            f"the mesh looks anisotropic on purpose: {where} are stretched alike, "
+            f"by {self.median:.3g} in the median and {self.largest:.3g} at most{damaged}"
+        )
+
+
+def stretched_layers(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> Layers:
+    """The layers of a planar mesh, as it is now. topology: of this mesh; which nodes it holds has no influence.
+
+    The result does not depend on the order of nodes and cells, nor on where the mesh lies and how large it is. survey:
+    of this mesh, where it is known.
+    """
+    triangles, turn = topology.near, topology.near_turn
+    count = len(topology.memory)
+    nothing = Layers(np.zeros(count, dtype=bool), np.zeros(len(triangles), dtype=bool), 1.0, 1.0, 0)
+    if not len(triangles) or topology.plane is None:
+        return nothing
+    survey = survey or Survey.of(mesh, topology)
+    layer = _seeds(survey, topology)
+    if not layer.any():
+        return nothing
+    refuse_unless_free(BYTES_PER_NODE * count, f"telling the layers among {count:,} nodes")
+    cells, number = np.empty((len(triangles), stretch.COLUMNS)), np.empty(count, dtype=np.int32)
+    stretch.per_cell(survey.points, triangles, turn, MOST, cells)
+    means = np.empty((count, stretch.COLUMNS))
+    stretch.to_nodes(triangles, np.zeros(count, dtype=bool), 1, cells, means, number)
+    alike = np.hypot(means[:, stretch.ALONG], means[:, stretch.ACROSS]) >= ALIKE
+    least = np.full(count, np.inf)
+    np.minimum.at(least, triangles.ravel(), np.repeat(cells[:, stretch.AREA], 3))
+    even = least >= EVEN * means[:, stretch.AREA]
+    candidates = alike | (even & (means[:, stretch.LENGTH] >= REACH))
+    for _ in range(RINGS):
+        touched = np.zeros(count, dtype=bool)
+        touched[triangles[connectivity.touching(triangles, layer)]] = True
+        layer |= touched & candidates
+    held = np.empty(count, dtype=bool)
+    held[topology.memory] = layer
+    return _layers(mesh, topology, held)
+
+
+def _seeds(survey: Survey, topology: Topology) -> Flags:
+    """(N,) by places in memory: nodes that hang together, FEWEST or more, of which the mean over two rings is SEED.
+
+    The mean of v, or more; cells with a node of the boundary or of an interface do not count.
+    """
+    seeds = np.zeros(len(survey.rim), dtype=bool)
+    if not survey.suspects.any():
+        return seeds
+    rows, corners, nodes = surroundings(topology.near, survey.suspects)
+    cells = np.empty((len(rows), stretch.COLUMNS))
+    stretch.per_cell(survey.points[nodes], corners, topology.near_turn[rows], MOST, cells)
+    strong = _coherent(corners, cells, survey.rim[nodes] > 0) & survey.suspects[nodes]
+    piece = pieces(corners, strong)
+    seeds[nodes[strong & (np.bincount(piece[strong], minlength=len(nodes)) >= FEWEST)[piece]]] = True
+    return seeds
+
+
+def _coherent(triangles: NDArray[np.int32], cells: Floats, rim: Flags) -> Flags:
+    """(N,) where the mean of v over two rings is SEED or longer; cells with a node of the rim do not count."""
+    nodes, around, number = np.empty((len(rim), 2)), np.empty((len(triangles), 2)), np.empty(len(rim), dtype=np.int32)
+    stretch.to_nodes(triangles, rim, FEW, cells, nodes, number)
+    # A corner of a cell that counts has a cell that counts, so no mean is formed with the zeros of nodes without one.
+    stretch.to_cells(triangles, nodes, around)
+    stretch.to_nodes(triangles, rim, FEW, around, nodes, number)
+    return np.asarray((nodes**2).sum(axis=1) >= SEED**2)
+
+
+def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers:
+    """From the nodes of layers, by id, to their cells and what can be held of them."""
+    triangles = topology.triangles
+    cells, number = np.empty((len(triangles), stretch.COLUMNS)), np.empty(len(layer), dtype=np.int32)
+    points = planar_points(mesh)
+    stretch.per_cell(points, triangles, topology.turn, math.inf, cells)
+    corners = np.take(layer.astype(np.int8), triangles)
+    count = corners[:, 0] + corners[:, 1] + corners[:, 2]  # of a cell's corners that are in a layer
+    chosen: Flags = np.asarray(count == 3)
+    chosen[_next_row(triangles, layer, count, cells)] = True
+    damaged = chosen & (cells[:, stretch.AREA] <= BROKEN * _area_around(triangles, cells, number))
+    nodes = np.zeros(len(layer), dtype=bool)
+    nodes[triangles[chosen]] = True
+    nodes[triangles[damaged]] = False
+    lengths = np.exp(cells[chosen, stretch.LENGTH])
+    return Layers(nodes, chosen, float(np.median(lengths)), float(lengths.max()), int(damaged.sum()))
+
+
+def _next_row(triangles: NDArray[np.int32], layer: Flags, count: NDArray[np.int8], cells: Floats) -> NDArray[np.int64]:
+    """Rows of stretched cells that have an edge, and about the area, in common with a cell of a layer.
+
+    count: (T,) how many corners of each cell are in a layer.
+    """
+    rim = np.flatnonzero((count == 2) & (cells[:, stretch.LENGTH] >= ALIKE))
+    own = triangles[rim][layer[triangles[rim]]].reshape(-1, 2)
+    beside = np.zeros(len(layer), dtype=bool)
+    beside[own] = True
+    inside = connectivity.touching(triangles, beside)
+    inside = inside[count[inside] == 3]
+    if not len(inside):
+        return rim[:0]
+    edges = triangles[inside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    key, known = (e.min(axis=1).astype(np.int64) * len(layer) + e.max(axis=1) for e in (own, edges))
+    order = np.argsort(known, kind="stable")
+    place = np.minimum(np.searchsorted(known[order], key), len(known) - 1)
+    across = np.repeat(np.abs(cells[inside, stretch.AREA]), 3)[order][place]
+    size = np.abs(cells[rim, stretch.AREA])
+    alike = (known[order][place] == key) & (size <= NEXT * across) & (across <= NEXT * size)
+    return np.asarray(rim[alike])
+
+
+def _area_around(triangles: NDArray[np.int32], cells: Floats, number: NDArray[np.int32]) -> Floats:
+    """(T,) the mean of |D| over the stars of each cell's corners."""
+    size = np.abs(cells[:, [stretch.AREA]])
+    nodes = np.empty((len(number), 1))
+    stretch.to_nodes(triangles, np.zeros(len(number), dtype=bool), 1, size, nodes, number)
+    around = np.empty_like(size)
+    stretch.to_cells(triangles, nodes, around)
+    return around[:, 0]

@@ -1,0 +1,163 @@
+"""Near which walls the sizes of cells are meant to be what they are.
+
+A mesh that is refined towards a body is so on purpose: what happens there, in about a boundary layer's thickness, must
+be resolved as its maker wanted. In isotropic regions the connectivity carries the grading, so they are smoothed freely;
+but converged smoothing changes single areas by a factor of up to two. So cells near such a wall keep their areas
+within a band, unless they are damaged; their shapes are improved as far as the band lets them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.simplex import measures as quality
+from gmsnet.kernels.simplex.survey import BOUNDARY
+from gmsnet.kernels.topology.components import pieces
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.preserve.survey import Survey
+from gmsnet.topology.stars import Ints
+from gmsnet.topology.topology import Topology
+
+Flags = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+
+NEAR = 0.02  # of a wall's diameter: how far from it a cell's middle may lie
+REFINED = 0.25  # cells there have edges of at most this share of those that cells of the mesh's mean area would have
+MOST = 0.5  # at least this share of the cells near a wall is refined, or it is not refined towards that wall
+# How far a cell's area may lie from the mean of its neighbours', in logarithms, averaged over the stars of its corners.
+CALM, ROUGH = 0.125, 0.4  # the median near a wall (more: all there has been disturbed); a cell (more: it is damaged)
+SOUND = 0.5  # the least 1/q of a cell
+CANDIDATES = 8  # edges of the wall, by their middles, among which the nearest is looked for
+
+
+def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> Flags:
+    """(N,) by node id: the corners of cells of a planar mesh that keep their areas.
+
+    topology: of this mesh, with what is stretched on purpose held: cells that cannot change are not looked at for
+    damage. The cells are those whose middle lies within NEAR of a wall's diameter from it (a wall is a piece of the
+    boundary that hangs together), provided that the mesh is refined towards that wall and has not been disturbed there;
+    but for the neighbours of damaged cells. Most cells near a refined wall are at most REFINED of the mesh's mean size,
+    and so small that at least one row of them is near. survey: of this mesh, where it is known.
+    """
+    triangles = topology.near
+    kept = np.zeros(len(topology.memory), dtype=bool)
+    if topology.plane is None or not len(triangles):
+        return kept
+    survey = survey or Survey.of(mesh, topology)
+    points = survey.points
+    largest = REFINED * float(_edge(survey.double))
+    if not (_edge(_double(points, triangles.take(survey.beside, axis=0))) <= largest).any():
+        return kept  # so it is with most meshes
+    chosen, rough = np.zeros(len(triangles), dtype=bool), None
+    for wall, cells in _walls(triangles, survey):
+        size = _edge(_double(points, triangles[cells]))
+        if (size <= largest).mean() < MOST:
+            continue
+        close = NEAR * _diameter(points[np.unique(wall)])
+        most = min(largest, close)
+        if not most > 0.0 or (size <= most).mean() < MOST:
+            continue
+        rows = _rows_near(points, triangles, points[wall], close)
+        if not rows.size or (_edge(_double(points, triangles[rows])) <= most).mean() < MOST:
+            continue
+        rough = _roughness(triangles, _double(points, triangles), len(points)) if rough is None else rough
+        if np.median(rough[rows]) <= CALM:
+            chosen[rows] = True
+    if rough is not None and chosen.any():
+        rows = np.flatnonzero(chosen)
+        corners, columns = triangles[rows], np.empty((4, len(rows)))
+        quality.per_cell(points, corners, topology.near_turn[rows], columns)
+        damaged = (rough[rows] > ROUGH) | (columns[quality.SHAPE] < SOUND)
+        kept[topology.memory[corners]] = True
+        kept[topology.memory[corners[damaged & topology.near_free[corners].any(axis=1)]]] = False
+    return kept
+
+
+def _roughness(triangles: Ints, double: Floats, nodes: int) -> Floats:
+    """(T,) how far areas lie from the mean of their neighbours' (in logarithms), around the corners of each cell.
+
+    A steady growth from row to row cancels in it.
+    """
+    size = np.log(np.maximum(double, np.finfo(float).tiny))
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
+    key = edges[:, 0] * nodes + edges[:, 1]
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    one, other = order[same] // 3, order[same + 1] // 3
+    both, across = np.concatenate([one, other]), np.concatenate([other, one])
+    count = np.bincount(both, minlength=len(size))
+    mean = np.bincount(both, size[across], minlength=len(size)) / np.maximum(count, 1)
+    off = np.where(count > 0, np.abs(size - mean), 0.0)
+    corners = triangles.ravel()
+    number = np.maximum(np.bincount(corners, minlength=nodes), 1)
+    around = np.bincount(corners, np.repeat(off, 3), minlength=nodes) / number
+    return np.asarray(around[triangles].mean(axis=1))
+
+
+def _double(points: Floats, triangles: Ints) -> Floats:
+    """(T,) twice the area."""
+    (ax, bx, cx), (ay, by, cy) = (points[:, axis][triangles].T for axis in range(2))
+    return np.asarray(np.abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)))
+
+
+def _edge(double: Floats | float) -> Floats:
+    """The edges of equilateral triangles of such areas."""
+    return np.asarray(np.sqrt(double * (2.0 / np.sqrt(3.0))))
+
+
+def _walls(triangles: Ints, survey: Survey) -> list[tuple[Ints, Ints]]:
+    """The boundary edges (k, 2) of each piece of the boundary that hangs together, and the row of the cell at each."""
+    boundary = (survey.rim & BOUNDARY) > 0
+    edges = triangles[survey.beside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    outer = np.flatnonzero(boundary[edges].all(axis=1))
+    ends = np.sort(edges[outer], axis=1)
+    key = ends[:, 0].astype(np.int64) * len(boundary) + ends[:, 1]
+    # An edge between two of these nodes that is not on the boundary has both of its cells among these rows.
+    _, place, count = np.unique(key, return_index=True, return_counts=True)
+    once = place[count == 1]
+    ends, cells = ends[once], survey.beside[outer[once] // 3]
+    piece = pieces(ends, boundary)[ends[:, 0]]
+    order = np.argsort(piece, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
+    return [(ends[part], cells[part]) for part in parts if len(part)]
+
+
+def _rows_near(points: Floats, triangles: Ints, wall: Floats, near: float) -> NDArray[np.int64]:
+    """The triangles whose middles lie within ``near`` of a wall with the edges (k, 2, 2)."""
+    middle = np.column_stack([points[:, axis][triangles].mean(axis=1) for axis in range(2)])
+    low, high = wall.min(axis=(0, 1)) - near, wall.max(axis=(0, 1)) + near
+    rows = np.flatnonzero(((middle >= low) & (middle <= high)).all(axis=1))
+    return rows[_distance(middle[rows], wall, near) <= near]
+
+
+def _diameter(points: Floats) -> float:
+    """The largest distance between two of the points."""
+    from scipy.spatial import ConvexHull, QhullError
+    from scipy.spatial.distance import pdist
+
+    try:
+        points = points[ConvexHull(points).vertices]
+    except QhullError:  # all in one line
+        along = points[:, int(np.argmax(np.ptp(points, axis=0)))]
+        points = points[[int(along.argmin()), int(along.argmax())]]
+    return float(pdist(points).max(initial=0.0))
+
+
+def _distance(points: Floats, ends: Floats, near: float) -> Floats:
+    """(n,) distance from a wall with the edges (k, 2, 2); ∞ where it is certainly larger than ``near``."""
+    from scipy.spatial import cKDTree
+
+    out = np.full(len(points), np.inf)
+    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    reach = near + 0.5 * float(np.linalg.norm(along, axis=1).max())
+    count = min(CANDIDATES, len(ends))
+    far, nearest = cKDTree(ends.mean(axis=1)).query(points, k=count, distance_upper_bound=reach)
+    far, nearest = far.reshape(len(points), count), nearest.reshape(len(points), count)
+    for k in range(count):
+        some = np.flatnonzero(far[:, k] < np.inf)
+        edge = nearest[some, k]
+        away, step = points[some] - start[edge], along[edge]
+        share = np.clip((away * step).sum(axis=1) / np.maximum((step * step).sum(axis=1), 1e-300), 0.0, 1.0)
+        out[some] = np.minimum(out[some], np.linalg.norm(away - share[:, None] * step, axis=1))
+    return out

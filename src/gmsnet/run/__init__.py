@@ -1,0 +1,1 @@
+"""One call of ``smooth``: options, stages, sweeps, the best mesh, the result."""

@@ -1,0 +1,84 @@
+"""Where a mesh on the way stands in the comparison of meshes: quick sums over its triangles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.measure.report import ASPECT, Totals
+
+ROUNDING = 1e-12  # a smaller gain in q̂ is no gain
+NONE = np.empty((0, 3), dtype=np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """Where a mesh stands in the comparison of meshes on the way.
+
+    measure: the sums over all triangles, None where there are none; asked for when they first matter. missing: the
+    corners (K, 3) of the triangles that miss the target, if there is one. positive: all triangles are known to be.
+    """
+
+    measure: Callable[[], Totals | None]
+    best_by: str
+    missing: NDArray[np.int32] = field(default_factory=lambda: NONE)
+    positive: bool = False
+
+    @classmethod
+    def of(cls, totals: Totals | None, best_by: str, missing: NDArray[np.int32] = NONE) -> Standing:
+        """From the sums over all triangles; None where there are none."""
+        return cls(lambda: totals, best_by, missing)
+
+    @cached_property
+    def totals(self) -> Totals | None:
+        """What the rest is taken from."""
+        return self.measure()
+
+    @property
+    def missed(self) -> int:
+        """How many cells miss the target."""
+        return len(self.missing)
+
+    @property
+    def inverted(self) -> int:
+        """How many are."""
+        return 0 if self.positive or self.totals is None else self.totals.inverted
+
+    @property
+    def qhat(self) -> float:
+        """q̂ with 1/q or 1/q_V, as asked for."""
+        if self.totals is None:
+            return math.nan
+        return self.totals.qhat_aspect if self.best_by == ASPECT else self.totals.qhat
+
+    @property
+    def min_shape(self) -> float:
+        """The least 1/q."""
+        return math.inf if self.totals is None else self.totals.shape_min
+
+    @property
+    def mean_shape(self) -> float:
+        """The mean 1/q."""
+        return math.nan if self.totals is None else self.totals.shape_mean
+
+    def nearer(self, other: Standing) -> bool:
+        """Nearer to the target: fewer inverted cells, then fewer that miss it, then a better worst cell, not q̂."""
+        if self.counts != other.counts:
+            return self.counts < other.counts
+        return self.min_shape > other.min_shape
+
+    def beats(self, other: Standing) -> bool:
+        """Fewer inverted cells first, then fewer that miss the target, then a larger q̂, by more than rounding."""
+        if self.counts != other.counts:
+            return self.counts < other.counts
+        return self.qhat > other.qhat + ROUNDING
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Inverted cells, and those that miss the target."""
+        return self.inverted, self.missed

@@ -1,0 +1,1 @@
+"""What follows from a mesh's connectivity, built once."""

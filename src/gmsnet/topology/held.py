@@ -1,0 +1,51 @@
+"""Why nodes are held: what is known before the faces are looked at, and each node under its first reason."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.topology import connectivity as marks_of
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.fans import Marks
+from gmsnet.topology.polygons import Ints
+
+SMOOTHED = ("triangle",)  # the cell types whose nodes may move
+MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would no longer fit any cache
+
+REASONS = {  # mark → text, in the order in which they count
+    marks_of.UNUSED: "not used by any cell",
+    marks_of.BOUNDARY: "boundary",
+    marks_of.INTERFACE: "interface between regions",
+    marks_of.LINE: "node of a line or vertex cell",
+    marks_of.FOREIGN: "node of a cell that is not smoothed",
+    marks_of.CROWDED: "non-manifold edge",
+    marks_of.UNWOUND: "part that cannot be wound consistently",
+    marks_of.SIDELESS: "part of zero area, which has no positive side",
+    marks_of.CHOSEN: "fixed by the user",
+    marks_of.TORN: "star is not one closed fan",
+    marks_of.HUB: f"more than {MOST_NEIGHBOURS} neighbours",
+}
+
+
+def known_marks(mesh: Mesh, fixed: NDArray[np.bool_] | None, position: Ints) -> Marks:
+    """(N,) by places in memory: LINE, FOREIGN, and CHOSEN for the nodes ``fixed`` (N,) by id."""
+    marks = np.zeros(len(position), dtype=np.uint16)
+    for block in mesh.cells:
+        if block.kind not in SMOOTHED:
+            marks[position[block.nodes.ravel()]] |= np.uint16(
+                marks_of.LINE if block.dimension < 2 else marks_of.FOREIGN
+            )
+    if fixed is not None and fixed.any():
+        marks[position[fixed]] |= np.uint16(marks_of.CHOSEN)
+    return marks
+
+
+def sorted_out(marks: Marks, position: Ints) -> tuple[dict[str, NDArray[np.int64]], Ints, Ints]:
+    """Reason → ids, each node under the first that applies to it; the ids of the free nodes, and their places."""
+    by_id = marks.take(position)
+    first = by_id & (~by_id + np.uint16(1))
+    found = int(np.bitwise_or.reduce(first))
+    held = {text: np.flatnonzero(first == mark) for mark, text in REASONS.items() if found & mark}
+    free = np.flatnonzero(first == 0).astype(np.int32)
+    return held, free, position.take(free)

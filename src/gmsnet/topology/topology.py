@@ -1,0 +1,257 @@
+"""What follows from a mesh's connectivity: winding, boundary, interfaces, which nodes are held and why, the patches.
+
+Built once per connectivity. Coordinates enter in two places only: which of the two sides of a part is up (its larger
+area is the positive one), and the memory order of nodes and triangles. On that no ring and no colour depends, but what
+looks at some of the cells, or adds over all of them, takes them in that order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.topology import connectivity, layout, patch
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.plane import in_plane
+from gmsnet.parallel.memory import refuse_unless_free
+from gmsnet.parallel.threads import side_by_side
+from gmsnet.topology.fans import closed_fans
+from gmsnet.topology.held import MOST_NEIGHBOURS, known_marks, sorted_out
+from gmsnet.topology.polygons import Faces, Offsets, check_size
+from gmsnet.topology.stars import Colouring, Flags, Ints, Stars
+
+PER_NODE, PER_CORNER = 90, 22  # bytes that the set-up takes at most, measured; 222 a node where all are triangles
+
+
+@dataclass(frozen=True, eq=False)
+class Topology:
+    """The connectivity of a mesh, seen from its nodes.
+
+    plane: the two axes of a planar mesh, else None. triangles: (T, 3) corner nodes of all cells with three corners, in
+    file order (six-node triangles by their corners); cell: (T,) the index of each among all cells of the mesh; turn:
+    (T,) int8, −1 where it has to be read backwards for all of its part to be wound alike with positive area.
+    held: reason → node ids, the first reason that applies.
+    free: (F,) ids of the nodes that may move, ascending.
+    memory: (N,) node ids in memory order. In that order, by places in memory: near (T, 3) and near_turn (T,), the
+    triangles; rings, each from its smallest id on, and their CSR start (N + 1); near_free (N,), which nodes may move.
+    colouring: of all nodes that were free at first, in the order of the ids, so that colours follow from the
+    connectivity alone.
+    """
+
+    plane: tuple[int, int] | None
+    triangles: Ints
+    cell: NDArray[np.int64]
+    turn: NDArray[np.int8]
+    held: dict[str, NDArray[np.int64]]
+    free: Ints
+    memory: Ints
+    near: Ints
+    near_turn: NDArray[np.int8]
+    near_start: Offsets
+    near_ring: Ints
+    near_free: Flags
+    colouring: Colouring
+
+    @classmethod
+    def of(cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1) -> Topology:
+        """The topology of a mesh; ``fixed`` (N,) bool holds further nodes ("fixed by the user").
+
+        threads: one or two; more have nothing to do.
+
+        Raises InputError for more nodes or faces than int32 can number, and where memory does not suffice.
+        """
+        return cls.and_points(mesh, fixed, threads)[0]
+
+    @classmethod
+    def and_points(
+        cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1
+    ) -> tuple[Topology, NDArray[np.float64]]:
+        """The same, and the mesh's ``near_points``, which were needed for it."""
+        nodes, corners = len(mesh.points), check_size(mesh)
+        refuse_unless_free(nodes * PER_NODE + corners * PER_CORNER, f"the connectivity of {nodes:,} nodes")
+        planar = planar_points(mesh)
+        (memory, position), written = side_by_side(threads, partial(_memory_order, planar), partial(Faces.of, mesh))
+        faces, planar = side_by_side(threads, partial(written.renumbered, position), partial(_taken, planar, memory))
+        marks = known_marks(mesh, fixed, position)
+        points = None if mesh.plane is None else planar
+        near_turn, start, ring = closed_fans(faces, points, marks, memory, MOST_NEIGHBOURS)
+        held, free, places = sorted_out(marks, position)
+        three, triangles = written.triangles()
+        whole, near = faces.triangles()
+        turn = near_turn
+        if (turn != turn[:1]).any():
+            turn = np.empty_like(near_turn)
+            turn[faces.origin] = near_turn
+        topology = cls(
+            plane=mesh.plane,
+            triangles=triangles,
+            cell=written.cell[three],
+            turn=turn[three],
+            held=held,
+            free=free,
+            memory=memory,
+            near=near,
+            near_turn=near_turn[whole],
+            near_start=start,
+            near_ring=ring[: start[-1]],
+            near_free=marks == 0,
+            colouring=Colouring(places, start, ring),
+        )
+        return topology, planar
+
+    def holding(self, chosen: Flags, reason: str) -> Topology:
+        """The same, with the free nodes among the chosen (N,) by id held for this reason."""
+        newly = self.free[chosen[self.free]]
+        if not len(newly):
+            return self
+        held = {**self.held, reason: newly.astype(np.int64)}
+        free = self.near_free & ~chosen[self.memory]
+        return replace(self, held=held, free=self.free[~chosen[self.free]], near_free=free)
+
+    def restricted(self, active: Flags) -> Topology:
+        """The same with the active nodes (N,) by places in memory alone free, and only the triangles around them.
+
+        For a while: ``held`` does not tell of the others.
+        """
+        nodes = np.flatnonzero(active)
+        near = patch.triangles_around(nodes, active, self.near_start, self.near_ring)
+        turn = np.ones(len(near), dtype=np.int8)
+        inner = replace(self, near=near, near_turn=turn, free=np.sort(self.memory[nodes]), near_free=active)
+        inner.__dict__["changeable"] = near, turn  # all of them
+        return inner
+
+    @cached_property
+    def stars(self) -> Stars:
+        """The patches in the order in which they are smoothed."""
+        free = np.flatnonzero(self.near_free).astype(np.int32)
+        degrees = np.diff(self.near_start).take(free)
+        most, colours = int(degrees.max(initial=0)), int(self.near_colours.max(initial=-1)) + 1
+        kind = self.near_colours.take(free) * (most + 1) + degrees
+        number = -(-np.bincount(kind, minlength=colours * (most + 1)).reshape(colours, most + 1) // LANES)
+        first, to = np.zeros((2, colours + 1), dtype=np.int64)
+        np.cumsum(number.sum(axis=1), out=first[1:])
+        np.cumsum(LANES * (number @ np.arange(most + 1)), out=to[1:])
+        blocks = int(first[-1])
+        centre, rings = np.empty(blocks * LANES, dtype=np.int32), np.empty(to[-1], dtype=np.int32)
+        offset, degree = np.empty(blocks, dtype=np.int64), np.empty(blocks, dtype=np.int32)
+        filled = np.zeros(blocks, dtype=np.int32)
+        layout.fill_blocks(
+            free, self.near_start, self.near_ring, kind, most + 1, first[:-1].copy(), to[:-1], centre, rings,
+            offset, degree, filled,
+        )  # fmt: skip
+        return Stars(Blocks(centre, rings, offset, degree, filled, most), first.astype(np.int32))
+
+    @cached_property
+    def patches(self) -> tuple[Offsets, Ints]:
+        """The rings of the free nodes by node ids: start (F + 1) and ring, row i of node free[i].
+
+        Counter-clockwise, each from its smallest id on.
+        """
+        place = self.places[self.free]
+        degree = np.diff(self.near_start)[place]
+        start = np.zeros(len(place) + 1, dtype=self.near_start.dtype)
+        np.cumsum(degree, out=start[1:])
+        within = np.arange(start[-1]) - np.repeat(start[:-1], degree)
+        return start, self.memory[self.near_ring[np.repeat(self.near_start[place], degree) + within]]
+
+    @cached_property
+    def places(self) -> Ints:
+        """(N,) the place in memory of each node by id."""
+        return _inverse(self.memory)
+
+    @cached_property
+    def near_colours(self) -> Ints:
+        """(N,) by places in memory: colours, of which no two free nodes of one cell share one; −1 where held."""
+        colours = self.colouring.colours
+        if len(self.free) == len(self.colouring.places):
+            return colours
+        return np.where(self.near_free, colours, np.int32(-1))
+
+    @cached_property
+    def near_ringed(self) -> Flags:
+        """(N,) by places in memory: which nodes have a ring: the free ones, and those held since (``holding``)."""
+        return np.diff(self.near_start) > 0
+
+    def with_rings_of_free_nodes(self) -> Topology:
+        """The same, in which a node has a ring only if it is free."""
+        free = self.near_free
+        if (self.near_ringed == free).all():
+            return self
+        degree = np.diff(self.near_start)
+        start = np.zeros_like(self.near_start)
+        np.cumsum(np.where(free, degree, 0), out=start[1:])
+        return replace(self, near_start=start, near_ring=self.near_ring[np.repeat(free, degree)])
+
+    @cached_property
+    def changeable(self) -> tuple[Ints, NDArray[np.int8]]:
+        """The rows of near and near_turn that have a free node."""
+        rows = connectivity.touching(self.near, self.near_free)
+        if len(rows) == len(self.near):
+            return self.near, self.near_turn
+        return self.near.take(rows, axis=0), self.near_turn.take(rows)
+
+    @cached_property
+    def colours(self) -> Ints:
+        """(N,) colour of each node by id, −1 where held."""
+        return self.near_colours[self.places]
+
+
+def _inverse(order: Ints) -> Ints:
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order), dtype=order.dtype)
+    return place
+
+
+def _memory_order(points: NDArray[np.float64]) -> tuple[Ints, Ints]:
+    """The ids in memory order, and the place of each."""
+    nodes = len(points)
+    memory, position = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
+    keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
+    layout.morton_order(points, keys, other, memory, position)
+    return memory, position
+
+
+class Flat(Protocol):
+    """Points in a plane: a Mesh, or what is kept of one. See there."""
+
+    @property
+    def points(self) -> NDArray[np.float64]:
+        """(N × 2 or N × 3) coordinates."""
+        ...
+
+    @property
+    def plane(self) -> tuple[int, int] | None:
+        """The two axes."""
+        ...
+
+    @property
+    def exponent(self) -> int:
+        """The power of two by which ``planar_points`` divides them."""
+        ...
+
+
+def planar_points(mesh: Flat) -> NDArray[np.float64]:
+    """The points in the plane of the mesh (N, 2), divided by 2 to the power of its ``exponent``, which is exact.
+
+    The largest coordinate is then near 1, so that products of tiny or huge ones neither under- nor overflow. Of a mesh
+    that is not planar, the first two coordinates.
+    """
+    points = in_plane(mesh.points, mesh.plane)
+    if abs(mesh.exponent) < 1000:
+        return np.ascontiguousarray(points * 2.0**-mesh.exponent)
+    return np.ldexp(points, -mesh.exponent)
+
+
+def near_points(mesh: Flat, topology: Topology) -> NDArray[np.float64]:
+    """The same by places in memory."""
+    return _taken(planar_points(mesh), topology.memory)
+
+
+def _taken(points: NDArray[np.float64], memory: Ints) -> NDArray[np.float64]:
+    return np.take(points, memory, axis=0)

@@ -1,0 +1,75 @@
+"""Ranking against NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import gmsnet
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods import ranking
+from gmsnet.topology.topology import Topology, planar_points
+
+
+def test_shapes_are_those_of_the_report():
+    mesh = gmsnet.random_mesh(300, seed=1)
+    report, topology = gmsnet.quality(mesh), Topology.of(mesh)
+    points, count = planar_points(mesh), len(topology.triangles)
+    shape, some = np.empty(count), np.empty(3)
+    ranking.shapes(points, topology.triangles, topology.turn, 0, -(-count // LANES), shape)
+    np.testing.assert_allclose(shape, report.shape, rtol=1e-12)
+    cells = np.array([5, 0, count - 1], dtype=np.int32)
+    ranking.shapes_of(points, topology.triangles, topology.turn, cells, some)
+    np.testing.assert_allclose(some, report.shape[cells], rtol=1e-12)
+
+
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 2000), wanted=st.integers(1, 500))
+@settings(max_examples=100)
+def test_the_worst_are_all_up_to_a_limit(seed, count, wanted):
+    rng = np.random.default_rng(seed)
+    shape = rng.uniform(-1, 1, count).astype(np.float32) ** rng.choice([1, 3])
+    cells = ranking.worst(shape, wanted)
+    assert min(wanted, count) <= len(cells) <= max(wanted + wanted // 4, 1)
+    limit = shape[cells].max()
+    np.testing.assert_array_equal(cells, np.flatnonzero(shape <= limit))
+
+
+@pytest.mark.parametrize("value", [-1.0, 0.0, 0.5, 1.0])
+def test_equal_ones_are_taken_together(value):
+    assert len(ranking.worst(np.full(100, value, dtype=np.float32), 3)) == 100
+
+
+def test_free_nodes_once_each():
+    topology = Topology.of(gmsnet.random_mesh(500, seed=2))
+    rng = np.random.default_rng(3)
+    triangles, free = topology.near, topology.near_free
+    cells = rng.choice(len(triangles), 60, replace=False).astype(np.int32)
+    shape = rng.random(60)
+    seen = np.zeros(len(free), dtype=np.bool_)
+    nodes = ranking.free_nodes(triangles, cells, shape, 0.5, free, topology.memory, seen)
+    wanted = np.unique(triangles[cells[shape <= 0.5]])
+    np.testing.assert_array_equal(np.sort(nodes), wanted[free[wanted]])
+    assert (np.diff(topology.memory[nodes]) > 0).all()
+    assert not seen.any()
+
+
+@given(values=st.lists(st.sampled_from([-1.0, 0.0, 0.5, 1.0]) | st.floats(-1, 1), min_size=1), data=st.data())
+def test_the_smallest_are_as_sorting_says(values, data):
+    rank = data.draw(st.integers(0, len(values) - 1))
+    before = np.array(values)
+    assert ranking.smallest(before, rank) == sorted(values)[rank]
+    np.testing.assert_array_equal(before, values)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 400))
+def test_nodes_in_the_order_of_their_ids(seed, count):
+    """Few among many, which are sorted, and so many that all are gone through."""
+    rng = np.random.default_rng(seed)
+    for total in (count, 16 * count, 20 * count):
+        memory = rng.permutation(total).astype(np.int32)
+        nodes = rng.choice(total, count, replace=False).astype(np.int32)
+        wanted = nodes[np.argsort(memory[nodes])].tolist()
+        ranking.by_id(nodes, memory)
+        assert nodes.tolist() == wanted

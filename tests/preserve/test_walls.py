@@ -1,0 +1,144 @@
+"""Cells keep their areas near walls that the mesh is refined towards, and nowhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.layer_meshes import grid
+
+import gmsnet
+from gmsnet.generate import Curve, disturb, good_mesh, layered_mesh
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.paper.cases import CASES
+from gmsnet.preserve.layers import stretched_layers
+from gmsnet.preserve.protection import WALL
+from gmsnet.preserve.walls import NEAR, near_walls
+from gmsnet.topology.topology import Topology
+
+
+def kept(mesh, held=None):
+    return near_walls(mesh, Topology.of(mesh, held))
+
+
+def distances(points, wall):
+    """(n,) from the closed polygon (k, 2), one edge after the other."""
+    out = np.full(len(points), np.inf)
+    for a, b in zip(wall, np.roll(wall, -1, axis=0), strict=True):
+        share = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+        out = np.minimum(out, np.linalg.norm(points - a - share[:, None] * (b - a), axis=1))
+    return out
+
+
+@pytest.fixture(scope="module")
+def ring():
+    """A hole of diameter 1 in a square of side 8, refined towards it: edges from 0.01 to 1."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 400)
+    hole = Curve(0.5 * np.column_stack([np.cos(turn), np.sin(turn)]), "hole")
+    square = Curve(np.array([[-4.0, -4.0], [4.0, -4.0], [4.0, 4.0], [-4.0, 4.0], [-4.0, -4.0]]), "square")
+    return good_mesh([[square], [hole]], lambda x: 0.01 + 0.25 * np.abs(np.linalg.norm(x, axis=1) - 0.5))
+
+
+def test_a_hole_that_the_mesh_is_refined_towards(ring):
+    flags = kept(ring)
+    triangles = ring.cells[0].nodes
+    middle = ring.points[triangles].mean(axis=1)
+    near = distances(middle, ring.points[ring.markers["hole"]]) <= NEAR
+    assert flags[triangles[near]].all()
+    assert set(np.flatnonzero(flags).tolist()) == set(triangles[near].ravel().tolist())
+    assert 200 < near.sum() < len(triangles) / 2
+
+
+def test_what_becomes_of_the_nodes_near_walls_is_told(ring):
+    count = int(kept(ring).sum()) - len(ring.markers["hole"])
+    told = f"the mesh is refined towards its walls: the {count:,} nodes next to them"
+    moved = gmsnet.smooth(ring)
+    band = "move only as far as the areas of their cells stay within 10% of the input's"
+    assert moved.notes == [f"{told} {band} (preserve='shape')"]
+    assert WALL not in moved.held
+    least = float(moved.before.shape.min())
+    for options in ({"max_sweeps": 1}, {"target_quality": least * 1.01}, {"target_quality": least * 0.9}):
+        held = gmsnet.smooth(ring, **options)
+        assert held.notes == [f"{told} are held in this run (preserve='shape'); preserve='none' lets them move"]
+        assert len(held.held[WALL]) == count
+        assert not held.moved[kept(ring)].any()
+
+
+def test_it_moves_turns_and_scales_with_the_mesh(ring):
+    cosine, sine = np.cos(0.7), np.sin(0.7)
+    turned = ring.points @ [[cosine, sine], [-sine, cosine]] * 1e3 + 1e4
+    assert kept(ring.with_points(turned)).tolist() == kept(ring).tolist()
+    assert kept(ring.with_points(ring.points * [1.0, -1.0])).tolist() == kept(ring).tolist()
+
+
+@pytest.mark.parametrize("amount", [0.3, 0.5, 1.0])
+def test_not_where_all_has_been_disturbed(ring, amount):
+    assert not kept(disturb(ring, Topology.of(ring).free, amount, seed=0)).any()
+
+
+@pytest.mark.parametrize("keep_valid", [True, False])
+def test_not_around_damaged_cells(ring, keep_valid):
+    flags, topology = kept(ring), Topology.of(ring)
+    inner = np.flatnonzero(flags & np.isin(np.arange(len(flags)), topology.free))
+    chosen = inner[np.random.default_rng(0).permutation(len(inner))[:6]]
+    broken = disturb(ring, chosen, 3.0, seed=0, keep_valid=keep_valid)
+    shape = gmsnet.quality(broken).shape
+    middle = broken.points[topology.triangles].mean(axis=1)
+    near = distances(middle, ring.points[ring.markers["hole"]]) < 0.9 * NEAR
+    bad = (shape < 0.5) & near
+    assert bad.any()
+    now = kept(broken)
+    assert not now[topology.triangles[bad]].any()
+    assert now.sum() > 0.8 * flags.sum()
+    held = np.zeros(len(flags), dtype=bool)
+    held[topology.triangles[bad]] = True
+    assert kept(broken, held).sum() > now.sum()  # what is held cannot be mended: no reason to give way
+
+
+def test_meshes_that_are_not_refined_towards_a_wall_have_none():
+    for shape in ("square", "circle", "plate", "lshape"):
+        for nodes in (50, 800):
+            for spacing in (0.2, 1.0, 4.0):
+                assert not kept(gmsnet.random_mesh(nodes, shape, boundary_spacing=spacing, seed=1)).any()
+    assert not kept(gmsnet.random_mesh(20_000, seed=1)).any()
+    assert not kept(grid(np.linspace(0.0, 1.0, 80), np.linspace(0.0, 1.0, 80))).any()
+    for case in CASES.values():
+        for run in range(3):
+            assert not kept(case.mesh(run)).any()
+
+
+def test_the_airfoil_of_the_real_meshes(real_meshes):
+    """All cells within 2 % of its chord."""
+    mesh = gmsnet.read(real_meshes / "mesh_NACA0012_inv.su2")
+    flags, triangles = kept(mesh), Topology.of(mesh).triangles
+    (airfoil,) = [
+        b.nodes for b in mesh.cells if b.dimension == 1 and set(b.nodes.ravel()) == set(mesh.markers["airfoil"])
+    ]
+    order = dict(airfoil.tolist())
+    loop = [int(airfoil[0, 0])]
+    while len(loop) < len(airfoil):
+        loop.append(order[loop[-1]])
+    near = distances(mesh.points[triangles, :2].mean(axis=1), mesh.points[loop, :2]) <= NEAR
+    assert near.sum() == 1632
+    assert flags[triangles[near]].all()
+
+
+@pytest.mark.parametrize("name", ["japan_sea.msh", "osteonT1_11.mesh", "helmholtz_apartment.vtk", "internal.msh"])
+def test_other_real_meshes_have_none(real_meshes, name):
+    assert not kept(gmsnet.read(real_meshes / name)).any()
+
+
+def test_the_last_rows_of_boundary_layers_and_what_is_next_to_them():
+    mesh = layered_mesh()
+    layers = stretched_layers(mesh, Topology.of(mesh))
+    flags = kept(mesh, layers.nodes)
+    assert flags[: 20 * 120].mean() > 0.9
+    assert not flags[len(flags) // 2 + 1000 :].all()
+
+
+def test_no_cells_no_extent_and_a_boundary_in_one_line():
+    assert kept(Mesh(np.zeros((0, 2)), ())).tolist() == []
+    flat = Mesh(np.zeros((3, 2)), (CellBlock("triangle", [[0, 1, 2]], [0]),))
+    assert not kept(flat).any()
+    line = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]), (CellBlock("triangle", [[0, 1, 2]], [0]),))
+    assert not kept(line).any()

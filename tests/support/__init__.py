@@ -1,0 +1,1 @@
+"""What tests share: slow twins of kernels, meshes, damage, and the like."""

@@ -1,0 +1,45 @@
+"""Meshes with cells that are stretched on purpose, for tests."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.topology import Topology
+
+
+def heights(aspect, width, growth=1.3):
+    """Heights of rows that grow from width/aspect to the width, up to 1."""
+    y, step = [0.0], width / aspect
+    while y[-1] < 1.0:
+        y.append(y[-1] + step)
+        step = min(step * growth, width)
+    return np.array(y)
+
+
+def grid(x, y, alternate=False, region=None):
+    """Rectangles between x and y, each halved (alternate: by a random diagonal); nodes in rows of equal y."""
+    rows, columns = len(y), len(x)
+    node = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]
+    other = np.random.default_rng(0).random(a.shape) < 0.5 if alternate else np.zeros(a.shape, dtype=bool)
+    halves = [((a, b, c), ~other), ((a, c, d), ~other), ((a, b, d), other), ((b, c, d), other)]
+    triangles = np.concatenate([np.stack(corners, axis=-1)[chosen] for corners, chosen in halves])
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    regions = np.zeros(len(triangles), dtype=int) if region is None else region(points[triangles].mean(axis=1))
+    return Mesh(points, (CellBlock("triangle", triangles, regions),))
+
+
+def shaken(mesh, x, y, amount, seed=0):
+    """The free nodes of a grid thrown along both axes by up to ``amount`` of the smaller spacing beside them."""
+
+    def spacing(values):
+        steps = np.diff(values)
+        return np.minimum(np.append(steps[0], steps), np.append(steps, steps[-1]))
+
+    local = np.stack(np.meshgrid(spacing(x), spacing(y)), axis=-1).reshape(-1, 2)
+    thrown = amount * local * np.random.default_rng(seed).uniform(-1.0, 1.0, local.shape)
+    free = np.zeros(len(local), dtype=bool)
+    free[Topology.of(mesh).free] = True
+    return mesh.with_points(np.where(free[:, None], mesh.points + thrown, mesh.points))
