@@ -98,7 +98,7 @@ def study(mesh, wanted, create, guard, sweeps, repeats):
     """What a method makes of a mesh: figures, which checks it passes, and times."""
     timed = Timed(mesh, create, guard, sweeps)
     for _ in range(repeats + 1):
-        timed.turn()
+        timed.orientation()
     seconds, product = timed.to_the_end()
     until = timed.until(wanted)
     points, _, _ = outcome(mesh, timed.topology, timed.best, measure(mesh, timed.topology), rank_by("shape"))

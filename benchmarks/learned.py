@@ -110,14 +110,14 @@ class Mesh:
         """(seconds so far, standing) before the first and after each sweep, until the method has settled."""
         run = Run(self.mesh, self.topology, create(), 1, "shape", "worst")
         chosen, seconds = run.smoother, 0.0
-        states = [(0.0, run.best_standing)]
+        states = [(0.0, run.best_score)]
         for _ in range(sweeps):
             began = time.thread_time()
             chosen.sweep(run.field, alone, lambda: False)
             seconds += time.thread_time() - began
-            standing = run._standing(alone)
+            standing = run._score(alone)
             states.append((seconds, standing))
-            if chosen.settled:
+            if chosen.converged:
                 break
         return states
 

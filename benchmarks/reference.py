@@ -66,7 +66,7 @@ class Plane:
     @classmethod
     def of(cls, mesh: Mesh) -> Plane:
         topology = Topology.of(mesh)
-        triangles = np.where(topology.near_turn[:, None] > 0, topology.near, topology.near[:, ::-1])
+        triangles = np.where(topology.near_orientation[:, None] > 0, topology.near, topology.near[:, ::-1])
         problem = Problem(np.ascontiguousarray(triangles, dtype=np.int32), topology.near_colours >= 0)
         return cls(mesh, topology, problem, planar_points(mesh)[topology.memory])
 

@@ -24,7 +24,7 @@ from gmsnet.methods import smoother
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field
 from gmsnet.methods.worst_first import CYCLES, Cycle, WorstFirst
-from gmsnet.run.standing import Standing
+from gmsnet.run.score import Score
 from gmsnet.topology.topology import Topology, planar_points
 
 LONG = tuple(
@@ -81,7 +81,7 @@ class Case:
         return time.thread_time() - began
 
     def standing(self, points):
-        return Standing.of(totals_of(points, self.topology.near, self.topology.near_turn), "shape")
+        return Score.of(totals_of(points, self.topology.near, self.topology.near_orientation), "shape")
 
     def travel(self, road, level):
         """Seconds of each stage, and how the mesh stands after it."""

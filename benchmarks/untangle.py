@@ -27,10 +27,10 @@ from gmsnet.kernels.star.guard import Precision
 from gmsnet.measure.report import exact_signs
 from gmsnet.topology.topology import Topology, planar_points
 from gmsnet.untangle import untangle
+from gmsnet.untangle.escalation import LAST_PATIENCE
 from gmsnet.untangle.lbfgs import whole
 from gmsnet.untangle.patch import Patch, in_order
-from gmsnet.untangle.road import LAST_PATIENCE
-from gmsnet.untangle.tangle import Tangle
+from gmsnet.untangle.state import UntanglingState
 
 REAL = (
     "mesh_NACA0012_inv.su2", "japan_sea.msh", "insulated.msh", "internal.msh", "helmholtz_apartment.vtk",
@@ -66,7 +66,7 @@ def tangled(mesh, topology, severity, seed):
 
 def by_lbfgs(points, topology, precision):
     """The cells that whole-mesh L-BFGS leaves inverted."""
-    tangle = Tangle(points, topology, precision)
+    tangle = UntanglingState(points, topology, precision)
     whole(tangle, Patch.of(topology, in_order(topology, topology.near_colours >= 0)), LAST_PATIENCE)
     return tangle.look()
 
@@ -88,7 +88,7 @@ def one(name, mesh, severity, seed, repeats):
         ours.append(seconds)
         seconds, left = timed(lambda: by_lbfgs(points, topology, precision))
         theirs.append(seconds)
-    before, after = (exact_signs(p, topology.near, topology.near_turn) for p in (points, result.points))
+    before, after = (exact_signs(p, topology.near, topology.near_orientation) for p in (points, result.points))
     assert (after[before > 0] > 0).all()
     assert (result.points == points)[topology.near_colours < 0].all()
     return {

@@ -21,7 +21,7 @@ KEPT = {"points_kept": True, "cells_kept": True, "moved": 1.0, "boundary": check
 
 
 def record(unit, *levels):
-    """What worker.py would write: L, and levels of (effort, seconds, mean, least 1/q, q̂)."""
+    """What worker.py would write: L, and levels of (effort, seconds, mean, minimum 1/q, q̂)."""
     return {
         "status": "measured", "versions": {"fake": "1.0"}, "L": unit, "memory": {"before": 1000, "peak": 4000},
         "levels": [
@@ -37,7 +37,7 @@ def record(unit, *levels):
 
 @pytest.fixture
 def theirs():
-    """At 0.89 of a final mean of 0.9 one level before the last; its least 1/q comes with the last only."""
+    """At 0.89 of a final mean of 0.9 one level before the last; its minimum 1/q comes with the last only."""
     return record(2e-3, (1, 1.0, 0.80, 0.10, -0.1), (2, 4.0, 0.895, 0.15, 0.0), (3, 10.0, 0.90, 0.40, 0.1))
 
 
@@ -119,10 +119,10 @@ def test_what_is_missed_is_listed(document, ours):
         mesh["tools"][table.DEFAULT] = record(1e-3, (1, 1.0, 0.892, 0.35, 0.11))
     missed = report.markdown(document).split("Where the aim is missed")[1]
     assert "Netgen: 2.00 times as fast to 99 % of its mean (5.00 with all that it did), 10 wanted" in missed
-    assert "Netgen: 99 % of its least 1/q is not reached" in missed
-    assert "Netgen: its least 1/q is better" in missed
+    assert "Netgen: 99 % of its minimum 1/q is not reached" in missed
+    assert "Netgen: its minimum 1/q is better" in missed
     assert "its q̂ is better" not in missed
-    assert "SciPy matrix: its least 1/q is better" in missed
+    assert "SciPy matrix: its minimum 1/q is better" in missed
 
 
 def test_pictures_are_made_of_what_there_is(document, tmp_path):

@@ -84,7 +84,7 @@ def test_the_stages_and_the_limit_are_told(run, square, tmp_path):
     text = run("smooth", square, tmp_path / "out.su2").out
     for stage in ("Newton on q, to its end", "MetricLoss, above 1/q = 0.4", "worst first", "MetricLoss, worst kept"):
         assert stage in text
-    assert "the least 1/q is" in text
+    assert "the minimum 1/q is" in text
     assert "cannot exceed" in text
     assert json.loads(run("smooth", square, tmp_path / "out.su2", "--json").out)["ceiling"] <= 1
 

@@ -20,11 +20,11 @@ def listing(folder):
 
 
 def test_ctrl_c_writes_the_best_mesh_so_far(run, square, tmp_path, monkeypatch):
-    def stop(self, sweep):
+    def interrupt(self, sweep):
         if sweep.index == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(Progress, "sweep", stop)
+    monkeypatch.setattr(Progress, "sweep", interrupt)
     out = tmp_path / "out.su2"
     done = run("smooth", square, out, "--method", "gmsnet")
     assert done.code == 0
@@ -35,10 +35,10 @@ def test_ctrl_c_writes_the_best_mesh_so_far(run, square, tmp_path, monkeypatch):
 
 
 def test_ctrl_c_before_the_smoothing_writes_nothing(run, square, tmp_path, monkeypatch):
-    def stop(*arguments):
+    def interrupt(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gmsnet.io.read", stop)
+    monkeypatch.setattr("gmsnet.io.read", interrupt)
     done = run("smooth", square, tmp_path / "out.su2")
     assert (done.code, done.out) == (130, "")
     assert done.err == "gmsnet: interrupted; nothing was written\n"

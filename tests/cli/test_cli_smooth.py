@@ -111,7 +111,7 @@ def test_a_target_that_is_not_met_is_exit_1_and_names_the_cells(run, square, tmp
     worst = int(after.cell[after.worst(1)[0]])
     gap = 0.99 - after.shape.min()
     assert re.fullmatch(
-        rf"gmsnet: target not met: the least 1/q is \S+, {gap:.4g} below 0\.99; {few:,} cells miss it "
+        rf"gmsnet: target not met: the minimum 1/q is \S+, {gap:.4g} below 0\.99; {few:,} cells miss it "
         rf"\(numbers from 0, worst first: {worst}, [^)]*\)(\n  cell \d+: .+){{10}}\n",
         done.err,
     )

@@ -21,7 +21,7 @@ def test_rows_around_an_airfoil(layers, aspect, around):
     edges = topology.triangles[:, [[0, 1], [1, 2]]].reshape(-1, 2).T
     graph = coo_matrix((np.ones(edges.shape[1]), edges), shape=(len(mesh.points),) * 2)
     assert connected_components(graph, directed=False)[0] == 1
-    assert (topology.turn == 1).all()
+    assert (topology.orientation == 1).all()
     lines = mesh.cells[1].nodes
     assert sorted(topology.held["boundary"].tolist()) == sorted(set(lines.ravel().tolist()))
     assert len(lines) == len(topology.held["boundary"])

@@ -42,7 +42,7 @@ def polygon(n):
 
 
 def reached(mesh, node, rows):
-    """The largest least 1/q of some triangles that any place of a node has been found to give."""
+    """The largest minimum 1/q of some triangles that any place of a node has been found to give."""
     triangles = mesh.cells[0].nodes[rows]
     points = mesh.points.copy()
 

@@ -118,7 +118,7 @@ def test_the_order_of_nodes_and_triangles_does_not_change_a_bit_of_the_totals():
 def test_how_the_work_is_shared_out_does_not_change_a_bit_of_the_totals():
     mesh = gmsnet.random_mesh(3000, seed=7)
     topology = Topology.of(mesh)
-    given = near_points(mesh, topology), topology.near, topology.near_turn
+    given = near_points(mesh, topology), topology.near, topology.near_orientation
 
     def parts(ends):
         return lambda work, first, last: [work(a, b) for a, b in zip([first, *ends], [*ends, last], strict=True)]
@@ -164,7 +164,7 @@ def test_the_sums_of_a_sweep_equal_the_report(best_by):
 
     mesh = gmsnet.random_mesh(500, seed=1)
     report = measure(mesh)
-    standing = Run(mesh, Topology.of(mesh), None, 1, best_by, "valid").best_standing
+    standing = Run(mesh, Topology.of(mesh), None, 1, best_by, "valid").best_score
     assert standing.inverted == report.inverted == 0
     qhat = report.qhat if best_by == "shape" else report.qhat_aspect
     assert standing.qhat == pytest.approx(qhat, abs=1e-13)

@@ -129,7 +129,7 @@ def test_results_and_reports_come_back_as_they_were(options):
     tangled = gmsnet.random_mesh(150, seed=3)
     points = tangled.points.copy()
     free = gmsnet.smooth(tangled, max_sweeps=1).moved.nonzero()[0]
-    points[free[:10]] = points[free[20]]  # some that are mended, and perhaps some that are not
+    points[free[:10]] = points[free[20]]  # some that are untangled, and perhaps some that are not
     result = gmsnet.smooth(tangled.with_points(points), **options)
     back = again(result)
     assert facts(back.mesh) == facts(result.mesh)

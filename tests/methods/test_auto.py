@@ -48,7 +48,7 @@ def test_each_stage_is_worth_something(plan):
     meshes += [CASES["circle"].mesh(run, 0) for run in range(3)]
 
     def found(stages):
-        best = [runs(mesh, stages).best_standing for mesh in meshes]
+        best = [runs(mesh, stages).best_score for mesh in meshes]
         return np.mean([[each.qhat, each.mean_shape] for each in best], axis=0)
 
     whole = found(plan)

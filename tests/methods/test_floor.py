@@ -24,11 +24,11 @@ class Looks:
     def __init__(self, monkeypatch):
         mesh = gmsnet.random_mesh(6000, seed=1)
         self.topology, self.floor, self.blocks = Topology.of(mesh), Floor(), []
-        self.points, original = near_points(mesh, self.topology), module.most_ratios
+        self.points, original = near_points(mesh, self.topology), module.ratio_upper_bounds
 
-        def counted(points, triangles, turn, blocks, *others):
+        def counted(points, triangles, orientation, blocks, *others):
             self.blocks.append(len(blocks))
-            original(points, triangles, turn, blocks, *others)
+            original(points, triangles, orientation, blocks, *others)
 
         monkeypatch.setattr(module, "most_ratios", counted)
 
@@ -44,10 +44,10 @@ def looks(monkeypatch):
     return Looks(monkeypatch)
 
 
-def worst(points, triangles, turn):
-    """The least D/L, exactly."""
+def worst(points, triangles, orientation):
+    """The minimum D/L, exactly."""
     least = Fraction(1)
-    for t, sign in zip(triangles, turn, strict=True):
+    for t, sign in zip(triangles, orientation, strict=True):
         (ax, ay), (bx, by), (cx, cy) = ([Fraction(v) for v in points[i].tolist()] for i in t)
         doubled = int(sign) * ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))
         lengths = (bx - ax) ** 2 + (by - ay) ** 2 + (cx - bx) ** 2 + (cy - by) ** 2 + (ax - cx) ** 2 + (ay - cy) ** 2
@@ -56,10 +56,10 @@ def worst(points, triangles, turn):
 
 
 def test_it_is_never_below_the_worst_cell_and_next_to_it_after_a_look_at_all(looks):
-    triangles, turn = looks.topology.changeable
+    triangles, orientation = looks.topology.changeable
     random = np.random.default_rng(0)
     for number in range(5):
-        found, least = looks.look(HELD_BACK), worst(looks.points, triangles, turn)
+        found, least = looks.look(HELD_BACK), worst(looks.points, triangles, orientation)
         assert Fraction(found) >= least
         if number in (0, 3):  # looks at all
             assert found == pytest.approx(float(least), rel=1e-9)

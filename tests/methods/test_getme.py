@@ -119,7 +119,7 @@ def test_penalties_of_an_element_that_is_put_back():
     before = field.points.copy()
     for count in range(1, 6):
         kernels.steps(field.points, elements, queue, getme.TRANSFORMATIONS["sequential"], guard_of(field), 1, tally)
-        # Its twin on the other side of the node is as bad, so they take turns: never twice running.
+        # Its twin on the other side of the node is as bad, so they take orientations: never twice running.
         assert queue.penalty.sum() == pytest.approx(count * 1e-4)
         assert tally.tolist() == [0, 0, count]
     assert queue.penalty[first] == pytest.approx(3e-4)
@@ -193,7 +193,7 @@ def test_a_sweep_is_a_step_for_each_free_node_in_whole_periods(nodes, steps, tes
     smoother.sweep(field, unshared, lambda: asked.append(True) or True)
     assert sum(made) == steps
     assert len(asked) == tests
-    assert not smoother.settled
+    assert not smoother.converged
 
 
 def test_it_settles_after_twenty_tests_without_gain():
@@ -201,7 +201,7 @@ def test_it_settles_after_twenty_tests_without_gain():
     smoother = gmsnet.methods.smoother("getme", variant="sequential-book")
     answers = iter([False] * 19 + [True] + [False] * 20 + [True])
     sweeps = 0
-    while not smoother.settled:
+    while not smoother.converged:
         smoother.sweep(field, unshared, lambda: next(answers))
         sweeps += 1
     assert sweeps == 4

@@ -25,11 +25,11 @@ EXAMPLES = int(os.environ.get("GMSNET_GUARD_EXAMPLES", "6"))
 SWEEPS = 3
 
 
-def ratios(points, triangles, turn, number):
+def ratios(points, triangles, orientation, number):
     """D/L of each triangle as an exact fraction; 0 for one that is a single point. number: of a coordinate."""
     exact = [[number(x), number(y)] for x, y in points.tolist()]
     found = []
-    for nodes, sign in zip(triangles.tolist(), turn.tolist(), strict=True):
+    for nodes, sign in zip(triangles.tolist(), orientation.tolist(), strict=True):
         (ax, ay), (bx, by), (cx, cy) = (exact[i] for i in nodes)
         px, py, qx, qy = ax - cx, ay - cy, bx - cx, by - cy
         lengths = px * px + py * py + qx * qx + qy * qy + (px - qx) ** 2 + (py - qy) ** 2
@@ -86,13 +86,13 @@ def test_each_sweep_keeps_what_the_level_promises(method, level, seed, nodes, ta
     number = LEVELS.index(level)
     start = planar_points(mesh)[topology.memory]
     field = Field(start.copy(), topology, precision_of(mesh), number)
-    triangles, turn = topology.changeable
+    triangles, orientation = topology.changeable
     rows = {node: np.flatnonzero((triangles == node).any(axis=1)) for node in np.flatnonzero(topology.near_free)}
     scale = mesh.exponent
     readings = [Fraction] if single else [Fraction, as_written]
 
     def exact():
-        return [ratios(np.ldexp(field.points, scale), triangles, turn, reading) for reading in readings]
+        return [ratios(np.ldexp(field.points, scale), triangles, orientation, reading) for reading in readings]
 
     before = exact()
     for _ in range(SWEEPS):
@@ -113,17 +113,17 @@ def test_so_does_the_whole_from_input_to_output_at_any_stop(level, seed, nodes, 
     topology = Topology.of(mesh)
     rng = np.random.default_rng(seed)
     result = gmsnet.smooth(mesh, guard=level, max_sweeps=int(rng.integers(0, 30)))
-    triangles, turn = topology.triangles, topology.turn
+    triangles, orientation = topology.triangles, topology.orientation
     rows = [np.flatnonzero((triangles == node).any(axis=1)) for node in topology.free]
     free = np.isin(triangles, topology.free).any(axis=1)
     if not free.any():
         return
     number = LEVELS.index(level)
     for reading in [Fraction] if single else [Fraction, as_written]:
-        before, after = (ratios(m.points, triangles, turn, reading) for m in (mesh, result.mesh))
+        before, after = (ratios(m.points, triangles, orientation, reading) for m in (mesh, result.mesh))
         # Mending a tangle is one transaction, which keeps the worst of the mesh, not that of each star.
         whole = min(number, 1) if result.before.inverted else number
         changed = [k for k in range(len(triangles)) if free[k]]
         place = {k: i for i, k in enumerate(changed)}
         check(whole, [before[k] for k in changed], [after[k] for k in changed], [[place[k] for k in r] for r in rows])
-    assert result.after.valid.tolist() == naive.signs(result.points, triangles, turn)
+    assert result.after.valid.tolist() == naive.signs(result.points, triangles, orientation)

@@ -63,7 +63,7 @@ def test_nothing_is_lost_and_nothing_gets_worse(method, level, seed, nodes):
     if mesh.single:
         assert (np.float64(np.float32(result.points)) == result.points).all()
 
-    plane, turn = result.topology.plane, result.topology.turn
+    plane, orientation = result.topology.plane, result.topology.orientation
     assert result.topology.triangles.tolist() == triangles
     free = set(range(len(mesh.points))) - held
     rows = [row for row, corners in enumerate(triangles) if free & set(corners)]
@@ -75,12 +75,14 @@ def test_nothing_is_lost_and_nothing_gets_worse(method, level, seed, nodes):
     number = LEVELS.index(level)
     chosen = np.array([triangles[row] for row in rows])
     for reading in [Fraction] if mesh.single else [Fraction, as_written]:
-        was, now = (ratios(points[:, plane], chosen, turn[rows], reading) for points in (mesh.points, result.points))
+        was, now = (
+            ratios(points[:, plane], chosen, orientation[rows], reading) for points in (mesh.points, result.points)
+        )
         # Mending a tangle is one transaction, which keeps the worst of the mesh, not that of each star.
         mended = number == STAR and result.before.inverted
         check(1 if mended else number, was, now, stars)
-    assert result.after.valid.tolist() == naive.signs(result.points[:, plane], triangles, turn)
-    assert result.before.valid.tolist() == naive.signs(mesh.points[:, plane], triangles, turn)
+    assert result.after.valid.tolist() == naive.signs(result.points[:, plane], triangles, orientation)
+    assert result.before.valid.tolist() == naive.signs(mesh.points[:, plane], triangles, orientation)
 
 
 @given(seed=st.integers(0, 2**32 - 1), nodes=st.integers(3, 40), bad=st.sampled_from([np.nan, np.inf, -np.inf]))

@@ -89,7 +89,7 @@ def test_nothing_valid_is_inverted_and_nothing_held_moves(method, seed, nodes, t
     mesh = triangulation(rng, nodes, tangle)
     chosen = rng.random(nodes) < 0.1
     result = gmsnet.smooth(mesh, **method, max_sweeps=int(rng.integers(1, 8)), fixed=chosen)
-    turn = Topology.of(mesh).turn
+    turn = Topology.of(mesh).orientation
     before, after = exact_signs(mesh, turn), exact_signs(result.mesh, turn)
     assert (after[before > 0] > 0).all()
     assert result.before.valid.tolist() == before.tolist()
@@ -176,7 +176,7 @@ def test_stars_without_extent_do_no_harm(method):
     result = gmsnet.smooth(broken, **method, max_sweeps=5)
     assert np.isfinite(result.points).all()
     assert result.after.inverted <= result.before.inverted
-    before, after = (exact_signs(m, topology.turn) for m in (broken, result.mesh))
+    before, after = (exact_signs(m, topology.orientation) for m in (broken, result.mesh))
     assert (after[before > 0] > 0).all()
 
 

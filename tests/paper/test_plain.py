@@ -272,10 +272,10 @@ def test_no_valid_cell_becomes_invalid(move, tangle):
     if tangle:
         mesh = disturb(mesh, topology.free, tangle, seed=1, keep_valid=False)
     twin = plain.PlainMesh.of(mesh, topology)
-    before = np.array(naive.signs(mesh.points, topology.triangles, topology.turn))
+    before = np.array(naive.signs(mesh.points, topology.triangles, topology.orientation))
     assert (before <= 0).any() == (tangle > 0)
     for _ in range(5):
         plain.sweep(twin, move)
-    after = np.array(naive.signs(twin.array(), topology.triangles, topology.turn))
+    after = np.array(naive.signs(twin.array(), topology.triangles, topology.orientation))
     assert (after[before > 0] > 0).all()
     assert (after > 0).sum() >= (before > 0).sum()

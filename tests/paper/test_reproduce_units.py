@@ -11,7 +11,7 @@ from support import reproduce_work as work
 from gmsnet.errors import InputError
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.store import Result, Store
-from gmsnet.paper.units import Stage, Standing, Unit, carry_out, missing
+from gmsnet.paper.units import Score, Stage, Unit, carry_out, missing
 
 PLAN = Plan(runs=1, sweeps=1, seed=0, quick=True)
 
@@ -27,8 +27,8 @@ def notes(*texts: str) -> list[Unit]:
     return [Unit(f"note/{text}", work.note, {"text": text}) for text in texts]
 
 
-def do(stages, store, should_stop=lambda: False) -> tuple[bool, list[Standing]]:
-    standings: list[Standing] = []
+def do(stages, store, should_stop=lambda: False) -> tuple[bool, list[Score]]:
+    standings: list[Score] = []
     return carry_out(stages, PLAN, store, standings.append, should_stop), standings
 
 
@@ -44,8 +44,8 @@ def test_stages_follow_one_another_and_results_are_kept(store):
     assert store.load("note/a")["process"] != os.getpid()
     assert (store.folder / "notes/c.txt").read_text() == "c"
     assert store.seconds("sum") >= 0
-    assert standings[0] == Standing(0, 5, "alone")
-    assert standings[-1] == Standing(5, 5, "after")
+    assert standings[0] == Score(0, 5, "alone")
+    assert standings[-1] == Score(5, 5, "after")
     assert [each.done for each in standings] == sorted(each.done for each in standings)
 
 
@@ -56,7 +56,7 @@ def test_what_is_there_is_not_done_again(store):
     assert [unit.name for stage in missing(both, store) for unit in stage.units] == ["note/b"]
     finished, standings = do(both, store)
     assert finished
-    assert standings[0] == Standing(1, 2, "first")
+    assert standings[0] == Score(1, 2, "first")
     assert (store.folder / "units/note/a.json").read_bytes() == kept
     assert do(both, store) == (True, [])
 

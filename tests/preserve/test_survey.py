@@ -23,7 +23,7 @@ def look(mesh):
     topology = Topology.of(mesh)
     survey = Survey.of(mesh, topology)
     cells = np.empty((len(topology.near), stretch.COLUMNS))
-    stretch.per_cell(survey.points, topology.near, topology.near_turn, MOST, cells)
+    stretch.per_cell(survey.points, topology.near, topology.near_orientation, MOST, cells)
     return survey.suspects, _coherent(topology.near, cells, survey.rim > 0)
 
 

@@ -92,7 +92,7 @@ def test_not_around_damaged_cells(ring, keep_valid):
     assert now.sum() > 0.8 * flags.sum()
     held = np.zeros(len(flags), dtype=bool)
     held[topology.triangles[bad]] = True
-    assert kept(broken, held).sum() > now.sum()  # what is held cannot be mended: no reason to give way
+    assert kept(broken, held).sum() > now.sum()  # what is held cannot be untangled: no reason to give way
 
 
 def test_meshes_that_are_not_refined_towards_a_wall_have_none():

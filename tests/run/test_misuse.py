@@ -226,8 +226,8 @@ def test_one_report_may_be_asked_by_many_threads():
 FORKS = """
 import multiprocessing, os, sys, threading
 import gmsnet
-from gmsnet import workers
-workers.FEWEST_BLOCKS = 1  # so that threads are used though the mesh is small
+from gmsnet.parallel import threads
+threads.FEWEST_BLOCKS = 1  # so that threads are used though the mesh is small
 mesh = gmsnet.random_mesh(3000, seed=1)
 
 def smoothed(threads):

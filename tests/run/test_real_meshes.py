@@ -52,7 +52,7 @@ def check(source: Path, target: Path) -> None:
     if source.suffix != ".stl":  # an STL file has no node numbers of its own
         moved = (before.points != after.points).any(axis=1)
         assert not moved[np.concatenate([[-1], *Topology.of(before).held.values()]).astype(int)[1:]].any()
-        turn = Topology.of(before).turn
+        turn = Topology.of(before).orientation
         triangles = Topology.of(before).triangles
         was = np.array(naive.signs(before.points[:, :2], triangles, turn)) if len(triangles) < 3000 else None
         if was is not None and len(was) and before.plane == (0, 1):

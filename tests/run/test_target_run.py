@@ -120,7 +120,7 @@ def test_patches_against_a_slow_twin():
         a, b, c = (points[patch.near[:, k]] for k in range(3))
         assert ((b - a)[:, 0] * (c - a)[:, 1] > (b - a)[:, 1] * (c - a)[:, 0]).all()
         assert patch.changeable[0] is patch.near
-        assert (patch.near_turn == 1).all()
+        assert (patch.near_orientation == 1).all()
 
 
 def test_what_a_target_gains_is_kept_though_the_mean_pays_for_it():
@@ -284,4 +284,4 @@ def test_no_triangle_with_a_smaller_angle_has_a_larger_shape_than_a_target_allow
     alpha = math.radians(angle)
     report = gmsnet.quality(([[0, 0], [1, 0], [ratio * math.cos(alpha), ratio * math.sin(alpha)]], [[0, 1, 2]]))
     assert report.min_angle[0] <= angle * (1 + 1e-9)
-    assert report.shape[0] <= Target(angle=angle).most_shape * (1 + 1e-12)
+    assert report.shape[0] <= Target(angle=angle).max_shape * (1 + 1e-12)

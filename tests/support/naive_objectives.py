@@ -80,7 +80,7 @@ def slope_at(name, ring, p):
 
 
 def least_area(ring, p):
-    """Twice the least area of the star's triangles."""
+    """Twice the minimum area of the star's triangles."""
     return min(cross(ring[j - 1] - p, ring[j] - p) for j in range(len(ring)))
 
 

@@ -61,7 +61,7 @@ def proposed(stars, propose, dtype=np.float64):
     work = np.empty(block.FLOORS * LANES)
     shift = np.empty(2 * LANES, dtype=dtype)
     for k, (centre, ring) in enumerate(stars):
-        n, lane = len(ring), k % LANES  # every lane takes its turn; all hold the same star
+        n, lane = len(ring), k % LANES  # every lane takes its orientation; all hold the same star
         pairs = np.vstack([centre, ring]).astype(float).repeat(LANES, axis=0).ravel()
         local = np.empty(2 * n * LANES, dtype=dtype)
         kernels_stars.localise(pairs, n, work, local)
@@ -86,7 +86,7 @@ def compiled_shifts(stars, weights):
 def compiled_gmsnet2_shifts(stars, weights):
     """As ``compiled_shifts``, by GMSNet 2."""
     network = fold_gmsnet2(weights)
-    work = kernels_gmsnet2.room(network, max(len(ring) for _, ring in stars))
+    work = kernels_gmsnet2.workspace(network, max(len(ring) for _, ring in stars))
 
     def propose(local, n, shift):
         kernels_gmsnet2.propose(local, n, network, work, shift)
@@ -97,7 +97,7 @@ def compiled_gmsnet2_shifts(stars, weights):
 def compiled_nn_shifts(stars, weights):
     """As ``compiled_shifts``, by NN-Smoothing."""
     table, flat = fold_nn(weights)
-    box, inputs, first, second, _ = kernels_nn.room(table)
+    box, inputs, first, second, _ = kernels_nn.workspace(table)
 
     def propose(local, n, shift):
         kernels_nn.propose(local, n, table, flat, box, inputs, first, second, shift)

@@ -40,7 +40,7 @@ def check_against_twin(mesh, topology, others=(), lines=()):
     counted = [i for ids in topology.held.values() for i in ids.tolist()]
     assert sorted([*counted, *free]) == list(range(len(mesh.points)))  # each node once
     start, ring = topology.patches
-    turn = topology.turn
+    turn = topology.orientation
     for i, v in enumerate(topology.free.tolist()):
         around = ring[start[i] : start[i + 1]].tolist()
         wanted = {
@@ -111,7 +111,7 @@ def test_parts_are_wound_alike_with_positive_area(seed, nodes):
     if nodes >= 5 and rng.random() < 0.2:
         triangles = np.vstack([triangles, [(i, (i + 1) % 5, (i + 2) % 5) for i in range(5)]])
     topology = Topology.of(mesh_of(points, triangles))
-    turned = [t[:: int(turn)] for t, turn in zip(triangles.tolist(), topology.turn, strict=True)]
+    turned = [t[:: int(turn)] for t, turn in zip(triangles.tolist(), topology.orientation, strict=True)]
     edges = {}
     for f, t in enumerate(turned):
         for a, b in zip(t, t[1:] + t[:1], strict=True):
@@ -202,7 +202,7 @@ def test_two_wheels_that_touch_in_a_node_are_two_parts_and_wound_each_for_itself
     second[second == 7 + 4] = 1  # the rightmost node of the one is the leftmost of the other: a bow-tie
     mesh = mesh_of(points, np.vstack([triangles, second[:, ::-1]]))
     topology = Topology.of(mesh)
-    assert topology.turn.tolist() == [1] * 6 + [-1] * 6
+    assert topology.orientation.tolist() == [1] * 6 + [-1] * 6
     assert topology.free.tolist() == [0, 7]
     assert topology.held["not used by any cell"].tolist() == [11]
 
@@ -323,5 +323,5 @@ def test_a_closed_surface_pressed_flat_has_no_positive_side_and_is_held(shift):
 def test_clockwise_meshes_of_any_size_are_wound_right(size):
     points, triangles = wheel(6)
     topology = Topology.of(mesh_of(points * size, triangles[:, ::-1]))
-    assert topology.turn.tolist() == [-1] * 6
+    assert topology.orientation.tolist() == [-1] * 6
     assert topology.free.tolist() == [0]

@@ -11,13 +11,13 @@ from support.tangles import annulus, grid, moved, prepared, untangled
 import gmsnet
 from gmsnet.generate import disturb
 from gmsnet.generate.layered import layered_mesh
-from gmsnet.kernels.untangle import mending as kernels
+from gmsnet.kernels.untangle import untangling as kernels
 from gmsnet.topology.topology import Topology
-from gmsnet.untangle.guarded import culprits, what_is_left
+from gmsnet.untangle.guarded import what_is_left, worst_nodes
 from gmsnet.untangle.harmonic import harmonic
 from gmsnet.untangle.patch import Patch, in_order
-from gmsnet.untangle.tangle import Tangle
-from gmsnet.untangle.transaction import give_back, take
+from gmsnet.untangle.state import UntanglingState
+from gmsnet.untangle.transaction import restore, take
 
 
 def thrown(seed, nodes=200, amount=1.0, share=1.0):
@@ -85,14 +85,14 @@ def test_harmonic_places_are_the_means_of_their_rings_and_valid_in_a_convex_rim(
     assert kernels.uncertified(new, patch.cells, precision.unit, precision.grain) == 0
 
 
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0.02, 0.5]), st.sampled_from([culprits, what_is_left]))
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.02, 0.5]), st.sampled_from([worst_nodes, what_is_left]))
 @settings(max_examples=30)
 def test_guarded_sweeps_do_no_harm(seed, part, sweeps):
     points, topology, precision = prepared(thrown(seed, 150, 2.0, part))
-    tangle = Tangle(points, topology, precision)
-    before = share(points, topology.near, topology.near_turn)
+    tangle = UntanglingState(points, topology, precision)
+    before = share(points, topology.near, topology.near_orientation)
     stage = sweeps(tangle)
-    after = share(tangle.points, topology.near, topology.near_turn)
+    after = share(tangle.points, topology.near, topology.near_orientation)
     assert (after[before > 0] > 0).all()
     assert after[after <= 0].min(initial=np.inf) >= before.min() - 1e-12
     assert tangle.left == stage.left == (after <= 0).sum() <= (before <= 0).sum()
@@ -105,7 +105,7 @@ def test_what_is_taken_inverts_nothing_and_the_rest_goes_back():
     mesh = moved(mesh, [tangled], [[0.45, 0.3]])
     points, topology, precision = prepared(mesh)
     place = np.argsort(topology.memory)
-    tangle = Tangle(points, topology, precision)
+    tangle = UntanglingState(points, topology, precision)
     assert tangle.left > 0
     tangle.points[place[tangled]] = np.array([0.25, 0.25]) / 2  # coordinates of the run are halves
     tangle.points[place[innocent]] += [0.1, 0.0]
@@ -116,7 +116,7 @@ def test_what_is_taken_inverts_nothing_and_the_rest_goes_back():
     elsewhere = np.flatnonzero((tangle.points != points).any(axis=1))
     assert topology.memory[elsewhere].tolist() in ([tangled], [tangled, idle], [idle, tangled])
     tangle.points[place[idle]] += [0.001, 0.0]
-    give_back(tangle)
+    restore(tangle)
     assert (tangle.points[place[idle]] == points[place[idle]]).all()
     assert (tangle.points[place[tangled]] != points[place[tangled]]).any()
 
@@ -125,7 +125,7 @@ def test_what_is_taken_inverts_nothing_and_the_rest_goes_back():
 def test_what_mends_nothing_is_not_taken(case):
     mesh = moved(grid(6), [3 * 7 + 3], [[0.7, 0.52]])
     points, topology, precision = prepared(mesh)
-    tangle = Tangle(points, topology, precision)
+    tangle = UntanglingState(points, topology, precision)
     v = int(np.argsort(topology.memory)[3 * 7 + 3])
     tangle.points[v] += [0.5, 0.0] if case == "worse than the worst" else [-1e-3, 0.0]
     tangle.look()

@@ -17,13 +17,13 @@ from gmsnet.untangle import ALL, NOTHING, PART, untangle
 
 
 def signs(points, topology):
-    return np.array(naive.signs(points, topology.near, topology.near_turn))
+    return np.array(naive.signs(points, topology.near, topology.near_orientation))
 
 
 def share(points, topology):
     """1/q of each triangle."""
     a, b, c = (points[topology.near[:, k]] for k in range(3))
-    twice = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) * topology.near_turn
+    twice = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) * topology.near_orientation
     lengths = ((b - a) ** 2 + (c - b) ** 2 + (a - c) ** 2).sum(axis=1)
     return 2 * np.sqrt(3) * twice / np.where(lengths > 0, lengths, 1)
 
@@ -190,7 +190,7 @@ def test_turning_mirroring_scaling_and_translating_commute(change):
 
 
 def test_nothing_can_be_taken_or_only_a_part():
-    """A node whose ring, all held, no place sees from the left: it stays; another one is mended."""
+    """A node whose ring, all held, no place sees from the left: it stays; another one is untangled."""
     mesh = grid(8)
     stuck, thrown = 2 * 9 + 2, 6 * 9 + 6
     held = np.zeros(81, dtype=bool)

@@ -27,7 +27,7 @@ class Progress:
         )
         shown = enabled and sys.stderr.isatty()
         self._bar = parts.Progress(*columns, console=Console(stderr=True), transient=True, disable=not shown)
-        self._task = self._bar.add_task("", total=None, standing="")
+        self._task = self._bar.add_task("", total=None, score="")
         self._sweeps = sweeps
 
     def __enter__(self) -> Progress:
@@ -39,7 +39,7 @@ class Progress:
 
     def stage(self, text: str) -> None:
         """Say what begins now."""
-        self._bar.update(self._task, description=visible(text), total=None, standing="")
+        self._bar.update(self._task, description=visible(text), total=None, score="")
 
     def sweep(self, sweep: Sweep) -> None:
         """The callback of ``smooth``: show the sweep and the mesh after it."""
@@ -49,5 +49,5 @@ class Progress:
             description=f"sweep {sweep.index} of at most {self._sweeps}",
             total=self._sweeps,
             completed=sweep.index,
-            standing=f"1/q mean {sweep.mean_shape:.4f}, min {sweep.min_shape:.4f}{inverted}",
+            score=f"1/q mean {sweep.mean_shape:.4f}, min {sweep.min_shape:.4f}{inverted}",
         )

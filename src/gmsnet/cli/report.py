@@ -61,7 +61,7 @@ def amount(count: int, what: str) -> str:
 
 
 def worst_cells(mesh: Mesh, report: QualityReport, held: NDArray[np.bool_] | None = None) -> list[dict[str, Any]]:
-    """The cells of least 1/q, the worst first: number from 0, measures, place, and how many corners are held."""
+    """The cells of minimum 1/q, the worst first: number from 0, measures, place, and how many corners are held."""
     rows = []
     for row in report.worst(WORST).tolist():
         cell = int(report.cell[row])

@@ -40,7 +40,7 @@ def smooth(
     variant: Annotated[str | None, typer.Option(help="A variant of the method; see 'gmsnet methods'.")] = None,
     objective: Annotated[str | None, typer.Option(help="What 'optimize' minimises; see 'gmsnet methods'.")] = None,
     max_sweeps: Annotated[
-        int, typer.Option(min=0, help="Make at most so many sweeps (mending inverted cells comes before).")
+        int, typer.Option(min=0, help="Make at most so many sweeps (untangling comes before).")
     ] = 100,
     target_quality: Annotated[
         float | None,
@@ -49,7 +49,7 @@ def smooth(
         ),
     ] = None,
     target_angle: Annotated[
-        float | None, typer.Option(help="The same for the least angle of a cell, in degrees, in (0, 60].")
+        float | None, typer.Option(help="The same for the minimum angle of a cell, in degrees, in (0, 60].")
     ] = None,
     guard: Annotated[
         str,
@@ -106,7 +106,7 @@ def smooth(
     """Smooth a mesh: move its free nodes so that its triangles become better, and change nothing else.
 
     Boundary, interfaces between regions and the nodes of markers stay where they are, and no cell that is valid
-    becomes invalid. Inverted cells are mended first. The worst cell never gets worse, and the result is never worse
+    becomes invalid. Inverted cells are untangled first. The worst cell never gets worse, and the result is never worse
     than the input. Exit code 1: a target is missed, or cells are inverted still.
 
     Formats are told by the suffix: .su2 .msh .vtk .vtu .mesh .node/.ele .stl .obj .off .ply; OUT of another format

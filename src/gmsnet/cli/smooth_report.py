@@ -21,7 +21,7 @@ from gmsnet.run import stop
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.sweep import Sweep
 
-UNKNOWN = "not mended, or untangling was off"
+UNKNOWN = "not untangled, or untangling was off"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Outcome:
 
     @property
     def least(self) -> float:
-        """The least 1/q of a cell after smoothing; infinite where there are no triangles."""
+        """The minimum 1/q of a cell after smoothing; infinite where there are no triangles."""
         return float(self.result.after.shape.min(initial=math.inf))
 
     @cached_property
@@ -74,10 +74,10 @@ class Outcome:
         figures, wanted = [], self.target
         if wanted.quality is not None and self.least < wanted.quality:
             gap = wanted.quality - self.least
-            figures.append(f"the least 1/q is {self.least:.4g}, {gap:.4g} below {wanted.quality:g}")
+            figures.append(f"the minimum 1/q is {self.least:.4g}, {gap:.4g} below {wanted.quality:g}")
         angle = float(after.min_angle.min(initial=math.inf))
         if wanted.angle is not None and angle < wanted.angle:
-            figures.append(f"the least angle is {angle:.4g}°, {wanted.angle - angle:.4g}° below {wanted.angle:g}°")
+            figures.append(f"the minimum angle is {angle:.4g}°, {wanted.angle - angle:.4g}° below {wanted.angle:g}°")
         cells = self.missed[: report.NAMED]
         why = self.result.limits.reasons(cells, self.target.shape)
         miss = "misses it" if len(self.missed) == 1 else "miss it"
@@ -96,11 +96,11 @@ class Outcome:
         return found
 
     def nearness(self) -> str:
-        """How near the least 1/q is to the most that it can be, as far as a bound is known."""
+        """How near the minimum 1/q is to the most that it can be, as far as a bound is known."""
         bounds = self.result.limits
         if not len(bounds.bound):
-            return "no bound is known for the least 1/q"
-        return f"the least 1/q is {self.least:.4g} and cannot exceed {bounds.ceiling:.4g}: {bounds.describe(0)}"
+            return "no bound is known for the minimum 1/q"
+        return f"the minimum 1/q is {self.least:.4g} and cannot exceed {bounds.ceiling:.4g}: {bounds.describe(0)}"
 
     def tangle(self) -> str:
         """Which cells are inverted still, where, and why as far as that is known."""

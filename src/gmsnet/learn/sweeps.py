@@ -51,7 +51,7 @@ class Meshes:
             plane = mesh.points[:, list(mesh.plane or (0, 1))]
             low, extent = plane.min(axis=0), np.ptp(plane, axis=0).max()
             points.append((plane - low) / extent)
-            turned = np.where(topology.turn[:, None] > 0, topology.triangles, topology.triangles[:, ::-1])
+            turned = np.where(topology.orientation[:, None] > 0, topology.triangles, topology.triangles[:, ::-1])
             triangles.append(before + turned.astype(np.int64))
             colour = np.empty(len(plane), dtype=np.int64)
             colour[topology.memory] = topology.near_colours

@@ -45,7 +45,7 @@ class Totals:
     aspect_mean: float
     aspect_min: float
     inverted: int
-    doubts: int
+    uncertain: int
 
     @classmethod
     def of(cls, parts: Iterable[Floats], triangles: int) -> Totals:
@@ -54,11 +54,11 @@ class Totals:
         sums = figures[:, : kernels.EXTREME].sum(axis=0)  # exact: see kernels.simplex.measures.grids
         low, high, shape, aspect = ((sums[: kernels.FINE] + sums[kernels.FINE :]) / triangles).tolist()
         least, most = figures.min(axis=0).tolist(), figures.max(axis=0).tolist()
-        inverted, doubts = (int(figures[:, count].sum()) for count in (kernels.INVERTED, kernels.DOUBTS))
+        inverted, uncertain = (int(figures[:, count].sum()) for count in (kernels.INVERTED, kernels.UNCERTAIN))
         return cls(
             low, least[kernels.EXTREME + kernels.LOW], high, most[kernels.EXTREME + kernels.HIGH],
             shape, least[kernels.EXTREME + kernels.SHAPE], aspect, least[kernels.EXTREME + kernels.ASPECT],
-            inverted, doubts,
+            inverted, uncertain,
         )  # fmt: skip
 
     @classmethod
@@ -91,14 +91,14 @@ class Totals:
 class Triangles:
     """The triangles of a mesh as they are when they are measured: nothing of it changes afterwards.
 
-    points: (N, dim), read-only. plane, single: as of the Mesh. corners: (T, 3). turn: (T,) ±1.
+    points: (N, dim), read-only. plane, single: as of the Mesh. corners: (T, 3). orientation: (T,) ±1.
     """
 
     points: Floats
     plane: tuple[int, int] | None
     single: bool
     corners: NDArray[np.int32]
-    turn: NDArray[np.int8]
+    orientation: NDArray[np.int8]
 
     @cached_property
     def exponent(self) -> int:
@@ -107,14 +107,16 @@ class Triangles:
 
     def columns(self, rows: NDArray[np.int32] | None = None) -> Floats:
         """Smallest and largest angle, shape and aspect of each: (4, T), or of some of them, the same bits."""
-        corners, turn = (self.corners, self.turn) if rows is None else (self.corners[rows], self.turn[rows])
+        corners, orientation = (
+            (self.corners, self.orientation) if rows is None else (self.corners[rows], self.orientation[rows])
+        )
         columns = np.empty((4, len(corners)))
         if self.plane is None:
             largest = float(np.abs(self.points).max(initial=0.0))
             scaled = np.ldexp(self.points, -int(np.frexp(largest)[1]))
             kernels.per_surface_cell(scaled, corners, columns)
         else:
-            kernels.per_cell(planar_points(self), corners, turn, columns)
+            kernels.per_cell(planar_points(self), corners, orientation, columns)
         return columns
 
     def centres(self) -> Floats:
@@ -197,7 +199,7 @@ class QualityReport:
         return self.triangles.columns()
 
     def worst(self, count: int) -> NDArray[np.int64]:
-        """Rows of the ``count`` triangles of least shape, the worst first."""
+        """Rows of the ``count`` triangles of minimum shape, the worst first."""
         if not 0 < count < len(self.cell):
             return np.argsort(self.shape, kind="stable")[:count]
         rows = np.flatnonzero(self.shape <= np.partition(self.shape, count - 1)[count - 1])
@@ -244,7 +246,7 @@ def measure(
     ``totals_of``.
     """
     topology = topology or Topology.of(mesh)
-    triangles = Triangles(mesh.points, mesh.plane, mesh.single, topology.triangles, topology.turn)
+    triangles = Triangles(mesh.points, mesh.plane, mesh.single, topology.triangles, topology.orientation)
     if not len(topology.triangles):
         return QualityReport(topology.cell, None, triangles, None)
     if mesh.plane is None:
@@ -257,16 +259,16 @@ def measure(
     if totals is None:
         near = near_points(mesh, topology) if near is None else near
         with workers(threads, -(-len(topology.near) // LANES)) as share:
-            totals = totals_of(near, topology.near, topology.near_turn, share, shapes)
+            totals = totals_of(near, topology.near, topology.near_orientation, share, shapes)
     assert totals is not None
-    signs = exact_signs(planar_points(mesh), topology.triangles, topology.turn) if totals.doubts else None
+    signs = exact_signs(planar_points(mesh), topology.triangles, topology.orientation) if totals.uncertain else None
     return QualityReport(topology.cell, totals, triangles, signs)
 
 
 def totals_of(
     points: Floats,
     corners: NDArray[np.int32],
-    turn: NDArray[np.int8],
+    orientation: NDArray[np.int8],
     share: Share = serial,
     shapes: NDArray[np.float32] = NOWHERE,
 ) -> Totals | None:
@@ -277,19 +279,20 @@ def totals_of(
     grids = kernels.grids(len(corners))
 
     def part(first: int, last: int) -> Floats:
-        figures: Floats = kernels.summarise(points, corners, turn, first, last, *grids, shapes)
+        figures: Floats = kernels.summarise(points, corners, orientation, first, last, *grids, shapes)
         return figures
 
     return Totals.of(share(part, 0, -(-len(corners) // LANES)), len(corners)) if len(corners) else None
 
 
-def exact_signs(points: Floats, triangles: NDArray[np.int32], turn: NDArray[np.int8]) -> NDArray[np.int8]:
-    """The exact sign of turn × area of each triangle: float64 where the error bound decides, else exact arithmetic."""
+def exact_signs(points: Floats, triangles: NDArray[np.int32], orientation: NDArray[np.int8]) -> NDArray[np.int8]:
+    """The exact sign of orientation × area of each triangle: float64 where the error bound decides, else exact
+    arithmetic."""
     out = np.empty(len(triangles), dtype=np.int8)
-    if predicates.signs(points, triangles, turn, 0.0, out):
+    if predicates.signs(points, triangles, orientation, 0.0, out):
         rows = np.flatnonzero(out == 0)
-        for t in rows[: exact(points, triangles, rows, turn, out)].tolist():
+        for t in rows[: exact(points, triangles, rows, orientation, out)].tolist():
             (ax, ay), (bx, by), (cx, cy) = ([Fraction(v) for v in points[i].tolist()] for i in triangles[t])
             area = (ax - cx) * (by - cy) - (ay - cy) * (bx - cx)
-            out[t] = int(turn[t]) * ((area > 0) - (area < 0))
+            out[t] = int(orientation[t]) * ((area > 0) - (area < 0))
     return out

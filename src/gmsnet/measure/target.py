@@ -20,7 +20,7 @@ SURE = 1.0 + 1e-12  # times the target: what is above it is so however it is mea
 
 @dataclass(frozen=True)
 class Target:
-    """What every cell is to reach. quality: the least 1/q. angle: the least angle in degrees. None: no matter."""
+    """What every cell is to reach. quality: the minimum 1/q. angle: the minimum angle in degrees. None: no matter."""
 
     quality: float | None = None
     angle: float | None = None
@@ -54,15 +54,15 @@ class Target:
         """And their 1/q."""
         triangles = report.triangles
         points = planar_points(triangles)
-        rows = missed(points, triangles.corners, triangles.turn, *self.limits)
+        rows = missed(points, triangles.corners, triangles.orientation, *self.limits)
         low, _, shape, _ = triangles.columns(rows)
         chosen = self.missed(shape, low)
         return rows[chosen], shape[chosen]
 
-    def clearly_missed(self, points: Floats, corners: NDArray[np.int32], turn: NDArray[np.int8]) -> bool:
-        """Do all these triangles (T, 3) miss it, however they are measured? points: (N, 2). turn: (T,) ±1."""
+    def clearly_missed(self, points: Floats, corners: NDArray[np.int32], orientation: NDArray[np.int8]) -> bool:
+        """Do all these triangles (T, 3) miss it, however they are measured? points: (N, 2). orientation: (T,) ±1."""
         quality, tangent = self.limits
-        return len(missed(points, corners, turn, quality / SURE**2, tangent / SURE**2)) == len(corners)
+        return len(missed(points, corners, orientation, quality / SURE**2, tangent / SURE**2)) == len(corners)
 
     def rank(self, report: QualityReport) -> tuple[int, int, float]:
         """Of two meshes that of the lesser rank is nearer: by inverted cells, cells that miss it, the worst one."""
@@ -71,12 +71,13 @@ class Target:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """The least 1/q and the tangent of the least angle at which no way to measure leaves a doubt; 0 for none."""
+        """The minimum 1/q and the tangent of the minimum angle at which no way to measure leaves a doubt; 0 for
+        none."""
         tangent = 0.0 if self.angle is None else math.tan(math.radians(self.angle))
         return (self.quality or 0.0) * SURE, tangent * SURE
 
     @property
-    def most_shape(self) -> float:
+    def max_shape(self) -> float:
         """The largest 1/q of a cell that misses it: of all triangles with an angle of α, (α, (π − α)/2, (π − α)/2)."""
         most = self.quality or 0.0
         if self.angle is not None:
@@ -86,7 +87,7 @@ class Target:
 
     @property
     def shape(self) -> float:
-        """The least 1/q that a cell has which meets it: of all triangles with angles of α or more, (α, α, π − 2α)."""
+        """The minimum 1/q that a cell has which meets it: of all triangles with angles of α or more, (α, α, π − 2α)."""
         least = self.quality or 0.0
         if self.angle is not None:
             alpha = math.radians(self.angle)

@@ -24,7 +24,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from gmsnet.kernels.jit.compile import LANES
-from gmsnet.kernels.simplex.measures import glance
+from gmsnet.kernels.simplex.measures import mean_shape_of_sample
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.measure.target import Target
 from gmsnet.methods.barrier import Barrier
@@ -84,7 +84,7 @@ SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 class Auto(Smoother):
     """The stages one after the other. Without any: those for the size of the mesh."""
 
-    idle_ends = False
+    stops_when_idle = False
 
     def __init__(self, stages: Sequence[Stage] = ()) -> None:
         self.stages = stages
@@ -93,7 +93,7 @@ class Auto(Smoother):
     def _enter(self, stage: int, field: Field) -> None:
         self.at, self.made, self.rounds, self.gained = stage, 0, 0, math.inf
         if stage == len(self.stages):
-            self.settled = True
+            self.converged = True
             return
         self.smoother = self.stages[stage].create()
         if self.stages[stage].rounds > 1 and not self.stages[stage].first:  # what those gain at first does not count
@@ -110,7 +110,7 @@ class Auto(Smoother):
         self.made += 1
         self.looks = False
         wanted = stage.first if stage.first and not self.rounds else stage.sweeps
-        if self.made == wanted or self.smoother.settled or not tally[MOVED]:
+        if self.made == wanted or self.smoother.converged or not tally[MOVED]:
             self._end_round(field)
         return tally
 
@@ -128,17 +128,17 @@ class Auto(Smoother):
                 before, self.gained = self.gained, mean - self.mean
                 goes_on = to_come(before, self.gained) > stage.gain
             self.mean = mean
-        reached = self.smoother.reached
-        self.looks = self.rounds % stage.often == 0 if goes_on else stage.looks or reached
+        target_reached = self.smoother.target_reached
+        self.looks = self.rounds % stage.often == 0 if goes_on else stage.looks or target_reached
         if not goes_on:
-            self._enter(len(self.stages) if reached else self.at + 1, field)
+            self._enter(len(self.stages) if target_reached else self.at + 1, field)
 
 
 def mean_shape(field: Field) -> float:
     """The mean of 1/q over some of the cells, evenly taken."""
-    triangles, turn = field.topology.changeable
+    triangles, orientation = field.topology.changeable
     stride = max(1, len(triangles) // (SAMPLE * LANES))
-    return float(glance(field.points, triangles, turn, stride))
+    return float(mean_shape_of_sample(field.points, triangles, orientation, stride))
 
 
 def to_come(before: float, gained: float) -> float:

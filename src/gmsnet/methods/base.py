@@ -46,8 +46,8 @@ class Field:
         guard = plain_guard(self.precision)
         if self.level == STAR:
             floors = np.empty(len(self.points))
-            triangles, turn = self.topology.changeable
-            star_floors(self.points, triangles, turn, self.topology.near_ringed, guard.unit, guard.grain, floors)
+            triangles, orientation = self.topology.changeable
+            star_floors(self.points, triangles, orientation, self.topology.near_ringed, guard.unit, guard.grain, floors)
             return StarGuard(*guard, floors)
         return guard
 
@@ -56,14 +56,14 @@ class Smoother(ABC):
     """A method ready for one run.
 
     settled: it has its own rule when to stop, and that has come true. reached: so has the target that it was made for.
-    looks: the mesh is worth measuring after the last sweep. idle_ends: a sweep that moved nothing is the last. stage:
-    what of the method the last sweep was, "" for methods of one stage.
+    looks: the mesh is worth measuring after the last sweep. stops_when_idle: a sweep that moved nothing is the last.
+    stage: what of the method the last sweep was, "" for methods of one stage.
     """
 
-    settled = False
-    reached = False
+    converged = False
+    target_reached = False
     looks = True
-    idle_ends = True
+    stops_when_idle = True
     stage = ""
 
     @abstractmethod

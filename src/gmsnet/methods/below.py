@@ -1,9 +1,9 @@
 """The cells below a target: Newton's method on high powers of q, at the free nodes of these cells alone.
 
 A round visits the free nodes of the cells that miss the target, the next one those that have such a cell yet, with a
-higher power, so that ever more weight is on the cells that miss it. A node whose cells have been mended by a neighbour
-before its turn comes stays where it is. That leaves fewer cells below the target than sweeps over patches do, in a
-fraction of the time.
+higher power, so that ever more weight is on the cells that miss it. A node whose cells have been untangled by a
+neighbour before its turn comes stays where it is. That leaves fewer cells below the target than sweeps over
+patches do, in a fraction of the time.
 """
 
 from __future__ import annotations
@@ -43,19 +43,19 @@ class Below(Smoother):
     def __init__(self, target: Target, plan: Sequence[Round], everywhere: bool) -> None:
         self.least, self.plan, self.everywhere = target.shape, np.array(plan), everywhere
         self.limits = target.limits
-        self.settled = self.reached = False
+        self.converged = self.target_reached = False
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """See Smoother. The visits depend on each other, so that they are made on one thread."""
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
-        triangles, turn = topology.changeable
-        self.settled = True
-        rows: NDArray[np.int32] = kernels.missed(field.points, triangles, turn, *self.limits)
-        self.reached = not len(rows)
-        if self.reached or len(rows) > max(MANY * len(triangles), SMALL):
+        triangles, orientation = topology.changeable
+        self.converged = True
+        rows: NDArray[np.int32] = kernels.missed(field.points, triangles, orientation, *self.limits)
+        self.target_reached = not len(rows)
+        if self.target_reached or len(rows) > max(MANY * len(triangles), SMALL):
             return tally
         shape = np.empty(len(rows))
-        ranking.shapes_of(field.points, triangles, turn, rows, shape)
+        ranking.shapes_of(field.points, triangles, orientation, rows, shape)
         if not self.limits[1]:  # of angles other cells can be the worst
             field.floor.watch(rows, shape)
         start, ring, free = topology.near_start, topology.near_ring, topology.near_free
@@ -69,5 +69,5 @@ class Below(Smoother):
             field.points, nodes, start, ring, free, topology.memory, field.guard(share), self.plan,
             MOST * len(topology.free), self.least, self.limits, self.everywhere, tally,
         )  # fmt: skip
-        self.reached = not len(left)
+        self.target_reached = not len(left)
         return tally

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.star.block import DROPPED, TRUNCATED
-from gmsnet.kernels.star.guard import Precision, most_ratios
+from gmsnet.kernels.star.guard import Precision, ratio_upper_bounds
 from gmsnet.parallel.threads import Share
 from gmsnet.topology.topology import Topology
 
@@ -47,20 +47,20 @@ class Floor:
         self.unhindered += not (tally[TRUNCATED] or tally[DROPPED])
 
     def of(self, points: NDArray[np.float64], topology: Topology, precision: Precision, share: Share) -> float:
-        """An upper bound of the least D/L of the triangles with a free node, as the points are now."""
-        triangles, turn = topology.changeable
+        """An upper bound of the minimum D/L of the triangles with a free node, as the points are now."""
+        triangles, orientation = topology.changeable
         blocks = self.blocks
         if blocks is None or self.unhindered < self.looks >= self.enough:
             count, watched = -(-len(triangles) // LANES), blocks
             blocks = np.arange(count, dtype=np.int32)
-            least = _least(points, triangles, turn, blocks, precision, share)
+            least = _least(points, triangles, orientation, blocks, precision, share)
             if watched is not None:
                 there = least[watched].min(initial=math.inf) == least.min(initial=math.inf)
                 self.enough = min(2 * self.enough, self.MOST_LOOKS) if there else self.LOOKS
             worst = max(self.FEWEST, count // self.SHARE)
             self._watch(blocks if worst >= count else np.sort(np.argpartition(least, worst)[:worst]).astype(np.int32))
         else:
-            least = _least(points, triangles, turn, blocks, precision, share)
+            least = _least(points, triangles, orientation, blocks, precision, share)
         self.looks += 1
         return float(least.min(initial=math.inf))
 
@@ -69,14 +69,14 @@ class Floor:
 
 
 def _least(
-    points: NDArray[np.float64], triangles: NDArray[np.int32], turn: NDArray[np.int8], blocks: NDArray[np.int32],
+    points: NDArray[np.float64], triangles: NDArray[np.int32], orientation: NDArray[np.int8], blocks: NDArray[np.int32],
     precision: Precision, share: Share,
 ) -> NDArray[np.float64]:  # fmt: skip
-    """An upper bound of the least D/L in each of these blocks of triangles."""
+    """An upper bound of the minimum D/L in each of these blocks of triangles."""
     least = np.empty(len(blocks))
 
     def look(first: int, last: int) -> None:
-        most_ratios(points, triangles, turn, blocks, precision.unit, precision.grain, first, last, least)
+        ratio_upper_bounds(points, triangles, orientation, blocks, precision.unit, precision.grain, first, last, least)
 
     share(look, 0, len(blocks))
     return least

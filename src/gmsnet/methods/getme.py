@@ -29,7 +29,7 @@ from gmsnet.parallel.threads import Share
 from gmsnet.topology.topology import Topology
 
 PERIOD = 100  # steps between tests
-PERIODS = 10  # of a sweep, at most: on large meshes a test after each hundred steps would be most of the work
+PERIODS = 10  # of a sweep, at maximum: on large meshes a test after each hundred steps would be most of the work
 PATIENCE = 20  # tests without gain after which it has settled
 
 TRANSFORMATIONS = {  # θ, λ, ρ, η
@@ -50,7 +50,7 @@ class SequentialGetme(Smoother):
 
     def __init__(self, transformation: Transformation) -> None:
         self.transformation = transformation
-        self.settled = False
+        self.converged = False
         self.without_gain = 0
         self.state: tuple[Elements, Queue] | None = None
 
@@ -63,10 +63,10 @@ class SequentialGetme(Smoother):
         nodes, tally = len(field.topology.free), np.zeros(3, dtype=np.int64)
         period = max(PERIOD, nodes // PERIODS)
         left = max(1, round(nodes / period))
-        while not self.settled and (left > 0 or tally[MOVED] == 0):
+        while not self.converged and (left > 0 or tally[MOVED] == 0):
             kernels.steps(field.points, elements, queue, self.transformation, field.guard(share), period, tally)
             self.without_gain = 0 if test() else self.without_gain + 1
-            self.settled = self.without_gain == PATIENCE
+            self.converged = self.without_gain == PATIENCE
             left -= 1
         return tally
 
@@ -105,7 +105,7 @@ def elements_of(topology: Topology) -> Elements:
     free = topology.near_free
     chosen = free[topology.near].any(axis=1)
     corners = topology.near[chosen]
-    backwards = topology.near_turn[chosen] < 0
+    backwards = topology.near_orientation[chosen] < 0
     corners[backwards] = corners[backwards, ::-1]
     first = corners.argmin(axis=1)
     corners = np.take_along_axis(corners, (first[:, None] + np.arange(3)) % 3, axis=1)

@@ -10,8 +10,9 @@ kernels/methods/laplacian_plain.py.
 - area: to the ring's mean weighted by the areas of the two triangles at each edge, so that large triangles pull most.
 
 The paper does not say which quality a smart move must raise. Three readings were compared on its cases: the mean of 1/q
-pays for slivers with good triangles elsewhere (on the square q̂ ends at -0.10, with 1/q_V, mean of ten runs), the least
-1/q refuses moves that would help the rest (-0.04, and a mean 1/q_V lower by 0.02), the mean of q does neither (-0.03).
+pays for slivers with good triangles elsewhere (on the square q̂ ends at -0.10, with 1/q_V, mean of ten runs), the
+minimum 1/q refuses moves that would help the rest (-0.04, and a mean 1/q_V lower by 0.02), the mean of q does neither
+(-0.03).
 """
 
 from __future__ import annotations

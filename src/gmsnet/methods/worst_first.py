@@ -46,7 +46,7 @@ CYCLES = (
     Cycle(0.0003, 7, 12),
 )
 LAST = (Cycle(0.0003, 7, 16), Cycle(0.0003, 8, 16))
-GAIN = 1e-4  # in the least 1/q: less is none
+GAIN = 1e-4  # in the minimum 1/q: less is none
 
 
 class WorstFirst(Smoother):
@@ -54,25 +54,25 @@ class WorstFirst(Smoother):
 
     def __init__(self, cycles: tuple[Cycle, ...] = CYCLES, at_once: int = 1) -> None:
         self.cycles, self.at_once = cycles, at_once
-        self.settled = False
+        self.converged = False
         self.cells: NDArray[np.int32] | None = None
         self.next = 0
 
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """See Smoother. The visits depend on each other, so that they are made on one thread."""
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
-        triangles, turn = topology.changeable
+        triangles, orientation = topology.changeable
         if self.cells is None or self.next >= len(self.cycles):
             self.cells = candidates(field, share)
         late = self.next >= len(self.cycles)
         chosen = LAST if late else self.cycles[self.next : self.next + self.at_once]
         plan = [(max(FEWEST, math.ceil(cycle.share * len(triangles))), cycle.power, cycle.sweeps) for cycle in chosen]
         before, after = kernels.cycles(
-            field.points, triangles, turn, self.cells, topology.near_free, topology.memory, topology.near_start,
+            field.points, triangles, orientation, self.cells, topology.near_free, topology.memory, topology.near_start,
             topology.near_ring, field.guard(share), np.array(plan), tally,
         )  # fmt: skip
         self.next += len(chosen)
-        self.settled = late and after < before + GAIN
+        self.converged = late and after < before + GAIN
         return tally
 
 
@@ -81,11 +81,11 @@ def candidates(field: Field, share: Share) -> NDArray[np.int32]:
 
     The floor of the guard is told of the worst of these.
     """
-    triangles, turn = field.topology.changeable
+    triangles, orientation = field.topology.changeable
     shape = np.empty(len(triangles), dtype=np.float32)
 
     def look(first: int, last: int) -> None:
-        ranking.shapes(field.points, triangles, turn, first, last, shape)
+        ranking.shapes(field.points, triangles, orientation, first, last, shape)
 
     share(look, 0, -(-len(triangles) // LANES))
     wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * len(triangles)))

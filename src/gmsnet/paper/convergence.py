@@ -37,7 +37,7 @@ def record(context: Context, case: str) -> Result:
 
     def run_of(contender: Contender, sweeps: int) -> dict[str, Any]:
         run = Run(mesh, topology, contender.smoother(), 1, ASPECT, "valid")
-        start = run.best_standing
+        start = run.best_score
         seconds, qhat, mean_shape = [0.0], [start.qhat], [start.mean_shape]
         began = time.process_time()
 

@@ -21,8 +21,9 @@ def refuse_unless_free(needed: int, what: str) -> None:
 def available(root: Path = Path("/")) -> int | None:
     """The bytes that this process can still get, with swap; None where the system does not tell.
 
-    The least of what the system has (/proc/meminfo, else ``os.sysconf``) and what is left of the limits of the control
-    groups that the process is in, of both versions; pages of files count as free. root: where /proc and /sys are.
+    The minimum of what the system has (/proc/meminfo, else ``os.sysconf``) and what is left of the limits of the
+    control groups that the process is in, of both versions; pages of files count as free. root: where /proc and /sys
+    are.
     """
     known = [_of_system(root), *_of_groups(root)]
     return min((amount for amount in known if amount is not None), default=None)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def histogram(axes: Axes, views: Sequence[View], name: str, label: str) -> None:
-    """The share of cells by a measure (an array of QualityReport, by name), and a mark at the least value.
+    """The share of cells by a measure (an array of QualityReport, by name), and a mark at the minimum value.
 
     The axis goes to 60 degrees for ``min_angle`` and to 1 else, and below 0 if cells are inverted.
     """
@@ -26,7 +26,7 @@ def histogram(axes: Axes, views: Sequence[View], name: str, label: str) -> None:
         axes.hist(each, bins, weights=share, color=view.colour, alpha=0.35, edgecolor="none")
         axes.hist(each, bins, weights=share, color=view.colour, histtype="step", linewidth=1.4, label=view.title)
         axes.plot(each.min(), 0.0, marker="v", color=view.colour, markersize=7, clip_on=False, zorder=3)
-    axes.set_xlabel(f"{label}; ▾ the least")
+    axes.set_xlabel(f"{label}; ▾ the minimum")
     axes.set_ylabel("share of cells (%)")
     axes.set_xlim(bins[0], bins[-1])
     axes.spines[["top", "right"]].set_visible(False)

@@ -148,7 +148,7 @@ def add_colour_bar(figure: Figure, mappable: ScalarMappable, maps: Sequence[Axes
 
 
 def _thickness(polygons: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(T,) the least height of each triangle."""
+    """(T,) the minimum height of each triangle."""
     edges = polygons - np.roll(polygons, 1, axis=1)
     (ax, ay), (bx, by) = edges[:, 0].T, edges[:, 1].T
     longest = np.sqrt((edges**2).sum(axis=2).max(axis=1))

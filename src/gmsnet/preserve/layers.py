@@ -35,7 +35,7 @@ REACH = math.log(2.5)  # the mean stretch of a star to which a layer extends; ri
 ALIKE = math.log(1.8)  # the same of the mean of v, if in little: the halves of squares have 1.73
 FEWEST = 6  # nodes above SEED that hang together
 RINGS = 4  # how far a layer extends beyond those, in edges
-EVEN = 0.2  # of the mean area of a star: the least of its areas where a layer goes around a corner
+EVEN = 0.2  # of the mean area of a star: the minimum of its areas where a layer goes around a corner
 NEXT = 3.0  # how many times the area of a cell's neighbour in a layer its own may be, or the other way round
 BYTES_PER_NODE = 600  # that the layers of a mesh that has some take to be told, measured where all cells are in one
 BROKEN = 0.05  # of the mean area around: a cell of less is damaged, and its nodes are not held
@@ -48,7 +48,7 @@ class Layers:
     nodes: (N,) bool by node id, the corners of those cells, but for damaged places. cells: (T,) bool by row of
     ``Topology.triangles``. median, largest: stretch of those cells, the ratio of the longer to the shorter axis of
     their Steiner ellipse (1 where there are none). damaged: how many of those cells are inverted, or have less than a
-    twentieth of the area of those around; their nodes are left out of ``nodes``, so that they can be mended.
+    twentieth of the area of those around; their nodes are left out of ``nodes``, so that they can be untangled.
     """
 
     nodes: Flags
@@ -80,7 +80,7 @@ def stretched_layers(mesh: Mesh, topology: Topology, survey: Survey | None = Non
     The result does not depend on the order of nodes and cells, nor on where the mesh lies and how large it is. survey:
     of this mesh, where it is known.
     """
-    triangles, turn = topology.near, topology.near_turn
+    triangles, orientation = topology.near, topology.near_orientation
     count = len(topology.memory)
     nothing = Layers(np.zeros(count, dtype=bool), np.zeros(len(triangles), dtype=bool), 1.0, 1.0, 0)
     if not len(triangles) or topology.plane is None:
@@ -91,7 +91,7 @@ def stretched_layers(mesh: Mesh, topology: Topology, survey: Survey | None = Non
         return nothing
     refuse_unless_free(BYTES_PER_NODE * count, f"telling the layers among {count:,} nodes")
     cells, number = np.empty((len(triangles), stretch.COLUMNS)), np.empty(count, dtype=np.int32)
-    stretch.per_cell(survey.points, triangles, turn, MOST, cells)
+    stretch.per_cell(survey.points, triangles, orientation, MOST, cells)
     means = np.empty((count, stretch.COLUMNS))
     stretch.to_nodes(triangles, np.zeros(count, dtype=bool), 1, cells, means, number)
     alike = np.hypot(means[:, stretch.ALONG], means[:, stretch.ACROSS]) >= ALIKE
@@ -118,7 +118,7 @@ def _seeds(survey: Survey, topology: Topology) -> Flags:
         return seeds
     rows, corners, nodes = surroundings(topology.near, survey.suspects)
     cells = np.empty((len(rows), stretch.COLUMNS))
-    stretch.per_cell(survey.points[nodes], corners, topology.near_turn[rows], MOST, cells)
+    stretch.per_cell(survey.points[nodes], corners, topology.near_orientation[rows], MOST, cells)
     strong = _coherent(corners, cells, survey.rim[nodes] > 0) & survey.suspects[nodes]
     piece = pieces(corners, strong)
     seeds[nodes[strong & (np.bincount(piece[strong], minlength=len(nodes)) >= FEWEST)[piece]]] = True
@@ -140,7 +140,7 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers:
     triangles = topology.triangles
     cells, number = np.empty((len(triangles), stretch.COLUMNS)), np.empty(len(layer), dtype=np.int32)
     points = planar_points(mesh)
-    stretch.per_cell(points, triangles, topology.turn, math.inf, cells)
+    stretch.per_cell(points, triangles, topology.orientation, math.inf, cells)
     corners = np.take(layer.astype(np.int8), triangles)
     count = corners[:, 0] + corners[:, 1] + corners[:, 2]  # of a cell's corners that are in a layer
     chosen: Flags = np.asarray(count == 3)

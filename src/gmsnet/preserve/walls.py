@@ -27,7 +27,7 @@ REFINED = 0.25  # cells there have edges of at most this share of those that cel
 MOST = 0.5  # at least this share of the cells near a wall is refined, or it is not refined towards that wall
 # How far a cell's area may lie from the mean of its neighbours', in logarithms, averaged over the stars of its corners.
 CALM, ROUGH = 0.125, 0.4  # the median near a wall (more: all there has been disturbed); a cell (more: it is damaged)
-SOUND = 0.5  # the least 1/q of a cell
+SOUND = 0.5  # the minimum 1/q of a cell
 CANDIDATES = 8  # edges of the wall, by their middles, among which the nearest is looked for
 
 
@@ -67,7 +67,7 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
     if rough is not None and chosen.any():
         rows = np.flatnonzero(chosen)
         corners, columns = triangles[rows], np.empty((4, len(rows)))
-        quality.per_cell(points, corners, topology.near_turn[rows], columns)
+        quality.per_cell(points, corners, topology.near_orientation[rows], columns)
         damaged = (rough[rows] > ROUGH) | (columns[quality.SHAPE] < SOUND)
         kept[topology.memory[corners]] = True
         kept[topology.memory[corners[damaged & topology.near_free[corners].any(axis=1)]]] = False

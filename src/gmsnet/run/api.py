@@ -27,7 +27,7 @@ from gmsnet.preserve.protection import WALL, Protection, method_for, protected, 
 from gmsnet.run.options import check_arguments
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.run import Run, outcome, precision_of, rank_by
-from gmsnet.run.standing import Standing
+from gmsnet.run.score import Score
 from gmsnet.run.stop import INTERRUPTED, NO_PROGRESS, NOTHING_TO_MOVE
 from gmsnet.run.sweep import Sweep
 from gmsnet.run.target_run import reach_target
@@ -72,7 +72,7 @@ def smooth(
     in METHODS. variant, objective: names out of the method's own lists (default: their first). max_sweeps: at most
     so many sweeps; in most, each node is visited once, in those of ``worst-first`` some nodes are often. threads:
     at most so many (default: the processors at hand); the result is the same bits for any number. target_quality,
-    target_angle: the least 1/q, in (0, 1], and the least angle, in (0, 60] degrees, that every cell is to have:
+    target_angle: the minimum 1/q, in (0, 1], and the minimum angle, in (0, 60] degrees, that every cell is to have:
     only cells that miss it and what is around them are smoothed, until none misses it. fixed: nodes to hold besides
     boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. preserve: "shape" holds the
     nodes of layers that are stretched on purpose, "size" besides keeps the areas of cells, "none" neither.
@@ -140,9 +140,9 @@ def smooth(
             shapes=shapes if start is given_points else None, **options,
         )  # fmt: skip
     else:
-        standing = Standing.of(before.totals, best_by) if start is given_points else None
+        score = Score.of(before.totals, best_by) if start is given_points else None
         best, stop_reason, history, totals = _smoothed(
-            Run(given, topology, chosen, points=start, standing=standing, **options), max_sweeps, callback
+            Run(given, topology, chosen, points=start, score=score, **options), max_sweeps, callback
         )
         if protection.kept is not None and stop_reason in (NO_PROGRESS, NOTHING_TO_MOVE):
             topology, totals = protection.outer, None
@@ -187,7 +187,7 @@ def _smoothed(
 ) -> tuple[Floats, str, list[Sweep], Totals | None]:
     """The best points of a whole run, why it ended, its record, and the totals of the best; nothing else is kept."""
     stop_reason = run.to_the_end(max_sweeps, callback)
-    return run.best, stop_reason, run.history, run.best_standing.totals
+    return run.best, stop_reason, run.history, run.best_score.totals
 
 
 def check_options(

@@ -29,10 +29,10 @@ def check_arguments(
     if threads is not None and not _is_whole(threads, 1):
         raise InputError(f"threads must be a whole number of 1 or more, got {threads!r}")
     if target_quality is not None and not _is_number(target_quality, 1.0):
-        raise InputError(f"target_quality is the least 1/q of a cell and must lie in (0, 1], got {target_quality!r}")
+        raise InputError(f"target_quality is the minimum 1/q of a cell and must lie in (0, 1], got {target_quality!r}")
     if target_angle is not None and not _is_number(target_angle, 60.0):
         raise InputError(
-            f"target_angle is the least angle of a cell in degrees and must lie in (0, 60], got {target_angle!r}"
+            f"target_angle is the minimum angle of a cell in degrees and must lie in (0, 60], got {target_angle!r}"
         )
     if not _is_whole(seed, 0):
         raise InputError(f"seed must be a whole number of 0 or more, got {seed!r}")

@@ -13,7 +13,7 @@ from gmsnet.measure.bounds.bounds import Limits, limits
 from gmsnet.measure.report import QualityReport
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.run.sweep import Sweep as Sweep
-from gmsnet.run.untangle_stage import UnmendedCell
+from gmsnet.run.untangle_stage import StillInvertedCell
 from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
@@ -41,7 +41,7 @@ class SmoothResult:
     held: dict[str, NDArray[np.int64]]
     history: list[Sweep]
     notes: list[str]
-    unmended: list[UnmendedCell]
+    unmended: list[StillInvertedCell]
     topology: Topology
     seconds: float
 

@@ -18,7 +18,7 @@ from gmsnet.measure.report import ASPECT, QualityReport, Totals, measure, totals
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, Smoother, Tally
 from gmsnet.parallel.threads import Share, serial, workers
-from gmsnet.run.standing import NONE, Standing
+from gmsnet.run.score import NONE, Score
 from gmsnet.run.stop import CALLBACK, INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.topology import Topology, near_points
@@ -26,7 +26,7 @@ from gmsnet.topology.topology import Topology, near_points
 Floats = NDArray[np.float64]
 
 
-PATIENCE = 10  # sweeps within which q̂ must rise by LEAST_GAIN, or a cell be mended, for the run to go on
+PATIENCE = 10  # sweeps within which q̂ must rise by LEAST_GAIN, or a cell be untangled, for the run to go on
 LEAST_GAIN = 1e-4
 
 
@@ -41,7 +41,7 @@ class Run:
     def __init__(
         self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str, guard: str,
         points: Floats | None = None, history: list[Sweep] | None = None, precision: Precision | None = None,
-        standing: Standing | None = None, missing: Callable[[Floats], NDArray[np.int32]] | None = None,
+        score: Score | None = None, missing: Callable[[Floats], NDArray[np.int32]] | None = None,
     ) -> None:  # fmt: skip
         self.topology, self.smoother, self.best_by = topology, smoother, best_by
         start = near_points(mesh, topology) if points is None else points
@@ -53,7 +53,7 @@ class Run:
         self.first = len(self.history)
         self.tally: Tally = np.zeros(3, dtype=np.int64)  # since the last look
         self.stages: dict[str, None] = {}  # since the last look, in their order
-        self.best, self.best_standing = start, standing or self._standing()
+        self.best, self.best_score = start, score or self._score()
 
     def to_the_end(self, max_sweeps: int, callback: Callable[[Sweep], bool | None] | None = None) -> str:
         """Sweeps until a stop rule says why to stop."""
@@ -65,28 +65,28 @@ class Run:
             with workers(self.threads, len(self.topology.free) // LANES) as share:
                 while self.sweeps < max_sweeps:
                     moved = self._sweep(share)
-                    settled = self.smoother.settled or (self.smoother.idle_ends and not moved)
-                    if not (self.smoother.looks or settled or self.sweeps == max_sweeps):
+                    converged = self.smoother.converged or (self.smoother.stops_when_idle and not moved)
+                    if not (self.smoother.looks or converged or self.sweeps == max_sweeps):
                         continue
-                    sweep = self._look(share, last=settled or self.sweeps == max_sweeps)
+                    sweep = self._look(share, last=converged or self.sweeps == max_sweeps)
                     if callback is not None and callback(sweep):
                         return CALLBACK
                     if self._reached():
                         return TARGET_REACHED
-                    if settled or self.smoother.settled or self._stalled():
+                    if converged or self.smoother.converged or self._stalled():
                         return NO_PROGRESS
         except KeyboardInterrupt:  # what was made since the last look counts, too: the guard allows each move by itself
             with suppress(KeyboardInterrupt):
-                self._keep_if_best(self._standing())
+                self._keep_if_best(self._score())
             return INTERRUPTED
         return MAX_SWEEPS
 
     def _reached(self) -> bool:
-        return self.missing is not None and not self.best_standing.missed
+        return self.missing is not None and not self.best_score.missed
 
     def _sweep(self, share: Share) -> int:
         """One sweep; returns how many nodes moved."""
-        tally = self.smoother.sweep(self.field, share, lambda: self._keep_if_best(self._standing(share)))
+        tally = self.smoother.sweep(self.field, share, lambda: self._keep_if_best(self._score(share)))
         self.tally += tally
         self.stages[self.smoother.stage] = None
         self.sweeps += 1
@@ -94,30 +94,30 @@ class Run:
 
     def _look(self, share: Share, *, last: bool) -> Sweep:
         """Measures the mesh as it is now, keeps it if it is the best, and writes the record. last: nothing follows."""
-        standing = self._standing(share)
-        self._keep_if_best(standing, last=last)
+        score = self._score(share)
+        self._keep_if_best(score, last=last)
         moved, truncated, dropped = self.tally.tolist()
         self.tally[:] = 0
         sweep = Sweep(
-            self.sweeps, " + ".join(self.stages), moved, truncated, dropped, standing.inverted, standing.qhat,
-            standing.min_shape, standing.mean_shape,
+            self.sweeps, " + ".join(self.stages), moved, truncated, dropped, score.inverted, score.qhat,
+            score.min_shape, score.mean_shape,
         )  # fmt: skip
         self.history.append(sweep)
-        self.fewest.append(min([standing.missed, *self.fewest[-1:]]))
+        self.fewest.append(min([score.missed, *self.fewest[-1:]]))
         self.stages.clear()
         return sweep
 
-    def _keep_if_best(self, standing: Standing, *, last: bool = False) -> bool:
-        better = standing.beats(self.best_standing)
+    def _keep_if_best(self, score: Score, *, last: bool = False) -> bool:
+        better = score.better_than(self.best_score)
         if better:
             points = self.field.points
-            self.best, self.best_standing = points if last else points.copy(), standing
+            self.best, self.best_score = points if last else points.copy(), score
         return better
 
-    def _standing(self, share: Share = serial) -> Standing:
+    def _score(self, share: Share = serial) -> Score:
         """The sums over all triangles of the coordinates as they are."""
-        totals = totals_of(self.field.points, self.topology.near, self.topology.near_turn, share)
-        return Standing.of(totals, self.best_by, self.missing(self.field.points) if self.missing else NONE)
+        totals = totals_of(self.field.points, self.topology.near, self.topology.near_orientation, share)
+        return Score.of(totals, self.best_by, self.missing(self.field.points) if self.missing else NONE)
 
     def _stalled(self) -> bool:
         """Has nothing been gained for PATIENCE looks?"""

@@ -17,7 +17,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.methods.auto import for_target
 from gmsnet.run.run import Run, precision_of
-from gmsnet.run.standing import Standing
+from gmsnet.run.score import Score
 from gmsnet.run.stop import INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.topology import Topology
@@ -49,7 +49,7 @@ def reach_target(
     history: list[Sweep] = []
     rows = rows_missing(points, topology, target, shapes)
     corners = topology.near.take(rows, axis=0)
-    clear = report is None or target.clearly_missed(points, corners, topology.near_turn.take(rows))
+    clear = report is None or target.clearly_missed(points, corners, topology.near_orientation.take(rows))
     if report is not None and not clear:
         corners = topology.places[topology.triangles[target.missed_in(report)]]
     if not len(corners):
@@ -70,14 +70,14 @@ def reach_target(
             share = len(corners) / len(patch.near)
             smoother = create() if create else for_target(target, share, rings=rings)
             missing = partial(corners_missing, topology=patch, target=target)
-            measure = partial(totals_of, points, patch.near, patch.near_turn)
-            before = Standing(measure, best_by, corners if clear else missing(points), positive)
+            measure = partial(totals_of, points, patch.near, patch.near_orientation)
+            before = Score(measure, best_by, corners if clear else missing(points), positive)
             run = Run(
                 mesh, patch, smoother, threads, best_by, guard, points, history, precision, before, missing
             )  # fmt: skip
             reason = run.to_the_end(max_sweeps, callback)
-            after = run.best_standing
-            if after.nearer(before):
+            after = run.best_score
+            if after.closer_to_target(before):
                 points, corners, clear = run.best, after.missing, True
             if not after.missed:
                 return points, NO_PROGRESS if hopeless else TARGET_REACHED, history
@@ -103,13 +103,13 @@ def rows_missing(
     points: Floats, topology: Topology, target: Target, shapes: NDArray[np.float32] | None = None
 ) -> NDArray[np.integer[Any]]:
     """The cells in ``near`` that miss the target, or are not clear of it. shapes: their 1/q, where it is known."""
-    near, turn = topology.near, topology.near_turn
+    near, orientation = topology.near, topology.near_orientation
     rows: NDArray[np.integer[Any]]
     if shapes is None:
-        rows = missed(points, near, turn, *target.limits)
+        rows = missed(points, near, orientation, *target.limits)
     else:
-        some = np.flatnonzero(~(shapes > target.most_shape * SINGLE))
-        rows = some[missed(points, near.take(some, axis=0), turn.take(some), *target.limits)]
+        some = np.flatnonzero(~(shapes > target.max_shape * SINGLE))
+        rows = some[missed(points, near.take(some, axis=0), orientation.take(some), *target.limits)]
     return rows
 
 

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 Reasons = dict[tuple[int, ...], str]
 
 
-class UnmendedCell(NamedTuple):
+class StillInvertedCell(NamedTuple):
     """A cell that is inverted still. cell: its index among all cells of the mesh."""
 
     cell: int
@@ -49,9 +49,9 @@ def beside(reasons: Reasons, topology: Topology) -> NDArray[np.bool_]:
     return chosen
 
 
-def still_inverted(after: QualityReport, topology: Topology, reasons: Reasons) -> list[UnmendedCell]:
+def still_inverted(after: QualityReport, topology: Topology, reasons: Reasons) -> list[StillInvertedCell]:
     """The cells of zero or negative area that have a reason for it."""
     rows = np.flatnonzero(after.valid <= 0) if reasons else np.empty(0, dtype=int)
     nodes = map(tuple, np.sort(topology.triangles[rows], axis=1).tolist())
     cells = after.cell[rows].tolist()
-    return [UnmendedCell(cell, reasons[key]) for cell, key in zip(cells, nodes, strict=True) if key in reasons]
+    return [StillInvertedCell(cell, reasons[key]) for cell, key in zip(cells, nodes, strict=True) if key in reasons]

@@ -18,23 +18,23 @@ REASONS = {  # mark → text, in the order in which they count
     marks_of.BOUNDARY: "boundary",
     marks_of.INTERFACE: "interface between regions",
     marks_of.LINE: "node of a line or vertex cell",
-    marks_of.FOREIGN: "node of a cell that is not smoothed",
-    marks_of.CROWDED: "non-manifold edge",
-    marks_of.UNWOUND: "part that cannot be wound consistently",
-    marks_of.SIDELESS: "part of zero area, which has no positive side",
+    marks_of.UNSUPPORTED_CELL: "node of a cell that is not smoothed",
+    marks_of.NON_MANIFOLD: "non-manifold edge",
+    marks_of.NON_ORIENTABLE: "part that cannot be wound consistently",
+    marks_of.ZERO_AREA: "part of zero area, which has no positive side",
     marks_of.CHOSEN: "fixed by the user",
-    marks_of.TORN: "star is not one closed fan",
-    marks_of.HUB: f"more than {MOST_NEIGHBOURS} neighbours",
+    marks_of.NOT_A_DISK: "star is not one closed fan",
+    marks_of.HIGH_VALENCE: f"more than {MOST_NEIGHBOURS} neighbours",
 }
 
 
 def known_marks(mesh: Mesh, fixed: NDArray[np.bool_] | None, position: Ints) -> Marks:
-    """(N,) by places in memory: LINE, FOREIGN, and CHOSEN for the nodes ``fixed`` (N,) by id."""
+    """(N,) by places in memory: LINE, UNSUPPORTED_CELL, and CHOSEN for the nodes ``fixed`` (N,) by id."""
     marks = np.zeros(len(position), dtype=np.uint16)
     for block in mesh.cells:
         if block.kind not in SMOOTHED:
             marks[position[block.nodes.ravel()]] |= np.uint16(
-                marks_of.LINE if block.dimension < 2 else marks_of.FOREIGN
+                marks_of.LINE if block.dimension < 2 else marks_of.UNSUPPORTED_CELL
             )
     if fixed is not None and fixed.any():
         marks[position[fixed]] |= np.uint16(marks_of.CHOSEN)

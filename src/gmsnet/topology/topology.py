@@ -34,25 +34,25 @@ class Topology:
     """The connectivity of a mesh, seen from its nodes.
 
     plane: the two axes of a planar mesh, else None. triangles: (T, 3) corner nodes of all cells with three corners, in
-    file order (six-node triangles by their corners); cell: (T,) the index of each among all cells of the mesh; turn:
-    (T,) int8, −1 where it has to be read backwards for all of its part to be wound alike with positive area.
-    held: reason → node ids, the first reason that applies.
+    file order (six-node triangles by their corners); cell: (T,) the index of each among all cells of the mesh;
+    orientation: (T,) int8, −1 where it has to be read backwards for all of its part to be wound alike with positive
+    area. held: reason → node ids, the first reason that applies.
     free: (F,) ids of the nodes that may move, ascending.
-    memory: (N,) node ids in memory order. In that order, by places in memory: near (T, 3) and near_turn (T,), the
-    triangles; rings, each from its smallest id on, and their CSR start (N + 1); near_free (N,), which nodes may move.
-    colouring: of all nodes that were free at first, in the order of the ids, so that colours follow from the
+    memory: (N,) node ids in memory order. In that order, by places in memory: near (T, 3) and near_orientation (T,),
+    the triangles; rings, each from its smallest id on, and their CSR start (N + 1); near_free (N,), which nodes may
+    move. colouring: of all nodes that were free at first, in the order of the ids, so that colours follow from the
     connectivity alone.
     """
 
     plane: tuple[int, int] | None
     triangles: Ints
     cell: NDArray[np.int64]
-    turn: NDArray[np.int8]
+    orientation: NDArray[np.int8]
     held: dict[str, NDArray[np.int64]]
     free: Ints
     memory: Ints
     near: Ints
-    near_turn: NDArray[np.int8]
+    near_orientation: NDArray[np.int8]
     near_start: Offsets
     near_ring: Ints
     near_free: Flags
@@ -80,24 +80,24 @@ class Topology:
         faces, planar = side_by_side(threads, partial(written.renumbered, position), partial(_taken, planar, memory))
         marks = known_marks(mesh, fixed, position)
         points = None if mesh.plane is None else planar
-        near_turn, start, ring = closed_fans(faces, points, marks, memory, MOST_NEIGHBOURS)
+        near_orientation, start, ring = closed_fans(faces, points, marks, memory, MOST_NEIGHBOURS)
         held, free, places = sorted_out(marks, position)
         three, triangles = written.triangles()
         whole, near = faces.triangles()
-        turn = near_turn
-        if (turn != turn[:1]).any():
-            turn = np.empty_like(near_turn)
-            turn[faces.origin] = near_turn
+        orientation = near_orientation
+        if (orientation != orientation[:1]).any():
+            orientation = np.empty_like(near_orientation)
+            orientation[faces.origin] = near_orientation
         topology = cls(
             plane=mesh.plane,
             triangles=triangles,
             cell=written.cell[three],
-            turn=turn[three],
+            orientation=orientation[three],
             held=held,
             free=free,
             memory=memory,
             near=near,
-            near_turn=near_turn[whole],
+            near_orientation=near_orientation[whole],
             near_start=start,
             near_ring=ring[: start[-1]],
             near_free=marks == 0,
@@ -121,9 +121,11 @@ class Topology:
         """
         nodes = np.flatnonzero(active)
         near = patch.triangles_around(nodes, active, self.near_start, self.near_ring)
-        turn = np.ones(len(near), dtype=np.int8)
-        inner = replace(self, near=near, near_turn=turn, free=np.sort(self.memory[nodes]), near_free=active)
-        inner.__dict__["changeable"] = near, turn  # all of them
+        orientation = np.ones(len(near), dtype=np.int8)
+        inner = replace(
+            self, near=near, near_orientation=orientation, free=np.sort(self.memory[nodes]), near_free=active
+        )
+        inner.__dict__["changeable"] = near, orientation  # all of them
         return inner
 
     @cached_property
@@ -190,11 +192,11 @@ class Topology:
 
     @cached_property
     def changeable(self) -> tuple[Ints, NDArray[np.int8]]:
-        """The rows of near and near_turn that have a free node."""
+        """The rows of near and near_orientation that have a free node."""
         rows = connectivity.touching(self.near, self.near_free)
         if len(rows) == len(self.near):
-            return self.near, self.near_turn
-        return self.near.take(rows, axis=0), self.near_turn.take(rows)
+            return self.near, self.near_orientation
+        return self.near.take(rows, axis=0), self.near_orientation.take(rows)
 
     @cached_property
     def colours(self) -> Ints:

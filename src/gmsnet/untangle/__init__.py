@@ -5,19 +5,19 @@ from __future__ import annotations
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.measure.report import exact_signs
 from gmsnet.topology.topology import Topology
+from gmsnet.untangle.escalation import escalate
 from gmsnet.untangle.guarded import what_is_left
 from gmsnet.untangle.newton import polish
 from gmsnet.untangle.patch import Floats
 from gmsnet.untangle.reasons import freeze, reasons
-from gmsnet.untangle.result import ALL, NOTHING, PART, Stage, Unmended, Untangled
-from gmsnet.untangle.road import follow
-from gmsnet.untangle.tangle import Tangle
-from gmsnet.untangle.transaction import give_back, moved, take
+from gmsnet.untangle.result import ALL, NOTHING, PART, Stage, StillInverted, Untangled
+from gmsnet.untangle.state import UntanglingState
+from gmsnet.untangle.transaction import moved, restore, take
 
-__all__ = ["ALL", "NOTHING", "PART", "Stage", "Unmended", "Untangled", "untangle"]
+__all__ = ["ALL", "NOTHING", "PART", "Stage", "StillInverted", "Untangled", "untangle"]
 
 
-ROUNDS = 2  # after the first, nodes of cells that cannot be mended stand still, for the sake of those beside them
+ROUNDS = 2  # after the first, nodes of cells that cannot be untangled stand still, for the sake of those beside them
 
 
 def untangle(points: Floats, topology: Topology, precision: Precision) -> Untangled:
@@ -26,18 +26,18 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     points: (N, 2) float64 by places in memory (``planar_points(mesh)[topology.memory]``); not changed. topology: of the
     mesh. precision: how exactly coordinates are known once they are written (kernels.star.guard).
 
-    A cell counts as mended once it is certified: positive as it will be written. No cell that was positive is not so
+    A cell counts as untangled once it is certified: positive as it will be written. No cell that was positive is not so
     afterwards, and none that stays inverted is worse (in 1/q) than the worst with a free node was. The result follows
     from the arguments alone.
     """
     topology = topology.with_rings_of_free_nodes()
-    tangle = Tangle(points, topology, precision)
+    tangle = UntanglingState(points, topology, precision)
     before = int(tangle.was_bad.sum())
     if not before:
         return Untangled(tangle.points, 0, 0, ALL, "", (), ())
     stages, whys = list[Stage](), list[str]()
     for _ in range(ROUNDS):
-        stages += follow(tangle)
+        stages += escalate(tangle)
         whys.append(take(tangle))
         tangle.frozen[:] = False
         if not tangle.bad_nodes().any():
@@ -48,10 +48,10 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     why = next(filter(None, whys), "")
     taken = NOTHING if not moved(tangle).any() else PART if why else ALL
     if taken != NOTHING:
-        stages += give_back(tangle), polish(tangle)
+        stages += restore(tangle), polish(tangle)
     after = 0
     if tangle.left:  # else all are certified that have moved or were not positive
-        after = int((exact_signs(tangle.points, topology.near, topology.near_turn) <= 0).sum())
+        after = int((exact_signs(tangle.points, topology.near, topology.near_orientation) <= 0).sum())
     sweeps = sum(stage.sweeps for stage in stages)
     return Untangled(
         tangle.points,

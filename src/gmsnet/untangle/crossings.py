@@ -47,13 +47,13 @@ def meeting(low: Floats, high: Floats, left: Floats, right: Floats) -> NDArray[n
     By their middles, those of one size (to a factor of two) with those of one size at a time.
     """
     pairs: list[NDArray[np.intp]] = [np.empty((0, 2), dtype=np.intp)]
-    room = MOST
+    pairs_left = MOST
     for one, middle, half in by_size(low, high):
         for other, other_middle, other_half in by_size(left, right):
             tree = scipy.spatial.cKDTree(other_middle)
             if len(one) * len(other) > MOST:  # only then is it worth counting before they are listed
-                room -= int(tree.query_ball_point(middle, half + other_half, p=np.inf, return_length=True).sum())
-                if room < 0:
+                pairs_left -= int(tree.query_ball_point(middle, half + other_half, p=np.inf, return_length=True).sum())
+                if pairs_left < 0:
                     return None
             close = tree.query_ball_point(middle, half + other_half, p=np.inf, return_sorted=True)
             count = np.fromiter(map(len, close), dtype=np.intp, count=len(close))
@@ -88,10 +88,10 @@ def held_edges(topology: Topology) -> tuple[Ints, Ints]:
 def crossings(points: Floats, pairs: Ints) -> Floats:
     """(k, 2) where pairs of edges (p, 2, 2) cross in the inside of both, by exact signs."""
     (a, b), (c, d) = pairs[:, 0].T, pairs[:, 1].T
-    turn = np.ones(len(pairs), dtype=np.int8)
+    orientation = np.ones(len(pairs), dtype=np.int8)
 
     def sign(*corners: Ints) -> NDArray[np.int8]:
-        return exact_signs(points, np.column_stack(corners), turn)
+        return exact_signs(points, np.column_stack(corners), orientation)
 
     crossed = (sign(a, b, c) * sign(a, b, d) < 0) & (sign(c, d, a) * sign(c, d, b) < 0)
     p, r = points[a[crossed]], points[b[crossed]] - points[a[crossed]]

@@ -1,7 +1,7 @@
 """Sweeps that do no harm at any step: certified cells stay so, bad ones become less inverted.
 
 They mend what a few nodes alone have done, without moving a neighbour, before anything wilder is tried; and at the end
-they get what can be had where not all can be mended.
+they get what can be had where not all can be untangled.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from gmsnet.kernels.untangle import barrier
 from gmsnet.untangle.newton import AVERAGING, closing, keep_gains, sweep
 from gmsnet.untangle.patch import Ints, Patch, in_order
 from gmsnet.untangle.result import Stage
-from gmsnet.untangle.tangle import Tangle
+from gmsnet.untangle.state import UntanglingState
 
 FIRST_SWEEPS, FEW_NODES = 3, 0.1  # only where no more than this share of the free nodes has bad cells
 LAST_SWEEPS, RINGS = 30, 2
 
 
-def culprits(tangle: Tangle) -> Stage:
+def worst_nodes(tangle: UntanglingState) -> Stage:
     """The nodes with bad cells, the worst first, each only if its star is still bad when its turn comes."""
     nodes = tangle.worst_first(in_order(tangle.topology, tangle.bad_nodes()))
     if len(nodes) > FEW_NODES * len(tangle.topology.free):
@@ -26,13 +26,13 @@ def culprits(tangle: Tangle) -> Stage:
     return guarded(tangle, nodes, FIRST_SWEEPS, barrier.MENDING, "barrier, guarded, worst first")
 
 
-def what_is_left(tangle: Tangle) -> Stage:
+def what_is_left(tangle: UntanglingState) -> Stage:
     """All nodes around bad cells."""
     return guarded(tangle, tangle.around(RINGS).nodes, LAST_SWEEPS, barrier.GUARDED, "barrier, guarded")
 
 
-def guarded(tangle: Tangle, nodes: Ints, most: int, mode: int, name: str) -> Stage:
-    """At most so many sweeps over some nodes; pieces in which no cell is mended by that go back."""
+def guarded(tangle: UntanglingState, nodes: Ints, most: int, mode: int, name: str) -> Stage:
+    """At most so many sweeps over some nodes; pieces in which no cell is untangled by that go back."""
     patch = Patch.of(tangle.topology, nodes)
     points = tangle.points[patch.every]
     scale = barrier.local_area(points, patch.cells, AVERAGING)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.untangle import barrier
 from gmsnet.untangle.newton import AVERAGING, closing
 from gmsnet.untangle.patch import Patch
-from gmsnet.untangle.tangle import Tangle
+from gmsnet.untangle.state import UntanglingState
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ BUDGET = 50_000_000  # iterations times nodes, all in all: many seconds, and the
 MEMORY = 10  # pairs of steps that L-BFGS remembers
 
 
-def whole(tangle: Tangle, patch: Patch, patience: int) -> int:
+def whole(tangle: UntanglingState, patch: Patch, patience: int) -> int:
     """L-BFGS on a piece until all its cells are certified; takes over where it has come to; returns iterations.
 
     patience: after so many values of ε that have not made the worst cell any better, it is given up.

@@ -8,10 +8,10 @@ import numpy as np
 
 from gmsnet.kernels.simplex.measures import TWO_SQRT3
 from gmsnet.kernels.untangle import barrier
-from gmsnet.kernels.untangle import mending as kernels
+from gmsnet.kernels.untangle import untangling as kernels
 from gmsnet.untangle.patch import Flags, Floats, Patch, free_nodes_of, in_order
 from gmsnet.untangle.result import Stage
-from gmsnet.untangle.tangle import Tangle
+from gmsnet.untangle.state import UntanglingState
 
 SWEEPS = 12
 POLISH, SLIVER = 3, 1e-4  # so many sweeps at the end where a cell that was moved has a 1/q below this
@@ -20,7 +20,7 @@ CLOSING = 0.2  # ε as a share of the worst cell's D while that is negative: Gar
 AVERAGING = 4  # rounds of averaging for the local area
 
 
-def newton(tangle: Tangle, patch: Patch, points: Floats) -> tuple[Flags, int]:
+def newton(tangle: UntanglingState, patch: Patch, points: Floats) -> tuple[Flags, int]:
     """Sweeps with an ε of its own for each piece, until all cells are certified; which pieces are not, and sweeps.
 
     points: (m, 2) of the patch, changed.
@@ -40,7 +40,13 @@ def newton(tangle: Tangle, patch: Patch, points: Floats) -> tuple[Flags, int]:
 
 
 def sweep(
-    tangle: Tangle, patch: Patch, points: Floats, scale: Floats, epsilon: Floats, mode: int, floor: float = -math.inf
+    tangle: UntanglingState,
+    patch: Patch,
+    points: Floats,
+    scale: Floats,
+    epsilon: Floats,
+    mode: int,
+    floor: float = -math.inf,
 ) -> int:
     """One sweep of Newton steps over the moved nodes of a patch; see the kernel."""
     precision, nodes = tangle.precision, np.arange(patch.count, dtype=np.int32)
@@ -56,11 +62,11 @@ def closing(worst: Floats) -> Floats:
     return np.sqrt(LEAST_EPSILON**2 + (CLOSING * np.minimum(worst, 0.0)) ** 2)
 
 
-def polish(tangle: Tangle) -> Stage:
+def polish(tangle: UntanglingState) -> Stage:
     """A few Newton sweeps on the stars of slivers that untangling has left; certified stars stay so."""
     slivers, topology = np.empty(len(tangle.bad), dtype=bool), tangle.topology
     kernels.find_slivers(
-        tangle.points, tangle.before, topology.near, topology.near_turn, SLIVER / TWO_SQRT3, slivers
+        tangle.points, tangle.before, topology.near, topology.near_orientation, SLIVER / TWO_SQRT3, slivers
     )  # fmt: skip
     patch = Patch.of(topology, in_order(topology, free_nodes_of(topology, slivers)))
     points = tangle.points[patch.every]
@@ -72,7 +78,7 @@ def polish(tangle: Tangle) -> Stage:
     return Stage("barrier, slivers", patch.count, POLISH, tangle.left)  # no cell changes its sign by that
 
 
-def keep_gains(tangle: Tangle, before: Floats, bad: Flags) -> None:
+def keep_gains(tangle: UntanglingState, before: Floats, bad: Flags) -> None:
     """Pieces that have moved since some points (N, 2), without fewer cells being bad than were then, go back there."""
     topology = tangle.topology
     patch = Patch.of(topology, in_order(topology, (tangle.points != before).any(axis=1)))

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
-from gmsnet.kernels.untangle import mending as kernels
+from gmsnet.kernels.untangle import untangling as kernels
 from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Why a cell could not be mended: what is proven to stand against it, and where."""
+"""Why a cell could not be untangled: what is proven to stand against it, and where."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from gmsnet.measure.report import exact_signs
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.crossings import held_edges, near_crossings
 from gmsnet.untangle.patch import Flags, Floats, free_nodes_of
-from gmsnet.untangle.result import Unmended
-from gmsnet.untangle.tangle import Tangle
+from gmsnet.untangle.result import StillInverted
+from gmsnet.untangle.state import UntanglingState
 
 HELD = "all its nodes are held"
 CROSSING = "the boundary crosses itself here"
 HELD_CROSSING = "edges whose nodes are held cross each other here"
 EMPTY = "no position of its free node makes all triangles of its star positive"
-CLUSTER = 100  # bad cells around one that cannot be mended, at most: more may have reasons of their own
+CLUSTER = 100  # bad cells around one that cannot be untangled, at maximum: more may have reasons of their own
 FOR_GOOD = (CROSSING, HELD, EMPTY, HELD_CROSSING)
 ROUNDING = "it is positive, but by no more than its coordinates may be off by"
 
 
-def reasons(topology: Topology, points: Floats, bad: Flags, sweeps: int) -> tuple[Unmended, ...]:
+def reasons(topology: Topology, points: Floats, bad: Flags, sweeps: int) -> tuple[StillInverted, ...]:
     """One row for each bad cell (T, bool), ascending. sweeps: how many there were."""
     rows = np.flatnonzero(bad)
     if not len(rows):
@@ -30,12 +30,12 @@ def reasons(topology: Topology, points: Floats, bad: Flags, sweeps: int) -> tupl
     cells = topology.near[rows]
     held = ~topology.near_free[cells]
     places = points[cells].mean(axis=1)
-    signs = exact_signs(points, topology.near[rows], topology.near_turn[rows])
+    signs = exact_signs(points, topology.near[rows], topology.near_orientation[rows])
     boundary, fixed = (near_crossings(points, edges, cells) for edges in held_edges(topology))
     empty: dict[int, bool] = {}
     out = []
     for k, (row, cell) in enumerate(zip(rows.tolist(), cells, strict=True)):
-        reason, place = f"not mended within {sweeps} sweeps", places[k]
+        reason, place = f"not untangled within {sweeps} sweeps", places[k]
         if signs[k] > 0:
             reason = ROUNDING
         elif np.isfinite(boundary[k, 0]):
@@ -46,11 +46,11 @@ def reasons(topology: Topology, points: Floats, bad: Flags, sweeps: int) -> tupl
             reason = EMPTY
         elif np.isfinite(fixed[k, 0]):
             reason, place = HELD_CROSSING, fixed[k]
-        out.append(Unmended(row, reason, (float(place[0]), float(place[1]))))
+        out.append(StillInverted(row, reason, (float(place[0]), float(place[1]))))
     return tuple(out)
 
 
-def give_up(tangle: Tangle, points: Floats, bad: Flags) -> bool:
+def freeze_hopeless(tangle: UntanglingState, points: Floats, bad: Flags) -> bool:
     """Freezes the free nodes of what no patch can mend, however large: the bad cells (of some points) with a reason of
     FOR_GOOD, and the few that hang together with them. Are there new ones?
     """
@@ -70,7 +70,7 @@ def give_up(tangle: Tangle, points: Floats, bad: Flags) -> bool:
     return bool(tangle.frozen.sum() > before)
 
 
-def freeze(tangle: Tangle) -> bool:
+def freeze(tangle: UntanglingState) -> bool:
     """Freezes the free nodes of bad cells with such a reason; are there any, and bad cells without one?"""
     topology = tangle.topology
     rows = [row.triangle for row in reasons(topology, tangle.points, tangle.bad, 0) if row.reason in FOR_GOOD]

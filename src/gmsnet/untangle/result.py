@@ -20,8 +20,8 @@ class Stage(NamedTuple):
     left: int
 
 
-class Unmended(NamedTuple):
-    """A cell that is not mended: its row in ``Topology.near``, why, and where (x, y, in coordinates of the run)."""
+class StillInverted(NamedTuple):
+    """A cell that is not untangled: its row in ``Topology.near``, why, and where (x, y, in coordinates of the run)."""
 
     triangle: int
     reason: str
@@ -42,7 +42,7 @@ class Untangled:
     taken: str
     why: str
     stages: tuple[Stage, ...]
-    unmended: tuple[Unmended, ...]
+    unmended: tuple[StillInverted, ...]
 
     @property
     def sweeps(self) -> int:

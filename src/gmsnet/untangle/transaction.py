@@ -11,16 +11,16 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.simplex.measures import TWO_SQRT3
-from gmsnet.kernels.untangle import mending as kernels
+from gmsnet.kernels.untangle import untangling as kernels
 from gmsnet.untangle.newton import keep_gains
 from gmsnet.untangle.patch import Flags, free_nodes_of, in_order
 from gmsnet.untangle.result import Stage
-from gmsnet.untangle.tangle import Tangle
+from gmsnet.untangle.state import UntanglingState
 
 BACK_SWEEPS, FINE = 20, 0.1  # a cell between nodes that went back and others may have this 1/q
 
 
-def take(tangle: Tangle) -> str:
+def take(tangle: UntanglingState) -> str:
     """Takes back what cannot be taken; returns why, or "" if all is taken."""
     if not tangle.left:
         return ""
@@ -30,8 +30,8 @@ def take(tangle: Tangle) -> str:
     tried, first = moved(tangle).sum(), 0
     while True:
         count = kernels.find_violated(
-            tangle.points, tangle.before, topology.near, topology.near_turn, tangle.was_bad, floor, precision.unit,
-            precision.grain, violated,
+            tangle.points, tangle.before, topology.near, topology.near_orientation, tangle.was_bad, floor,
+            precision.unit, precision.grain, violated,
         )  # fmt: skip
         if not count:
             break
@@ -46,21 +46,23 @@ def take(tangle: Tangle) -> str:
         return "no inverted cell has a node that may move"
     if moved(tangle).sum() == tried:
         return ""
-    return f"{first} cells that were positive, or better, would have been inverted" if first else "no cell was mended"
+    return (
+        f"{first} cells that were positive, or better, would have been inverted" if first else "no cell was untangled"
+    )
 
 
-def moved(tangle: Tangle) -> Flags:
+def moved(tangle: UntanglingState) -> Flags:
     """(N,) which nodes are elsewhere than at first."""
     elsewhere: Flags = (tangle.points != tangle.before).any(axis=1)
     return elsewhere
 
 
-def put_back(tangle: Tangle, nodes: Flags) -> None:
+def put_back(tangle: UntanglingState, nodes: Flags) -> None:
     """Nodes (N, bool) go back to where they were at first."""
     tangle.points[nodes] = tangle.before[nodes]
 
 
-def give_back(tangle: Tangle) -> Stage:
+def restore(tangle: UntanglingState) -> Stage:
     """Nodes that need not be elsewhere go back to their very bits: what was made thin on purpose stays as it was."""
     topology, precision = tangle.topology, tangle.precision
     nodes = in_order(topology, moved(tangle))

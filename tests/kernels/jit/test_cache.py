@@ -60,7 +60,7 @@ def test_a_cache_is_stale_once_what_a_function_calls_has_changed(tmp_path):
         return done.stdout, done.stderr
 
     assert call() == ("True\n", "")
-    predicates = tmp_path / "gmsnet" / "kernels" / "predicates.py"
+    predicates = tmp_path / "gmsnet" / "kernels" / "simplex" / "predicates.py"
     turned = predicates.read_text().replace("return left - right, bound", "return right - left, bound")
     assert turned != predicates.read_text()
     predicates.write_text(turned)

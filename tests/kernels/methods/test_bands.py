@@ -25,7 +25,7 @@ def shares_of(points, topology, kept, shifts):
     """What is left of the shift (N, 2; over the stars' sizes) of each free node, all others where they are."""
     blocks = topology.stars.blocks
     given = bands.Bands(points.copy(), kept, WIDTH)
-    room = stars.room_for(blocks.most)
+    room = stars.workspace_for(blocks.most)
     local, shift = np.empty(2 * blocks.most * LANES), np.empty(2 * LANES)
     left, size = np.full((len(points), 2), np.nan), np.full(len(points), np.nan)
     for block in range(len(blocks.degree)):
@@ -67,7 +67,7 @@ def test_what_is_outside_of_its_band_may_go_back_only():
     start = planar_points(mesh)[topology.memory]
     place = int(np.flatnonzero(topology.memory == 0)[0])
     blocks = topology.stars.blocks
-    room = stars.room_for(blocks.most)
+    room = stars.workspace_for(blocks.most)
     local = np.empty(2 * blocks.most * LANES)
     now = start.copy()
     now[place] = [-0.2, -0.2]

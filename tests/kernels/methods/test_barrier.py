@@ -37,7 +37,7 @@ def value(p, ring, place):
 
 
 def least_surplus(ring, place, floor):
-    """The least D − floor·L of the star's triangles."""
+    """The minimum D − floor·L of the star's triangles."""
     a, b = np.roll(ring, 1, axis=0) - place, ring - place
     d, sides = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * a + b * b + (a - b) ** 2).sum(axis=1)
     return (d - floor * sides).min()
@@ -133,7 +133,7 @@ def test_derivatives_and_step(p, degree):
         there = place + shift[[0, LANES]]
         least = naive_objectives.least_area(ring, there)
         assert rows[kernels.LEAST_AFTER, 0] == pytest.approx(least, rel=1e-9, abs=1e-12)
-        assert rows[kernels.SURPLUS, 0] == pytest.approx(least_surplus(ring, there, 0.1), rel=1e-5, abs=1e-5)
+        assert rows[kernels.LOWEST_MARGIN, 0] == pytest.approx(least_surplus(ring, there, 0.1), rel=1e-5, abs=1e-5)
         if least > 0:
             assert rows[kernels.AFTER, 0] == pytest.approx(value(p, ring, there), rel=1e-10)
         pairs = np.vstack([place, ring]).repeat(LANES, axis=0).ravel()

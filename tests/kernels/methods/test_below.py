@@ -48,7 +48,7 @@ def test_rows_and_nodes_against_a_slow_twin(target):
     topology = Topology.of(mesh)
     points, near, may_move = near_points(mesh, topology), topology.near, topology.near_free
     report = gmsnet.quality(mesh)
-    rows = below.missed(points, near, topology.near_turn, *target.limits)
+    rows = below.missed(points, near, topology.near_orientation, *target.limits)
     expected = np.flatnonzero(target.missed(report.shape, report.min_angle))
     assert sorted(sorted(topology.memory[near[t]].tolist()) for t in rows) == sorted(
         sorted(topology.triangles[t].tolist()) for t in expected
@@ -72,7 +72,7 @@ def test_rows_and_nodes_against_a_slow_twin(target):
 def test_rounds_end_where_nothing_is_missed_or_too_much_was_done():
     mesh = gmsnet.random_mesh(500, seed=3)
     topology, target = Topology.of(mesh), Target(0.3)
-    near, turn, may_move = topology.near, topology.near_turn, topology.near_free
+    near, turn, may_move = topology.near, topology.near_orientation, topology.near_free
     rings, ids = (topology.near_start, topology.near_ring), topology.memory
 
     def made(plan, most, everywhere=False):
@@ -95,7 +95,7 @@ def test_rounds_end_where_nothing_is_missed_or_too_much_was_done():
     assert made(plan, nodes - 1) == one  # the first round has made that many, so that there is no second one
     assert made(plan, nodes)[0] != one[0]
     some, all_of_them = made([(2, 1)], 10**6)[1][MOVED], made([(2, 1)], 10**6, everywhere=True)[1][MOVED]
-    assert 0 < some < all_of_them == nodes  # the others' cells had been mended before their turn
+    assert 0 < some < all_of_them == nodes  # the others' cells had been untangled before their turn
 
 
 @given(

@@ -45,7 +45,7 @@ def test_value_and_step(doublings, degree):
         place, ring = valid_star(rng, degree)
         most = largest(ring, place)
         inverse = 1 / (math.sqrt(3) * most)
-        value, dx, dy, least = kernels.methods.newton(ring.ravel(), degree, *place, inverse, doublings)
+        value, dx, dy, least = kernels.newton(ring.ravel(), degree, *place, inverse, doublings)
         f, g, h = naive_objectives.derivatives_at(f"q{p}", ring, place)
         f, g, h = (degree * (x / most**p) for x in (f, g, h))
         newton = -np.linalg.solve(h, g)
@@ -117,7 +117,7 @@ def test_the_guard_is_that_of_blocks(level, single):
         shifts = rng.choice([0.1, 1.0, 5.0], LANES)[:, None] * rng.normal(size=(LANES, 2))
         targets = points[:LANES] + shifts
 
-        shared, tally = kernels_stars.room_for(degree), np.zeros(3, dtype=int)
+        shared, tally = kernels_stars.workspace_for(degree), np.zeros(3, dtype=int)
         local = np.empty(2 * degree * LANES)
         one, other = points.copy(), points.copy()
         kernels_stars.fetch(one, blocks, 0, shared, local)

@@ -25,7 +25,7 @@ def commit(stars_, shifts, unit=U64, single=False):
     lanes = np.minimum(np.arange(LANES), count - 1)
     centre = lanes.astype(np.int32)
     rings = np.concatenate([count + lanes * degree + j for j in range(degree)]).astype(np.int32)
-    room = kernels.room_for(degree)
+    room = kernels.workspace_for(degree)
     local = np.empty(2 * degree * LANES, dtype=np.float32)
     one = np.zeros(1, dtype=np.int64), np.array([degree], dtype=np.int32), np.array([count], dtype=np.int32)
     blocks = block.Blocks(centre, rings, *one, degree)

@@ -25,7 +25,7 @@ from gmsnet.kernels.jit.cache import make_trustworthy
 
 KNOWN = (0, 68)  # the last version of Numba of which it is known that kernels.jit.compilers fits it
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-LANES = 64  # stars or triangles that go through the processor abreast
+LANES = 64  # stars or triangles that go through the processor in SIMD lanes
 
 
 def options(version: tuple[int, ...]) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:

@@ -106,13 +106,13 @@ def propose(objective, local, n, sizes, state, out, shift, other):
 @kernel
 def sweep(points, blocks, first, last, guard, objective, sizes, tally):
     """Smooths the blocks first…last (of one colour) once. sizes: (steps,) η_t. tally: (3,), added to."""
-    room = stars.room_for(blocks.most)
+    workspace = stars.workspace_for(blocks.most)
     local = np.empty(2 * blocks.most * LANES)
     shift, other = np.empty(2 * LANES), np.empty(2 * LANES)
     state, out = np.empty(STATE * LANES), np.empty(OUT * LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, room, local)
+        n = stars.fetch(points, blocks, block, workspace, local)
         propose(objective, local, n, sizes, state, out, shift, other)
-        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
+        stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
-        tally[k] += room.counts[k]
+        tally[k] += workspace.counts[k]

@@ -57,11 +57,11 @@ def propose(local, n, shift):
 @kernel
 def sweep(points, blocks, first, last, guard, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
-    room = stars.room_for(blocks.most)
+    workspace = stars.workspace_for(blocks.most)
     local, shift = np.empty(2 * blocks.most * LANES), np.empty(2 * LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, room, local)
+        n = stars.fetch(points, blocks, block, workspace, local)
         propose(local, n, shift)
-        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
+        stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
-        tally[k] += room.counts[k]
+        tally[k] += workspace.counts[k]

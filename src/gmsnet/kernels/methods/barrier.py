@@ -26,7 +26,7 @@ from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.methods.barrier_star import FAR, MOST, descend
 from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.block import MARGIN, PAIRS, REACH, SIZE, ask_ahead, gather, ring_row
-from gmsnet.kernels.star.certificate import COARSE, NARROWEST, WIDER, doubt
+from gmsnet.kernels.star.certificate import COARSE, NARROWEST, WIDER, error_bound
 from gmsnet.kernels.star.guard import WITH_FLOORS
 
 SMALL = 1e-5  # of F: a fall that float32 may not see; the step is then so short that it is Newton's to rounding
@@ -34,10 +34,10 @@ SMALL = 1e-5  # of F: a fall that float32 may not see; the step is then so short
 FLAT = 300.0  # mean Q of a star: D of a triangle is off by a few times 2⁻²⁴·Q in float32
 
 
-# Rows of a block's sums: F, −∇F, the Hessian without its isotropic part (of xx and yy the half), Σ c/D, the least D;
-# after the step F, the least D, the least surplus above the guard's floor; gᵀH⁻¹g, whether to do the star over; the
+# Rows of a block's sums: F, −∇F, the Hessian without its isotropic part (of xx and yy the half), Σ c/D, the minimum D;
+# after the step F, the minimum D, the minimum margin above the guard's floor; gᵀH⁻¹g, whether to do the star over; the
 # ring's largest component, and δ.
-VALUE, GX, GY, XX, XY, YY, ROUND, LEAST, AFTER, LEAST_AFTER, SURPLUS, FALL, REDO, WIDTH, DOUBT = range(15)
+VALUE, GX, GY, XX, XY, YY, ROUND, LEAST, AFTER, LEAST_AFTER, LOWEST_MARGIN, FALL, REDO, WIDTH, DOUBT = range(15)
 SUMS = 15
 
 
@@ -75,7 +75,7 @@ def relate(star, n, guard, work, flat, local, sums):
 
 @part
 def derive(local, n, power, sums):
-    """F with its two derivatives, and the least D."""
+    """F with its two derivatives, and the minimum D."""
     real = sums.dtype.type
     two, four = real(power.two), real(power.four)
     sums[: LEAST * LANES] = 0.0
@@ -148,7 +148,7 @@ def propose(sums, relaxation, ratio, step):
 
 @part
 def judge(local, n, power, step, floor, sums):
-    """F, the least D and the least surplus D − floor·L after the step: rows AFTER, LEAST_AFTER and SURPLUS."""
+    """F, the minimum D and the minimum margin D − floor·L after the step: rows AFTER, LEAST_AFTER and SURPLUS."""
     real = sums.dtype.type
     two, four, unity, simple = real(power.two), real(power.four), real(1.0), power.one > 0.0
     twice = real(2.0 * WIDER * floor)
@@ -163,20 +163,20 @@ def judge(local, n, power, step, floor, sums):
             bx, by = s[lane] - step[lane], s[LANES + lane] - step[LANES + lane]
             d = ax * by - ay * bx
             half = (bx * bx + by * by) + (ay * (ay - by) - ax * (bx - ax))
-            surplus = d - twice * half
+            margin = d - twice * half
             q = half * (unity / d)
             value = q if simple else q * q * (two + four * (q * q))
             sums[AFTER * LANES + lane] += value
             sums[LEAST_AFTER * LANES + lane] = min(sums[LEAST_AFTER * LANES + lane], d)
-            least = sums[SURPLUS * LANES + lane]
-            sums[SURPLUS * LANES + lane] = surplus if not surplus >= least else least
+            least = sums[LOWEST_MARGIN * LANES + lane]
+            sums[LOWEST_MARGIN * LANES + lane] = margin if not margin >= least else least
 
 
 @part
 def settle(sums, most, step, mean, mean_sums, with_mean):
     """Takes the mean instead of the step where F falls by it. Row REDO: 1 where float64 is called for, else 0.
 
-    most: the largest F that float32 can be trusted with.
+    maximum: the largest F that float32 can be trusted with.
     """
     real = sums.dtype.type
     most = real(most)
@@ -196,8 +196,8 @@ def settle(sums, most, step, mean, mean_sums, with_mean):
             step[lane] = mean[lane] if taken else step[lane]
             step[LANES + lane] = mean[LANES + lane] if taken else step[LANES + lane]
             sums[REDO * LANES + lane] = no if taken else sums[REDO * LANES + lane]
-            surplus, of_mean = sums[SURPLUS * LANES + lane], mean_sums[SURPLUS * LANES + lane]
-            sums[SURPLUS * LANES + lane] = of_mean if taken else surplus
+            margin, of_mean = sums[LOWEST_MARGIN * LANES + lane], mean_sums[LOWEST_MARGIN * LANES + lane]
+            sums[LOWEST_MARGIN * LANES + lane] = of_mean if taken else margin
 
 
 @part
@@ -218,14 +218,14 @@ def certify(sums, step, unit, work):
     """
     real = sums.dtype.type
     unit, zero = real(unit), real(0.0)
-    doubtful = 0
+    uncertified = 0
     for lane in range(LANES):
         m = max(sums[WIDTH * LANES + lane], max(abs(step[lane]), abs(step[LANES + lane])))
-        certain = sums[SURPLUS * LANES + lane] - doubt(m, sums[DOUBT * LANES + lane] + unit * m, COARSE)
+        certain = sums[LOWEST_MARGIN * LANES + lane] - error_bound(m, sums[DOUBT * LANES + lane] + unit * m, COARSE)
         certain = certain if sums[REDO * LANES + lane] == zero else 0.0
         work[MARGIN * LANES + lane] = certain
-        doubtful += not certain > 0.0
-    return doubtful
+        uncertified += not certain > 0.0
+    return uncertified
 
 
 @part
@@ -248,16 +248,16 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
     stretch: that many times the way to the mean of the ring is taken instead of a step where F falls by it; 0: steps
     only.
     """
-    room, local = stars.room_for(blocks.most), np.empty(2 * blocks.most * LANES, dtype=np.float32)
+    workspace, local = stars.workspace_for(blocks.most), np.empty(2 * blocks.most * LANES, dtype=np.float32)
     sums, mean_sums = np.empty(SUMS * LANES, dtype=np.float32), np.empty(SUMS * LANES, dtype=np.float32)
     step, mean = np.empty(2 * LANES, dtype=np.float32), np.empty(2 * LANES, dtype=np.float32)
-    star, work, shift = room.star, room.work, np.empty(2 * LANES)
+    star, work, shift = workspace.star, workspace.work, np.empty(2 * LANES)
     floor, most = max(guard.floor, 0.0), FLAT * (power.one + FLAT * (power.two + power.four * (FLAT * FLAT)))
     for block in range(first, last):
         n, count = blocks.degree[block], blocks.filled[block]
         gather(points, blocks, block, n, star)
         ask_ahead(points, blocks, block + 1)
-        relate(star, n, guard, work, room.sums, local, sums)
+        relate(star, n, guard, work, workspace.sums, local, sums)
         derive(local, n, power, sums)
         propose(sums, relaxation, power.ratio, step)
         judge(local, n, power, step, floor, sums)
@@ -267,13 +267,13 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
         settle(sums, most * n, step, mean, mean_sums, stretch > 0.0)
         for k in range(2 * LANES):
             shift[k] = step[k]
-        doubtful = certify(sums, step, guard.unit, work)
-        if doubtful:
+        uncertified = certify(sums, step, guard.unit, work)
+        if uncertified:
             refine(star, n, count, work, power, sums, shift)
         if len(guard) == WITH_FLOORS:
-            stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
+            stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
             continue
         stars.aim(work, shift, guard.single)
-        stars.store(points, blocks, block, room, shift, guard, room.counts)
+        stars.store(points, blocks, block, workspace, shift, guard, workspace.counts)
     for k in range(len(tally)):
-        tally[k] += room.counts[k]
+        tally[k] += workspace.counts[k]

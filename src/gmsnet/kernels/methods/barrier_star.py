@@ -30,7 +30,7 @@ class Power(NamedTuple):
 
 @part
 def derivatives(x, y, star, n, lane, power):
-    """One star in float64 with its free node at (x, y): F, −∇F, the Hessian (xx, xy, yy), the least D."""
+    """One star in float64 with its free node at (x, y): F, −∇F, the Hessian (xx, xy, yy), the minimum D."""
     value, gx, gy, xx, xy, yy, even, least = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.inf
     a = 2 * (n * LANES + lane)
     ax, ay = star[a] - x, star[a + 1] - y
@@ -80,7 +80,7 @@ def value_at(x, y, star, n, lane, power):
 
 @inlined
 def newton_step(gx, gy, xx, xy, yy):
-    """H⁻¹g; where H is too flat to be inverted (close to a sliver), the least of the same quadratic along g."""
+    """H⁻¹g; where H is too flat to be inverted (close to a sliver), the minimum of the same quadratic along g."""
     determinant, trace = xx * yy - xy * xy, xx + yy
     if determinant > FLAT * trace * trace:
         return (yy * gx - xy * gy) / determinant, (xx * gy - xy * gx) / determinant

@@ -13,7 +13,7 @@ from gmsnet.kernels.methods.worst_first_cycles import visit
 
 
 @kernel
-def missed(points, triangles, turn, quality, tangent):
+def missed(points, triangles, orientation, quality, tangent):
     """The rows (int32) of the triangles that miss the target."""
     rows = np.empty(len(triangles) + LANES, dtype=np.int32)
     edges, short = np.empty(4 * LANES), np.empty(LANES, dtype=np.int64)
@@ -24,7 +24,7 @@ def missed(points, triangles, turn, quality, tangent):
             t = start + lane
             # Unsigned, so that nothing is compared with zero.
             a, b, c = np.uint32(triangles[t, 0]), np.uint32(triangles[t, 1]), np.uint32(triangles[t, 2])
-            x, y, sign = points[a, 0], points[a, 1], np.float64(turn[t])
+            x, y, sign = points[a, 0], points[a, 1], np.float64(orientation[t])
             edges[lane] = sign * (points[b, 0] - x)  # a triangle to be read backwards: its mirror image
             edges[LANES + lane] = points[b, 1] - y
             edges[2 * LANES + lane] = sign * (points[c, 0] - x)
@@ -44,7 +44,7 @@ def rounds(points, nodes, start, around, free, memory, guard, plan, most, scale,
 
     nodes: (K,) int32, free ones in the order of their ids; everywhere: all of them are visited in the first round.
     start, around: the rings of all nodes, in CSR form. free: (N,) bool. memory: (N,) ids. plan: (R, 2) of log₂ of the
-    power p and visits, for each round. most: visits; a round that would begin after so many is not made. scale: the
+    power p and visits, for each round. maximum: visits; a round that would begin after so many is not made. scale: the
     1/q from which powers are formed. target: what ``missing`` asks for. tally: (3,), added to.
     """
     mark, tried = np.zeros(len(points), dtype=np.bool_), np.zeros(len(points), dtype=np.bool_)

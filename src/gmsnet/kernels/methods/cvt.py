@@ -56,14 +56,14 @@ def sweep(points, blocks, first, last, guard, circum, tally):
 
     circum: with circumcentres, else with centroids.
     """
-    room = stars.room_for(blocks.most)
+    workspace = stars.workspace_for(blocks.most)
     local, row, shift = np.empty(2 * blocks.most * LANES), np.empty(LANES), np.empty(2 * LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, room, local)
+        n = stars.fetch(points, blocks, block, workspace, local)
         if circum:
             circumcentres(local, n, row, shift)
         else:
             centroids(local, n, row, shift)
-        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
+        stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
-        tally[k] += room.counts[k]
+        tally[k] += workspace.counts[k]

@@ -139,14 +139,15 @@ def length(x, y):
 
 @kernel
 def steps(points, elements, queue, transformation, guard, count, tally):
-    """So many times the element with the least key is transformed. tally: counts of moved and dropped nodes, added to.
+    """So many times the element with the minimum key is transformed. tally: counts of moved and dropped nodes, added
+    to.
 
     An element that is put back gets a penalty; one that is transformed loses some of its own; one that is chosen twice
     running gets a little more. While the same element is put back again and again nothing else changes, so it is not
     transformed anew each time.
     """
     memory, penalty = queue.memory, queue.penalty
-    old, target, room = np.empty(6), np.empty(6), np.empty(12)
+    old, target, workspace = np.empty(6), np.empty(6), np.empty(12)
     for _ in range(count):
         e = queue.heap[0]
         repeated = e == memory[LAST]
@@ -157,7 +158,7 @@ def steps(points, elements, queue, transformation, guard, count, tally):
             movable += elements.free[elements.corners[e, k]]
         if not (repeated and memory[STUCK]):
             propose(points, elements, e, transformation, guard.single, old, target)
-            memory[STUCK] = not moved(points, elements, e, old, target, guard, room)
+            memory[STUCK] = not moved(points, elements, e, old, target, guard, workspace)
         if memory[STUCK]:
             penalty[e] += INVALID
             tally[DROPPED] += movable
@@ -198,7 +199,7 @@ def propose(points, elements, e, transformation, single, old, target):
 
 
 @part
-def moved(points, elements, e, old, target, guard, room):
+def moved(points, elements, e, old, target, guard, workspace):
     """Moves the corners of an element to their targets if that breaks no triangle; tells whether it has."""
     for k in range(3):
         i = elements.corners[e, k]
@@ -210,7 +211,7 @@ def moved(points, elements, e, old, target, guard, room):
                 f = elements.around[at]
                 if seen(elements, e, k, f):
                     continue
-                if not allowed(points, elements.corners, f, e, old, guard, room):
+                if not allowed(points, elements.corners, f, e, old, guard, workspace):
                     for m in range(3):
                         j = elements.corners[e, m]
                         points[j, 0], points[j, 1] = old[2 * m], old[2 * m + 1]
@@ -231,10 +232,10 @@ def seen(elements, e, k, f):
 
 
 @part
-def allowed(points, corners, f, e, old, guard, room):
+def allowed(points, corners, f, e, old, guard, workspace):
     """May element f be as it is now that the corners of e have left their old places? The rule of
     kernels.star.guard."""
-    x, was = room[:6], room[6:]
+    x, was = workspace[:6], workspace[6:]
     reach, floor = 0.0, guard.floor
     for k in range(3):
         i = corners[f, k]

@@ -46,26 +46,26 @@ def mean_shifts(local, n, transformation, weights, shift):
 @kernel
 def plan(points, blocks, first, last, transformation, shifts):
     """The shifts (blocks, 2·LANES) of the stars in the blocks first…last; nothing moves."""
-    room = stars.room_for(blocks.most)
+    workspace = stars.workspace_for(blocks.most)
     local, weights = np.empty(2 * blocks.most * LANES), np.empty(LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, room, local)
+        n = stars.fetch(points, blocks, block, workspace, local)
         mean_shifts(local, n, transformation, weights, shifts[block])
         for lane in range(LANES):
-            shifts[block, lane] *= room.work[SIZE * LANES + lane]
-            shifts[block, LANES + lane] *= room.work[SIZE * LANES + lane]
+            shifts[block, lane] *= workspace.work[SIZE * LANES + lane]
+            shifts[block, LANES + lane] *= workspace.work[SIZE * LANES + lane]
 
 
 @kernel
 def carry_out(points, blocks, first, last, guard, shifts, tally):
     """The guard moves the stars in the blocks first…last, of one colour, by their planned shifts."""
-    room = stars.room_for(blocks.most)
+    workspace = stars.workspace_for(blocks.most)
     local, shift = np.empty(2 * blocks.most * LANES), np.empty(2 * LANES)
     for block in range(first, last):
-        stars.fetch(points, blocks, block, room, local)
+        stars.fetch(points, blocks, block, workspace, local)
         for lane in range(LANES):  # the shifts are absolute: the ring has moved since
-            shift[lane] = shifts[block, lane] / room.work[SIZE * LANES + lane]
-            shift[LANES + lane] = shifts[block, LANES + lane] / room.work[SIZE * LANES + lane]
-        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
+            shift[lane] = shifts[block, lane] / workspace.work[SIZE * LANES + lane]
+            shift[LANES + lane] = shifts[block, LANES + lane] / workspace.work[SIZE * LANES + lane]
+        stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
-        tally[k] += room.counts[k]
+        tally[k] += workspace.counts[k]

@@ -147,14 +147,14 @@ def decode(weights, hidden, features, row, decoded, shift):
 @kernel
 def sweep(points, blocks, first, last, guard, weights, hidden, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
-    room = stars.room_for(blocks.most)
+    workspace = stars.workspace_for(blocks.most)
     local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
     shift, row = np.empty(2 * LANES, dtype=np.float32), np.empty(4 * LANES, dtype=np.float32)
     m, decoded = np.empty(5 * LANES, dtype=np.float32), np.empty(hidden * LANES, dtype=np.float32)
     features = np.zeros(8 * ((hidden + 3) // 4) * LANES, dtype=np.float32)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, room, local)
+        n = stars.fetch(points, blocks, block, workspace, local)
         propose(local, n, weights, hidden, m, row, features, decoded, shift)
-        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
+        stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
-        tally[k] += room.counts[k]
+        tally[k] += workspace.counts[k]

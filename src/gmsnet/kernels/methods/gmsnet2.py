@@ -48,10 +48,10 @@ class Network(NamedTuple):
     activation: int
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """The rows of LANES that a block of stars with up to ``most`` neighbours works in.
 
-    mean (3): 1/mean D, 1/mean |a|², least D. features (5), hidden (P): of one triangle. pooled (2P): mean and max.
+    mean (3): 1/mean D, 1/mean |a|², minimum D. features (5), hidden (P): of one triangle. pooled (2P): mean and max.
     code (2P): c, and what it adds to each triangle. out (6): o, and sums of the weights and the weighted vectors.
     kept (P + 1 for each triangle): W₃h + b₃, then s.
     """
@@ -66,10 +66,10 @@ class Room(NamedTuple):
 
 
 @part
-def room(network, most):
+def workspace(network, most):
     """Room for stars of up to so many neighbours. Rows of hidden features from H on are zeros and stay it."""
     padded = network.triangle.shape[1] - 1
-    return Room(
+    return Workspace(
         np.empty(3 * LANES, dtype=np.float32),
         np.empty(FEATURES * LANES, dtype=np.float32),
         np.zeros(padded * LANES, dtype=np.float32),
@@ -276,13 +276,13 @@ def conclude(local, n, mean, out, shift):
 @kernel
 def sweep(points, blocks, first, last, guard, network, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
-    block_room = stars.room_for(blocks.most)
+    block_workspace = stars.workspace_for(blocks.most)
     local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
     shift = np.empty(2 * LANES, dtype=np.float32)
-    work = room(network, blocks.most)
+    work = workspace(network, blocks.most)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, block_room, local)
+        n = stars.fetch(points, blocks, block, block_workspace, local)
         propose(local, n, network, work, shift)
-        stars.commit(points, blocks, block, block_room, local, shift, guard, block_room.counts)
+        stars.commit(points, blocks, block, block_workspace, local, shift, guard, block_workspace.counts)
     for k in range(len(tally)):
-        tally[k] += block_room.counts[k]
+        tally[k] += block_workspace.counts[k]

@@ -1,8 +1,8 @@
 """A binary min-heap of the items 0 … n − 1, each of which may get another key at any time.
 
 heap: (n,) int32 items, the children of slot s in the slots 2s + 1 and 2s + 2; place: (n,) int32, the slot of each item;
-key: (n,) float64, the key of each item. Of equal keys the lower item comes first, so that the least item, heap[0], does
-not depend on the order in which keys were changed.
+key: (n,) float64, the key of each item. Of equal keys the lower item comes first, so that the minimum item, heap[0],
+does not depend on the order in which keys were changed.
 """
 
 from __future__ import annotations

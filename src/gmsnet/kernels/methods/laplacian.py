@@ -13,7 +13,7 @@ import numpy as np
 from gmsnet.kernels.jit.compile import LANES, kernel, part
 from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.block import MARGIN, REACH, SIZE, ask_ahead
-from gmsnet.kernels.star.certificate import COARSE, WIDER, doubt
+from gmsnet.kernels.star.certificate import COARSE, WIDER, error_bound
 from gmsnet.kernels.star.guard import WITH_FLOORS
 
 SMART, INVERSE_LENGTH, AREA = range(3)
@@ -84,7 +84,7 @@ def judge(local, n, shift, floor, row):
 
     GAIN: by how much Σ q falls, if all triangles are positive before and after (times 2√3). SOUND: positive if each
     triangle is positive after it, or less inverted than before. WAS_SOUND: positive if all triangles are positive
-    before it. ABOVE, WAS_ABOVE: the least surplus D − floor·L after and before.
+    before it. ABOVE, WAS_ABOVE: the minimum margin D − floor·L after and before.
     """
     for lane in range(LANES):
         row[GAIN * LANES + lane] = 0.0
@@ -113,7 +113,7 @@ def judge(local, n, shift, floor, row):
 def smart_mean(local, n, floor, row, shift):
     """The mean where nothing is inverted by it and Σ q falls, or is infinite before (a tangled star); else 0.
 
-    Row ABOVE: the least surplus D − floor·L with that.
+    Row ABOVE: the minimum margin D − floor·L with that.
     """
     mean(local, n, shift)
     judge(local, n, shift, floor, row)
@@ -135,7 +135,7 @@ def certify_smart(row, unit, grain, work):
     """
     for lane in range(LANES):
         delta = WIDER * (unit * WIDER * work[REACH * LANES + lane] + grain) / work[SIZE * LANES + lane]
-        work[MARGIN * LANES + lane] = row[ABOVE * LANES + lane] - doubt(WIDER, delta, COARSE)
+        work[MARGIN * LANES + lane] = row[ABOVE * LANES + lane] - error_bound(WIDER, delta, COARSE)
 
 
 @part
@@ -152,18 +152,18 @@ def propose(local, n, variant, floor, row, shift):
 @kernel
 def sweep(points, blocks, first, last, guard, variant, tally):
     """Smooths the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
-    room = stars.room_for(blocks.most)
+    workspace = stars.workspace_for(blocks.most)
     local, row, shift = np.empty(2 * blocks.most * LANES), np.empty(ROWS * LANES), np.empty(2 * LANES)
     floor = max(guard.floor, 0.0)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, room, local)
+        n = stars.fetch(points, blocks, block, workspace, local)
         ask_ahead(points, blocks, block + 1)
         propose(local, n, variant, floor, row, shift)
         if variant == SMART and len(guard) != WITH_FLOORS:
-            stars.aim(room.work, shift, guard.single)
-            certify_smart(row, guard.unit, guard.grain, room.work)
-            stars.store(points, blocks, block, room, shift, guard, room.counts)
+            stars.aim(workspace.work, shift, guard.single)
+            certify_smart(row, guard.unit, guard.grain, workspace.work)
+            stars.store(points, blocks, block, workspace, shift, guard, workspace.counts)
         else:
-            stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
+            stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
-        tally[k] += room.counts[k]
+        tally[k] += workspace.counts[k]

@@ -13,18 +13,18 @@ from gmsnet.kernels.jit.compile import LANES, kernel, part
 from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.block import (
     CENTRE,
+    LOWEST_MARGIN,
     MARGIN,
     MOVED,
     PAIRS,
     REACH,
     SIZE,
-    SURPLUS,
     WIDTH,
     ask_ahead,
     gather,
     ring_row,
 )
-from gmsnet.kernels.star.certificate import COARSE, NARROWEST, WIDER, doubt, surplus_of
+from gmsnet.kernels.star.certificate import COARSE, NARROWEST, WIDER, error_bound, margin_of
 from gmsnet.kernels.star.guard import WITH_FLOORS
 
 SHORTEST = 1e-290  # a first spoke that is shorter, whose inverse might be infinite, measures no star
@@ -80,7 +80,7 @@ def certify(local, n, floor, unit, grain, work, sums):
     real = sums.dtype.type
     twice = real(2.0 * WIDER * floor)
     for lane in range(LANES):
-        sums[SURPLUS * LANES + lane] = np.inf
+        sums[LOWEST_MARGIN * LANES + lane] = np.inf
         sums[WIDTH * LANES + lane] = NARROWEST
     for j in range(n):
         i = n - 1 if j == 0 else j - 1
@@ -88,18 +88,18 @@ def certify(local, n, floor, unit, grain, work, sums):
         q = local[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
             qx, qy = q[lane], q[LANES + lane]
-            surplus, least = surplus_of(p[lane], p[LANES + lane], qx, qy, twice), sums[SURPLUS * LANES + lane]
-            sums[SURPLUS * LANES + lane] = surplus if not surplus >= least else least
+            margin, least = margin_of(p[lane], p[LANES + lane], qx, qy, twice), sums[LOWEST_MARGIN * LANES + lane]
+            sums[LOWEST_MARGIN * LANES + lane] = margin if not margin >= least else least
             sums[WIDTH * LANES + lane] = max(sums[WIDTH * LANES + lane], max(abs(qx), abs(qy)))
-    doubtful = 0
+    uncertified = 0
     for lane in range(LANES):
         tx, ty = work[TARGETS * LANES + 2 * lane], work[TARGETS * LANES + 2 * lane + 1]
         width, size = np.float64(sums[WIDTH * LANES + lane]), work[SIZE * LANES + lane]
         delta = WIDER * (unit * (max(abs(tx), abs(ty)) + size * width) + grain) / size
-        margin = sums[SURPLUS * LANES + lane] - doubt(width, delta, COARSE)
+        margin = sums[LOWEST_MARGIN * LANES + lane] - error_bound(width, delta, COARSE)
         work[MARGIN * LANES + lane] = margin
-        doubtful += not margin > 0.0
-    return doubtful
+        uncertified += not margin > 0.0
+    return uncertified
 
 
 @part
@@ -134,9 +134,9 @@ def prepare(star, n, work, shift, steps):
 @kernel
 def sweep(points, blocks, first, last, guard, tally):
     """Smooths the blocks first…last (of one colour) once: gather, aim, certify, commit. tally: (3,), added to."""
-    room, flat = stars.room_for(blocks.most), np.empty(2 * LANES, dtype=np.float32)
+    workspace, flat = stars.workspace_for(blocks.most), np.empty(2 * LANES, dtype=np.float32)
     local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
-    star, work, shift, steps = room.star, room.work, np.empty(2 * LANES), np.empty(2 * LANES)
+    star, work, shift, steps = workspace.star, workspace.work, np.empty(2 * LANES), np.empty(2 * LANES)
     floor = max(guard.floor, 0.0)
     for block in range(first, last):
         n = blocks.degree[block]
@@ -145,14 +145,14 @@ def sweep(points, blocks, first, last, guard, tally):
         aim(star, n, guard.single, shift, work)
         if len(guard) == WITH_FLOORS:
             prepare(star, n, work, shift, steps)
-            stars.commit(points, blocks, block, room, local, steps, guard, room.counts)
+            stars.commit(points, blocks, block, workspace, local, steps, guard, workspace.counts)
             continue
         relate(star, n, work, flat, local)
-        if certify(local, n, floor, guard.unit, guard.grain, work, room.sums) == 0:
-            put(points, blocks, block, star, work, room.counts)
+        if certify(local, n, floor, guard.unit, guard.grain, work, workspace.sums) == 0:
+            put(points, blocks, block, star, work, workspace.counts)
         else:
             prepare(star, n, work, shift, steps)
             stars.aim(work, steps, guard.single)
-            stars.store(points, blocks, block, room, steps, guard, room.counts)
+            stars.store(points, blocks, block, workspace, steps, guard, workspace.counts)
     for k in range(len(tally)):
-        tally[k] += room.counts[k]
+        tally[k] += workspace.counts[k]

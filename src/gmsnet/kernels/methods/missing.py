@@ -1,4 +1,4 @@
-"""Which triangles miss a target: a least 1/q, and the tangent of a least angle (0: none)."""
+"""Which triangles miss a target: a minimum 1/q, and the tangent of a minimum angle (0: none)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ALL = (math.inf, 0.0)  # what each triangle misses
 
 @inlined
 def missing(px, py, qx, qy, quality, tangent):
-    """Does the triangle with these two sides miss a least 1/q, or the tangent of a least angle (0: none)?
+    """Does the triangle with these two sides miss a minimum 1/q, or the tangent of a minimum angle (0: none)?
 
     Its smallest angle is where the product of two sides is largest.
     """

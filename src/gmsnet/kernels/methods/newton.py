@@ -31,7 +31,7 @@ ARMIJO = 1e-4
 REACH, END = 0.5, 1e-9  # the longest and the shortest step, in radii
 LEAST_SHARE = 2.0**-10  # the shortest step as a share of d
 FLOOR, FLAT = 1e-8, 1e-6  # ε, and δ for stars of size 1: less is taken for rounding
-MARGIN = 0.1  # of the mean D of a star: the least that a bounded objective may make of a triangle's
+MARGIN = 0.1  # of the mean D of a star: the minimum that a bounded objective may make of a triangle's
 TINY = 1e-150
 # Rows of a block's state: the place on trial (first), the last one taken and its value, the step d from there with its
 # slope and length, the share of d on trial, how many steps were taken, whether to go on, and what holds for the star.
@@ -75,7 +75,7 @@ def descend(objective, local, n, state, out, hessian, shift):
 
 @part
 def begin(local, n, margin, state):
-    """All lanes at the origin, their radii, and the least D that they may come to."""
+    """All lanes at the origin, their radii, and the minimum D that they may come to."""
     state[:] = 0.0
     for j in range(n):
         i = n - 1 if j == 0 else j - 1
@@ -140,13 +140,13 @@ def propose(objective, local, n, state, out, hessian, shift, other):
 @kernel
 def sweep(points, blocks, first, last, guard, objective, tally):
     """Smooths the blocks first…last (of one colour) once. tally: (3,), added to."""
-    room = stars.room_for(blocks.most)
+    workspace = stars.workspace_for(blocks.most)
     local = np.empty(2 * blocks.most * LANES)
     shift, other = np.empty(2 * LANES), np.empty(2 * LANES)
     state, out, hessian = np.empty(STATE * LANES), np.empty(OUT * LANES), np.empty(3 * LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, room, local)
+        n = stars.fetch(points, blocks, block, workspace, local)
         propose(objective, local, n, state, out, hessian, shift, other)
-        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
+        stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
-        tally[k] += room.counts[k]
+        tally[k] += workspace.counts[k]

@@ -117,7 +117,7 @@ def propose(local, n, table, weights, box, inputs, first, second, shift):
 
 
 @part
-def room(table):
+def workspace(table):
     """The arrays that ``propose`` works in: box, inputs, first, second and shift."""
     return (
         np.empty(4 * LANES, dtype=np.float32),
@@ -131,12 +131,12 @@ def room(table):
 @kernel
 def sweep(points, blocks, begin, end, guard, table, weights, tally):
     """Smooths the blocks begin…end (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
-    block_room = stars.room_for(blocks.most)
+    block_workspace = stars.workspace_for(blocks.most)
     local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
-    box, inputs, first, second, shift = room(table)
+    box, inputs, first, second, shift = workspace(table)
     for block in range(begin, end):
-        n = stars.fetch(points, blocks, block, block_room, local)
+        n = stars.fetch(points, blocks, block, block_workspace, local)
         propose(local, n, table, weights, box, inputs, first, second, shift)
-        stars.commit(points, blocks, block, block_room, local, shift, guard, block_room.counts)
+        stars.commit(points, blocks, block, block_workspace, local, shift, guard, block_workspace.counts)
     for k in range(len(tally)):
-        tally[k] += block_room.counts[k]
+        tally[k] += block_workspace.counts[k]

@@ -16,7 +16,7 @@ HALVINGS = 24  # of the interval in which a limit is looked for: single precisio
 
 
 @kernel
-def shapes(points, triangles, turn, first, last, shape):
+def shapes(points, triangles, orientation, first, last, shape):
     """1/q of the triangles in the blocks first…last of LANES, with the sign of their area, into shape (T,)."""
     edges, row = np.empty(4 * LANES), np.empty(LANES)
     for block in range(first, last):
@@ -37,17 +37,17 @@ def shapes(points, triangles, turn, first, last, shape):
             px, py, qx, qy = edges[lane], edges[LANES + lane], edges[2 * LANES + lane], edges[3 * LANES + lane]
             row[lane] = shape_of(px, py, qx, qy)
         for lane in range(count):
-            shape[start + lane] = turn[start + lane] * row[lane]
+            shape[start + lane] = orientation[start + lane] * row[lane]
 
 
 @kernel
-def shapes_of(points, triangles, turn, cells, shape):
+def shapes_of(points, triangles, orientation, cells, shape):
     """1/q of some of the triangles, into shape (len(cells),)."""
     for k in range(len(cells)):
         t = cells[k]
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         x, y = points[a, 0], points[a, 1]
-        shape[k] = turn[t] * shape_of(points[b, 0] - x, points[b, 1] - y, points[c, 0] - x, points[c, 1] - y)
+        shape[k] = orientation[t] * shape_of(points[b, 0] - x, points[b, 1] - y, points[c, 0] - x, points[c, 1] - y)
 
 
 @part
@@ -88,7 +88,7 @@ def worst(shape, wanted):
 
 @part
 def least(values):
-    """The least of them; NumPy's takes a third of a second to compile."""
+    """The minimum of them; NumPy's takes a third of a second to compile."""
     found = np.inf
     for k in range(len(values)):
         found = min(found, values[k])

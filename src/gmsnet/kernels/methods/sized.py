@@ -37,7 +37,7 @@ MOST = 50.0  # times a Newton step: the longest one
 SHORTEST = 1e-9  # of the star's size: a shorter step is rounding
 
 # Rows of a block's state: where the node is (two), the step (two), how much of it is on trial; the value there and on
-# trial, the gradient (two) and the Hessian (three), the least D; 1 where the halvings go on.
+# trial, the gradient (two) and the Hessian (three), the minimum D; 1 where the halvings go on.
 X, Y, DX, DY, SHARE, VALUE, AFTER, GX, GY, XX, XY, YY, LEAST, OPEN = range(14)
 STATE = 14
 
@@ -85,7 +85,7 @@ def double(points, i, j, k):
 
 @part
 def derive(local, n, wanted, weight, state):
-    """The objective with its derivatives, and the least D, where the nodes are. wanted: D₀ over the size squared."""
+    """The objective with its derivatives, and the minimum D, where the nodes are. wanted: D₀ over the size squared."""
     state[VALUE * LANES : (VALUE + 1) * LANES] = 0.0
     state[GX * LANES : LEAST * LANES] = 0.0
     state[LEAST * LANES : (LEAST + 1) * LANES] = np.inf
@@ -179,12 +179,12 @@ def sweep(points, blocks, areas, weight, kept, first, last, guard, tally):
 
     areas: as ``targets`` leaves them. kept: bands.Bands that no shift leaves.
     """
-    room = stars.room_for(blocks.most)
+    workspace = stars.workspace_for(blocks.most)
     local, wanted = np.empty(2 * blocks.most * LANES), np.empty(blocks.most * LANES)
     state, shift = np.empty(STATE * LANES), np.empty(2 * LANES)
     for block in range(first, last):
-        n = stars.fetch(points, blocks, block, room, local)
-        offset, sizes = blocks.offset[block], room.work[SIZE * LANES : (SIZE + 1) * LANES]
+        n = stars.fetch(points, blocks, block, workspace, local)
+        offset, sizes = blocks.offset[block], workspace.work[SIZE * LANES : (SIZE + 1) * LANES]
         for j in range(n):
             for lane in range(LANES):
                 size = sizes[lane]
@@ -199,7 +199,7 @@ def sweep(points, blocks, areas, weight, kept, first, last, guard, tally):
                     shift[lane] += local[2 * j * LANES + lane] / n
                     shift[LANES + lane] += local[(2 * j + 1) * LANES + lane] / n
         if len(kept.kept):
-            bands.shorten(kept, blocks, block, room.star, sizes, shift)
-        stars.commit(points, blocks, block, room, local, shift, guard, room.counts)
+            bands.shorten(kept, blocks, block, workspace.star, sizes, shift)
+        stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
-        tally[k] += room.counts[k]
+        tally[k] += workspace.counts[k]

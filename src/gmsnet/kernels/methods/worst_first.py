@@ -17,11 +17,11 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import inlined, part
 from gmsnet.kernels.methods.barrier_star import newton_step
-from gmsnet.kernels.star.guard import WITH_FLOORS, permitted, surplus_above, surplus_above_zero
+from gmsnet.kernels.star.guard import WITH_FLOORS, margin_above, margin_above_zero, permitted
 from gmsnet.kernels.star.truncation import HALVINGS
 
 MOST = 50.0  # times a Newton step: the longest one
-STEPS, FAR = 8, 0.8  # of a visit, at most: on while a step brings F below FAR of what it was
+STEPS, FAR = 8, 0.8  # of a visit, at maximum: on while a step brings F below FAR of what it was
 SHORTENINGS = 30
 SMALLEST = 1e-200  # F, with margin: below it powers underflow
 
@@ -65,7 +65,7 @@ def value_at(ring, n, x, y, inverse, doublings):
 
 @part
 def newton(ring, n, x, y, inverse, doublings):
-    """F with the free node at (x, y), 1/M given; the step from there; and the least D."""
+    """F with the free node at (x, y), 1/M given; the step from there; and the minimum D."""
     p = 2.0**doublings
     least = np.inf
     value, gx, gy, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -162,11 +162,8 @@ def certified(star, n, tx, ty, delta):
     least = np.inf
     for j in range(n):
         bx, by, floor = star[2 * j] - tx, star[2 * j + 1] - ty, star[2 * n + j]
-        if floor > 0.0:
-            surplus = surplus_above(ax, ay, bx, by, delta, floor)
-        else:
-            surplus = surplus_above_zero(ax, ay, bx, by, delta)
-        least = surplus if not surplus >= least else least
+        margin = margin_above(ax, ay, bx, by, delta, floor) if floor > 0.0 else margin_above_zero(ax, ay, bx, by, delta)
+        least = margin if not margin >= least else least
         ax, ay = bx, by
     return least > 0.0
 

@@ -18,8 +18,8 @@ LEAST = 1e-6  # of 1/q, where cells are inverted: the scale of q is taken from t
 
 
 @kernel
-def cycles(points, triangles, turn, cells, free, memory, start, around, guard, plan, tally):
-    """Makes the cycles of a plan among the cells; returns the least 1/q of these before and after it.
+def cycles(points, triangles, orientation, cells, free, memory, start, around, guard, plan, tally):
+    """Makes the cycles of a plan among the cells; returns the minimum 1/q of these before and after it.
 
     cells: indices of triangles. free: (N,) bool. memory: (N,) ids. start, around: the rings of all nodes, in CSR form.
     plan: (C, 3) of cells to take, log₂ of the power p, and visits to their free nodes. tally: (3,), added to.
@@ -27,7 +27,7 @@ def cycles(points, triangles, turn, cells, free, memory, start, around, guard, p
     shape, mark = np.empty(len(cells)), np.empty(len(points), dtype=np.bool_)
     for i in range(len(points)):
         mark[i] = False
-    shapes_of(points, triangles, turn, cells, shape)
+    shapes_of(points, triangles, orientation, cells, shape)
     before = least(shape)
     for c in range(len(plan)):
         wanted = min(plan[c, 0], len(cells))
@@ -35,7 +35,7 @@ def cycles(points, triangles, turn, cells, free, memory, start, around, guard, p
         scale = max(least(shape), LEAST) / math.sqrt(3.0)
         nodes = free_nodes(triangles, cells, shape, limit, free, memory, mark)
         visit(points, nodes, start, around, guard, plan[c, 1], plan[c, 2], scale, None, mark, None, tally)
-        shapes_of(points, triangles, turn, cells, shape)
+        shapes_of(points, triangles, orientation, cells, shape)
     return before, least(shape)
 
 

@@ -51,11 +51,12 @@ def sign_of_sum(terms, sums):
 
 
 @kernel
-def exact(points, triangles, rows, turn, out):
-    """Writes turn × the exact sign of the area of some triangles; returns how many are not told, at the front of rows.
+def exact(points, triangles, rows, orientation, out):
+    """Writes orientation × the exact sign of the area of some triangles; returns how many are not told, at the front
+    of rows.
 
-    points: (N, 2) float64. rows: int64, of triangles (T, 3), turn (T,) ±1 and out (T,) int8. Where a coordinate is too
-    small or too large for products without rounding, nothing is written.
+    points: (N, 2) float64. rows: int64, of triangles (T, 3), orientation (T,) ±1 and out (T,) int8. Where a coordinate
+    is too small or too large for products without rounding, nothing is written.
     """
     terms, sums, unknown = np.empty(TERMS), np.empty(TERMS), 0
     for k in range(len(rows)):
@@ -79,5 +80,5 @@ def exact(points, triangles, rows, turn, out):
         terms[6], terms[7] = product(-ay, bx)
         terms[8], terms[9] = product(ay, cx)
         terms[10], terms[11] = product(cy, bx)
-        out[t] = turn[t] * sign_of_sum(terms, sums)
+        out[t] = orientation[t] * sign_of_sum(terms, sums)
     return unknown

@@ -1,4 +1,4 @@
-"""Angles, shape and aspect of triangles, 64 abreast and without branches, and their sums.
+"""Angles, shape and aspect of triangles, 64 in SIMD lanes and without branches, and their sums.
 
 With the edge vectors of a corner k, its angle is atan2(2|S|, dot_k); 2|S| is the same at all corners, so the largest
 dot product belongs to the smallest angle and the smallest to the largest. Shape is 1/q = 4√3·S/(l² + m² + n²), aspect
@@ -21,7 +21,7 @@ TINY = 1e-300  # stands in for a length of zero: the quotient is then zero, not 
 
 # What ``summarise`` says of triangles, angles in degrees: sums on the coarse and on the fine grid, extremes, counts.
 LOW, HIGH, SHAPE, ASPECT = range(4)
-COARSE, FINE, EXTREME, INVERTED, DOUBTS = 0, 4, 8, 12, 13
+COARSE, FINE, EXTREME, INVERTED, UNCERTAIN = 0, 4, 8, 12, 13
 FIGURES = 14
 
 SIGN, TOTALS = 6 * LANES, 7 * LANES  # in a workspace of doubles, after the edge vectors
@@ -94,17 +94,18 @@ def planar_figures(work, lane):
     rx, ry = work[4 * LANES + lane], work[5 * LANES + lane]
     left, right = px * qy, py * qx
     double = work[SIGN + lane] * (left - right)
-    doubt = not double > SHEWCHUK * (abs(left) + abs(right)) + UNDERFLOW
+    error_bound = not double > SHEWCHUK * (abs(left) + abs(right)) + UNDERFLOW
     at_a, at_b, at_c = px * qx + py * qy, -(px * rx + py * ry), qx * rx + qy * ry
     low, high, shape, aspect = figures(
         double, at_a, at_b, at_c, px * px + py * py, qx * qx + qy * qy, rx * rx + ry * ry
     )
-    return low, high, shape, aspect, doubt
+    return low, high, shape, aspect, error_bound
 
 
 @inlined
-def gather(points, triangles, turn, start, count, work):
-    """Edge vectors b − a, c − a and c − b of the triangles from ``start`` on, and their turns, into a workspace."""
+def gather(points, triangles, orientation, start, count, work):
+    """Edge vectors b − a, c − a and c − b of the triangles from ``start`` on, and their orientations, into a
+    workspace."""
     for lane in range(count):
         t = start + lane
         a, b, c = np.uint32(triangles[t, 0]), np.uint32(triangles[t, 1]), np.uint32(triangles[t, 2])
@@ -114,7 +115,7 @@ def gather(points, triangles, turn, start, count, work):
         work[3 * LANES + lane] = points[c, 1] - points[a, 1]
         work[4 * LANES + lane] = points[c, 0] - points[b, 0]
         work[5 * LANES + lane] = points[c, 1] - points[b, 1]
-        work[SIGN + lane] = turn[t]
+        work[SIGN + lane] = orientation[t]
 
 
 @inlined
@@ -132,12 +133,12 @@ def grids(count: int) -> tuple[float, float]:
     count·2⁸ in units of the coarse width and count/2 coarse widths in units of the fine one (the reproducible sums
     of Demmel and Nguyen, 2013). The fine width is at most 4·2⁻⁹⁷·count²: 2⁻⁴⁹ for ten million triangles.
     """
-    room = 2.0 ** math.frexp(count)[1]
-    return 384.0 * room, 1.5 * 2.0**-45 * room * room
+    workspace = 2.0 ** math.frexp(count)[1]
+    return 384.0 * workspace, 1.5 * 2.0**-45 * workspace * workspace
 
 
 @kernel
-def summarise(points, triangles, turn, first, last, coarse, fine, shapes):
+def summarise(points, triangles, orientation, first, last, coarse, fine, shapes):
     """The figures (FIGURES,) named above over the blocks first…last of LANES triangles. coarse, fine: their ``grids``.
 
     The sums of all blocks follow from those of parts exactly, so they do not depend on how the blocks are shared out,
@@ -153,9 +154,9 @@ def summarise(points, triangles, turn, first, last, coarse, fine, shapes):
         work[TOTALS + (EXTREME + ASPECT) * LANES + lane] = np.inf
     for start in range(first * LANES, min(last * LANES, len(triangles)), LANES):
         count = min(LANES, len(triangles) - start)
-        gather(points, triangles, turn, start, count, work)
+        gather(points, triangles, orientation, start, count, work)
         for lane in range(count):
-            low, high, shape, aspect, doubt = planar_figures(work, lane)
+            low, high, shape, aspect, error_bound = planar_figures(work, lane)
             at = TOTALS + lane
             add(work, at + LOW * LANES, low, coarse, fine)
             add(work, at + HIGH * LANES, high, coarse, fine)
@@ -167,7 +168,7 @@ def summarise(points, triangles, turn, first, last, coarse, fine, shapes):
             work[k + SHAPE * LANES] = min(work[k + SHAPE * LANES], shape)
             work[k + ASPECT * LANES] = min(work[k + ASPECT * LANES], aspect)
             work[at + INVERTED * LANES] += 1.0 if shape <= 0.0 else 0.0
-            work[at + DOUBTS * LANES] += 1.0 if doubt else 0.0
+            work[at + UNCERTAIN * LANES] += 1.0 if error_bound else 0.0
             work[lane] = shape  # its edges are not needed any more
         if len(shapes):
             for lane in range(count):
@@ -188,12 +189,12 @@ def summarise(points, triangles, turn, first, last, coarse, fine, shapes):
 
 
 @kernel
-def per_cell(points, triangles, turn, columns):
+def per_cell(points, triangles, orientation, columns):
     """LOW, HIGH, SHAPE and ASPECT of each triangle into columns (4, T); angles in degrees."""
     work = np.zeros(ROOM)
     for start in range(0, len(triangles), LANES):
         count = min(LANES, len(triangles) - start)
-        gather(points, triangles, turn, start, count, work)
+        gather(points, triangles, orientation, start, count, work)
         for lane in range(count):
             low, high, shape, aspect, _ = planar_figures(work, lane)
             work[TOTALS + LOW * LANES + lane] = low
@@ -231,13 +232,13 @@ def shape_of(px, py, qx, qy):
 
 
 @kernel
-def glance(points, triangles, turn, stride):
+def mean_shape_of_sample(points, triangles, orientation, stride):
     """The mean shape over every stride-th block of LANES triangles."""
     work, shape = np.empty(ROOM), np.empty(LANES)
     total_shape, count = 0.0, 0
     for start in range(0, len(triangles), stride * LANES):
         filled = min(LANES, len(triangles) - start)
-        gather(points, triangles, turn, start, filled, work)
+        gather(points, triangles, orientation, start, filled, work)
         for lane in range(filled):
             px, py = work[lane], work[LANES + lane]
             qx, qy = work[2 * LANES + lane], work[3 * LANES + lane]

@@ -39,7 +39,7 @@ KAPPA = 1.0 / math.sqrt(3.0)
 THIRD = 1.0 / 3.0
 SMALL = 1e-30  # a squared length that is none, in stars of size 1
 
-VALUE, GRADIENT, LEAST = 0, 1, 3  # rows of ``out``: value, gradient (two), the least D of the star
+VALUE, GRADIENT, LEAST = 0, 1, 3  # rows of ``out``: value, gradient (two), the minimum D of the star
 OUT = 4
 
 
@@ -197,7 +197,7 @@ def spokes(lane, at, p, q):
 
 @inlined
 def add(lane, at, p, q, triangle, out, hessian):
-    """Adds one triangle's value and derivatives to the sums of its lane, and keeps the least D."""
+    """Adds one triangle's value and derivatives to the sums of its lane, and keeps the minimum D."""
     ax, ay, bx, by = spokes(lane, at, p, q)
     value, gx, gy, xx, xy, yy = triangle
     out[lane] += value

@@ -34,22 +34,24 @@ def determinant_and_bound(ax, ay, bx, by, cx, cy, delta):
 
 
 @kernel
-def signs(points, triangles, turn, delta, out):
-    """Sign of each triangle's area times its turn: +1 or −1 where it is certain, 0 where the bound leaves a doubt.
+def signs(points, triangles, orientation, delta, out):
+    """Sign of each triangle's area times its orientation: +1 or −1 where it is certain, 0 where the bound leaves a
+    doubt.
 
-    points: (N, 2) float64; triangles: (T, 3); turn: (T,) ±1; delta: see above; out: (T,) int8. Returns the doubts.
+    points: (N, 2) float64; triangles: (T, 3); orientation: (T,) ±1; delta: see above; out: (T,) int8. Returns the
+    doubts.
     """
-    doubts = 0
+    uncertain = 0
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         value, bound = determinant_and_bound(
             points[a, 0], points[a, 1], points[b, 0], points[b, 1], points[c, 0], points[c, 1], delta
         )
         if value > bound:
-            out[t] = turn[t]
+            out[t] = orientation[t]
         elif value < -bound:
-            out[t] = -turn[t]
+            out[t] = -orientation[t]
         else:
             out[t] = 0
-            doubts += 1
-    return doubts
+            uncertain += 1
+    return uncertain

@@ -37,10 +37,10 @@ def stretch(ax, ay, bx, by):
 
 
 @kernel
-def per_cell(points, triangles, turn, most, cells):
+def per_cell(points, triangles, orientation, most, cells):
     """v, log s and D of each triangle into cells (T, COLUMNS); log s, and v with it, no longer than ``most``.
 
-    points: (N, 2). turn: (T,) signs by which D is multiplied. A triangle of a single point is not stretched.
+    points: (N, 2). orientation: (T,) signs by which D is multiplied. A triangle of a single point is not stretched.
     """
     for t in range(len(triangles)):
         i, j, k = triangles[t]
@@ -53,7 +53,7 @@ def per_cell(points, triangles, turn, most, cells):
         cells[t, ALONG] = share * along
         cells[t, ACROSS] = share * across
         cells[t, LENGTH] = length
-        cells[t, AREA] = turn[t] * double
+        cells[t, AREA] = orientation[t] * double
 
 
 @kernel

@@ -18,7 +18,7 @@ MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
 COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
 # Rows of a block's work array. CENTRE, TARGET and KEPT have two, one an axis; PAIRS four, two [lane][axis]; FLOORS n.
 SIZE, REACH, CENTRE, TARGET, MARGIN, SHARE, KEPT, PAIRS, FLOORS = 0, 1, 2, 4, 6, 7, 8, 10, 14
-SURPLUS, WIDTH = range(2)  # rows of what a certificate is made of
+LOWEST_MARGIN, WIDTH = range(2)  # rows of what a certificate is made of
 FAR = 2**18  # nodes: the coordinates of more (4 MiB) do not stay in the second-level cache
 
 
@@ -26,7 +26,7 @@ class Blocks(NamedTuple):
     """The free nodes with their rings in blocks of LANES of one colour and degree (see
     kernels.topology.layout.fill_blocks).
 
-    filled: how many of the lanes hold stars of their own. most: the largest degree.
+    filled: how many of the lanes hold stars of their own. maximum: the largest degree.
     """
 
     centre: NDArray[np.int32]
@@ -37,7 +37,7 @@ class Blocks(NamedTuple):
     most: int
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """The arrays that a sweep works in. star: coordinates. work: rows of LANES. sums: for a certificate."""
 
     star: NDArray[np.float64]
@@ -47,13 +47,13 @@ class Room(NamedTuple):
 
 
 @part
-def room_for(most):
+def workspace_for(most):
     """For stars of up to so many nodes."""
     counts = np.empty(COUNTERS, dtype=np.int64)
     for k in range(COUNTERS):
         counts[k] = 0
     star, work = np.empty(2 * (1 + most) * LANES), np.empty((FLOORS + most) * LANES)
-    return Room(star, work, np.empty(2 * LANES, dtype=np.float32), counts)
+    return Workspace(star, work, np.empty(2 * LANES, dtype=np.float32), counts)
 
 
 @part

@@ -1,4 +1,4 @@
-"""Certifies shifts abreast: positive margins are proofs. Others may be allowed all the same: see
+"""Certifies shifts in SIMD lanes: positive margins are proofs. Others may be allowed all the same: see
 kernels.star.truncation.
 
 Loops are vectorised where offsets into one array are constants: slices of it could overlap, for all that is known.
@@ -10,7 +10,7 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, inlined, part
 from gmsnet.kernels.simplex.predicates import UNDERFLOW
-from gmsnet.kernels.star.block import FLOORS, MARGIN, PAIRS, REACH, SIZE, SURPLUS, TARGET, WIDTH, ring_row
+from gmsnet.kernels.star.block import FLOORS, LOWEST_MARGIN, MARGIN, PAIRS, REACH, SIZE, TARGET, WIDTH, ring_row
 from gmsnet.kernels.star.guard import WITH_FLOORS
 
 WIDER = 1.0 + 2.0**-20  # so that what is rounded to float32 is an upper bound
@@ -19,15 +19,15 @@ COARSE, FINE = 2.0**-24, 2.0**-53  # units of rounding
 
 
 @inlined
-def doubt(m, delta, u):
-    """By how much the least surplus D − φL of a star, as computed, may be off, whatever φ is.
+def error_bound(m, delta, u):
+    """By how much the minimum margin D − φL of a star, as computed, may be off, whatever φ is.
 
     m: no component of the ring or the target minus the centre is larger, or none of the ring minus the target larger
     than 2m. delta: by how much a coordinate may be off. u: the unit of rounding. A component of a spoke, from the
     target, is off by at most e = 8(u·m + δ): by the rounding of a component, of its scaling and of the difference of
     two, by that of the target, and by what is not known of it and of the ring. D changes by 8·m·e + 2e² with that, and
     by 16u·m² for its own rounding; L/2 by 24·m·e + 6e² and 88u·m²; 2φ is at most 1/√3; the difference rounds by
-    36u·m². That is 22·m·e + 6e² + 104u·m² in all, which is less than 512·m·(u·m + δ), or that is more than any surplus.
+    36u·m². That is 22·m·e + 6e² + 104u·m² in all, which is less than 512·m·(u·m + δ), or that is more than any margin.
     """
     return 512.0 * m * (u * m + delta)
 
@@ -42,7 +42,7 @@ def certify(local, n, shift, floor, unit, grain, work, sums):
     real = sums.dtype.type
     twice = real(2.0 * WIDER * floor)
     for lane in range(LANES):
-        sums[SURPLUS * LANES + lane] = np.inf
+        sums[LOWEST_MARGIN * LANES + lane] = np.inf
         sums[WIDTH * LANES + lane] = max(NARROWEST, max(abs(shift[lane]), abs(shift[LANES + lane])))
     for j in range(n):
         i = n - 1 if j == 0 else j - 1
@@ -51,21 +51,23 @@ def certify(local, n, shift, floor, unit, grain, work, sums):
         for lane in range(LANES):
             px, py = real(p[lane] - shift[lane]), real(p[LANES + lane] - shift[LANES + lane])
             qx, qy = real(q[lane] - shift[lane]), real(q[LANES + lane] - shift[LANES + lane])
-            surplus = surplus_of(px, py, qx, qy, twice)
-            least = sums[SURPLUS * LANES + lane]
-            # A shift that is not finite makes every surplus NaN or −∞, and no comparison with it holds.
-            sums[SURPLUS * LANES + lane] = surplus if not surplus >= least else least
+            margin = margin_of(px, py, qx, qy, twice)
+            least = sums[LOWEST_MARGIN * LANES + lane]
+            # A shift that is not finite makes every margin NaN or −∞, and no comparison with it holds.
+            sums[LOWEST_MARGIN * LANES + lane] = margin if not margin >= least else least
             sums[WIDTH * LANES + lane] = max(sums[WIDTH * LANES + lane], max(abs(qx), abs(qy)))
     for lane in range(LANES):
         reach = max(
             work[REACH * LANES + lane], max(abs(work[TARGET * LANES + lane]), abs(work[(TARGET + 1) * LANES + lane]))
         )
         delta = WIDER * (unit * reach + grain) / work[SIZE * LANES + lane]
-        work[MARGIN * LANES + lane] = sums[SURPLUS * LANES + lane] - doubt(sums[WIDTH * LANES + lane], delta, COARSE)
+        work[MARGIN * LANES + lane] = sums[LOWEST_MARGIN * LANES + lane] - error_bound(
+            sums[WIDTH * LANES + lane], delta, COARSE
+        )
 
 
 @inlined
-def surplus_of(px, py, qx, qy, twice):
+def margin_of(px, py, qx, qy, twice):
     """D − φL of the triangle (0, p, q), as computed; 2φ given."""
     half = (qx * qx + qy * qy) + (py * (py - qy) - px * (qx - px))
     return (px * qy - py * qx) - twice * half
@@ -85,13 +87,13 @@ def certify_stars(star, n, above, unit, grain, work):
             tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
             px, py, qx, qy = p[2 * lane] - tx, p[2 * lane + 1] - ty, q[2 * lane] - tx, q[2 * lane + 1] - ty
             twice = 2.0 * above * max(work[(FLOORS + j) * LANES + lane], 0.0)
-            surplus, least = surplus_of(px, py, qx, qy, twice), work[MARGIN * LANES + lane]
-            work[MARGIN * LANES + lane] = surplus if not surplus >= least else least
+            margin, least = margin_of(px, py, qx, qy, twice), work[MARGIN * LANES + lane]
+            work[MARGIN * LANES + lane] = margin if not margin >= least else least
             work[PAIRS * LANES + lane] = max(work[PAIRS * LANES + lane], max(abs(qx), abs(qy)))
     for lane in range(LANES):
         tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
         delta = unit * max(work[REACH * LANES + lane], max(abs(tx), abs(ty))) + grain
-        work[MARGIN * LANES + lane] -= doubt(work[PAIRS * LANES + lane], delta, FINE) + UNDERFLOW
+        work[MARGIN * LANES + lane] -= error_bound(work[PAIRS * LANES + lane], delta, FINE) + UNDERFLOW
 
 
 @part

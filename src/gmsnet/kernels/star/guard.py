@@ -12,8 +12,8 @@ in float64, and as written. A move is allowed if after it each triangle of the s
 - is certified above 0, or was certainly inverted before and is certainly less so after it; and,
 - where the level is WORST or STAR, is certified above its floor.
 
-VALID knows no floors. WORST has one for the mesh: the least of an upper bound of D/L over the triangles that have a
-free node. STAR has one for each node with a ring, the least over those of its triangles that have a free node; a
+VALID knows no floors. WORST has one for the mesh: the minimum of an upper bound of D/L over the triangles that have a
+free node. STAR has one for each node with a ring, the minimum over those of its triangles that have a free node; a
 triangle's floor is the largest of its nodes'. Floors are taken at the start of a sweep. What follows is proven in
 docs/guarantees.md.
 """
@@ -89,7 +89,7 @@ def plain_guard(precision: Precision = Precision()) -> MeshGuard:  # noqa: B008 
 
 
 @inlined
-def surplus_above_zero(px, py, qx, qy, delta):
+def margin_above_zero(px, py, qx, qy, delta):
     """By how much D of the triangle (0, p, q) exceeds its error bound."""
     left = px * qy
     right = py * qx
@@ -98,7 +98,7 @@ def surplus_above_zero(px, py, qx, qy, delta):
 
 
 @inlined
-def surplus_above(px, py, qx, qy, delta, floor):
+def margin_above(px, py, qx, qy, delta, floor):
     """By how much D of the triangle (0, p, q) exceeds floor·L and the error bounds of both."""
     left = px * qy
     right = py * qx
@@ -111,7 +111,7 @@ def surplus_above(px, py, qx, qy, delta, floor):
 
 
 @inlined
-def most_of(px, py, qx, qy, delta):
+def ratio_upper_bound(px, py, qx, qy, delta):
     """The most that D/L of the triangle (0, p, q) can be in exact arithmetic; LARGEST where nothing is certain."""
     left = px * qy
     right = py * qx
@@ -119,9 +119,9 @@ def most_of(px, py, qx, qy, delta):
     lengths = (px * px + py * py) + (qx * qx + qy * qy) + (rx * rx + ry * ry)
     around = abs(px) + abs(py) + abs(qx) + abs(qy) + 4.0 * delta
     top = (left - right) + (SHEWCHUK * (abs(left) + abs(right)) + UNDERFLOW + 4.0 * delta * around)
-    doubt = ROUNDING_L * lengths + 16.0 * delta * around
+    error_bound = ROUNDING_L * lengths + 16.0 * delta * around
     # An inverted triangle is the less inverted, the larger L is; a positive one the better, the smaller.
-    below = lengths - doubt if top > 0.0 else lengths + doubt
+    below = lengths - error_bound if top > 0.0 else lengths + error_bound
     ratio = top / below if below > 0.0 else LARGEST
     return min(ratio + 4.0 * UNIT * abs(ratio), LARGEST)
 
@@ -129,20 +129,21 @@ def most_of(px, py, qx, qy, delta):
 @part
 def permitted(was, now, delta, floor):
     """May a triangle with the corners ``was`` (6 numbers) become ``now``? The scalar form of the rule."""
-    after, doubt = determinant_and_bound(now[0], now[1], now[2], now[3], now[4], now[5], delta)
+    after, error_bound = determinant_and_bound(now[0], now[1], now[2], now[3], now[4], now[5], delta)
     if floor > -np.inf:
         px, py, qx, qy = now[0] - now[4], now[1] - now[5], now[2] - now[4], now[3] - now[5]
-        if not surplus_above(px, py, qx, qy, delta, floor) > 0.0:
+        if not margin_above(px, py, qx, qy, delta, floor) > 0.0:
             return False
-    if after > doubt:
+    if after > error_bound:
         return True
-    before, doubt_before = determinant_and_bound(was[0], was[1], was[2], was[3], was[4], was[5], delta)
-    return before < -doubt_before and after - doubt > before + doubt_before
+    before, error_bound_before = determinant_and_bound(was[0], was[1], was[2], was[3], was[4], was[5], delta)
+    return before < -error_bound_before and after - error_bound > before + error_bound_before
 
 
 @kernel
-def most_ratios(points, triangles, turn, blocks, unit, grain, first, last, least):
-    """The least ``most_of`` over each of the blocks of LANES triangles with the places first…last, into ``least``."""
+def ratio_upper_bounds(points, triangles, orientation, blocks, unit, grain, first, last, least):
+    """The minimum ``ratio_upper_bound`` over each of the blocks of LANES triangles with the places first…last, into
+    ``least``."""
     block, ratio = np.empty(6 * LANES), np.empty(LANES)
     for number in range(first, last):
         start = blocks[number] * LANES
@@ -152,7 +153,7 @@ def most_ratios(points, triangles, turn, blocks, unit, grain, first, last, least
             block[lane], block[LANES + lane] = points[a, 0], points[a, 1]
             block[2 * LANES + lane], block[3 * LANES + lane] = points[b, 0], points[b, 1]
             block[4 * LANES + lane], block[5 * LANES + lane] = points[c, 0], points[c, 1]
-            ratio[lane] = turn[t]
+            ratio[lane] = orientation[t]
         for lane in range(LANES):
             px, py = block[lane] - block[4 * LANES + lane], block[LANES + lane] - block[5 * LANES + lane]
             qx, qy = (
@@ -163,11 +164,11 @@ def most_ratios(points, triangles, turn, blocks, unit, grain, first, last, least
             reach = max(abs(block[4 * LANES + lane]), abs(block[5 * LANES + lane])) + size
             # Turned over, the triangle has −D: the components of one side change sides.
             forth = ratio[lane] > 0.0
-            ratio[lane] = most_of(
+            ratio[lane] = ratio_upper_bound(
                 px if forth else qx, py if forth else qy, qx if forth else px, qy if forth else py, unit * reach + grain
             )
         width = LANES
-        while width > 1:  # in halves, which go abreast, where one after the other would not
+        while width > 1:  # in halves, which go in SIMD lanes, where one after the other would not
             width //= 2
             for lane in range(width):
                 ratio[lane] = min(ratio[lane], ratio[width + lane])
@@ -176,21 +177,21 @@ def most_ratios(points, triangles, turn, blocks, unit, grain, first, last, least
 
 @inlined
 def ratio_of(points, a, b, c, unit, grain):
-    """``most_of`` the triangle with the nodes a, b, c."""
+    """``ratio_upper_bound`` the triangle with the nodes a, b, c."""
     px, py, qx, qy = points[a, 0], points[a, 1], points[b, 0], points[b, 1]
     px, py, qx, qy = px - points[c, 0], py - points[c, 1], qx - points[c, 0], qy - points[c, 1]
     reach = max(abs(points[c, 0]), abs(points[c, 1])) + ((abs(px) + abs(py)) + (abs(qx) + abs(qy)))
-    return most_of(px, py, qx, qy, unit * reach + grain)
+    return ratio_upper_bound(px, py, qx, qy, unit * reach + grain)
 
 
 @kernel
-def star_floors(points, triangles, turn, ringed, unit, grain, floors):
-    """For each node with a ring the least ``most_of`` over its triangles; −∞ for the others."""
+def star_floors(points, triangles, orientation, ringed, unit, grain, floors):
+    """For each node with a ring the minimum ``ratio_upper_bound`` over its triangles; −∞ for the others."""
     for i in range(len(floors)):
         floors[i] = np.inf if ringed[i] else -np.inf
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        ratio = ratio_of(points, b, a, c, unit, grain) if turn[t] < 0 else ratio_of(points, a, b, c, unit, grain)
+        ratio = ratio_of(points, b, a, c, unit, grain) if orientation[t] < 0 else ratio_of(points, a, b, c, unit, grain)
         floors[a] = min(floors[a], ratio)
         floors[b] = min(floors[b], ratio)
         floors[c] = min(floors[c], ratio)

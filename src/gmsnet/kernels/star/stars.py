@@ -24,18 +24,18 @@ from gmsnet.kernels.star.block import (
     ring_row,
 )  # fmt: skip
 from gmsnet.kernels.star.block import Blocks as Blocks
-from gmsnet.kernels.star.block import room_for as room_for
+from gmsnet.kernels.star.block import workspace_for as workspace_for
 from gmsnet.kernels.star.certificate import certify, certify_stars, gather_floors
 from gmsnet.kernels.star.guard import WITH_FLOORS
-from gmsnet.kernels.star.truncation import halve_abreast, truncate
+from gmsnet.kernels.star.truncation import halve_in_lanes, truncate
 
 
 @part
-def fetch(points, blocks, block, room, local):
+def fetch(points, blocks, block, workspace, local):
     """Gathers a block and brings it to the size of the star (``localise``); returns the degree."""
     n = blocks.degree[block]
-    gather(points, blocks, block, n, room.star)
-    localise(room.star, n, room.work, local)
+    gather(points, blocks, block, n, workspace.star)
+    localise(workspace.star, n, workspace.work, local)
     return n
 
 
@@ -83,20 +83,20 @@ def take_centres(star, work):
 
 
 @part
-def commit(points, blocks, block, room, local, shift, guard, tally):
+def commit(points, blocks, block, workspace, local, shift, guard, tally):
     """Moves the free nodes of a block by size·shift, truncated by the guard; counts what happened in ``tally``.
 
-    room, local: as ``fetch`` leaves them; shift: (2·LANES,), [axis][lane], over the star's size.
+    workspace, local: as ``fetch`` leaves them; shift: (2·LANES,), [axis][lane], over the star's size.
     """
-    n, work = blocks.degree[block], room.work
+    n, work = blocks.degree[block], workspace.work
     aim(work, shift, guard.single)
     if len(guard) == WITH_FLOORS:
         gather_floors(blocks, block, guard, work)
-        certify_stars(room.star, n, 1.0, guard.unit, guard.grain, work)
-        halve_abreast(n, room, shift, guard)
+        certify_stars(workspace.star, n, 1.0, guard.unit, guard.grain, work)
+        halve_in_lanes(n, workspace, shift, guard)
     else:
-        certify(local, n, shift, max(guard.floor, 0.0), guard.unit, guard.grain, work, room.sums)
-    store(points, blocks, block, room, shift, guard, tally)
+        certify(local, n, shift, max(guard.floor, 0.0), guard.unit, guard.grain, work, workspace.sums)
+    store(points, blocks, block, workspace, shift, guard, tally)
 
 
 @part
@@ -112,12 +112,12 @@ def aim(work, shift, single):
 
 
 @part
-def store(points, blocks, block, room, shift, guard, tally):
+def store(points, blocks, block, workspace, shift, guard, tally):
     """Moves the free nodes whose row MARGIN is positive to their targets, and tries the others one by one.
 
     At the level STAR, row SHARE: how much is left of the shift.
     """
-    n, count, work = blocks.degree[block], blocks.filled[block], room.work
+    n, count, work = blocks.degree[block], blocks.filled[block], workspace.work
     to_the_star = len(guard) == WITH_FLOORS
     centre = blocks.centre[block * LANES : (block + 1) * LANES]
     refused, moved = 0, 0
@@ -145,7 +145,7 @@ def store(points, blocks, block, room, shift, guard, tally):
             elif to_the_star and work[MARGIN * LANES + lane] == -np.inf:
                 tally[DROPPED] += 1
             else:
-                truncate(points, i, n, lane, room, shift, guard, tally)
+                truncate(points, i, n, lane, workspace, shift, guard, tally)
     if len(guard) == WITH_FLOORS:
         for lane in range(count):
             tally[TRUNCATED] += (work[MARGIN * LANES + lane] > 0.0) & (work[SHARE * LANES + lane] < 1.0)

@@ -19,20 +19,20 @@ from gmsnet.kernels.star.block import (
     TRUNCATED,
 )
 from gmsnet.kernels.star.certificate import certify_stars
-from gmsnet.kernels.star.guard import permitted, surplus_above
+from gmsnet.kernels.star.guard import margin_above, permitted
 
 HALVINGS, FEW_HALVINGS = 20, 6
 
 
 @part
-def halve_abreast(n, room, shift, guard):
+def halve_in_lanes(n, workspace, shift, guard):
     """Halves the shifts of the lanes that are not allowed, all at once, until none is left or FEW_HALVINGS are made.
 
     For the level STAR, which refuses many moves whatever their length: those that make the worst cell of a star worse
     to first order. Row MARGIN: positive where the target is allowed; −∞ where the shift is to be dropped; else the
     scalar form, which knows inverted cells, is to try. Row SHARE: how much of the shift is left, 0 if none is allowed.
     """
-    star, work = room.star, room.work
+    star, work = workspace.star, workspace.work
     for lane in range(LANES):
         work[SHARE * LANES + lane] = 1.0
     for _ in range(FEW_HALVINGS):
@@ -66,13 +66,13 @@ def halve_abreast(n, room, shift, guard):
 
 
 @part
-def truncate(points, i, n, lane, room, shift, guard, tally):
+def truncate(points, i, n, lane, workspace, shift, guard, tally):
     """Halves the shift of one lane until it is allowed (Algorithm 1), or drops it.
 
     Below a floor a triangle comes by its first-order change, so that more than FEW_HALVINGS hardly ever help.
     """
     single, halvings = guard.single, HALVINGS if guard.floor <= 0.0 else FEW_HALVINGS
-    star, work = room.star, room.work
+    star, work = workspace.star, workspace.work
     x, y, size = star[2 * lane], star[2 * lane + 1], work[SIZE * LANES + lane]
     dx = size * shift[lane]
     dy = size * shift[LANES + lane]
@@ -111,7 +111,7 @@ def clear(tx, ty, star, n, lane, delta, floor):
     for j in range(n):
         k = 2 * ((j + 1) * LANES + lane)
         qx, qy = star[k] - tx, star[k + 1] - ty
-        if not surplus_above(px, py, qx, qy, delta, floor) > 0.0:
+        if not margin_above(px, py, qx, qy, delta, floor) > 0.0:
             return False
         px, py = qx, qy
     return True

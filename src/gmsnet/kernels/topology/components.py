@@ -9,7 +9,7 @@ from gmsnet.kernels.jit.compile import kernel
 
 @kernel
 def pieces(cells, chosen):
-    """(N,) int32: the least of the nodes that each one hangs together with, over edges between chosen nodes.
+    """(N,) int32: the minimum of the nodes that each one hangs together with, over edges between chosen nodes.
 
     cells: (k, m), polygons of m nodes, or edges (m = 2). chosen: (N,) bool.
     """

@@ -16,7 +16,19 @@ from gmsnet.kernels.jit.compile import kernel, part
 from gmsnet.kernels.topology.layout import span
 
 # Why a node is held, in the order in which reasons count.
-UNUSED, BOUNDARY, INTERFACE, LINE, FOREIGN, CROWDED, UNWOUND, SIDELESS, CHOSEN, TORN, HUB = (1 << k for k in range(11))
+(
+    UNUSED,
+    BOUNDARY,
+    INTERFACE,
+    LINE,
+    UNSUPPORTED_CELL,
+    NON_MANIFOLD,
+    NON_ORIENTABLE,
+    ZERO_AREA,
+    CHOSEN,
+    NOT_A_DISK,
+    HIGH_VALENCE,
+) = (1 << k for k in range(11))
 
 WIDTH = 8  # neighbours: also of nodes with fewer, loops make so many rounds, so that processors foresee their end
 AHEAD = 256  # nodes whose corners are listed at a time
@@ -39,15 +51,16 @@ def touching(triangles, chosen):
 
 
 @kernel
-def walk_fans(first, corner, turn, region, begin, identity, hub, marks, link, lists, start, ring):
+def walk_fans(first, corner, orientation, region, begin, identity, hub, marks, link, lists, start, ring):
     """The ring of each node that has a closed fan and no mark; the marks that follow from the faces around a node.
 
-    turn: (F,) int8; faces of turn −1 are read backwards. region: (F,) int64, or none (0,) where all are the same.
-    begin: (N + 1,), the faces whose lowest node is v are begin[v] … begin[v + 1] − 1. identity: (N,) the id of each
-    node. marks: (N,) uint16; those are added that are known here: UNUSED, BOUNDARY, INTERFACE, CROWDED, TORN, and HUB
-    where there are more than ``hub`` neighbours (whose ring is kept). Writes the rings in CSR form: start (N + 1,), and
-    ring, with room for as many as corners and WIDTH more: the nodes around, in the sense in which the faces are read,
-    from the smallest id on. Returns whether all edges of two faces are read in both directions, as they must be.
+    orientation: (F,) int8; faces of orientation −1 are read backwards. region: (F,) int64, or none (0,) where all are
+    the same. begin: (N + 1,), the faces whose lowest node is v are begin[v] … begin[v + 1] − 1. identity: (N,) the id
+    of each node. marks: (N,) uint16; those are added that are known here: UNUSED, BOUNDARY, INTERFACE, NON_MANIFOLD,
+    TORN, and HUB where there are more than ``hub`` neighbours (whose ring is kept). Writes the rings in CSR form:
+    start (N + 1,), and ring, with room for as many as corners and WIDTH more: the nodes around, in the sense in which
+    the faces are read, from the smallest id on. Returns whether all edges of two faces are read in both directions, as
+    they must be.
 
     link (N + 1,), of the node at hand ≪ 32 | the node that follows this one around it, and lists (N,), the first corner
     listed at a node ≪ 32 | how many: int64 zeros, to work with.
@@ -81,7 +94,7 @@ def walk_fans(first, corner, turn, region, begin, identity, hub, marks, link, li
             for k in range(count):
                 after = np.int64(corner[np.uint64(low + (k + 1 if k + 1 < count else 0))])
                 before = np.int64(corner[np.uint64(low + (k - 1 if k > 0 else count - 1))])
-                if turn[f] < 0:
+                if orientation[f] < 0:
                     after, before = before, after
                 left -= 1
                 node, at = np.uint64(corner[np.uint64(low + k)]), np.int64(unused[np.uint64(left)])
@@ -96,7 +109,7 @@ def walk_fans(first, corner, turn, region, begin, identity, hub, marks, link, li
             start[v] = end
             at, count = lists[v] >> 32, lists[v] & HALF
             if count == 0:
-                if not marks[v] & (LINE | FOREIGN):
+                if not marks[v] & (LINE | UNSUPPORTED_CELL):
                     marks[v] |= UNUSED
                 continue
             least = LAST
@@ -132,14 +145,14 @@ def walk_fans(first, corner, turn, region, begin, identity, hub, marks, link, li
             if not marks[v]:
                 end += count
                 if count > hub:
-                    marks[v] |= HUB
+                    marks[v] |= HIGH_VALENCE
         for k in range(found):  # what they have listed is still there
             v = others[k]
             mark, both_ways = look_at_edges(v, lists[v], pair, face, later, region, link)
             marks[v] |= mark
             agrees &= both_ways
             if not marks[v]:
-                marks[v] |= TORN
+                marks[v] |= NOT_A_DISK
     start[nodes] = end
     return agrees
 
@@ -156,7 +169,7 @@ def copied(values, longer):
 
 @part
 def look_at_edges(v, listed, pair, face, later, region, link):
-    """BOUNDARY, CROWDED, INTERFACE for node v as its edges are, and whether edges of two faces are read both ways.
+    """BOUNDARY, NON_MANIFOLD, INTERFACE for node v as its edges are, and whether edges of two faces are read both ways.
 
     Linear in its corners: see ``walk_fans``. link: here of the node at hand ≪ 32 | the number of the edge.
     """
@@ -189,7 +202,7 @@ def look_at_edges(v, listed, pair, face, later, region, link):
         if faces[e] == 1:
             found |= BOUNDARY
         elif faces[e] > 2:
-            found |= CROWDED
+            found |= NON_MANIFOLD
         else:
             both_ways &= balance[e] == 0
             if differ[e] != 0:

@@ -41,7 +41,7 @@ def around(triangles, rings, free, start, ring):
 
 @kernel
 def triangles_around(nodes, active, start, ring):
-    """(T, 3) the triangles that have one of the nodes, each once, wound as the rings: with the least such node first.
+    """(T, 3) the triangles that have one of the nodes, each once, wound as the rings: with the minimum such node first.
 
     nodes: (K,) ascending. active: (N,) bool, whether a node is one of them. start, ring: their rings, in CSR form.
     """

@@ -12,7 +12,7 @@ from gmsnet.kernels.jit.compile import inlined, kernel
 from gmsnet.kernels.topology.layout import span
 
 ALONE = -1  # the half-edge has no partner: a boundary edge
-CROWDED = -2  # three or more faces meet at the edge
+NON_MANIFOLD = -2  # three or more faces meet at the edge
 
 
 @inlined
@@ -41,7 +41,7 @@ def count_signs(points, first, corner, faces):
 
 @kernel
 def match(first, corner, faces, start, by_low, ends, twin):
-    """Writes twin: the partner of each half-edge over its edge, ALONE, or CROWDED. Linear in the half-edges.
+    """Writes twin: the partner of each half-edge over its edge, ALONE, or NON_MANIFOLD. Linear in the half-edges.
 
     start: zeros, two more than nodes. by_low, ends, like twin as long as corner, to work with.
     """
@@ -73,17 +73,17 @@ def match(first, corner, faces, start, by_low, ends, twin):
                 twin[h] = other
             else:  # a third face: all at this edge are crowded
                 if twin[other] >= 0:
-                    twin[twin[other]] = CROWDED
-                twin[other] = CROWDED
-                twin[h] = CROWDED
+                    twin[twin[other]] = NON_MANIFOLD
+                twin[other] = NON_MANIFOLD
+                twin[h] = NON_MANIFOLD
 
 
 @kernel
-def wind(first, corner, face, twin, part, turn):
+def wind(first, corner, face, twin, part, orientation):
     """Floods over the edges that join two faces; returns whether each part (bool) can be wound consistently.
 
     face: of each half-edge, or None where all are triangles. Writes the part of each face (part, −1 before) and its
-    turn (int8, 1 before): faces of turn −1 are to be read backwards for all of a part to be wound alike.
+    turn (int8, 1 before): faces of orientation −1 are to be read backwards for all of a part to be wound alike.
     """
     faces = len(part)
     consistent = np.ones(faces, dtype=np.bool_)
@@ -104,25 +104,26 @@ def wind(first, corner, face, twin, part, turn):
                 if other < 0:
                     continue
                 g = other // 3 if face is None else face[other]
-                wanted = -turn[f] if corner[h] == corner[other] else turn[f]
+                wanted = -orientation[f] if corner[h] == corner[other] else orientation[f]
                 if part[g] < 0:
                     part[g] = parts
-                    turn[g] = wanted
+                    orientation[g] = wanted
                     queue[size] = g
                     size += 1
-                elif turn[g] != wanted:
+                elif orientation[g] != wanted:
                     consistent[parts] = False
         parts += 1
     return consistent[:parts]
 
 
 @kernel
-def part_areas(points, first, corner, part, turn, parts):
-    """Signed area of each part, its faces read with their turns, and the sum of their absolute areas (float64)."""
+def part_areas(points, first, corner, part, orientation, parts):
+    """Signed area of each part, its faces read with their orientations, and the sum of their absolute areas
+    (float64)."""
     area = np.zeros(parts)
     extent = np.zeros(parts)
     for f in range(len(part)):
         own = signed_area(points, first, corner, f)
-        area[part[f]] += own * turn[f]
+        area[part[f]] += own * orientation[f]
         extent[part[f]] += abs(own)
     return area, extent

@@ -20,8 +20,8 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.simplex.predicates import determinant_and_bound
-from gmsnet.kernels.star.guard import surplus_above
-from gmsnet.kernels.untangle.mending import surplus
+from gmsnet.kernels.star.guard import margin_above
+from gmsnet.kernels.untangle.untangling import margin
 
 KAPPA = 1.0 / math.sqrt(3.0)
 THIRD = 1.0 / 3.0
@@ -105,7 +105,7 @@ def is_certified(points, v, start, ring, unit, grain):
     before = ring[start[v + 1] - 1]
     for at in range(start[v], start[v + 1]):
         after = ring[at]
-        if not surplus(points, v, before, after, unit, grain) > 0.0:
+        if not margin(points, v, before, after, unit, grain) > 0.0:
             return False
         before = after
     return True
@@ -124,9 +124,9 @@ def keeps(points, v, x, y, start, ring, unit, grain, floor):
         delta = unit * reach + grain
         value, bound = determinant_and_bound(ax, ay, bx, by, x, y, delta)
         if not value > bound:
-            old, doubt = determinant_and_bound(ax, ay, bx, by, points[v, 0], points[v, 1], delta)
-            above = surplus_above(ax - x, ay - y, bx - x, by - y, delta, floor) > 0.0
-            if not (old < -doubt and value - bound > old + doubt and above):
+            old, error_bound = determinant_and_bound(ax, ay, bx, by, points[v, 0], points[v, 1], delta)
+            above = margin_above(ax - x, ay - y, bx - x, by - y, delta, floor) > 0.0
+            if not (old < -error_bound and value - bound > old + error_bound and above):
                 return False
         before = after
     return True
@@ -185,12 +185,12 @@ def sweep(points, nodes, start, ring, scale, epsilon, mode, unit, grain, single,
 
 @kernel
 def least(points, cells, scale, part, unit, grain, out):
-    """The least of what exceeds the bound, over s, of the cells of each part: out[part[first node of the cell]]."""
+    """The minimum of what exceeds the bound, over s, of the cells of each part: out[part[first node of the cell]]."""
     out[:] = np.inf
     for t in range(len(cells)):
         a, b, c = cells[t, 0], cells[t, 1], cells[t, 2]
         s = THIRD * (scale[a] + scale[b] + scale[c])
-        out[part[a]] = min(out[part[a]], surplus(points, a, b, c, unit, grain) / s)
+        out[part[a]] = min(out[part[a]], margin(points, a, b, c, unit, grain) / s)
 
 
 @kernel

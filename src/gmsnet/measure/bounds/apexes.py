@@ -38,8 +38,8 @@ def meet(middle: Floats, upright: Floats, t: Floats) -> Flags:
     length = np.hypot(upright[..., 0], upright[..., 1])
     centre = middle + (0.5 * ROOT3 / t)[:, None, None] * upright
     radius = (0.5 * ROOT3 * np.sqrt(np.maximum(1.0 / (t * t) - 1.0, 0.0)))[:, None] * length
-    room = SLACK * length.max(axis=1, initial=0.0)
-    reach = radius * (1.0 + SLACK) + room[:, None]
+    workspace = SLACK * length.max(axis=1, initial=0.0)
+    reach = radius * (1.0 + SLACK) + workspace[:, None]
 
     def inside(place: Floats) -> Flags:
         """Does a point (G, 2) lie in all discs, but for rounding?"""
@@ -54,7 +54,7 @@ def meet(middle: Floats, upright: Floats, t: Floats) -> Flags:
         for k in range(m):
             r, s, between = radius[:, m], radius[:, k], centre[:, k] - centre[:, m]
             d = np.hypot(between[:, 0], between[:, 1])
-            apart |= d > (r + s) * (1.0 + SLACK) + room
+            apart |= d > (r + s) * (1.0 + SLACK) + workspace
             crossing = (d > np.abs(r - s)) & (d > 0.0)  # else one lies in the other
             d = np.where(crossing, d, 1.0)
             along = 0.5 * (d + (r - s) * (r + s) / d)

@@ -1,7 +1,7 @@
 """How good the cells of a mesh can become at most, with its connectivity and its held nodes; what stands in the way.
 
-Each bound is for a group of cells: in no mesh without inverted cells are all of them better. So the least bound of all
-groups, the *ceiling*, is an upper bound of the mesh's worst 1/q. With D twice the area and L the sum of the squared
+Each bound is for a group of cells: in no mesh without inverted cells are all of them better. So the minimum bound of
+all groups, the *ceiling*, is an upper bound of the mesh's worst 1/q. With D twice the area and L the sum of the squared
 sides, 1/q = 2√3·D/L.
 
 *Held cells.* All three nodes are held: its 1/q is what it is.
@@ -46,7 +46,7 @@ SHOWN = 4  # cells that a sentence names
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Groups of cells that cannot all be better than a bound; those with the least bounds first.
+    """Groups of cells that cannot all be better than a bound; those with the minimum bounds first.
 
     bound: (G,) of 1/q. kind: (G,) one of the kinds in groups.py. node: (G,) id of the node where it is, −1 for
     held cells. angle: (G,) of a corner, in degrees. first, rows: group g has the rows rows[first[g] : first[g + 1]] of
@@ -118,7 +118,7 @@ def limits(mesh: Mesh, topology: Topology, below: float = 0.9) -> Limits:
     """
     free = np.zeros(len(topology.memory), dtype=bool)
     free[topology.free] = True
-    found = groups.collect(planar_points(mesh), topology.triangles, topology.turn, free, below)
+    found = groups.collect(planar_points(mesh), topology.triangles, topology.orientation, free, below)
     return Limits(
         bound=found.bound,
         kind=found.kind,

@@ -41,7 +41,7 @@ class Groups(NamedTuple):
 
     @classmethod
     def joined(cls, parts: list[Groups]) -> Groups:
-        """All of them, those with the least bounds first, then by nodes."""
+        """All of them, those with the minimum bounds first, then by nodes."""
         kind, node, angle, bound = (np.concatenate([part[k] for part in parts]) for k in range(4))
         count = np.concatenate([np.diff(part.first) for part in parts])
         rows = np.concatenate([part.rows for part in parts])
@@ -78,8 +78,11 @@ def best_with_corner(angle: Floats) -> Floats:
     return np.where(angle < math.pi, ROOT3 * np.sin(angle) / (2.0 - np.cos(angle)), 0.0)
 
 
-def collect(points: Floats, triangles: NDArray[np.int32], turn: NDArray[np.int8], free: Flags, below: float) -> Groups:
-    """All groups with a bound less than ``below``. points: (N, 2). triangles: (T, 3). turn: (T,) ±1. free: (N,)."""
+def collect(
+    points: Floats, triangles: NDArray[np.int32], orientation: NDArray[np.int8], free: Flags, below: float
+) -> Groups:
+    """All groups with a bound less than ``below``. points: (N, 2). triangles: (T, 3). orientation: (T,) ±1. free:
+    (N,)."""
     may = free[triangles]
     number = may[:, 0].astype(np.int8) + may[:, 1] + may[:, 2]
     degree = np.bincount(triangles.ravel(), minlength=len(free))
@@ -90,10 +93,10 @@ def collect(points: Floats, triangles: NDArray[np.int32], turn: NDArray[np.int8]
     beside[triangles[some][~may[some]]] = True
     alone = triangles[number == 1][may[number == 1]]  # free nodes with an opposite edge that is held
     beside |= np.bincount(alone, minlength=len(free)) > 1
-    around = corners_at(crowded | beside, triangles, turn)
+    around = corners_at(crowded | beside, triangles, orientation)
     return Groups.joined(
         [
-            held_cells(points, triangles, turn, np.flatnonzero(number == 0), below),
+            held_cells(points, triangles, orientation, np.flatnonzero(number == 0), below),
             full_turns(around, crowded, degree, full),
             *rings(points, around, free, below),
             between_held_edges(points, around, free, below),
@@ -101,24 +104,24 @@ def collect(points: Floats, triangles: NDArray[np.int32], turn: NDArray[np.int8]
     )
 
 
-def corners_at(chosen: Flags, triangles: NDArray[np.int32], turn: NDArray[np.int8]) -> Corners:
+def corners_at(chosen: Flags, triangles: NDArray[np.int32], orientation: NDArray[np.int8]) -> Corners:
     """The corners at the chosen nodes (N,)."""
     row, corner = np.nonzero(chosen[triangles])
     order = np.argsort(triangles[row, corner], kind="stable")
     row, corner = row[order], corner[order]
     node, left, right = (triangles[row, (corner + k) % 3].astype(np.intp) for k in range(3))
-    back = turn[row] < 0
+    back = orientation[row] < 0
     return Corners(node, row, np.where(back, right, left), np.where(back, left, right))
 
 
 def held_cells(
-    points: Floats, triangles: NDArray[np.int32], turn: NDArray[np.int8], rows: Places, below: float
+    points: Floats, triangles: NDArray[np.int32], orientation: NDArray[np.int8], rows: Places, below: float
 ) -> Groups:
     """Cells (rows) all of whose nodes are held."""
     a, b, c = (points[triangles[rows, k]] for k in range(3))
     u, v = b - a, c - a
     lengths = 2.0 * (u * u + v * v - u * v).sum(axis=1)
-    double = turn[rows] * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    double = orientation[rows] * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
     bound = np.divide(2.0 * ROOT3 * double, lengths, out=np.zeros(len(rows)), where=lengths > 0.0)
     rows, bound = rows[bound < below], bound[bound < below]
     ones = np.ones(len(rows), dtype=np.intp)

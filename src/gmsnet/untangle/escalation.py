@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gmsnet.untangle.guarded import culprits
+from gmsnet.untangle.guarded import worst_nodes
 from gmsnet.untangle.harmonic import harmonic
 from gmsnet.untangle.lbfgs import whole
 from gmsnet.untangle.newton import keep_gains, newton
 from gmsnet.untangle.patch import Patch, in_order
-from gmsnet.untangle.reasons import give_up
+from gmsnet.untangle.reasons import freeze_hopeless
 from gmsnet.untangle.result import Stage
-from gmsnet.untangle.tangle import Tangle
+from gmsnet.untangle.state import UntanglingState
 
 LAPLACIAN_SWEEPS = 8
 MEDIANS, WEIGHING = 2, 5  # the first sweeps are to medians of the rings, by so many steps from the mean
@@ -24,11 +24,11 @@ FEW = 0.25  # harmonic places are a better start if they leave no more than this
 PATIENCE, LAST_PATIENCE = 3, 8  # of L-BFGS, and where the patch cannot grow any more
 
 
-def follow(tangle: Tangle) -> Iterator[Stage]:
+def escalate(tangle: UntanglingState) -> Iterator[Stage]:
     """Untangles; yields what each stage has done, and ends when nothing is left or nothing is left to try."""
     if not tangle.left:
         return
-    yield culprits(tangle)
+    yield worst_nodes(tangle)
     if not tangle.left:
         return
     yield bad_stars(tangle)
@@ -41,20 +41,20 @@ def follow(tangle: Tangle) -> Iterator[Stage]:
         if not patch.count or (tried and np.array_equal(patch.every, tried.every)):
             break
         if tried and rings == RINGS[-1] and patch.count > LEAP * tried.count:
-            break  # what so large a patch could not mend is not mended by one of all nodes either
+            break  # what so large a patch could not mend is not untangled by one of all nodes either
         tried = patch
         last = patch.count == len(tangle.topology.free)
         where = "all nodes" if last else "all rings" if rings == RINGS[-1] else f"{rings} rings"
         yield from mend(tangle, patch, where, LAST_PATIENCE if last else PATIENCE)
         if tangle.left < left:
             points, bad, left = tangle.points.copy(), tangle.bad.copy(), tangle.left
-        if tangle.left and give_up(tangle, points, bad):
+        if tangle.left and freeze_hopeless(tangle, points, bad):
             keep_gains(tangle, points, bad)
     if tangle.left:
         keep_gains(tangle, points, bad)
 
 
-def bad_stars(tangle: Tangle) -> Stage:
+def bad_stars(tangle: UntanglingState) -> Stage:
     """Laplacian sweeps over the stars that have a bad cell at the time."""
     chosen = tangle.bad_nodes()
     visited = chosen.copy()
@@ -68,7 +68,7 @@ def bad_stars(tangle: Tangle) -> Stage:
     return Stage("Laplacian, bad stars", int(visited.sum()), sweeps, tangle.left)
 
 
-def mend(tangle: Tangle, patch: Patch, where: str, patience: int) -> Iterator[Stage]:
+def mend(tangle: UntanglingState, patch: Patch, where: str, patience: int) -> Iterator[Stage]:
     """The barrier on a patch: Newton sweeps; from harmonic places if these are better; L-BFGS on what is left."""
     points = tangle.points[patch.every]
     open_, sweeps = newton(tangle, patch, points)

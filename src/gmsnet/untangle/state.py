@@ -1,4 +1,4 @@
-"""The state of one untangling: the points as they are now, and which cells are still to be mended."""
+"""The state of one untangling: the points as they are now, and which cells are still to be untangled."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from functools import cached_property
 import numpy as np
 
 from gmsnet.kernels.star.guard import Precision
-from gmsnet.kernels.untangle import mending as kernels
+from gmsnet.kernels.untangle import untangling as kernels
 from gmsnet.measure.report import exact_signs
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.patch import Flags, Floats, Ints, Patch, free_nodes_of, in_order
 
 
-class Tangle:
+class UntanglingState:
     """points: (N, 2) in memory order, of which free nodes are moved. before: the same at first, not changed.
 
-    signs: (T,) exact signs at first. bad: (T,) which cells are to be mended: not certified (kernels.untangle.mending),
-    and inverted at first or with a node that has moved. left: how many. frozen: (N,) free nodes that stand
-    still all the same. work: iterations of L-BFGS so far, times nodes.
+    signs: (T,) exact signs at first. bad: (T,) which cells are to be untangled: not certified
+    (kernels.untangle.untangling), and inverted at first or with a node that has moved. left: how many. frozen: (N,)
+    free nodes that stand still all the same. work: iterations of L-BFGS so far, times nodes.
     """
 
     def __init__(self, points: Floats, topology: Topology, precision: Precision) -> None:
         self.before, self.topology, self.precision = points, topology, precision
         self.points = points.copy()
-        self.signs = exact_signs(points, topology.near, topology.near_turn)
+        self.signs = exact_signs(points, topology.near, topology.near_orientation)
         self.was_bad = self.signs <= 0
         self.bad = np.empty(len(topology.near), dtype=bool)
         self.left = self.work = 0
@@ -33,17 +33,19 @@ class Tangle:
 
     @cached_property
     def worst(self) -> float:
-        """An upper bound of the least D/L at first of the cells that can change, 0 if none of them was inverted."""
-        triangles, turn = self.topology.changeable
+        """An upper bound of the minimum D/L at first of the cells that can change, 0 if none of them was inverted."""
+        triangles, orientation = self.topology.changeable
         precision = self.precision
-        return min(float(kernels.least_ratio(self.before, triangles, turn, precision.unit, precision.grain)), 0.0)
+        return min(
+            float(kernels.least_ratio(self.before, triangles, orientation, precision.unit, precision.grain)), 0.0
+        )
 
     def look(self) -> int:
         """Finds the bad cells of the points as they are now; returns how many there are."""
         precision, topology = self.precision, self.topology
         self.left = int(
             kernels.find_bad(
-                self.points, self.before, topology.near, topology.near_turn, self.was_bad, precision.unit,
+                self.points, self.before, topology.near, topology.near_orientation, self.was_bad, precision.unit,
                 precision.grain, self.bad,
             )
         )  # fmt: skip

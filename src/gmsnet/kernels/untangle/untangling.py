@@ -1,4 +1,4 @@
-"""Which cells are to be mended, the patches around them, and plain Laplacian sweeps that no guard holds back.
+"""Which cells are to be untangled, the patches around them, and plain Laplacian sweeps that no guard holds back.
 
 A cell is *certified* if its determinant exceeds the error bound of kernels.simplex.predicates with all coordinates
 known up to ±δ, δ = unit·(its largest coordinate) + grain: then it is positive as it is written, too.
@@ -10,13 +10,13 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import kernel, part
 from gmsnet.kernels.simplex.predicates import determinant_and_bound
-from gmsnet.kernels.star.guard import ratio_of, surplus_above
+from gmsnet.kernels.star.guard import margin_above, ratio_of
 
 TINY = 1e-290  # stands in for a squared length of zero
 
 
 @part
-def surplus(points, a, b, c, unit, grain):
+def margin(points, a, b, c, unit, grain):
     """By how much the determinant of the triangle a, b, c exceeds its bound; positive: certified."""
     ax, ay, bx, by = points[a, 0], points[a, 1], points[b, 0], points[b, 1]
     cx, cy = points[c, 0], points[c, 1]
@@ -26,11 +26,11 @@ def surplus(points, a, b, c, unit, grain):
 
 
 @kernel
-def find_bad(points, before, triangles, turn, was_bad, unit, grain, bad):
-    """Marks the cells that are to be mended: not certified, and inverted at first or with a node that has moved.
+def find_bad(points, before, triangles, orientation, was_bad, unit, grain, bad):
+    """Marks the cells that are to be untangled: not certified, and inverted at first or with a node that has moved.
 
-    points, before: (N, 2), now and at first. triangles: (T, 3). turn: (T,) ±1. was_bad, bad: (T,) bool. Returns how
-    many.
+    points, before: (N, 2), now and at first. triangles: (T, 3). orientation: (T,) ±1. was_bad, bad: (T,) bool. Returns
+    how many.
     """
     count = 0
     for t in range(len(triangles)):
@@ -41,9 +41,9 @@ def find_bad(points, before, triangles, turn, was_bad, unit, grain, bad):
                 if points[i, 0] != before[i, 0] or points[i, 1] != before[i, 1]:
                     bad[t] = True
         if bad[t]:
-            if turn[t] < 0:
+            if orientation[t] < 0:
                 b, c = c, b
-            bad[t] = not surplus(points, a, b, c, unit, grain) > 0.0
+            bad[t] = not margin(points, a, b, c, unit, grain) > 0.0
             count += bad[t]
     return count
 
@@ -117,7 +117,7 @@ def bad_in_star(points, v, start, ring, unit, grain):
     before = ring[start[v + 1] - 1]
     for at in range(start[v], start[v + 1]):
         after = ring[at]
-        count += not surplus(points, v, before, after, unit, grain) > 0.0
+        count += not margin(points, v, before, after, unit, grain) > 0.0
         before = after
     return count
 
@@ -193,7 +193,7 @@ def go_back(points, before, nodes, start, ring, limit, unit, grain):
             points[v, 0], points[v, 1] = before[v, 0], before[v, 1]
             away = points[a, 0] != before[a, 0] or points[a, 1] != before[a, 1]
             away |= points[b, 0] != before[b, 0] or points[b, 1] != before[b, 1]
-            fits = surplus(points, v, a, b, unit, grain) > 0.0 and (not away or share(points, v, a, b) >= least)
+            fits = margin(points, v, a, b, unit, grain) > 0.0 and (not away or share(points, v, a, b) >= least)
             points[v, 0], points[v, 1] = x, y
             if not fits:
                 break
@@ -208,12 +208,12 @@ def uncertified(points, cells, unit, grain):
     """How many of the cells (c, 3), counter-clockwise, are not certified."""
     count = 0
     for t in range(len(cells)):
-        count += not surplus(points, cells[t, 0], cells[t, 1], cells[t, 2], unit, grain) > 0.0
+        count += not margin(points, cells[t, 0], cells[t, 1], cells[t, 2], unit, grain) > 0.0
     return count
 
 
 @kernel
-def find_violated(points, before, triangles, turn, was_bad, floor, unit, grain, violated):
+def find_violated(points, before, triangles, orientation, was_bad, floor, unit, grain, violated):
     """Marks the cells with a node that has moved which stand against taking the points; returns how many.
 
     Those are the cells that were positive and are not certified, and those that were not positive, are not certified,
@@ -228,9 +228,9 @@ def find_violated(points, before, triangles, turn, was_bad, floor, unit, grain, 
                 violated[t] = True
         if not violated[t]:
             continue
-        if turn[t] < 0:
+        if orientation[t] < 0:
             b, c = c, b
-        violated[t] = not surplus(points, a, b, c, unit, grain) > 0.0
+        violated[t] = not margin(points, a, b, c, unit, grain) > 0.0
         if violated[t] and was_bad[t]:
             violated[t] = not surplus_over(points, a, b, c, unit, grain, floor) > 0.0
         count += violated[t]
@@ -238,7 +238,7 @@ def find_violated(points, before, triangles, turn, was_bad, floor, unit, grain, 
 
 
 @kernel
-def find_slivers(points, before, triangles, turn, limit, slivers):
+def find_slivers(points, before, triangles, orientation, limit, slivers):
     """Marks the cells with a node that has moved whose D/L is below a limit."""
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -247,7 +247,7 @@ def find_slivers(points, before, triangles, turn, limit, slivers):
             if points[i, 0] != before[i, 0] or points[i, 1] != before[i, 1]:
                 slivers[t] = True
         if slivers[t]:
-            if turn[t] < 0:
+            if orientation[t] < 0:
                 b, c = c, b
             slivers[t] = share(points, a, b, c) < limit
 
@@ -267,16 +267,16 @@ def surplus_over(points, a, b, c, unit, grain, floor):
     px, py = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
     qx, qy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
     reach = max(abs(points[a, 0]), abs(points[a, 1])) + ((abs(px) + abs(py)) + (abs(qx) + abs(qy)))
-    return surplus_above(px, py, qx, qy, unit * reach + grain, floor)
+    return margin_above(px, py, qx, qy, unit * reach + grain, floor)
 
 
 @kernel
-def least_ratio(points, triangles, turn, unit, grain):
-    """The least that a bound of D/L from above is over the cells (kernels.star.guard); 1/q is 2√3 times that."""
+def least_ratio(points, triangles, orientation, unit, grain):
+    """The minimum that a bound of D/L from above is over the cells (kernels.star.guard); 1/q is 2√3 times that."""
     least = np.inf
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        if turn[t] < 0:
+        if orientation[t] < 0:
             b, c = c, b
         least = min(least, ratio_of(points, b, c, a, unit, grain))
     return least

@@ -17,7 +17,7 @@ NONE = np.empty((0, 3), dtype=np.int32)
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class Score:
     """Where a mesh stands in the comparison of meshes on the way.
 
     measure: the sums over all triangles, None where there are none; asked for when they first matter. missing: the
@@ -30,7 +30,7 @@ class Standing:
     positive: bool = False
 
     @classmethod
-    def of(cls, totals: Totals | None, best_by: str, missing: NDArray[np.int32] = NONE) -> Standing:
+    def of(cls, totals: Totals | None, best_by: str, missing: NDArray[np.int32] = NONE) -> Score:
         """From the sums over all triangles; None where there are none."""
         return cls(lambda: totals, best_by, missing)
 
@@ -58,7 +58,7 @@ class Standing:
 
     @property
     def min_shape(self) -> float:
-        """The least 1/q."""
+        """The minimum 1/q."""
         return math.inf if self.totals is None else self.totals.shape_min
 
     @property
@@ -66,13 +66,13 @@ class Standing:
         """The mean 1/q."""
         return math.nan if self.totals is None else self.totals.shape_mean
 
-    def nearer(self, other: Standing) -> bool:
+    def closer_to_target(self, other: Score) -> bool:
         """Nearer to the target: fewer inverted cells, then fewer that miss it, then a better worst cell, not q̂."""
         if self.counts != other.counts:
             return self.counts < other.counts
         return self.min_shape > other.min_shape
 
-    def beats(self, other: Standing) -> bool:
+    def better_than(self, other: Score) -> bool:
         """Fewer inverted cells first, then fewer that miss the target, then a larger q̂, by more than rounding."""
         if self.counts != other.counts:
             return self.counts < other.counts
