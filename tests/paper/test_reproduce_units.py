@@ -11,7 +11,7 @@ from support import reproduce_work as work
 from gmsnet.errors import InputError
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.store import Result, Store
-from gmsnet.paper.units import Score, Stage, Unit, carry_out, missing
+from gmsnet.paper.units import Stage, Unit, UnitsDone, carry_out, missing
 
 PLAN = Plan(runs=1, sweeps=1, seed=0, quick=True)
 
@@ -27,9 +27,9 @@ def notes(*texts: str) -> list[Unit]:
     return [Unit(f"note/{text}", work.note, {"text": text}) for text in texts]
 
 
-def do(stages, store, should_stop=lambda: False) -> tuple[bool, list[Score]]:
-    standings: list[Score] = []
-    return carry_out(stages, PLAN, store, standings.append, should_stop), standings
+def do(stages, store, should_stop=lambda: False) -> tuple[bool, list[UnitsDone]]:
+    records: list[UnitsDone] = []
+    return carry_out(stages, PLAN, store, records.append, should_stop), records
 
 
 def test_stages_follow_one_another_and_results_are_kept(store):
@@ -38,15 +38,15 @@ def test_stages_follow_one_another_and_results_are_kept(store):
         Stage("together", notes("c", "d")),
         Stage("after", [Unit("sum", work.add, {"names": ["note/d", "note/a"]})]),
     ]
-    finished, standings = do(stages, store)
+    finished, records = do(stages, store)
     assert finished
     assert store.load("sum") == {"text": "da"}
     assert store.load("note/a")["process"] != os.getpid()
     assert (store.folder / "notes/c.txt").read_text() == "c"
     assert store.seconds("sum") >= 0
-    assert standings[0] == Score(0, 5, "alone")
-    assert standings[-1] == Score(5, 5, "after")
-    assert [each.done for each in standings] == sorted(each.done for each in standings)
+    assert records[0] == UnitsDone(0, 5, "alone")
+    assert records[-1] == UnitsDone(5, 5, "after")
+    assert [each.done for each in records] == sorted(each.done for each in records)
 
 
 def test_what_is_there_is_not_done_again(store):
@@ -54,18 +54,18 @@ def test_what_is_there_is_not_done_again(store):
     kept = (store.folder / "units/note/a.json").read_bytes()
     both = [Stage("first", notes("a", "b"))]
     assert [unit.name for stage in missing(both, store) for unit in stage.units] == ["note/b"]
-    finished, standings = do(both, store)
+    finished, records = do(both, store)
     assert finished
-    assert standings[0] == Score(1, 2, "first")
+    assert records[0] == UnitsDone(1, 2, "first")
     assert (store.folder / "units/note/a.json").read_bytes() == kept
     assert do(both, store) == (True, [])
 
 
 def test_a_stop_gives_up_what_is_in_work_and_keeps_the_rest(store):
     stages = [Stage("first", notes("a")), Stage("second", [Unit("endless", work.endless), *notes("b")], alone=True)]
-    finished, standings = do(stages, store, lambda: store.holds("note/a"))
+    finished, records = do(stages, store, lambda: store.holds("note/a"))
     assert not finished
-    assert standings[-1].done <= 1
+    assert records[-1].done <= 1
     assert store.holds("note/a")
     assert not store.holds("endless")
     assert not store.holds("note/b")

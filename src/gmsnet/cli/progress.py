@@ -23,7 +23,7 @@ class Progress:
             parts.SpinnerColumn(),
             parts.TextColumn("{task.description}", markup=False),
             parts.BarColumn(),
-            parts.TextColumn("{task.fields[standing]}", markup=False),
+            parts.TextColumn("{task.fields[score]}", markup=False),
         )
         shown = enabled and sys.stderr.isatty()
         self._bar = parts.Progress(*columns, console=Console(stderr=True), transient=True, disable=not shown)

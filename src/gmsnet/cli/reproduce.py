@@ -12,7 +12,7 @@ import typer
 from gmsnet.cli.signals import Deferral, Interrupted
 
 if TYPE_CHECKING:
-    from gmsnet.paper.units import Score
+    from gmsnet.paper.units import UnitsDone
 
 
 def _what() -> list[str]:
@@ -62,7 +62,7 @@ def reproduce(
 
 
 @contextmanager
-def _bar(total: int) -> Iterator[Callable[[Score], None]]:
+def _bar(total: int) -> Iterator[Callable[[UnitsDone], None]]:
     """A progress bar on standard error, if that is a terminal."""
     from rich import progress as columns
     from rich.console import Console
@@ -76,4 +76,4 @@ def _bar(total: int) -> Iterator[Callable[[Score], None]]:
     )
     with columns.Progress(*shown, console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("starting", total=total)
-        yield lambda score: bar.update(task, description=score.stage, completed=score.done)
+        yield lambda units: bar.update(task, description=units.stage, completed=units.done)

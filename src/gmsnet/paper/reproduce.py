@@ -14,7 +14,7 @@ from gmsnet.paper.page import page
 from gmsnet.paper.plan import WHAT, Plan
 from gmsnet.paper.sheets import sheets
 from gmsnet.paper.store import Store, dumps
-from gmsnet.paper.units import Score, carry_out, missing
+from gmsnet.paper.units import UnitsDone, carry_out, missing
 
 PAGE, DOCUMENT = "reproduction.html", "reproduction.json"
 
@@ -52,7 +52,7 @@ def prepare(what: str, plan: Plan, folder: Path) -> Work:
 
 
 def reproduce(
-    work: Work, on_unit: Callable[[Score], None], should_stop: Callable[[], bool]
+    work: Work, on_unit: Callable[[UnitsDone], None], should_stop: Callable[[], bool]
 ) -> list[Path] | None:  # fmt: skip
     """Does what is not there yet, and writes page, tables and document of all parts that are; returns their paths.
 

@@ -70,7 +70,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Score:
+class UnitsDone:
     """How far a reproduction is: so many of all units are there; a unit of this stage was the last."""
 
     done: int
@@ -88,7 +88,7 @@ def carry_out(
     stages: Sequence[Stage],
     plan: Plan,
     store: Store,
-    on_unit: Callable[[Score], None],
+    on_unit: Callable[[UnitsDone], None],
     should_stop: Callable[[], bool],
 ) -> bool:
     """Does what is missing, a stage after the other; tells whether all is there now.
@@ -108,7 +108,7 @@ def carry_out(
     with ProcessPoolExecutor(processes, mp_context=method, initializer=_prepare, initargs=(stop,)) as pool:
         try:
             for stage in left:
-                on_unit(Score(done, total, stage.title))
+                on_unit(UnitsDone(done, total, stage.title))
                 abreast = 1 if stage.alone else processes
                 waiting, running = list(stage.units), set[Future[bool]]()
                 while waiting or running:
@@ -120,7 +120,7 @@ def carry_out(
                     finished, running = wait(running, timeout=LOOK, return_when=FIRST_COMPLETED)
                     for each in finished:
                         done += each.result()
-                        on_unit(Score(done, total, stage.title))
+                        on_unit(UnitsDone(done, total, stage.title))
                 if stop.is_set():
                     return False
         except BrokenProcessPool as error:

@@ -34,7 +34,7 @@ class Run:
     """The state of one run: coordinates in memory order, the best so far, and the record.
 
     points: to start from, in memory order (default: the mesh's own). history: to go on with. precision: of
-    the mesh, where it is known; standing: of those points, where it is. missing: the corners (K, 3) of the triangles
+    the mesh, where it is known; score: of those points, where it is. missing: the corners (K, 3) of the triangles
     that miss a target at given points; the run ends when there is none.
     """
 
