@@ -19,7 +19,7 @@ from sweeps import averaging_matrix
 
 import gmsnet
 from gmsnet.kernels.star.guard import LEVELS, Precision
-from gmsnet.measure.report import totals_of
+from gmsnet.measure.totals import totals_of
 from gmsnet.methods import smoother
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field

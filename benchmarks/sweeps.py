@@ -24,7 +24,7 @@ from machine import describe
 
 import gmsnet
 from gmsnet.kernels.star.guard import LEVELS, Precision
-from gmsnet.measure.report import totals_of
+from gmsnet.measure.totals import totals_of
 from gmsnet.methods import METHODS, Field, smoother
 from gmsnet.parallel.threads import workers
 from gmsnet.topology.topology import Topology, planar_points

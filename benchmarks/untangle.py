@@ -24,7 +24,7 @@ from machine import describe
 import gmsnet
 from gmsnet.generate import disturb
 from gmsnet.kernels.star.guard import Precision
-from gmsnet.measure.report import exact_signs
+from gmsnet.measure.signs import exact_signs
 from gmsnet.topology.topology import Topology, planar_points
 from gmsnet.untangle import untangle
 from gmsnet.untangle.escalation import LAST_PATIENCE

@@ -10,7 +10,9 @@ from support import naive
 
 import gmsnet
 from gmsnet import CellBlock, Mesh
-from gmsnet.measure.report import exact_signs, measure, percentile, totals_of
+from gmsnet.measure.report import measure, percentile
+from gmsnet.measure.signs import exact_signs
+from gmsnet.measure.totals import totals_of
 from gmsnet.topology.topology import Topology, near_points
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -13,128 +11,30 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex import measures as kernels
-from gmsnet.kernels.simplex import predicates
-from gmsnet.kernels.simplex.exact import exact
+from gmsnet.measure.cells import MeasuredCells
+from gmsnet.measure.totals import NOWHERE, Totals, totals_of
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.mesh.plane import exponent_of
-from gmsnet.parallel.threads import Share, serial, workers
-from gmsnet.topology.topology import Topology, near_points, planar_points
+from gmsnet.parallel.threads import workers
+from gmsnet.topology.topology import Topology, near_points
 
 SHAPE, ASPECT = "shape", "aspect"  # with which 1/q meshes on the way are compared: the loss's or Verdict's
 
 Floats = NDArray[np.float64]
 
-NOWHERE = np.empty(0, dtype=np.float32)
 THRESHOLDS = {"min_angle": (5.0, 10.0, 20.0, 30.0), "max_angle": (120.0, 150.0, 170.0), "shape": (0.1, 0.2, 0.3, 0.5)}
-
-
-@dataclass(frozen=True)
-class Totals:
-    """Means and extremes over the triangles of a mesh; angles in degrees. The means are those of exact sums.
-
-    low, high: the smallest and the largest angles. doubts: how many triangles are not certainly of positive area;
-    inverted: those of them that are not, as far as float64 can tell.
-    """
-
-    low_mean: float
-    low_min: float
-    high_mean: float
-    high_max: float
-    shape_mean: float
-    shape_min: float
-    aspect_mean: float
-    aspect_min: float
-    inverted: int
-    uncertain: int
-
-    @classmethod
-    def of(cls, parts: Iterable[Floats], triangles: int) -> Totals:
-        """From what kernels.simplex.measures.summarise says of the parts of a mesh; so many triangles, at least one."""
-        figures = np.array(list(parts))
-        sums = figures[:, : kernels.EXTREME].sum(axis=0)  # exact: see kernels.simplex.measures.grids
-        low, high, shape, aspect = ((sums[: kernels.FINE] + sums[kernels.FINE :]) / triangles).tolist()
-        least, most = figures.min(axis=0).tolist(), figures.max(axis=0).tolist()
-        inverted, uncertain = (int(figures[:, count].sum()) for count in (kernels.INVERTED, kernels.UNCERTAIN))
-        return cls(
-            low, least[kernels.EXTREME + kernels.LOW], high, most[kernels.EXTREME + kernels.HIGH],
-            shape, least[kernels.EXTREME + kernels.SHAPE], aspect, least[kernels.EXTREME + kernels.ASPECT],
-            inverted, uncertain,
-        )  # fmt: skip
-
-    @classmethod
-    def of_columns(cls, columns: Floats) -> Totals:
-        """From the measures (4, T) of each triangle, at least one."""
-        low, high, shape, aspect = columns
-        bad = int((shape <= 0.0).sum())
-        return cls(
-            float(low.mean()), float(low.min()), float(high.mean()), float(high.max()), float(shape.mean()),
-            float(shape.min()), float(aspect.mean()), float(aspect.min()), bad, bad,
-        )  # fmt: skip
-
-    @property
-    def qhat(self) -> float:
-        """q̂ of equation 11 with 1/q as in the loss."""
-        return self._weighted(self.shape_mean, self.shape_min)
-
-    @property
-    def qhat_aspect(self) -> float:
-        """q̂ of equation 11 with 1/q_V as in the paper's tables."""
-        return self._weighted(self.aspect_mean, self.aspect_min)
-
-    def _weighted(self, mean: float, least: float) -> float:
-        """Equation 11: (1/6)[(α_mean + α_min + 120 − β_max − β_mean)/60 + (1/q)_mean + (1/q)_min], in degrees."""
-        angles = (self.low_mean + self.low_min + 120.0 - self.high_max - self.high_mean) / 60.0
-        return (angles + mean + least) / 6.0
-
-
-@dataclass(frozen=True, eq=False)
-class Triangles:
-    """The triangles of a mesh as they are when they are measured: nothing of it changes afterwards.
-
-    points: (N, dim), read-only. plane, single: as of the Mesh. corners: (T, 3). orientation: (T,) ±1.
-    """
-
-    points: Floats
-    plane: tuple[int, int] | None
-    single: bool
-    corners: NDArray[np.int32]
-    orientation: NDArray[np.int8]
-
-    @cached_property
-    def exponent(self) -> int:
-        """See ``exponent_of``."""
-        return exponent_of(self.points, self.plane, self.single)
-
-    def columns(self, rows: NDArray[np.int32] | None = None) -> Floats:
-        """Smallest and largest angle, shape and aspect of each: (4, T), or of some of them, the same bits."""
-        corners, orientation = (
-            (self.corners, self.orientation) if rows is None else (self.corners[rows], self.orientation[rows])
-        )
-        columns = np.empty((4, len(corners)))
-        if self.plane is None:
-            largest = float(np.abs(self.points).max(initial=0.0))
-            scaled = np.ldexp(self.points, -int(np.frexp(largest)[1]))
-            kernels.per_surface_cell(scaled, corners, columns)
-        else:
-            kernels.per_cell(planar_points(self), corners, orientation, columns)
-        return columns
-
-    def centres(self) -> Floats:
-        """(T, dim) the mean of the corners of each."""
-        third = self.points / 3.0  # before the sum, lest that overflow
-        a, b, c = (np.take(third, corner, axis=0) for corner in self.corners.T)
-        return np.asarray(a + b + c)
 
 
 @dataclass(frozen=True, eq=False)
 class QualityReport:
-    """Measures of the T triangles of a mesh (six-node triangles by their corners).
+    """Measures of the T triangles and quads of a mesh (six-node triangles by their corners).
 
     cell: (T,) index of each among all cells of the mesh, in file order. centre: (T, dim) where it is.
     min_angle, max_angle: (T,) degrees, of the geometric triangle. shape: (T,) 1/q = 4√3·S/(l² + m² + n²), the inverse
     of the paper's aspect ratio (equation 10). aspect: (T,) 1/q_V = 4√3·S/(l_max·(l₁ + l₂ + l₃)), the inverse of
     Verdict's aspect ratio, which the paper's tables fit. Both carry the sign of S after neighbours have been wound
-    alike; on a surface that is not planar they are unsigned. valid: (T,) int8, the exact sign of S in float64.
+    alike; on a surface that is not planar they are unsigned. Of a quad, shape is 2D/(|e₁|² + |e₂|²) of its worst
+    corner, D = e₁ × e₂, angles are those at its corners, and aspect is nan. scaled_jacobian: (T,) the least of
+    D/(|e₁||e₂|) over the corners, of a triangle times 2/√3. valid: (T,) int8, the exact sign of S in float64.
 
     ``inverted`` and q̂ are known from the beginning, and so are the totals: means and extremes, None where there are no
     triangles. The columns are made when one of them is first asked for, of the triangles as they were measured.
@@ -142,7 +42,7 @@ class QualityReport:
 
     cell: NDArray[np.int64]
     totals: Totals | None = field(repr=False)
-    triangles: Triangles = field(repr=False)
+    cells: MeasuredCells = field(repr=False)
     signs: NDArray[np.int8] | None = field(repr=False)  # None where all are certainly positive
 
     @property
@@ -168,7 +68,7 @@ class QualityReport:
     @cached_property
     def centre(self) -> Floats:
         """(T, dim) where each triangle is."""
-        return self.triangles.centres()
+        return self.cells.centres()
 
     @property
     def min_angle(self) -> Floats:
@@ -196,7 +96,12 @@ class QualityReport:
 
     @cached_property
     def _columns(self) -> Floats:
-        return self.triangles.columns()
+        return self.cells.columns()
+
+    @cached_property
+    def scaled_jacobian(self) -> Floats:
+        """(T,) of each cell's worst corner."""
+        return self.cells.scaled_jacobian()
 
     def worst(self, count: int) -> NDArray[np.int64]:
         """Rows of the ``count`` triangles of minimum shape, the worst first."""
@@ -246,53 +151,17 @@ def measure(
     ``totals_of``.
     """
     topology = topology or Topology.of(mesh)
-    triangles = Triangles(mesh.points, mesh.plane, mesh.single, topology.triangles, topology.orientation)
-    if not len(topology.triangles):
-        return QualityReport(topology.cell, None, triangles, None)
+    cells, cell = MeasuredCells.of(mesh, topology)
+    if not len(cell):
+        return QualityReport(cell, None, cells, None)
     if mesh.plane is None:
-        columns = triangles.columns()
-        report = QualityReport(
-            topology.cell, Totals.of_columns(columns), triangles, (columns[kernels.SHAPE] > 0).astype(np.int8)
-        )
+        columns = cells.columns()
+        report = QualityReport(cell, Totals.of_columns(columns), cells, (columns[kernels.SHAPE] > 0).astype(np.int8))
         report.__dict__["_columns"] = columns
         return report
     if totals is None:
         near = near_points(mesh, topology) if near is None else near
         with workers(threads, -(-len(topology.near) // LANES)) as share:
-            totals = totals_of(near, topology.near, topology.near_orientation, share, shapes)
+            totals = totals_of(near, topology.simplices, share, shapes)
     assert totals is not None
-    signs = exact_signs(planar_points(mesh), topology.triangles, topology.orientation) if totals.uncertain else None
-    return QualityReport(topology.cell, totals, triangles, signs)
-
-
-def totals_of(
-    points: Floats,
-    corners: NDArray[np.int32],
-    orientation: NDArray[np.int8],
-    share: Share = serial,
-    shapes: NDArray[np.float32] = NOWHERE,
-) -> Totals | None:
-    """Means and extremes of some triangles (T, 3) of planar points; None where there are none.
-
-    share: how blocks of LANES triangles are shared out to threads. shapes: (T,), for 1/q of each, if it is wanted.
-    """
-    grids = kernels.grids(len(corners))
-
-    def part(first: int, last: int) -> Floats:
-        figures: Floats = kernels.summarise(points, corners, orientation, first, last, *grids, shapes)
-        return figures
-
-    return Totals.of(share(part, 0, -(-len(corners) // LANES)), len(corners)) if len(corners) else None
-
-
-def exact_signs(points: Floats, triangles: NDArray[np.int32], orientation: NDArray[np.int8]) -> NDArray[np.int8]:
-    """The exact sign of orientation × area of each triangle: float64 where the error bound decides, else exact
-    arithmetic."""
-    out = np.empty(len(triangles), dtype=np.int8)
-    if predicates.signs(points, triangles, orientation, 0.0, out):
-        rows = np.flatnonzero(out == 0)
-        for t in rows[: exact(points, triangles, rows, orientation, out)].tolist():
-            (ax, ay), (bx, by), (cx, cy) = ([Fraction(v) for v in points[i].tolist()] for i in triangles[t])
-            area = (ax - cx) * (by - cy) - (ay - cy) * (bx - cx)
-            out[t] = int(orientation[t]) * ((area > 0) - (area < 0))
-    return out
+    return QualityReport(cell, totals, cells, cells.signs() if totals.uncertain else None)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.methods.below import missed
+from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.measure.report import QualityReport
 from gmsnet.topology.topology import planar_points
 
@@ -52,17 +53,18 @@ class Target:
 
     def _missed_in(self, report: QualityReport) -> tuple[NDArray[np.int32], Floats]:
         """And their 1/q."""
-        triangles = report.triangles
+        triangles = report.cells
         points = planar_points(triangles)
-        rows = missed(points, triangles.corners, triangles.orientation, *self.limits)
+        rows = missed(points, Simplices(triangles.corners, triangles.orientation), *self.limits)
         low, _, shape, _ = triangles.columns(rows)
         chosen = self.missed(shape, low)
         return rows[chosen], shape[chosen]
 
-    def clearly_missed(self, points: Floats, corners: NDArray[np.int32], orientation: NDArray[np.int8]) -> bool:
-        """Do all these triangles (T, 3) miss it, however they are measured? points: (N, 2). orientation: (T,) ±1."""
+    def clearly_missed(self, points: Floats, simplices: Simplices) -> bool:
+        """Do all these corner simplices miss it, however they are measured? points: (N, 2)."""
         quality, tangent = self.limits
-        return len(missed(points, corners, orientation, quality / SURE**2, tangent / SURE**2)) == len(corners)
+        rows = missed(points, simplices, quality / SURE**2, tangent / SURE**2)
+        return len(rows) == len(simplices.rows)
 
     def rank(self, report: QualityReport) -> tuple[int, int, float]:
         """Of two meshes that of the lesser rank is nearer: by inverted cells, cells that miss it, the worst one."""

@@ -136,9 +136,9 @@ class Auto(Smoother):
 
 def mean_shape(field: Field) -> float:
     """The mean of 1/q over some of the cells, evenly taken."""
-    triangles, orientation = field.topology.changeable
-    stride = max(1, len(triangles) // (SAMPLE * LANES))
-    return float(mean_shape_of_sample(field.points, triangles, orientation, stride))
+    simplices = field.topology.changeable
+    stride = max(1, len(simplices.rows) // (SAMPLE * LANES))
+    return float(mean_shape_of_sample(field.points, simplices, stride))
 
 
 def to_come(before: float, gained: float) -> float:

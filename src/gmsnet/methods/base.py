@@ -46,8 +46,8 @@ class Field:
         guard = plain_guard(self.precision)
         if self.level == STAR:
             floors = np.empty(len(self.points))
-            triangles, orientation = self.topology.changeable
-            star_floors(self.points, triangles, orientation, self.topology.near_ringed, guard.unit, guard.grain, floors)
+            ringed = self.topology.near_ringed
+            star_floors(self.points, self.topology.changeable, ringed, guard.unit, guard.grain, floors)
             return StarGuard(*guard, floors)
         return guard
 

@@ -48,25 +48,25 @@ class Below(Smoother):
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """See Smoother. The visits depend on each other, so that they are made on one thread."""
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
-        triangles, orientation = topology.changeable
+        simplices = topology.changeable
         self.converged = True
-        rows: NDArray[np.int32] = kernels.missed(field.points, triangles, orientation, *self.limits)
+        rows: NDArray[np.int32] = kernels.missed(field.points, simplices, *self.limits)
         self.target_reached = not len(rows)
-        if self.target_reached or len(rows) > max(MANY * len(triangles), SMALL):
+        if self.target_reached or len(rows) > max(MANY * len(simplices.rows), SMALL):
             return tally
         shape = np.empty(len(rows))
-        ranking.shapes_of(field.points, triangles, orientation, rows, shape)
+        ranking.shapes_of(field.points, simplices, rows, shape)
         if not self.limits[1]:  # of angles other cells can be the worst
             field.floor.watch(rows, shape)
-        start, ring, free = topology.near_start, topology.near_ring, topology.near_free
+        free = topology.near_free
         if self.everywhere:
             places = np.flatnonzero(free).astype(np.int32)
             nodes = places[np.argsort(topology.memory[places])]
         else:
             seen = np.zeros(len(free), dtype=np.bool_)
-            nodes = ranking.free_nodes(triangles, rows, shape, np.inf, free, topology.memory, seen)
+            nodes = ranking.free_nodes(simplices.rows, rows, shape, np.inf, free, topology.memory, seen)
         left = kernels.rounds(
-            field.points, nodes, start, ring, free, topology.memory, field.guard(share), self.plan,
+            field.points, nodes, topology.links, free, topology.memory, field.guard(share), self.plan,
             MOST * len(topology.free), self.least, self.limits, self.everywhere, tally,
         )  # fmt: skip
         self.target_reached = not len(left)

@@ -61,15 +61,17 @@ class WorstFirst(Smoother):
     def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
         """See Smoother. The visits depend on each other, so that they are made on one thread."""
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
-        triangles, orientation = topology.changeable
+        simplices = topology.changeable
         if self.cells is None or self.next >= len(self.cycles):
             self.cells = candidates(field, share)
         late = self.next >= len(self.cycles)
         chosen = LAST if late else self.cycles[self.next : self.next + self.at_once]
-        plan = [(max(FEWEST, math.ceil(cycle.share * len(triangles))), cycle.power, cycle.sweeps) for cycle in chosen]
+        plan = [
+            (max(FEWEST, math.ceil(cycle.share * len(simplices.rows))), cycle.power, cycle.sweeps) for cycle in chosen
+        ]
         before, after = kernels.cycles(
-            field.points, triangles, orientation, self.cells, topology.near_free, topology.memory, topology.near_start,
-            topology.near_ring, field.guard(share), np.array(plan), tally,
+            field.points, simplices, self.cells, topology.near_free, topology.memory, topology.links,
+            field.guard(share), np.array(plan), tally,
         )  # fmt: skip
         self.next += len(chosen)
         self.converged = late and after < before + GAIN
@@ -81,14 +83,14 @@ def candidates(field: Field, share: Share) -> NDArray[np.int32]:
 
     The floor of the guard is told of the worst of these.
     """
-    triangles, orientation = field.topology.changeable
-    shape = np.empty(len(triangles), dtype=np.float32)
+    simplices = field.topology.changeable
+    shape = np.empty(len(simplices.rows), dtype=np.float32)
 
     def look(first: int, last: int) -> None:
-        ranking.shapes(field.points, triangles, orientation, first, last, shape)
+        ranking.shapes(field.points, simplices, first, last, shape)
 
-    share(look, 0, -(-len(triangles) // LANES))
-    wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * len(triangles)))
+    share(look, 0, -(-len(shape) // LANES))
+    wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * len(shape)))
     cells: NDArray[np.int32] = ranking.worst(shape, wanted)
     field.floor.watch(cells, shape[cells])
     return cells

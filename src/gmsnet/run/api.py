@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology.connectivity import CHOSEN
-from gmsnet.measure.report import QualityReport, Totals, measure
+from gmsnet.measure.report import QualityReport, measure
 from gmsnet.measure.target import Target
+from gmsnet.measure.totals import Totals
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.cell_block import CORNERS
 from gmsnet.mesh.mesh import Mesh, unmeasured

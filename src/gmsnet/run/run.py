@@ -14,7 +14,8 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import LEVELS, Precision
 from gmsnet.kernels.topology.write_back import put_back
-from gmsnet.measure.report import ASPECT, QualityReport, Totals, measure, totals_of
+from gmsnet.measure.report import ASPECT, QualityReport, measure
+from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, Smoother, Tally
 from gmsnet.parallel.threads import Share, serial, workers
@@ -116,7 +117,7 @@ class Run:
 
     def _score(self, share: Share = serial) -> Score:
         """The sums over all triangles of the coordinates as they are."""
-        totals = totals_of(self.field.points, self.topology.near, self.topology.near_orientation, share)
+        totals = totals_of(self.field.points, self.topology.scored, share)
         return Score.of(totals, self.best_by, self.missing(self.field.points) if self.missing else NONE)
 
     def _stalled(self) -> bool:
@@ -130,8 +131,8 @@ class Run:
         fewest = min(s.inverted for s in earlier)
         if min(s.inverted for s in recent) < fewest:
             return False
-        best = max(s.qhat for s in earlier if s.inverted == fewest)
-        return max((s.qhat for s in recent if s.inverted == fewest), default=-math.inf) < best + LEAST_GAIN
+        best = max(merit(s) for s in earlier if s.inverted == fewest)
+        return max((merit(s) for s in recent if s.inverted == fewest), default=-math.inf) < best + LEAST_GAIN
 
 
 def precision_of(mesh: Mesh) -> Precision:
@@ -155,7 +156,8 @@ def outcome(
     count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)
     if count:
         points.flags.writeable = False  # so that the mesh need not copy them
-        known = (best, threads, totals) if exact else (None, threads)
+        whole = totals if topology.scored is topology.simplices else None
+        known = (best, threads, whole) if exact else (None, threads)
         after = measure(mesh.with_points(points), topology, *known)
         if rank(after) <= rank(before):
             return points, moved, after
@@ -173,5 +175,19 @@ def _factors(exponent: int) -> tuple[float, float]:
 
 
 def rank_by(best_by: str) -> Callable[[QualityReport], Any]:
-    """Fewer inverted cells first, then the larger q̂."""
-    return lambda report: (report.inverted, -(report.qhat_aspect if best_by == ASPECT else report.qhat))
+    """Fewer inverted cells first, then the larger q̂, or the larger least and then mean 1/q if not all are triangles."""
+
+    def rank(report: QualityReport) -> tuple[float, ...]:
+        totals = report.totals
+        if totals is None:
+            return (report.inverted,)
+        if math.isnan(totals.qhat):
+            return report.inverted, -totals.shape_min, -totals.shape_mean
+        return report.inverted, -(totals.qhat_aspect if best_by == ASPECT else totals.qhat)
+
+    return rank
+
+
+def merit(sweep: Sweep) -> float:
+    """What must rise for a run to go on: q̂, or the least and the mean 1/q together if not all cells are triangles."""
+    return sweep.min_shape + sweep.mean_shape if math.isnan(sweep.qhat) else sweep.qhat

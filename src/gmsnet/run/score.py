@@ -10,7 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.measure.report import ASPECT, Totals
+from gmsnet.measure.report import ASPECT
+from gmsnet.measure.totals import Totals
 
 ROUNDING = 1e-12  # a smaller gain in q̂ is no gain
 NONE = np.empty((0, 3), dtype=np.int32)
@@ -73,9 +74,16 @@ class Score:
         return self.min_shape > other.min_shape
 
     def better_than(self, other: Score) -> bool:
-        """Fewer inverted cells first, then fewer that miss the target, then a larger q̂, by more than rounding."""
+        """Fewer inverted cells first, then fewer that miss the target, then a larger q̂, by more than rounding.
+
+        Where not all cells are triangles: then the larger minimum 1/q of the cells with a free node, then their mean.
+        """
         if self.counts != other.counts:
             return self.counts < other.counts
+        if math.isnan(self.qhat):
+            if abs(self.min_shape - other.min_shape) > ROUNDING:
+                return self.min_shape > other.min_shape
+            return self.mean_shape > other.mean_shape + ROUNDING
         return self.qhat > other.qhat + ROUNDING
 
     @property

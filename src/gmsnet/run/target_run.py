@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.methods.below import missed
 from gmsnet.kernels.topology.patch import around
-from gmsnet.measure.report import QualityReport, totals_of
+from gmsnet.measure.report import QualityReport
 from gmsnet.measure.target import Target
+from gmsnet.measure.totals import totals_of
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.methods.auto import for_target
@@ -49,7 +50,7 @@ def reach_target(
     history: list[Sweep] = []
     rows = rows_missing(points, topology, target, shapes)
     corners = topology.near.take(rows, axis=0)
-    clear = report is None or target.clearly_missed(points, corners, topology.near_orientation.take(rows))
+    clear = report is None or target.clearly_missed(points, topology.simplices.take(rows))
     if report is not None and not clear:
         corners = topology.places[topology.triangles[target.missed_in(report)]]
     if not len(corners):
@@ -70,7 +71,7 @@ def reach_target(
             share = len(corners) / len(patch.near)
             smoother = create() if create else for_target(target, share, rings=rings)
             missing = partial(corners_missing, topology=patch, target=target)
-            measure = partial(totals_of, points, patch.near, patch.near_orientation)
+            measure = partial(totals_of, points, patch.scored)
             before = Score(measure, best_by, corners if clear else missing(points), positive)
             run = Run(
                 mesh, patch, smoother, threads, best_by, guard, points, history, precision, before, missing
@@ -103,13 +104,13 @@ def rows_missing(
     points: Floats, topology: Topology, target: Target, shapes: NDArray[np.float32] | None = None
 ) -> NDArray[np.integer[Any]]:
     """The cells in ``near`` that miss the target, or are not clear of it. shapes: their 1/q, where it is known."""
-    near, orientation = topology.near, topology.near_orientation
+    simplices = topology.simplices
     rows: NDArray[np.integer[Any]]
     if shapes is None:
-        rows = missed(points, near, orientation, *target.limits)
+        rows = missed(points, simplices, *target.limits)
     else:
         some = np.flatnonzero(~(shapes > target.max_shape * SINGLE))
-        rows = some[missed(points, near.take(some, axis=0), orientation.take(some), *target.limits)]
+        rows = some[missed(points, simplices.take(some), *target.limits)]
     return rows
 
 

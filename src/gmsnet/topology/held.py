@@ -10,7 +10,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.fans import Marks
 from gmsnet.topology.polygons import Ints
 
-SMOOTHED = ("triangle",)  # the cell types whose nodes may move
+SMOOTHED = ("triangle", "quad")  # the cell types whose nodes may move
 MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would no longer fit any cache
 
 REASONS = {  # mark → text, in the order in which they count

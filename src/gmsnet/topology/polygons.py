@@ -68,12 +68,14 @@ class Faces:
         region = self.region.take(origin) if len(self.region) else self.region
         return NearFaces(first, corner, region, self.cell, origin, begin[:-1])
 
-    def triangles(self) -> tuple[Ints | slice, Ints]:
-        """The faces with three corners: which, and their corners (T, 3)."""
-        if self.first is None:
+    def with_corners(self, count: int) -> tuple[Ints | slice, Ints]:
+        """The faces with so many corners: which, and their corners (F, count)."""
+        if self.first is None and count == 3:
             return slice(None), self.corner.reshape(-1, 3)
-        three = np.flatnonzero(np.diff(self.first) == 3).astype(np.int32)
-        return three, self.corner[self.first[three][:, None] + np.arange(3)]
+        if self.first is None:
+            return np.empty(0, dtype=np.int32), np.empty((0, count), dtype=np.int32)
+        chosen = np.flatnonzero(np.diff(self.first) == count).astype(np.int32)
+        return chosen, self.corner[self.first[chosen][:, None] + np.arange(count)]
 
     @property
     def face(self) -> Ints | None:

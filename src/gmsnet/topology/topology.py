@@ -7,7 +7,7 @@ looks at some of the cells, or adds over all of them, takes them in that order.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Protocol
 
@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.simplex.mean_ratio2 import Simplices
+from gmsnet.kernels.star import pattern as kernels_stars
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.topology import connectivity, layout, patch
 from gmsnet.mesh.mesh import Mesh
@@ -23,6 +25,7 @@ from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
 from gmsnet.topology.fans import closed_fans
 from gmsnet.topology.held import MOST_NEIGHBOURS, known_marks, sorted_out
+from gmsnet.topology.links import Links
 from gmsnet.topology.polygons import Faces, Offsets, check_size
 from gmsnet.topology.stars import Colouring, Flags, Ints, Stars
 
@@ -57,6 +60,13 @@ class Topology:
     near_ring: Ints
     near_free: Flags
     colouring: Colouring
+    near_shapes: NDArray[np.uint8] | None = None
+    near_cells: Ints | None = None
+    near_pattern: Ints | None = None
+    patterns: kernels_stars.Patterns | None = None
+    quads: Ints = field(default_factory=lambda: np.empty((0, 4), dtype=np.int32))
+    quad_cell: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    quad_orientation: NDArray[np.int8] = field(default_factory=lambda: np.empty(0, dtype=np.int8))
 
     @classmethod
     def of(cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1) -> Topology:
@@ -82,8 +92,8 @@ class Topology:
         points = None if mesh.plane is None else planar
         near_orientation, start, ring = closed_fans(faces, points, marks, memory, MOST_NEIGHBOURS)
         held, free, places = sorted_out(marks, position)
-        three, triangles = written.triangles()
-        whole, near = faces.triangles()
+        three, triangles = written.with_corners(3)
+        whole, near = faces.with_corners(3)
         orientation = near_orientation
         if (orientation != orientation[:1]).any():
             orientation = np.empty_like(near_orientation)
@@ -103,7 +113,27 @@ class Topology:
             near_free=marks == 0,
             colouring=Colouring(places, start, ring),
         )
+        if any(block.kind == "quad" and len(block.nodes) for block in mesh.cells):
+            topology = topology.linked(Links.of(faces, near_orientation, start, topology.near_ring))
+            four, quads = written.with_corners(4)
+            topology = replace(topology, quads=quads, quad_cell=written.cell[four], quad_orientation=orientation[four])
         return topology, planar
+
+    def linked(self, links: Links) -> Topology:
+        """The same, its stars and cells given by links instead of fans."""
+        stars, simplices = links
+        return replace(
+            self,
+            near=simplices.rows,
+            near_orientation=simplices.orientation,
+            near_shapes=simplices.shapes,
+            near_cells=simplices.cells,
+            near_start=stars.start,
+            near_ring=stars.around[: stars.start[-1]],
+            near_pattern=stars.pattern,
+            patterns=stars.patterns,
+            colouring=Colouring(self.colouring.places, stars.start, stars.around),
+        )
 
     def holding(self, chosen: Flags, reason: str) -> Topology:
         """The same, with the free nodes among the chosen (N,) by id held for this reason."""
@@ -120,34 +150,47 @@ class Topology:
         For a while: ``held`` does not tell of the others.
         """
         nodes = np.flatnonzero(active)
-        near = patch.triangles_around(nodes, active, self.near_start, self.near_ring)
-        orientation = np.ones(len(near), dtype=np.int8)
+        if self.patterns is None:
+            near = patch.triangles_around(nodes, active, self.near_start, self.near_ring)
+            around = Simplices(near, np.ones(len(near), dtype=np.int8))
+        else:
+            around = self.simplices.take(connectivity.touching(self.near, active))
         inner = replace(
-            self, near=near, near_orientation=orientation, free=np.sort(self.memory[nodes]), near_free=active
-        )
-        inner.__dict__["changeable"] = near, orientation  # all of them
+            self, near=around.rows, near_orientation=around.orientation, near_shapes=around.shapes,
+            near_cells=around.cells, free=np.sort(self.memory[nodes]), near_free=active,
+        )  # fmt: skip
+        inner.__dict__["changeable"] = inner.simplices  # all of them
         return inner
 
     @cached_property
     def stars(self) -> Stars:
         """The patches in the order in which they are smoothed."""
         free = np.flatnonzero(self.near_free).astype(np.int32)
-        degrees = np.diff(self.near_start).take(free)
-        most, colours = int(degrees.max(initial=0)), int(self.near_colours.max(initial=-1)) + 1
-        kind = self.near_colours.take(free) * (most + 1) + degrees
-        number = -(-np.bincount(kind, minlength=colours * (most + 1)).reshape(colours, most + 1) // LANES)
+        numbers = self.near_pattern
+        if self.patterns is None or numbers is None:
+            kind = np.diff(self.near_start).take(free)
+            most = int(kind.max(initial=0))
+            sizes, pattern = np.arange(most + 1), None
+        else:
+            kind, pattern = numbers.take(free), self.patterns
+            sizes = np.diff(pattern.row)
+            most = int(max(sizes.max(initial=0), np.diff(pattern.first).max(initial=0)))
+        colours, kinds = int(self.near_colours.max(initial=-1)) + 1, len(sizes)
+        kind = self.near_colours.take(free) * kinds + kind
+        number = -(-np.bincount(kind, minlength=colours * kinds).reshape(colours, kinds) // LANES)
         first, to = np.zeros((2, colours + 1), dtype=np.int64)
         np.cumsum(number.sum(axis=1), out=first[1:])
-        np.cumsum(LANES * (number @ np.arange(most + 1)), out=to[1:])
+        np.cumsum(LANES * (number @ sizes), out=to[1:])
         blocks = int(first[-1])
         centre, rings = np.empty(blocks * LANES, dtype=np.int32), np.empty(to[-1], dtype=np.int32)
         offset, degree = np.empty(blocks, dtype=np.int64), np.empty(blocks, dtype=np.int32)
         filled = np.zeros(blocks, dtype=np.int32)
         layout.fill_blocks(
-            free, self.near_start, self.near_ring, kind, most + 1, first[:-1].copy(), to[:-1], centre, rings,
-            offset, degree, filled,
+            free, self.near_start, self.near_ring, kind, sizes, first[:-1].copy(), to[:-1], centre, rings, offset,
+            degree, filled,
         )  # fmt: skip
-        return Stars(Blocks(centre, rings, offset, degree, filled, most), first.astype(np.int32))
+        of_block = None if pattern is None or numbers is None else numbers[centre[::LANES]]
+        return Stars(Blocks(centre, rings, offset, degree, filled, most, of_block, pattern), first.astype(np.int32))
 
     @cached_property
     def patches(self) -> tuple[Offsets, Ints]:
@@ -188,15 +231,37 @@ class Topology:
         degree = np.diff(self.near_start)
         start = np.zeros_like(self.near_start)
         np.cumsum(np.where(free, degree, 0), out=start[1:])
-        return replace(self, near_start=start, near_ring=self.near_ring[np.repeat(free, degree)])
+        pattern = None if self.near_pattern is None else np.where(free, self.near_pattern, 0)  # 0: of no cells
+        return replace(self, near_start=start, near_ring=self.near_ring[np.repeat(free, degree)], near_pattern=pattern)
 
     @cached_property
-    def changeable(self) -> tuple[Ints, NDArray[np.int8]]:
-        """The rows of near and near_orientation that have a free node."""
+    def simplices(self) -> Simplices:
+        """The corner simplices of all cells whose nodes may move, in memory order."""
+        return Simplices(self.near, self.near_orientation, self.near_shapes, self.near_cells)
+
+    @cached_property
+    def scored(self) -> Simplices:
+        """Those by which meshes on the way are compared: all triangles, or, if not all cells are triangles, the corner
+        simplices of the cells with a free node."""
+        if self.near_cells is None:
+            return self.simplices
+        rows = connectivity.touching(self.near, self.near_free)
+        cells = np.zeros(int(self.near_cells.max(initial=-1)) + 1, dtype=bool)
+        cells[self.near_cells[rows]] = True
+        return self.simplices.take(np.flatnonzero(cells[self.near_cells]))
+
+    @cached_property
+    def changeable(self) -> Simplices:
+        """Those that have a free node."""
         rows = connectivity.touching(self.near, self.near_free)
         if len(rows) == len(self.near):
-            return self.near, self.near_orientation
-        return self.near.take(rows, axis=0), self.near_orientation.take(rows)
+            return self.simplices
+        return self.simplices.take(rows)
+
+    @cached_property
+    def links(self) -> kernels_stars.Stars:
+        """The stars of all nodes by places in memory, in CSR form."""
+        return kernels_stars.Stars(self.near_start, self.near_ring, self.near_pattern, self.patterns)
 
     @cached_property
     def colours(self) -> Ints:

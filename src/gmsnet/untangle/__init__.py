@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gmsnet.kernels.star.guard import Precision
-from gmsnet.measure.report import exact_signs
+from gmsnet.measure.signs import exact_signs
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.escalation import escalate
 from gmsnet.untangle.guarded import what_is_left

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.spatial
 from numpy.typing import NDArray
 
-from gmsnet.measure.report import exact_signs
+from gmsnet.measure.signs import exact_signs
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.patch import Floats, Ints
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.simplex.measures import TWO_SQRT3
+from gmsnet.kernels.simplex.mean_ratio2 import TWO_SQRT3
 from gmsnet.kernels.untangle import barrier
 from gmsnet.kernels.untangle import untangling as kernels
 from gmsnet.untangle.patch import Flags, Floats, Patch, free_nodes_of, in_order

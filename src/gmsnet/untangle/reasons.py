@@ -6,7 +6,7 @@ import numpy as np
 import scipy.optimize
 import scipy.sparse
 
-from gmsnet.measure.report import exact_signs
+from gmsnet.measure.signs import exact_signs
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.crossings import held_edges, near_crossings
 from gmsnet.untangle.patch import Flags, Floats, free_nodes_of

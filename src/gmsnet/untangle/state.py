@@ -8,7 +8,7 @@ import numpy as np
 
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.kernels.untangle import untangling as kernels
-from gmsnet.measure.report import exact_signs
+from gmsnet.measure.signs import exact_signs
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.patch import Flags, Floats, Ints, Patch, free_nodes_of, in_order
 
@@ -34,7 +34,7 @@ class UntanglingState:
     @cached_property
     def worst(self) -> float:
         """An upper bound of the minimum D/L at first of the cells that can change, 0 if none of them was inverted."""
-        triangles, orientation = self.topology.changeable
+        triangles, orientation, *_ = self.topology.changeable
         precision = self.precision
         return min(
             float(kernels.least_ratio(self.before, triangles, orientation, precision.unit, precision.grain)), 0.0

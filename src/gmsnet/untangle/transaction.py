@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.simplex.measures import TWO_SQRT3
+from gmsnet.kernels.simplex.mean_ratio2 import TWO_SQRT3
 from gmsnet.kernels.untangle import untangling as kernels
 from gmsnet.untangle.newton import keep_gains
 from gmsnet.untangle.patch import Flags, free_nodes_of, in_order

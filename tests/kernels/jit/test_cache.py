@@ -50,7 +50,7 @@ def test_a_cache_is_stale_once_what_a_function_calls_has_changed(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "GMSNET_CACHE": "", "NUMBA_CACHE_DIR": ""}
     code = (
         "import numpy as np; from gmsnet.kernels.star.guard import permitted;"
-        "triangle = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0]); print(permitted(triangle, triangle, 0.0, -np.inf))"
+        "triangle = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0]); print(permitted(triangle, triangle, 0.0, -np.inf, None))"
     )
 
     def call():

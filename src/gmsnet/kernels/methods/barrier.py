@@ -24,10 +24,12 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.methods.barrier_star import FAR, MOST, descend
+from gmsnet.kernels.simplex.mean_ratio2 import half_lengths, pull, roundness
 from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.block import MARGIN, PAIRS, REACH, SIZE, ask_ahead, gather, ring_row
 from gmsnet.kernels.star.certificate import COARSE, NARROWEST, WIDER, error_bound
 from gmsnet.kernels.star.guard import WITH_FLOORS
+from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at, weights_of
 
 SMALL = 1e-5  # of F: a fall that float32 may not see; the step is then so short that it is Newton's to rounding
 
@@ -74,19 +76,20 @@ def relate(star, n, guard, work, flat, local, sums):
 
 
 @part
-def derive(local, n, power, sums):
+def derive(local, n, pattern, power, sums):
     """F with its two derivatives, and the minimum D."""
     real = sums.dtype.type
     two, four = real(power.two), real(power.four)
     sums[: LEAST * LANES] = 0.0
     sums[LEAST * LANES : (LEAST + 1) * LANES] = np.inf
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        weights = weights_of(pattern, k, real)
         r = local[2 * i * LANES : 2 * (i + 1) * LANES]
         s = local[2 * j * LANES : 2 * (j + 1) * LANES]
         if power.one > 0.0:
             for lane in range(LANES):
-                q, d, u, wx, wy, gx, gy = triangle(lane, r, s)
+                q, d, u, wx, wy, gx, gy = simplex(lane, r, s, weights)
                 tx, ty = u * wx, u * wy
                 sums[VALUE * LANES + lane] += q
                 sums[GX * LANES + lane] += gx
@@ -94,12 +97,12 @@ def derive(local, n, power, sums):
                 sums[XX * LANES + lane] += gx * tx
                 sums[XY * LANES + lane] += gx * ty + tx * gy
                 sums[YY * LANES + lane] += gy * ty
-                sums[ROUND * LANES + lane] += u
+                sums[ROUND * LANES + lane] += roundness(u, weights)
                 sums[LEAST * LANES + lane] = min(sums[LEAST * LANES + lane], d)
         else:
             c2, c4, e2, e4 = real(2.0) * two, real(4.0) * four, two, real(6.0) * four
             for lane in range(LANES):
-                q, d, u, wx, wy, gx, gy = triangle(lane, r, s)
+                q, d, u, wx, wy, gx, gy = simplex(lane, r, s, weights)
                 square = q * q
                 c, e = q * (c2 + c4 * square), e2 + e4 * square
                 u *= c
@@ -110,19 +113,20 @@ def derive(local, n, power, sums):
                 sums[XX * LANES + lane] += e * (gx * gx) + gx * tx
                 sums[XY * LANES + lane] += (e + e) * (gx * gy) + (gx * ty + tx * gy)
                 sums[YY * LANES + lane] += e * (gy * gy) + gy * ty
-                sums[ROUND * LANES + lane] += u
+                sums[ROUND * LANES + lane] += roundness(u, weights)
                 sums[LEAST * LANES + lane] = min(sums[LEAST * LANES + lane], d)
 
 
 @inlined
-def triangle(lane, r, s):
-    """Q, D, 1/D, w and G of one lane's triangle with the spokes in r and s."""
+def simplex(lane, r, s, weights):
+    """Q, D, 1/D, w and G of one lane's simplex with the spokes in r and s."""
     ax, ay, bx, by = r[lane], r[LANES + lane], s[lane], s[LANES + lane]
     wx, wy = ay - by, bx - ax
     d = ax * by - ay * bx
     inverse = r.dtype.type(1.0) / d
-    q = ((bx * bx + by * by) + (ay * wx - ax * wy)) * inverse
-    return q, d, inverse, wx, wy, ((ax + bx) + q * wx) * inverse, ((ay + by) + q * wy) * inverse
+    q = half_lengths(ax, ay, bx, by, weights) * inverse
+    gx, gy = pull(ax, bx, weights) + q * wx, pull(ay, by, weights) + q * wy
+    return q, d, inverse, wx, wy, gx * inverse, gy * inverse
 
 
 @part
@@ -147,22 +151,23 @@ def propose(sums, relaxation, ratio, step):
 
 
 @part
-def judge(local, n, power, step, floor, sums):
+def judge(local, n, pattern, power, step, floor, sums):
     """F, the minimum D and the minimum margin D − floor·L after the step: rows AFTER, LEAST_AFTER and SURPLUS."""
     real = sums.dtype.type
     two, four, unity, simple = real(power.two), real(power.four), real(1.0), power.one > 0.0
     twice = real(2.0 * WIDER * floor)
     sums[AFTER * LANES : LEAST_AFTER * LANES] = 0.0
     sums[LEAST_AFTER * LANES : FALL * LANES] = np.inf
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        weights = weights_of(pattern, k, real)
         r = local[2 * i * LANES : 2 * (i + 1) * LANES]
         s = local[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
             ax, ay = r[lane] - step[lane], r[LANES + lane] - step[LANES + lane]
             bx, by = s[lane] - step[lane], s[LANES + lane] - step[LANES + lane]
             d = ax * by - ay * bx
-            half = (bx * bx + by * by) + (ay * (ay - by) - ax * (bx - ax))
+            half = half_lengths(ax, ay, bx, by, weights)
             margin = d - twice * half
             q = half * (unity / d)
             value = q if simple else q * q * (two + four * (q * q))
@@ -201,11 +206,11 @@ def settle(sums, most, step, mean, mean_sums, with_mean):
 
 
 @part
-def refine(star, n, count, work, power, sums, shift):
+def refine(star, n, pattern, count, work, power, sums, shift):
     """The shifts of the lanes that are to be done over, as ``descend`` finds them."""
     for lane in range(count):
         if sums[REDO * LANES + lane] > 0.0:
-            dx, dy = descend(star, n, lane, power)
+            dx, dy = descend(star, n, pattern, lane, power)
             shift[lane] = dx / work[SIZE * LANES + lane]
             shift[LANES + lane] = dy / work[SIZE * LANES + lane]
 
@@ -229,14 +234,19 @@ def certify(sums, step, unit, work):
 
 
 @part
-def average(local, n, stretch, mean):
-    """So many times the mean of the ring, as a step."""
+def average(local, n, pattern, stretch, mean):
+    """So many times the mean of the neighbours, as a step."""
     mean[:] = 0.0
     for j in range(n):
         p = local[2 * j * LANES : 2 * (j + 1) * LANES]
-        for k in range(2 * LANES):
-            mean[k] += p[k]
-    factor = mean.dtype.type(stretch / n)
+        if pattern is not None:
+            weight = mean.dtype.type(neighbour_weight(pattern, j))
+            for k in range(2 * LANES):
+                mean[k] += weight * p[k]
+        else:
+            for k in range(2 * LANES):
+                mean[k] += p[k]
+    factor = mean.dtype.type(stretch / neighbours(pattern, n))
     for k in range(2 * LANES):
         mean[k] *= factor
 
@@ -255,21 +265,22 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
     floor, most = max(guard.floor, 0.0), FLAT * (power.one + FLAT * (power.two + power.four * (FLAT * FLAT)))
     for block in range(first, last):
         n, count = blocks.degree[block], blocks.filled[block]
+        pattern = pattern_at(blocks.patterns, blocks.pattern, block)
         gather(points, blocks, block, n, star)
         ask_ahead(points, blocks, block + 1)
         relate(star, n, guard, work, workspace.sums, local, sums)
-        derive(local, n, power, sums)
+        derive(local, n, pattern, power, sums)
         propose(sums, relaxation, power.ratio, step)
-        judge(local, n, power, step, floor, sums)
+        judge(local, n, pattern, power, step, floor, sums)
         if stretch > 0.0:
-            average(local, n, stretch, mean)
-            judge(local, n, power, mean, floor, mean_sums)
+            average(local, n, pattern, stretch, mean)
+            judge(local, n, pattern, power, mean, floor, mean_sums)
         settle(sums, most * n, step, mean, mean_sums, stretch > 0.0)
         for k in range(2 * LANES):
             shift[k] = step[k]
         uncertified = certify(sums, step, guard.unit, work)
         if uncertified:
-            refine(star, n, count, work, power, sums, shift)
+            refine(star, n, pattern, count, work, power, sums, shift)
         if len(guard) == WITH_FLOORS:
             stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
             continue

@@ -45,7 +45,7 @@ def centroids(local, n, row, shift):
 
     Σ|T|(a + b)/3 / Σ|T| is two thirds of the mean weighted by areas.
     """
-    area_mean(local, n, row, shift)
+    area_mean(local, n, None, row, shift)
     for k in range(2 * LANES):
         shift[k] *= 2.0 / 3.0
 

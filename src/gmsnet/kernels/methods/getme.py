@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import kernel, part
 from gmsnet.kernels.methods.heap import build, update
-from gmsnet.kernels.simplex.measures import TINY, TWO_SQRT3
+from gmsnet.kernels.simplex.mean_ratio2 import TINY, TWO_SQRT3
 from gmsnet.kernels.star.block import DROPPED, MOVED
 from gmsnet.kernels.star.guard import WITH_FLOORS, permitted
 
@@ -248,7 +248,7 @@ def allowed(points, corners, f, e, old, guard, workspace):
                 was[2 * k], was[2 * k + 1] = old[2 * m], old[2 * m + 1]
         for m in range(2 * k, 2 * k + 2):
             reach = max(reach, max(abs(x[m]), abs(was[m])))
-    return permitted(was, x, guard.unit * reach + guard.grain, floor)
+    return permitted(was, x, guard.unit * reach + guard.grain, floor, None)
 
 
 @part

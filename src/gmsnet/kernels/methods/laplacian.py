@@ -2,6 +2,9 @@
 
     shift = Σ w_j p_j / Σ w_j,    w_j = 1,  1/|p_j|,  or the areas of the two triangles at the edge p_j.
 
+In other cells than triangles the ring is that of the nodes that an edge joins to the free one; areas are those of all
+corner simplices of the star, each with its two nodes.
+
 The smart form takes the mean only where the sum of q over the star falls by it and no triangle is inverted by it. It is
 certified by what it has been judged with. The plain form stands in kernels.methods.laplacian_plain.
 """
@@ -10,11 +13,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import LANES, kernel, part
+from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.block import MARGIN, REACH, SIZE, ask_ahead
 from gmsnet.kernels.star.certificate import COARSE, WIDER, error_bound
 from gmsnet.kernels.star.guard import WITH_FLOORS
+from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at, weights_of
 
 SMART, INVERSE_LENGTH, AREA = range(3)
 TINY = 1e-300  # stands in for a product of areas that is not positive: the star is judged by its signs then
@@ -24,29 +28,37 @@ ROWS = 5
 
 
 @part
-def mean(local, n, shift):
+def mean(local, n, pattern, shift):
     """w_j = 1."""
     for k in range(2 * LANES):
         shift[k] = 0.0
     for j in range(n):
         p = local[2 * j * LANES : 2 * (j + 1) * LANES]
-        for k in range(2 * LANES):
-            shift[k] += p[k]
-    factor = 1.0 / n
+        if pattern is not None:
+            weight = neighbour_weight(pattern, j)
+            for k in range(2 * LANES):
+                shift[k] += weight * p[k]
+        else:
+            for k in range(2 * LANES):
+                shift[k] += p[k]
+    factor = 1.0 / neighbours(pattern, n)
     for k in range(2 * LANES):
         shift[k] *= factor
 
 
 @part
-def inverse_length_mean(local, n, row, shift):
+def inverse_length_mean(local, n, pattern, row, shift):
     """w_j = 1/|p_j|; not a number, so no move, where a neighbour lies on the centre. row: the sum of weights."""
     for lane in range(LANES):
         row[lane] = shift[lane] = shift[LANES + lane] = 0.0
     for j in range(n):
         p = local[2 * j * LANES : 2 * (j + 1) * LANES]
+        share = neighbour_weight(pattern, j)
+        if share == 0.0:
+            continue
         for lane in range(LANES):
             u, v = p[lane], p[LANES + lane]
-            weight = 1.0 / np.sqrt(u * u + v * v)
+            weight = share / np.sqrt(u * u + v * v)
             row[lane] += weight
             shift[lane] += weight * u
             shift[LANES + lane] += weight * v
@@ -56,15 +68,15 @@ def inverse_length_mean(local, n, row, shift):
 
 
 @part
-def area_mean(local, n, row, shift):
+def area_mean(local, n, pattern, row, shift):
     """w_j = |T_j−1| + |T_j|, so Σ w_j p_j = Σ |T_j|(p_j + p_j+1) and Σ w_j = 2 Σ |T_j|; row: the latter.
 
     Not a number, so no move, where no triangle has an area.
     """
     for lane in range(LANES):
         row[lane] = shift[lane] = shift[LANES + lane] = 0.0
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
         p = local[2 * i * LANES : 2 * (i + 1) * LANES]
         q = local[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
@@ -78,8 +90,16 @@ def area_mean(local, n, row, shift):
         shift[LANES + lane] /= 2.0 * row[lane]
 
 
+@inlined
+def with_opposite(px, py, qx, qy, opposite, weights):
+    """L of the simplex (0, p, q), given the square of its third edge."""
+    if weights is None:
+        return px * px + py * py + qx * qx + qy * qy + opposite
+    return weights.a * (px * px + py * py) + weights.b * (qx * qx + qy * qy) + weights.opposite * opposite
+
+
 @part
-def judge(local, n, shift, floor, row):
+def judge(local, n, pattern, shift, floor, row):
     """What the shift does to the star, into the rows of LANES
 
     GAIN: by how much Σ q falls, if all triangles are positive before and after (times 2√3). SOUND: positive if each
@@ -89,19 +109,20 @@ def judge(local, n, shift, floor, row):
     for lane in range(LANES):
         row[GAIN * LANES + lane] = 0.0
     row[SOUND * LANES : ROWS * LANES] = np.inf
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        weights = weights_of(pattern, k, np.float64)
         p = local[2 * i * LANES : 2 * (i + 1) * LANES]
         q = local[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
             px, py, qx, qy = p[lane], p[LANES + lane], q[lane], q[LANES + lane]
-            rim = (px - qx) * (px - qx) + (py - qy) * (py - qy)
+            opposite = (px - qx) * (px - qx) + (py - qy) * (py - qy)
             before = px * qy - py * qx
-            lengths_before = px * px + py * py + qx * qx + qy * qy + rim
+            lengths_before = with_opposite(px, py, qx, qy, opposite, weights)
             px, py = px - shift[lane], py - shift[LANES + lane]
             qx, qy = qx - shift[lane], qy - shift[LANES + lane]
             after = px * qy - py * qx
-            lengths = px * px + py * py + qx * qx + qy * qy + rim
+            lengths = with_opposite(px, py, qx, qy, opposite, weights)
             row[GAIN * LANES + lane] += (lengths_before * after - lengths * before) / max(before * after, TINY)
             row[SOUND * LANES + lane] = min(row[SOUND * LANES + lane], max(after, after - before))
             row[WAS_SOUND * LANES + lane] = min(row[WAS_SOUND * LANES + lane], before)
@@ -110,13 +131,13 @@ def judge(local, n, shift, floor, row):
 
 
 @part
-def smart_mean(local, n, floor, row, shift):
+def smart_mean(local, n, pattern, floor, row, shift):
     """The mean where nothing is inverted by it and Σ q falls, or is infinite before (a tangled star); else 0.
 
     Row ABOVE: the minimum margin D − floor·L with that.
     """
-    mean(local, n, shift)
-    judge(local, n, shift, floor, row)
+    mean(local, n, pattern, shift)
+    judge(local, n, pattern, shift, floor, row)
     for lane in range(LANES):
         falls = row[GAIN * LANES + lane] > 0.0 or row[WAS_SOUND * LANES + lane] <= 0.0
         taken = row[SOUND * LANES + lane] > 0.0 and falls
@@ -139,14 +160,14 @@ def certify_smart(row, unit, grain, work):
 
 
 @part
-def propose(local, n, variant, floor, row, shift):
+def propose(local, n, pattern, variant, floor, row, shift):
     """Shifts (2·LANES, over the star's size) of a variant for a block of stars. row: (ROWS·LANES,) to work in."""
     if variant == SMART:
-        smart_mean(local, n, floor, row, shift)
+        smart_mean(local, n, pattern, floor, row, shift)
     elif variant == INVERSE_LENGTH:
-        inverse_length_mean(local, n, row, shift)
+        inverse_length_mean(local, n, pattern, row, shift)
     else:
-        area_mean(local, n, row, shift)
+        area_mean(local, n, pattern, row, shift)
 
 
 @kernel
@@ -158,7 +179,7 @@ def sweep(points, blocks, first, last, guard, variant, tally):
     for block in range(first, last):
         n = stars.fetch(points, blocks, block, workspace, local)
         ask_ahead(points, blocks, block + 1)
-        propose(local, n, variant, floor, row, shift)
+        propose(local, n, pattern_at(blocks.patterns, blocks.pattern, block), variant, floor, row, shift)
         if variant == SMART and len(guard) != WITH_FLOORS:
             stars.aim(workspace.work, shift, guard.single)
             certify_smart(row, guard.unit, guard.grain, workspace.work)

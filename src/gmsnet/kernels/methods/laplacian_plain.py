@@ -24,23 +24,29 @@ from gmsnet.kernels.star.block import (
     gather,
     ring_row,
 )
-from gmsnet.kernels.star.certificate import COARSE, NARROWEST, WIDER, error_bound, margin_of
+from gmsnet.kernels.star.certificate import COARSE, NARROWEST, WIDER, error_bound, margin_of, widest
 from gmsnet.kernels.star.guard import WITH_FLOORS
+from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at, weights_of
 
 SHORTEST = 1e-290  # a first spoke that is shorter, whose inverse might be infinite, measures no star
 TARGETS, INVERSES = PAIRS, PAIRS + 2  # rows of work, two each, [lane][axis]
 
 
 @part
-def aim(star, n, single, shift, work):
+def aim(star, n, pattern, single, shift, work):
     """The mean of the ring minus the centre to ``shift``, [lane][axis], and where that leads to the rows TARGETS."""
     for k in range(2 * LANES):
         shift[k] = 0.0
     for j in range(n):
         p = ring_row(star, j)
-        for k in range(2 * LANES):
-            shift[k] += p[k] - star[k]
-    factor = 1.0 / n
+        if pattern is not None:
+            weight = neighbour_weight(pattern, j)
+            for k in range(2 * LANES):
+                shift[k] += weight * (p[k] - star[k])
+        else:
+            for k in range(2 * LANES):
+                shift[k] += p[k] - star[k]
+    factor = 1.0 / neighbours(pattern, n)
     for k in range(2 * LANES):
         shift[k] *= factor
         work[TARGETS * LANES + k] = star[k] + shift[k]
@@ -71,7 +77,7 @@ def relate(star, n, work, flat, local):
 
 
 @part
-def certify(local, n, floor, unit, grain, work, sums):
+def certify(local, n, pattern, floor, unit, grain, work, sums):
     """Row MARGIN: positive where all triangles are certified above the floor, which is not negative, at the targets.
 
     As certificate.certify, from what ``relate`` leaves. No coordinate of the star is larger than those of its target
@@ -82,15 +88,16 @@ def certify(local, n, floor, unit, grain, work, sums):
     for lane in range(LANES):
         sums[LOWEST_MARGIN * LANES + lane] = np.inf
         sums[WIDTH * LANES + lane] = NARROWEST
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        weights = weights_of(pattern, k, real)
         p = local[2 * i * LANES : 2 * (i + 1) * LANES]
         q = local[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
-            qx, qy = q[lane], q[LANES + lane]
-            margin, least = margin_of(p[lane], p[LANES + lane], qx, qy, twice), sums[LOWEST_MARGIN * LANES + lane]
+            px, py, qx, qy = p[lane], p[LANES + lane], q[lane], q[LANES + lane]
+            margin, least = margin_of(px, py, qx, qy, twice, weights), sums[LOWEST_MARGIN * LANES + lane]
             sums[LOWEST_MARGIN * LANES + lane] = margin if not margin >= least else least
-            sums[WIDTH * LANES + lane] = max(sums[WIDTH * LANES + lane], max(abs(qx), abs(qy)))
+            sums[WIDTH * LANES + lane] = max(sums[WIDTH * LANES + lane], widest(px, py, qx, qy, weights))
     uncertified = 0
     for lane in range(LANES):
         tx, ty = work[TARGETS * LANES + 2 * lane], work[TARGETS * LANES + 2 * lane + 1]
@@ -139,16 +146,16 @@ def sweep(points, blocks, first, last, guard, tally):
     star, work, shift, steps = workspace.star, workspace.work, np.empty(2 * LANES), np.empty(2 * LANES)
     floor = max(guard.floor, 0.0)
     for block in range(first, last):
-        n = blocks.degree[block]
+        n, pattern = blocks.degree[block], pattern_at(blocks.patterns, blocks.pattern, block)
         gather(points, blocks, block, n, star)
         ask_ahead(points, blocks, block + 1)
-        aim(star, n, guard.single, shift, work)
+        aim(star, n, pattern, guard.single, shift, work)
         if len(guard) == WITH_FLOORS:
             prepare(star, n, work, shift, steps)
             stars.commit(points, blocks, block, workspace, local, steps, guard, workspace.counts)
             continue
         relate(star, n, work, flat, local)
-        if certify(local, n, floor, guard.unit, guard.grain, work, workspace.sums) == 0:
+        if certify(local, n, pattern, floor, guard.unit, guard.grain, work, workspace.sums) == 0:
             put(points, blocks, block, star, work, workspace.counts)
         else:
             prepare(star, n, work, shift, steps)

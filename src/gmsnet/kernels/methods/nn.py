@@ -102,7 +102,7 @@ def propose(local, n, table, weights, box, inputs, first, second, shift):
     networks, flat. Work, rows of LANES: box (4), inputs, first, second (as many as the layers have, padded).
     """
     if n >= len(table) or table[n, 0] < 0:
-        laplacian.mean(local, n, shift)
+        laplacian.mean(local, n, None, shift)
         return
     at, wide, narrow = table[n, 0], table[n, 1], table[n, 2]
     frame(local, n, box, inputs)

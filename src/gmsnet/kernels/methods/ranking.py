@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, kernel, part
-from gmsnet.kernels.simplex.measures import shape_of
+from gmsnet.kernels.simplex.mean_ratio2 import put_weights, shape_of, weights_at_first, weights_in
 
 PLACE = 8  # bits of an id by which it is sorted at a time
 DIGITS = 1 << PLACE
@@ -16,9 +16,10 @@ HALVINGS = 24  # of the interval in which a limit is looked for: single precisio
 
 
 @kernel
-def shapes(points, triangles, orientation, first, last, shape):
-    """1/q of the triangles in the blocks first…last of LANES, with the sign of their area, into shape (T,)."""
-    edges, row = np.empty(4 * LANES), np.empty(LANES)
+def shapes(points, simplices, first, last, shape):
+    """1/q of the simplices in the blocks first…last of LANES, with the sign of their area, into shape (S,)."""
+    triangles, orientation = simplices.rows, simplices.orientation
+    edges, row, weight = np.empty(4 * LANES), np.empty(LANES), np.empty(3 * LANES)
     for block in range(first, last):
         start = block * LANES
         count = min(LANES, len(triangles) - start)
@@ -31,23 +32,26 @@ def shapes(points, triangles, orientation, first, last, shape):
             edges[LANES + lane] = points[b, 1] - y
             edges[2 * LANES + lane] = points[c, 0] - x
             edges[3 * LANES + lane] = points[c, 1] - y
+            put_weights(weights_at_first(simplices.shapes, t, True), weight, lane)
         for lane in range(count, LANES):
             edges[lane] = edges[LANES + lane] = edges[2 * LANES + lane] = edges[3 * LANES + lane] = 0.0
         for lane in range(LANES):
             px, py, qx, qy = edges[lane], edges[LANES + lane], edges[2 * LANES + lane], edges[3 * LANES + lane]
-            row[lane] = shape_of(px, py, qx, qy)
+            row[lane] = shape_of(px, py, qx, qy, weights_in(simplices.shapes, weight, lane))
         for lane in range(count):
             shape[start + lane] = orientation[start + lane] * row[lane]
 
 
 @kernel
-def shapes_of(points, triangles, orientation, cells, shape):
-    """1/q of some of the triangles, into shape (len(cells),)."""
+def shapes_of(points, simplices, cells, shape):
+    """1/q of some of the simplices, into shape (len(cells),)."""
+    triangles, orientation = simplices.rows, simplices.orientation
     for k in range(len(cells)):
         t = cells[k]
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         x, y = points[a, 0], points[a, 1]
-        shape[k] = orientation[t] * shape_of(points[b, 0] - x, points[b, 1] - y, points[c, 0] - x, points[c, 1] - y)
+        px, py, qx, qy = points[b, 0] - x, points[b, 1] - y, points[c, 0] - x, points[c, 1] - y
+        shape[k] = orientation[t] * shape_of(px, py, qx, qy, weights_at_first(simplices.shapes, t, True))
 
 
 @part
@@ -127,7 +131,7 @@ def smallest(values, rank):
 
 
 @kernel
-def free_nodes(triangles, cells, shape, limit, free, memory, seen):
+def free_nodes(rows, cells, shape, limit, free, memory, seen):
     """The free nodes (int32) of those of the cells whose shape is at most the limit, in the order of their ids.
 
     shape: (len(cells),). free: (N,) bool. memory: (N,) the id of each node. seen: (N,) bool, all False before and
@@ -138,7 +142,7 @@ def free_nodes(triangles, cells, shape, limit, free, memory, seen):
     for k in range(len(cells)):
         if shape[k] <= limit:
             for m in range(3):
-                i = triangles[cells[k], m]
+                i = rows[cells[k], m]
                 if free[i] and not seen[i]:
                     seen[i] = True
                     found[count] = i

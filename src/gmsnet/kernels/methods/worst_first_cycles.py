@@ -11,6 +11,7 @@ from gmsnet.kernels.methods.missing import any_missing
 from gmsnet.kernels.methods.ranking import free_nodes, least, shapes_of, smallest
 from gmsnet.kernels.methods.worst_first import descend, gather, way_there
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
+from gmsnet.kernels.star.pattern import count_of, pattern_at
 from gmsnet.kernels.star.truncation import HALVINGS
 
 STILL = 1e-8  # of a spoke's square: a move of less leaves a star be
@@ -18,57 +19,59 @@ LEAST = 1e-6  # of 1/q, where cells are inverted: the scale of q is taken from t
 
 
 @kernel
-def cycles(points, triangles, orientation, cells, free, memory, start, around, guard, plan, tally):
+def cycles(points, simplices, cells, free, memory, stars, guard, plan, tally):
     """Makes the cycles of a plan among the cells; returns the minimum 1/q of these before and after it.
 
-    cells: indices of triangles. free: (N,) bool. memory: (N,) ids. start, around: the rings of all nodes, in CSR form.
+    cells: indices of corner simplices. free: (N,) bool. memory: (N,) ids. stars: of all nodes (kernels.star.pattern).
     plan: (C, 3) of cells to take, log₂ of the power p, and visits to their free nodes. tally: (3,), added to.
     """
     shape, mark = np.empty(len(cells)), np.empty(len(points), dtype=np.bool_)
     for i in range(len(points)):
         mark[i] = False
-    shapes_of(points, triangles, orientation, cells, shape)
+    shapes_of(points, simplices, cells, shape)
     before = least(shape)
     for c in range(len(plan)):
         wanted = min(plan[c, 0], len(cells))
         limit = smallest(shape, wanted - 1)
         scale = max(least(shape), LEAST) / math.sqrt(3.0)
-        nodes = free_nodes(triangles, cells, shape, limit, free, memory, mark)
-        visit(points, nodes, start, around, guard, plan[c, 1], plan[c, 2], scale, None, mark, None, tally)
-        shapes_of(points, triangles, orientation, cells, shape)
+        nodes = free_nodes(simplices.rows, cells, shape, limit, free, memory, mark)
+        visit(points, nodes, stars, guard, plan[c, 1], plan[c, 2], scale, None, mark, None, tally)
+        shapes_of(points, simplices, cells, shape)
     return before, least(shape)
 
 
 @part
-def visit(points, nodes, start, around, guard, doublings, sweeps, scale, target, awake, tried, tally):
+def visit(points, nodes, stars, guard, doublings, sweeps, scale, target, awake, tried, tally):
     """Visits the nodes in their order, so many times, p = 2^doublings. tally: (3,), added to.
 
-    start, around: the rings of all nodes, in CSR form. scale: see ``descend``. target: a node is left out while no
-    triangle around it misses that (kernels.methods.missing), if there is one. awake: (N,) bool, all False before and
+    stars: of all nodes (kernels.star.pattern). scale: see ``descend``. target: a node is left out while no simplex
+    around it misses that (kernels.methods.missing), if there is one. awake: (N,) bool, all False before and
     after: a node is left out while neither it nor a neighbour has moved since it was found to move no more. tried:
     (N,) bool, to become True of the nodes that the target has not left out, if there is one.
     """
     unit, grain, single = guard.unit, guard.grain, guard.single
+    start, around = stars.start, stars.around
     most = 0
     for i in nodes:
-        most = max(most, start[i + 1] - start[i])
+        n = start[i + 1] - start[i]
+        most = max(most, 2 * n + count_of(pattern_at(stars.patterns, stars.pattern, i), n))
         awake[i] = True
-    star = np.empty(3 * most + 1)
+    star = np.empty(most + 1)
     for _ in range(sweeps):
         for i in nodes:
             if not awake[i]:
                 continue
-            n = gather(points, i, start, around, guard, star)
+            n, pattern = gather(points, i, stars, guard, star)
             x, y = points[i, 0], points[i, 1]
             awake[i] = False
             if target is not None:
-                if not any_missing(star, n, x, y, target[0], target[1]):
+                if not any_missing(star, n, pattern, x, y, target[0], target[1]):
                     continue
                 tried[i] = True
-            tx, ty = descend(star, n, x, y, scale, doublings)
+            tx, ty = descend(star, n, pattern, x, y, scale, doublings)
             if tx == x and ty == y:
                 continue
-            tx, ty, halvings = way_there(star, n, x, y, tx, ty, unit, grain, single)
+            tx, ty, halvings = way_there(star, n, pattern, x, y, tx, ty, unit, grain, single)
             tally[DROPPED] += halvings == HALVINGS
             tally[TRUNCATED] += 0 < halvings < HALVINGS
             tally[MOVED] += halvings < HALVINGS

@@ -12,12 +12,11 @@ import math
 import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
+from gmsnet.kernels.simplex.mean_ratio2 import TINY, TWO_SQRT3, put_weights, shape_of, weights_at_first, weights_in
 from gmsnet.kernels.simplex.predicates import SHEWCHUK, UNDERFLOW
 
-TWO_SQRT3 = 2.0 * math.sqrt(3.0)
 TAN_PI_8 = math.tan(math.pi / 8.0)
 DEGREES = 180.0 / math.pi
-TINY = 1e-300  # stands in for a length of zero: the quotient is then zero, not a division by zero
 
 # What ``summarise`` says of triangles, angles in degrees: sums on the coarse and on the fine grid, extremes, counts.
 LOW, HIGH, SHAPE, ASPECT = range(4)
@@ -223,26 +222,22 @@ def per_surface_cell(points, triangles, columns):
         columns[LOW, t], columns[HIGH, t], columns[SHAPE, t], columns[ASPECT, t] = low, high, shape, aspect
 
 
-@inlined
-def shape_of(px, py, qx, qy):
-    """1/q of the triangle (0, p, q)."""
-    rx, ry = qx - px, qy - py
-    lengths = (px * px + py * py) + (qx * qx + qy * qy) + (rx * rx + ry * ry)
-    return TWO_SQRT3 * (px * qy - py * qx) / max(lengths, TINY)
-
-
 @kernel
-def mean_shape_of_sample(points, triangles, orientation, stride):
-    """The mean shape over every stride-th block of LANES triangles."""
-    work, shape = np.empty(ROOM), np.empty(LANES)
+def mean_shape_of_sample(points, simplices, stride):
+    """The mean 1/q over every stride-th block of LANES corner simplices."""
+    rows, orientation = simplices.rows, simplices.orientation
+    work, shape, weight = np.empty(ROOM), np.empty(LANES), np.empty(3 * LANES)
     total_shape, count = 0.0, 0
-    for start in range(0, len(triangles), stride * LANES):
-        filled = min(LANES, len(triangles) - start)
-        gather(points, triangles, orientation, start, filled, work)
+    for start in range(0, len(rows), stride * LANES):
+        filled = min(LANES, len(rows) - start)
+        gather(points, rows, orientation, start, filled, work)
+        for lane in range(filled):
+            put_weights(weights_at_first(simplices.shapes, start + lane, True), weight, lane)
         for lane in range(filled):
             px, py = work[lane], work[LANES + lane]
             qx, qy = work[2 * LANES + lane], work[3 * LANES + lane]
-            shape[lane] = work[SIGN + lane] * shape_of(px, py, qx, qy)
+            weights = weights_in(simplices.shapes, weight, lane)
+            shape[lane] = work[SIGN + lane] * shape_of(px, py, qx, qy, weights)
         for lane in range(filled):
             total_shape += shape[lane]
         count += filled

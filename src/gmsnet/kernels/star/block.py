@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES, inlined, part
 from gmsnet.kernels.jit.prefetch import prefetch
+from gmsnet.kernels.star.pattern import Patterns
 
 MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
 COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
@@ -23,10 +24,12 @@ FAR = 2**18  # nodes: the coordinates of more (4 MiB) do not stay in the second-
 
 
 class Blocks(NamedTuple):
-    """The free nodes with their rings in blocks of LANES of one colour and degree (see
+    """The free nodes with the nodes around them, in blocks of LANES of one colour and degree, and one pattern (see
     kernels.topology.layout.fill_blocks).
 
-    filled: how many of the lanes hold stars of their own. maximum: the largest degree.
+    degree: how many nodes are around each free node of a block. filled: how many of the lanes hold stars of their own.
+    most: the largest number of nodes or of simplices of a star. pattern: (B,) of each block, patterns: all there are
+    (kernels.star.pattern); both None where all stars are fans.
     """
 
     centre: NDArray[np.int32]
@@ -35,6 +38,8 @@ class Blocks(NamedTuple):
     degree: NDArray[np.int32]
     filled: NDArray[np.int32]
     most: int
+    pattern: NDArray[np.int32] | None = None
+    patterns: Patterns | None = None
 
 
 class Workspace(NamedTuple):

@@ -9,9 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, inlined, part
+from gmsnet.kernels.simplex.mean_ratio2 import half_lengths
 from gmsnet.kernels.simplex.predicates import UNDERFLOW
 from gmsnet.kernels.star.block import FLOORS, LOWEST_MARGIN, MARGIN, PAIRS, REACH, SIZE, TARGET, WIDTH, ring_row
 from gmsnet.kernels.star.guard import WITH_FLOORS
+from gmsnet.kernels.star.pattern import count_of, other_of, pair_of, pattern_at, weights_of
 
 WIDER = 1.0 + 2.0**-20  # so that what is rounded to float32 is an upper bound
 NARROWEST = 0.25  # what counts as a star's extent at least, over its size, so that what underflows does not matter
@@ -28,12 +30,14 @@ def error_bound(m, delta, u):
     two, by that of the target, and by what is not known of it and of the ring. D changes by 8·m·e + 2e² with that, and
     by 16u·m² for its own rounding; L/2 by 24·m·e + 6e² and 88u·m²; 2φ is at most 1/√3; the difference rounds by
     36u·m². That is 22·m·e + 6e² + 104u·m² in all, which is less than 512·m·(u·m + δ), or that is more than any margin.
+    Of other weights, none above √3 and one of them 0, L/2 changes by 28·m·e + 7e², and by 128u·m² for its rounding, so
+    that with the difference it is less than that, too.
     """
     return 512.0 * m * (u * m + delta)
 
 
 @part
-def certify(local, n, shift, floor, unit, grain, work, sums):
+def certify(local, n, pattern, shift, floor, unit, grain, work, sums):
     """Row MARGIN: positive where all triangles are certified above the floor, which is not negative, after the shift.
 
     local, shift: over row SIZE of work, as stars.localise leaves them, [axis][lane]. Reads TARGET and REACH, too.
@@ -44,18 +48,19 @@ def certify(local, n, shift, floor, unit, grain, work, sums):
     for lane in range(LANES):
         sums[LOWEST_MARGIN * LANES + lane] = np.inf
         sums[WIDTH * LANES + lane] = max(NARROWEST, max(abs(shift[lane]), abs(shift[LANES + lane])))
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        weights = weights_of(pattern, k, real)
         p = local[2 * i * LANES : 2 * (i + 1) * LANES]
         q = local[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
             px, py = real(p[lane] - shift[lane]), real(p[LANES + lane] - shift[LANES + lane])
             qx, qy = real(q[lane] - shift[lane]), real(q[LANES + lane] - shift[LANES + lane])
-            margin = margin_of(px, py, qx, qy, twice)
+            margin = margin_of(px, py, qx, qy, twice, weights)
             least = sums[LOWEST_MARGIN * LANES + lane]
             # A shift that is not finite makes every margin NaN or −∞, and no comparison with it holds.
             sums[LOWEST_MARGIN * LANES + lane] = margin if not margin >= least else least
-            sums[WIDTH * LANES + lane] = max(sums[WIDTH * LANES + lane], max(abs(qx), abs(qy)))
+            sums[WIDTH * LANES + lane] = max(sums[WIDTH * LANES + lane], widest(px, py, qx, qy, weights))
     for lane in range(LANES):
         reach = max(
             work[REACH * LANES + lane], max(abs(work[TARGET * LANES + lane]), abs(work[(TARGET + 1) * LANES + lane]))
@@ -67,29 +72,38 @@ def certify(local, n, shift, floor, unit, grain, work, sums):
 
 
 @inlined
-def margin_of(px, py, qx, qy, twice):
-    """D − φL of the triangle (0, p, q), as computed; 2φ given."""
-    half = (qx * qx + qy * qy) + (py * (py - qy) - px * (qx - px))
-    return (px * qy - py * qx) - twice * half
+def margin_of(px, py, qx, qy, twice, weights):
+    """D − φL of the simplex (0, p, q), as computed; 2φ given."""
+    return (px * qy - py * qx) - twice * half_lengths(px, py, qx, qy, weights)
+
+
+@inlined
+def widest(px, py, qx, qy, weights):
+    """The largest component of the two spokes; of a fan, where each node is the second one once, of the second."""
+    if weights is None:
+        return max(abs(qx), abs(qy))
+    return max(max(abs(px), abs(py)), max(abs(qx), abs(qy)))
 
 
 @part
-def certify_stars(star, n, above, unit, grain, work):
+def certify_stars(star, n, pattern, above, unit, grain, work):
     """As ``certify``, each triangle above ``above`` times the floor in its row from FLOORS on, in float64 from the
     coordinates: for the level STAR, at which most stars are near their floors.
     """
     for lane in range(LANES):
         work[MARGIN * LANES + lane] = np.inf
         work[PAIRS * LANES + lane] = 0.0
-    for j in range(n):
-        p, q = ring_row(star, n - 1 if j == 0 else j - 1), ring_row(star, j)
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        weights = weights_of(pattern, k, np.float64)
+        p, q = ring_row(star, i), ring_row(star, j)
         for lane in range(LANES):
             tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
             px, py, qx, qy = p[2 * lane] - tx, p[2 * lane + 1] - ty, q[2 * lane] - tx, q[2 * lane + 1] - ty
-            twice = 2.0 * above * max(work[(FLOORS + j) * LANES + lane], 0.0)
-            margin, least = margin_of(px, py, qx, qy, twice), work[MARGIN * LANES + lane]
+            twice = 2.0 * above * max(work[(FLOORS + k) * LANES + lane], 0.0)
+            margin, least = margin_of(px, py, qx, qy, twice, weights), work[MARGIN * LANES + lane]
             work[MARGIN * LANES + lane] = margin if not margin >= least else least
-            work[PAIRS * LANES + lane] = max(work[PAIRS * LANES + lane], max(abs(qx), abs(qy)))
+            work[PAIRS * LANES + lane] = max(work[PAIRS * LANES + lane], widest(px, py, qx, qy, weights))
     for lane in range(LANES):
         tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
         delta = unit * max(work[REACH * LANES + lane], max(abs(tx), abs(ty))) + grain
@@ -98,19 +112,21 @@ def certify_stars(star, n, above, unit, grain, work):
 
 @part
 def gather_floors(blocks, block, guard, work):
-    """The floor of each triangle of a block's stars, into the rows from FLOORS on: triangle j lies before ring node j.
+    """The floor of each simplex of a block's stars, into the rows from FLOORS on.
 
-    At the level STAR that is the largest of its nodes' floors, else the mesh's.
+    At the level STAR that is the largest of the floors of its cell's nodes, else the mesh's.
     """
-    n = blocks.degree[block]
+    n, pattern = blocks.degree[block], pattern_at(blocks.patterns, blocks.pattern, block)
     if len(guard) != WITH_FLOORS:
-        for k in range(FLOORS * LANES, (FLOORS + n) * LANES):
+        for k in range(FLOORS * LANES, (FLOORS + count_of(pattern, n)) * LANES):
             work[k] = guard.floor
         return
     rings, offset, floors = blocks.rings, blocks.offset[block], guard.floors
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        other = other_of(pattern, k, i)
         for lane in range(LANES):
             floor = floors[blocks.centre[block * LANES + lane]]
             around = max(floors[rings[offset + i * LANES + lane]], floors[rings[offset + j * LANES + lane]])
-            work[(FLOORS + j) * LANES + lane] = max(floor, around)
+            around = max(around, floors[rings[offset + other * LANES + lane]])
+            work[(FLOORS + k) * LANES + lane] = max(floor, around)

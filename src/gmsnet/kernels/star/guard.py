@@ -27,6 +27,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
+from gmsnet.kernels.simplex.mean_ratio2 import (
+    lengths,
+    put_weights,
+    same_cell,
+    sensitivity,
+    weights_at_last,
+    weights_in,
+)
 from gmsnet.kernels.simplex.predicates import SHEWCHUK, UNDERFLOW, UNIT, determinant_and_bound
 
 LEVELS = ("valid", "worst", "star")
@@ -98,41 +106,39 @@ def margin_above_zero(px, py, qx, qy, delta):
 
 
 @inlined
-def margin_above(px, py, qx, qy, delta, floor):
-    """By how much D of the triangle (0, p, q) exceeds floor·L and the error bounds of both."""
+def margin_above(px, py, qx, qy, delta, floor, weights):
+    """By how much D of the simplex (0, p, q) exceeds floor·L and the error bounds of both."""
     left = px * qy
     right = py * qx
-    rx, ry = qx - px, qy - py
-    lengths = (px * px + py * py) + (qx * qx + qy * qy) + (rx * rx + ry * ry)
+    square = lengths(px, py, qx, qy, weights)
     around = abs(px) + abs(py) + abs(qx) + abs(qy) + 4.0 * delta
     bound = SHEWCHUK * (abs(left) + abs(right)) + UNDERFLOW + 4.0 * delta * around
-    bound += abs(floor) * (ROUNDING_L * lengths + 16.0 * delta * around)
-    return (left - right) - floor * lengths - bound
+    bound += abs(floor) * (ROUNDING_L * square + sensitivity(weights) * delta * around)
+    return (left - right) - floor * square - bound
 
 
 @inlined
-def ratio_upper_bound(px, py, qx, qy, delta):
-    """The most that D/L of the triangle (0, p, q) can be in exact arithmetic; LARGEST where nothing is certain."""
+def ratio_upper_bound(px, py, qx, qy, delta, weights):
+    """The most that D/L of the simplex (0, p, q) can be in exact arithmetic; LARGEST where nothing is certain."""
     left = px * qy
     right = py * qx
-    rx, ry = qx - px, qy - py
-    lengths = (px * px + py * py) + (qx * qx + qy * qy) + (rx * rx + ry * ry)
+    square = lengths(px, py, qx, qy, weights)
     around = abs(px) + abs(py) + abs(qx) + abs(qy) + 4.0 * delta
     top = (left - right) + (SHEWCHUK * (abs(left) + abs(right)) + UNDERFLOW + 4.0 * delta * around)
-    error_bound = ROUNDING_L * lengths + 16.0 * delta * around
+    error_bound = ROUNDING_L * square + sensitivity(weights) * delta * around
     # An inverted triangle is the less inverted, the larger L is; a positive one the better, the smaller.
-    below = lengths - error_bound if top > 0.0 else lengths + error_bound
+    below = square - error_bound if top > 0.0 else square + error_bound
     ratio = top / below if below > 0.0 else LARGEST
     return min(ratio + 4.0 * UNIT * abs(ratio), LARGEST)
 
 
 @part
-def permitted(was, now, delta, floor):
-    """May a triangle with the corners ``was`` (6 numbers) become ``now``? The scalar form of the rule."""
+def permitted(was, now, delta, floor, weights):
+    """May a simplex with the nodes a, b, v in ``was`` (6 numbers) become ``now``? The scalar form of the rule."""
     after, error_bound = determinant_and_bound(now[0], now[1], now[2], now[3], now[4], now[5], delta)
     if floor > -np.inf:
         px, py, qx, qy = now[0] - now[4], now[1] - now[5], now[2] - now[4], now[3] - now[5]
-        if not margin_above(px, py, qx, qy, delta, floor) > 0.0:
+        if not margin_above(px, py, qx, qy, delta, floor, weights) > 0.0:
             return False
     if after > error_bound:
         return True
@@ -141,19 +147,22 @@ def permitted(was, now, delta, floor):
 
 
 @kernel
-def ratio_upper_bounds(points, triangles, orientation, blocks, unit, grain, first, last, least):
-    """The minimum ``ratio_upper_bound`` over each of the blocks of LANES triangles with the places first…last, into
+def ratio_upper_bounds(points, simplices, blocks, unit, grain, first, last, least):
+    """The minimum ``ratio_upper_bound`` over each of the blocks of LANES simplices with the places first…last, into
     ``least``."""
+    rows, orientation = simplices.rows, simplices.orientation
     block, ratio = np.empty(6 * LANES), np.empty(LANES)
+    weight = np.empty(3 * LANES)
     for number in range(first, last):
         start = blocks[number] * LANES
         for lane in range(LANES):
-            t = min(start + lane, len(triangles) - 1)
-            a, b, c = np.uint32(triangles[t, 0]), np.uint32(triangles[t, 1]), np.uint32(triangles[t, 2])
+            t = min(start + lane, len(rows) - 1)
+            a, b, c = np.uint32(rows[t, 0]), np.uint32(rows[t, 1]), np.uint32(rows[t, 2])
             block[lane], block[LANES + lane] = points[a, 0], points[a, 1]
             block[2 * LANES + lane], block[3 * LANES + lane] = points[b, 0], points[b, 1]
             block[4 * LANES + lane], block[5 * LANES + lane] = points[c, 0], points[c, 1]
             ratio[lane] = orientation[t]
+            put_weights(weights_at_last(simplices.shapes, t, orientation[t] > 0), weight, lane)
         for lane in range(LANES):
             px, py = block[lane] - block[4 * LANES + lane], block[LANES + lane] - block[5 * LANES + lane]
             qx, qy = (
@@ -162,11 +171,11 @@ def ratio_upper_bounds(points, triangles, orientation, blocks, unit, grain, firs
             )
             size = (abs(px) + abs(py)) + (abs(qx) + abs(qy))
             reach = max(abs(block[4 * LANES + lane]), abs(block[5 * LANES + lane])) + size
-            # Turned over, the triangle has −D: the components of one side change sides.
+            # Turned over, the simplex has −D: the components of one side change sides.
             forth = ratio[lane] > 0.0
-            ratio[lane] = ratio_upper_bound(
-                px if forth else qx, py if forth else qy, qx if forth else px, qy if forth else py, unit * reach + grain
-            )
+            ax, ay, bx, by = px if forth else qx, py if forth else qy, qx if forth else px, qy if forth else py
+            weights = weights_in(simplices.shapes, weight, lane)
+            ratio[lane] = ratio_upper_bound(ax, ay, bx, by, unit * reach + grain, weights)
         width = LANES
         while width > 1:  # in halves, which go in SIMD lanes, where one after the other would not
             width //= 2
@@ -176,22 +185,35 @@ def ratio_upper_bounds(points, triangles, orientation, blocks, unit, grain, firs
 
 
 @inlined
-def ratio_of(points, a, b, c, unit, grain):
-    """``ratio_upper_bound`` the triangle with the nodes a, b, c."""
+def ratio_of(points, a, b, c, unit, grain, weights):
+    """``ratio_upper_bound`` of the simplex with the nodes a, b, c, its spokes from c."""
     px, py, qx, qy = points[a, 0], points[a, 1], points[b, 0], points[b, 1]
     px, py, qx, qy = px - points[c, 0], py - points[c, 1], qx - points[c, 0], qy - points[c, 1]
     reach = max(abs(points[c, 0]), abs(points[c, 1])) + ((abs(px) + abs(py)) + (abs(qx) + abs(qy)))
-    return ratio_upper_bound(px, py, qx, qy, unit * reach + grain)
+    return ratio_upper_bound(px, py, qx, qy, unit * reach + grain, weights)
+
+
+@inlined
+def ratio_of_row(points, simplices, t, unit, grain):
+    """The same of row t, read in its orientation."""
+    rows, forth = simplices.rows, simplices.orientation[t] > 0
+    a, b, c = rows[t, 0 if forth else 1], rows[t, 1 if forth else 0], rows[t, 2]
+    return ratio_of(points, a, b, c, unit, grain, weights_at_last(simplices.shapes, t, forth))
 
 
 @kernel
-def star_floors(points, triangles, orientation, ringed, unit, grain, floors):
-    """For each node with a ring the minimum ``ratio_upper_bound`` over its triangles; −∞ for the others."""
+def star_floors(points, simplices, ringed, unit, grain, floors):
+    """For each node with a star the minimum ``ratio_upper_bound`` over the cells around it; −∞ for the others."""
+    rows = simplices.rows
     for i in range(len(floors)):
         floors[i] = np.inf if ringed[i] else -np.inf
-    for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        ratio = ratio_of(points, b, a, c, unit, grain) if orientation[t] < 0 else ratio_of(points, a, b, c, unit, grain)
-        floors[a] = min(floors[a], ratio)
-        floors[b] = min(floors[b], ratio)
-        floors[c] = min(floors[c], ratio)
+    t = 0
+    while t < len(rows):
+        ratio, end = ratio_of_row(points, simplices, t, unit, grain), t + 1
+        while same_cell(simplices.cells, t, end):
+            ratio = min(ratio, ratio_of_row(points, simplices, end, unit, grain))
+            end += 1
+        for k in range(t, end):
+            for corner in range(3):
+                floors[rows[k, corner]] = min(floors[rows[k, corner]], ratio)
+        t = end

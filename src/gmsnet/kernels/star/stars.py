@@ -27,6 +27,7 @@ from gmsnet.kernels.star.block import Blocks as Blocks
 from gmsnet.kernels.star.block import workspace_for as workspace_for
 from gmsnet.kernels.star.certificate import certify, certify_stars, gather_floors
 from gmsnet.kernels.star.guard import WITH_FLOORS
+from gmsnet.kernels.star.pattern import pattern_at
 from gmsnet.kernels.star.truncation import halve_in_lanes, truncate
 
 
@@ -89,13 +90,14 @@ def commit(points, blocks, block, workspace, local, shift, guard, tally):
     workspace, local: as ``fetch`` leaves them; shift: (2·LANES,), [axis][lane], over the star's size.
     """
     n, work = blocks.degree[block], workspace.work
+    pattern = pattern_at(blocks.patterns, blocks.pattern, block)
     aim(work, shift, guard.single)
     if len(guard) == WITH_FLOORS:
         gather_floors(blocks, block, guard, work)
-        certify_stars(workspace.star, n, 1.0, guard.unit, guard.grain, work)
-        halve_in_lanes(n, workspace, shift, guard)
+        certify_stars(workspace.star, n, pattern, 1.0, guard.unit, guard.grain, work)
+        halve_in_lanes(n, pattern, workspace, shift, guard)
     else:
-        certify(local, n, shift, max(guard.floor, 0.0), guard.unit, guard.grain, work, workspace.sums)
+        certify(local, n, pattern, shift, max(guard.floor, 0.0), guard.unit, guard.grain, work, workspace.sums)
     store(points, blocks, block, workspace, shift, guard, tally)
 
 
@@ -134,6 +136,7 @@ def store(points, blocks, block, workspace, shift, guard, tally):
             points[i, 0] = work[TARGET * LANES + lane]
             points[i, 1] = work[(TARGET + 1) * LANES + lane]
     else:
+        pattern = pattern_at(blocks.patterns, blocks.pattern, block)
         gather_floors(blocks, block, guard, work)
         for lane in range(count):
             i = centre[lane]
@@ -145,7 +148,7 @@ def store(points, blocks, block, workspace, shift, guard, tally):
             elif to_the_star and work[MARGIN * LANES + lane] == -np.inf:
                 tally[DROPPED] += 1
             else:
-                truncate(points, i, n, lane, workspace, shift, guard, tally)
+                truncate(points, i, n, pattern, lane, workspace, shift, guard, tally)
     if len(guard) == WITH_FLOORS:
         for lane in range(count):
             tally[TRUNCATED] += (work[MARGIN * LANES + lane] > 0.0) & (work[SHARE * LANES + lane] < 1.0)

@@ -20,12 +20,13 @@ from gmsnet.kernels.star.block import (
 )
 from gmsnet.kernels.star.certificate import certify_stars
 from gmsnet.kernels.star.guard import margin_above, permitted
+from gmsnet.kernels.star.pattern import count_of, pair_of, weights_of
 
 HALVINGS, FEW_HALVINGS = 20, 6
 
 
 @part
-def halve_in_lanes(n, workspace, shift, guard):
+def halve_in_lanes(n, pattern, workspace, shift, guard):
     """Halves the shifts of the lanes that are not allowed, all at once, until none is left or FEW_HALVINGS are made.
 
     For the level STAR, which refuses many moves whatever their length: those that make the worst cell of a star worse
@@ -50,14 +51,14 @@ def halve_in_lanes(n, workspace, shift, guard):
                 work[k] = np.float64(np.float32(work[k]))
         if refused == 0:
             return
-        certify_stars(star, n, 1.0, guard.unit, guard.grain, work)
+        certify_stars(star, n, pattern, 1.0, guard.unit, guard.grain, work)
     for lane in range(LANES):
         allowed_now = work[MARGIN * LANES + lane] > 0.0
         work[SHARE * LANES + lane] = work[SHARE * LANES + lane] if allowed_now else 0.0
     for k in range(2 * LANES):
         work[KEPT * LANES + k] = work[TARGET * LANES + k]
         work[TARGET * LANES + k] = work[CENTRE * LANES + k]
-    certify_stars(star, n, 0.0, guard.unit, guard.grain, work)  # the stars as they are
+    certify_stars(star, n, pattern, 0.0, guard.unit, guard.grain, work)  # the stars as they are
     for lane in range(LANES):
         margin = -np.inf if work[MARGIN * LANES + lane] > 0.0 else 0.0
         work[MARGIN * LANES + lane] = 1.0 if work[SHARE * LANES + lane] > 0.0 else margin
@@ -66,7 +67,7 @@ def halve_in_lanes(n, workspace, shift, guard):
 
 
 @part
-def truncate(points, i, n, lane, workspace, shift, guard, tally):
+def truncate(points, i, n, pattern, lane, workspace, shift, guard, tally):
     """Halves the shift of one lane until it is allowed (Algorithm 1), or drops it.
 
     Below a floor a triangle comes by its first-order change, so that more than FEW_HALVINGS hardly ever help.
@@ -89,9 +90,9 @@ def truncate(points, i, n, lane, workspace, shift, guard, tally):
         delta = guard.unit * max(work[REACH * LANES + lane], max(abs(tx), abs(ty))) + guard.grain
         # Above a positive floor no triangle is inverted; what was inverted is for the whole rule to judge.
         if (
-            clear(tx, ty, star, n, lane, delta, guard.floor)
+            clear(tx, ty, star, n, pattern, lane, delta, guard.floor)
             if guard.floor > 0.0
-            else allowed(tx, ty, star, n, lane, delta, work)
+            else allowed(tx, ty, star, n, pattern, lane, delta, work)
         ):
             points[i, 0] = tx
             points[i, 1] = ty
@@ -104,33 +105,31 @@ def truncate(points, i, n, lane, workspace, shift, guard, tally):
 
 
 @part
-def clear(tx, ty, star, n, lane, delta, floor):
+def clear(tx, ty, star, n, pattern, lane, delta, floor):
     """Is each triangle of one lane certified above a floor that is not negative, with the free node at (tx, ty)?"""
-    last = 2 * (n * LANES + lane)
-    px, py = star[last] - tx, star[last + 1] - ty
-    for j in range(n):
-        k = 2 * ((j + 1) * LANES + lane)
-        qx, qy = star[k] - tx, star[k + 1] - ty
-        if not margin_above(px, py, qx, qy, delta, floor) > 0.0:
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        a, b = 2 * ((i + 1) * LANES + lane), 2 * ((j + 1) * LANES + lane)
+        px, py, qx, qy = star[a] - tx, star[a + 1] - ty, star[b] - tx, star[b + 1] - ty
+        if not margin_above(px, py, qx, qy, delta, floor, weights_of(pattern, k, np.float64)) > 0.0:
             return False
-        px, py = qx, qy
     return True
 
 
 @part
-def allowed(tx, ty, star, n, lane, delta, work):
+def allowed(tx, ty, star, n, pattern, lane, delta, work):
     """May the free node of one lane move to (tx, ty)? The scalar form of the rule, which also knows inverted cells.
 
     Rows of work: reads those from FLOORS on; KEPT's are overwritten.
     """
     was, now = work[KEPT * LANES : KEPT * LANES + 6], work[(KEPT + 1) * LANES : (KEPT + 1) * LANES + 6]
     was[4], was[5], now[4], now[5] = star[2 * lane], star[2 * lane + 1], tx, ty
-    for j in range(n):
-        a = 2 * ((n if j == 0 else j) * LANES + lane)
-        b = 2 * ((j + 1) * LANES + lane)
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        a, b = 2 * ((i + 1) * LANES + lane), 2 * ((j + 1) * LANES + lane)
         was[0], was[1], was[2], was[3] = star[a], star[a + 1], star[b], star[b + 1]
-        for k in range(4):  # an assignment of slices would take seconds to compile
-            now[k] = was[k]
-        if not permitted(was, now, delta, work[(FLOORS + j) * LANES + lane]):
+        for c in range(4):  # an assignment of slices would take seconds to compile
+            now[c] = was[c]
+        if not permitted(was, now, delta, work[(FLOORS + k) * LANES + lane], weights_of(pattern, k, np.float64)):
             return False
     return True

@@ -108,23 +108,24 @@ def take_faces(first, corner, order, new_first, new_corner):
 
 
 @kernel
-def fill_blocks(free, start, ring, kind, degrees, block, to, centre, rings, offset, degree, filled):
+def fill_blocks(free, start, ring, kind, sizes, block, to, centre, rings, offset, degree, filled):
     """Writes the stars of the free nodes (by places, ascending) into blocks of LANES stars of one colour and degree.
 
     A block stands where its first star does among those of its colour, so that what is near in memory is visited at
-    about the same time, of whatever degree. start, ring: CSR by places. kind: (F,) of each star, colour·degrees +
-    degree. block, to: by colour, the first block and where its ring begins in ``rings``; counted up here. Writes the
-    arrays of ``kernels.star.block.Blocks``; filled: zeros before. The lanes left over repeat the last star.
+    about the same time, of whatever degree. start, ring: CSR by places. kind: (F,) of each star, colour·K + k for one
+    of K kinds. sizes: (K,) how many nodes are around a star of each. block, to: by colour, the first block and where
+    its ring begins in ``rings``; counted up here. Writes the arrays of ``kernels.star.block.Blocks``; filled: zeros
+    before. The lanes left over repeat the last star.
     """
-    open_block = np.empty(len(block) * degrees, dtype=np.int64)  # of each kind, the one that has room
+    open_block = np.empty(len(block) * len(sizes), dtype=np.int64)  # of each kind, the one that has room
     for k in range(len(open_block)):
         open_block[k] = -1
     for i in range(len(free)):
         v, k = free[i], kind[i]
-        n = k % degrees
+        n = sizes[k % len(sizes)]
         b = open_block[k]
         if b < 0:
-            colour = k // degrees
+            colour = k // len(sizes)
             b = open_block[k] = block[colour]
             block[colour] = b + 1
             offset[b], degree[b] = to[colour], n

@@ -125,7 +125,7 @@ def keeps(points, v, x, y, start, ring, unit, grain, floor):
         value, bound = determinant_and_bound(ax, ay, bx, by, x, y, delta)
         if not value > bound:
             old, error_bound = determinant_and_bound(ax, ay, bx, by, points[v, 0], points[v, 1], delta)
-            above = margin_above(ax - x, ay - y, bx - x, by - y, delta, floor) > 0.0
+            above = margin_above(ax - x, ay - y, bx - x, by - y, delta, floor, None) > 0.0
             if not (old < -error_bound and value - bound > old + error_bound and above):
                 return False
         before = after

@@ -267,7 +267,7 @@ def surplus_over(points, a, b, c, unit, grain, floor):
     px, py = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
     qx, qy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
     reach = max(abs(points[a, 0]), abs(points[a, 1])) + ((abs(px) + abs(py)) + (abs(qx) + abs(qy)))
-    return margin_above(px, py, qx, qy, unit * reach + grain, floor)
+    return margin_above(px, py, qx, qy, unit * reach + grain, floor, None)
 
 
 @kernel
@@ -278,5 +278,5 @@ def least_ratio(points, triangles, orientation, unit, grain):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         if orientation[t] < 0:
             b, c = c, b
-        least = min(least, ratio_of(points, b, c, a, unit, grain))
+        least = min(least, ratio_of(points, b, c, a, unit, grain, None))
     return least

@@ -1,0 +1,117 @@
+"""Means and extremes over the cells of a mesh: exact sums, the same bits in any order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.simplex import cell_measures as cells
+from gmsnet.kernels.simplex import measures as kernels
+from gmsnet.kernels.simplex.mean_ratio2 import Simplices
+from gmsnet.parallel.threads import Share, serial
+
+Floats = NDArray[np.float64]
+
+
+NOWHERE = np.empty(0, dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class Totals:
+    """Means and extremes over the cells of a mesh; angles in degrees. The means are those of exact sums.
+
+    low, high: the smallest and the largest angles. uncertain: how many cells are not certainly valid; inverted: those
+    of them that are not, as far as float64 can tell. Where not all cells are triangles, only 1/q and these two are
+    told, of a cell's worst corner; the others are nan.
+    """
+
+    low_mean: float
+    low_min: float
+    high_mean: float
+    high_max: float
+    shape_mean: float
+    shape_min: float
+    aspect_mean: float
+    aspect_min: float
+    inverted: int
+    uncertain: int
+
+    @classmethod
+    def of(cls, parts: Iterable[Floats], triangles: int) -> Totals:
+        """From what kernels.simplex.measures.summarise says of the parts of a mesh; so many triangles, at least one."""
+        figures = np.array(list(parts))
+        sums = figures[:, : kernels.EXTREME].sum(axis=0)  # exact: see kernels.simplex.measures.grids
+        low, high, shape, aspect = ((sums[: kernels.FINE] + sums[kernels.FINE :]) / triangles).tolist()
+        least, most = figures.min(axis=0).tolist(), figures.max(axis=0).tolist()
+        inverted, uncertain = (int(figures[:, count].sum()) for count in (kernels.INVERTED, kernels.UNCERTAIN))
+        return cls(
+            low, least[kernels.EXTREME + kernels.LOW], high, most[kernels.EXTREME + kernels.HIGH],
+            shape, least[kernels.EXTREME + kernels.SHAPE], aspect, least[kernels.EXTREME + kernels.ASPECT],
+            inverted, uncertain,
+        )  # fmt: skip
+
+    @classmethod
+    def of_cells(cls, parts: Iterable[Floats]) -> Totals:
+        """From what kernels.simplex.cell_measures.summarise_cells says of the parts of a mesh, of one cell or more."""
+        figures = np.array(list(parts))
+        sums = figures[:, [cells.COARSE, cells.FINE]].sum(axis=0)  # exact: see kernels.simplex.measures.grids
+        inverted, uncertain, count = figures[:, [cells.INVERTED, cells.UNCERTAIN, cells.COUNT]].sum(axis=0)
+        mean, least, nan = float(sums.sum() / count), float(figures[:, cells.MINIMUM].min()), math.nan
+        return cls(nan, nan, nan, nan, mean, least, nan, nan, int(inverted), int(uncertain))
+
+    @classmethod
+    def of_columns(cls, columns: Floats) -> Totals:
+        """From the measures (4, T) of each triangle, at least one."""
+        low, high, shape, aspect = columns
+        bad = int((shape <= 0.0).sum())
+        return cls(
+            float(low.mean()), float(low.min()), float(high.mean()), float(high.max()), float(shape.mean()),
+            float(shape.min()), float(aspect.mean()), float(aspect.min()), bad, bad,
+        )  # fmt: skip
+
+    @property
+    def qhat(self) -> float:
+        """q̂ of equation 11 with 1/q as in the loss."""
+        return self._weighted(self.shape_mean, self.shape_min)
+
+    @property
+    def qhat_aspect(self) -> float:
+        """q̂ of equation 11 with 1/q_V as in the paper's tables."""
+        return self._weighted(self.aspect_mean, self.aspect_min)
+
+    def _weighted(self, mean: float, least: float) -> float:
+        """Equation 11: (1/6)[(α_mean + α_min + 120 − β_max − β_mean)/60 + (1/q)_mean + (1/q)_min], in degrees."""
+        angles = (self.low_mean + self.low_min + 120.0 - self.high_max - self.high_mean) / 60.0
+        return (angles + mean + least) / 6.0
+
+
+def totals_of(
+    points: Floats, simplices: Simplices, share: Share = serial, shapes: NDArray[np.float32] = NOWHERE
+) -> Totals | None:
+    """Means and extremes over the cells of some corner simplices of planar points; None where there are none.
+
+    share: how blocks of LANES simplices are shared out to threads. shapes: (T,), for 1/q of each triangle, if it is
+    wanted and all are triangles.
+    """
+    rows, blocks = simplices.rows, -(-len(simplices.rows) // LANES)
+    if not len(rows):
+        return None
+    grids = kernels.grids(len(rows))
+    if simplices.shapes is not None:
+
+        def part_of_cells(first: int, last: int) -> Floats:
+            figures: Floats = cells.summarise_cells(points, simplices, first, last, *grids)
+            return figures
+
+        return Totals.of_cells(share(part_of_cells, 0, blocks))
+
+    def part(first: int, last: int) -> Floats:
+        figures: Floats = kernels.summarise(points, rows, simplices.orientation, first, last, *grids, shapes)
+        return figures
+
+    return Totals.of(share(part, 0, blocks), len(rows))
