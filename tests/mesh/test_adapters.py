@@ -99,10 +99,12 @@ def test_cells_by_kind(cells):
         ("hexahedron27", 27, "hexahedron27", 3),
         ("wedge15", 15, "wedge15", 3),
         ("pyramid13", 13, "pyramid13", 3),
-        ("VTK_LAGRANGE_WEDGE", 6, "VTK_LAGRANGE_WEDGE", 3),
+        ("tetra20", 20, "tetra20", None),
+        ("quad16", 16, "quad16", None),
+        ("VTK_LAGRANGE_WEDGE", 6, "VTK_LAGRANGE_WEDGE", None),
     ],
 )
-def test_known_types_of_cells_pass(kind, columns, taken, dimension):
+def test_types_of_cells_that_meshio_has_pass(kind, columns, taken, dimension):
     mesh, _ = to_mesh((in_space(POINTS), {kind: np.arange(columns)[None] % 6}))
     (block,) = mesh.cells
     assert (block.kind, block.dimension) == (taken, dimension)
@@ -306,6 +308,27 @@ def test_unstructured_grid(pv):
 def test_volumes_stay_volumes(pv):
     given = pv.UnstructuredGrid([4, 0, 1, 2, 3], [10], in_space(POINTS))
     assert to_mesh(given)[0].cells[0].dimension == 3
+
+
+def test_a_voxel_is_a_hexahedron_that_counts_row_by_row(pv):
+    points = [[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)]
+    (block,) = to_mesh(pv.UnstructuredGrid([8, *range(8)], [11], points))[0].cells
+    assert (block.kind, block.nodes.tolist()) == ("hexahedron", [[0, 1, 3, 2, 4, 5, 7, 6]])
+
+
+def test_a_type_that_only_vtk_has_is_kept_under_its_number(pv):
+    (block,) = to_mesh(pv.UnstructuredGrid([6, 0, 1, 2, 3, 4, 5], [30], in_space(POINTS)))[0].cells
+    assert (block.kind, block.dimension) == ("VTK type 30", None)
+
+
+def test_cells_of_an_unknown_type_have_regions_of_their_own():
+    meshio = pytest.importorskip("meshio")
+    cells = [("triangle", FAN), ("quad16", np.arange(16)[None] % 6)]
+    given = meshio.Mesh(POINTS, cells, cell_data={"region": [np.arange(len(FAN)), np.array([7])]})
+    mesh, restore = to_mesh(given)
+    assert [block.dimension for block in mesh.cells] == [2, None]
+    assert mesh.markers == {}
+    assert restore(mesh.points).cells[1].type == "quad16"
 
 
 def test_other_pyvista_meshes_name_the_mend(pv):

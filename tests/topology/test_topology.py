@@ -145,7 +145,7 @@ def test_where_corners_are_many_rings_begin_at_int64(monkeypatch):
         two = Topology.of(each)
         assert (one.near_start.dtype, two.near_start.dtype) == (np.int32, np.int64)
         assert two.near_ring.dtype == two.near.dtype == np.int32
-        for name in ("near_start", "near_ring", "near_colours", "turn", "free", "memory", "near"):
+        for name in ("near_start", "near_ring", "near_colours", "orientation", "free", "memory", "near"):
             np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
         for mine, other in zip(one.patches, two.patches, strict=True):
             np.testing.assert_array_equal(mine, other)

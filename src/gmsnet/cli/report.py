@@ -9,7 +9,6 @@ import numpy as np
 from rich.table import Table
 
 from gmsnet.cli.output import table
-from gmsnet.mesh.cell_block import CORNERS
 from gmsnet.mesh.mesh import Mesh
 
 if TYPE_CHECKING:
@@ -111,7 +110,7 @@ def corners_of(mesh: Mesh, cell: int) -> NDArray[np.int64]:
     """The corner nodes of a cell by its index among all cells of the mesh."""
     for block in mesh.cells:
         if cell < len(block.nodes):
-            return block.nodes[cell, : CORNERS.get(block.kind, block.nodes.shape[1])]
+            return block.nodes[cell, : block.corners]
         cell -= len(block.nodes)
     raise IndexError(cell)
 

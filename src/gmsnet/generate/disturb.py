@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from gmsnet.errors import InputError
 from gmsnet.generate.random import generator
 from gmsnet.kernels.simplex.predicates import signs
-from gmsnet.mesh.cell_block import CORNERS
 from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -32,9 +31,7 @@ def disturb(mesh: Mesh, free: ArrayLike, amount: float, *, seed: int = 0, keep_v
         raise InputError("only planar meshes can be disturbed; this one varies along all three axes")
     axes = list(mesh.plane)
     old = np.ascontiguousarray(mesh.points[:, axes])
-    rings = [
-        block.nodes[:, : CORNERS.get(block.kind, block.nodes.shape[1])] for block in mesh.cells if block.dimension == 2
-    ]
+    rings = [block.nodes[:, : block.corners] for block in mesh.cells if block.dimension == 2]
     rng = generator(seed)
     radius, angle = np.sqrt(rng.random(len(old))), 2 * np.pi * rng.random(len(old))
     throw = radius * _mean_edge(old, rings) * amount * _mask(free, len(old))

@@ -8,10 +8,11 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import CELLS
 from gmsnet.errors import FormatError
 from gmsnet.io.cells import Small, cell_blocks, distinct
 from gmsnet.io.places import ranges
-from gmsnet.mesh.cell_block import NODES, CellBlock
+from gmsnet.mesh.cell_block import CellBlock
 
 
 class Kind(NamedTuple):
@@ -39,7 +40,7 @@ def table_blocks(
     """
     present = distinct(codes)
     for code in present:
-        expected = NODES.get(kinds[code].name)
+        expected = CELLS[kinds[code].name].nodes
         if expected is None:
             continue
         wrong = np.flatnonzero((codes == code) & (sizes != expected))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import face_name
 from gmsnet.io.places import ranges
 from gmsnet.io.text import Starts, Text
 from gmsnet.mesh.cell_block import CellBlock
@@ -18,14 +19,9 @@ Small = NDArray[np.int64] | NDArray[np.int32] | NDArray[np.int8]  # types and si
 MOST_BLOCKS = 1000
 
 
-def polygon_kind(size: int) -> str:
-    """meshio's name of a face with ``size`` corners."""
-    return {3: "triangle", 4: "quad"}.get(size, "polygon")
-
-
 def polygon_kinds(sizes: Small) -> dict[int, str]:
     """The names of all sizes of faces that occur."""
-    return {size: polygon_kind(size) for size in distinct(sizes)}
+    return {size: face_name(size) for size in distinct(sizes)}
 
 
 def cell_blocks(

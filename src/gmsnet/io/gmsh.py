@@ -144,8 +144,8 @@ def _assemble(found: Contents, nodes: Nodes, elements: Elements) -> Parsed:
     cells, _ = table_blocks(KINDS, elements.codes, elements.sizes, place, regions, {})
     for block in cells:  # a negative tag means: the same group, turned round
         for region in np.unique(block.regions[block.regions < 0]).tolist():
-            if (block.dimension, -region) in names:
-                names.setdefault((block.dimension, region), names[block.dimension, -region])
+            if (block.cell.dimension, -region) in names:
+                names.setdefault((block.cell.dimension, region), names[block.cell.dimension, -region])
     return Parsed(nodes.points, cells, nodes.slots, names, unread=_unread(found, nodes, elements, regions))
 
 
@@ -231,7 +231,7 @@ def _groups(mesh: Mesh) -> _Groups:
     found: dict[tuple[int, int], dict[str, list[NDArray[np.int64]]]] = {}
     for block in mesh.cells:
         for region in distinct(block.regions):
-            kinds = found.setdefault((block.dimension, region), {})
+            kinds = found.setdefault((block.cell.dimension, region), {})
             kinds.setdefault(block.kind, []).append(block.nodes[block.regions == region])
     return {key: {kind: np.concatenate(parts) for kind, parts in found[key].items()} for key in sorted(found)}
 

@@ -14,6 +14,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import nodes_of
 from gmsnet.io.cell_table import Kind
 from gmsnet.io.cells import joined
 from gmsnet.io.mapped import Data
@@ -22,7 +23,6 @@ from gmsnet.io.splice import Slots
 from gmsnet.io.text import Text, fail, quoted
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 from gmsnet.kernels.text import text as kernels
-from gmsnet.mesh.cell_block import NODES
 
 # Gmsh's types of elements: the name, the number of nodes and, where Gmsh's order differs, the places of Mesh's nodes.
 KINDS = {
@@ -32,7 +32,7 @@ KINDS = {
     17: Kind("hexahedron20", (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)), 21: Kind("triangle10"),
     26: Kind("line4"),
 }  # fmt: skip
-SIZES = np.array([NODES[KINDS[code].name] if code in KINDS else 0 for code in range(max(KINDS) + 1)], dtype=np.int8)
+SIZES = np.array([nodes_of(KINDS[code].name) if code in KINDS else 0 for code in range(max(KINDS) + 1)], dtype=np.int8)
 
 _TOGETHER = 1 << 20  # numbers of elements that are looked at together
 
@@ -295,4 +295,4 @@ def node_count(words: Words, at: int, code: int) -> int:
     """The number of nodes of a type of element. Raises FormatError for one that is not supported."""
     if code not in KINDS:
         words.fail(at, f"elements of Gmsh type {code} are not supported: save the mesh with order 1 or 2")
-    return NODES[KINDS[code].name]
+    return nodes_of(KINDS[code].name)

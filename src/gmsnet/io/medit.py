@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import nodes_of
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
 from gmsnet.io.cells import check_nodes, distinct, sealed
@@ -20,7 +21,7 @@ from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Starts, Text
-from gmsnet.mesh.cell_block import NODES, CellBlock
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "Medit"
@@ -114,7 +115,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
             points, ends = text.spans(starts := np.ascontiguousarray(rows[:, :dimension]))
             slots, references = TextSlots(starts, ends), text.integers(rows[:, dimension])
         elif key in KINDS or key in HELD:
-            width = NODES[KINDS[key]] if key in KINDS else 1
+            width = nodes_of(KINDS[key]) if key in KINDS else 1
             rows = stream.take(stream.count(key) * (width + (key in KINDS))).reshape(-1, width + (key in KINDS))
             nodes = text.integers(rows[:, :width])
             nodes -= 1

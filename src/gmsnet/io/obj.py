@@ -48,7 +48,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
     points, ends = text.spans(starts)
     regions, names = _regions(text, rows, keys)
     cells = _cells(text, rows, keys, len(points), regions)
-    used = {(b.dimension, r) for b in cells for r in distinct(b.regions)}
+    used = {(b.cell.dimension, r) for b in cells for r in distinct(b.regions)}
     region_names = {(dim, r): names[r] for dim, r in sorted(used) if names[r]}
     return Parsed(points, cells, TextSlots(starts, ends), region_names, unread=_unread(rows, keys))
 
@@ -198,12 +198,12 @@ def _text(mesh: Mesh) -> Iterator[Piece]:
     yield from convert.rows(b"v % % %\n", convert.in_space(mesh))
     group = ""
     for block in mesh.cells:
-        row = {0: b"p ", 1: b"l ", 2: b"f "}[block.dimension] + convert.row_of(block.nodes.shape[1])
+        row = {0: b"p ", 1: b"l ", 2: b"f "}[block.cell.dimension] + convert.row_of(block.nodes.shape[1])
         cuts = (np.flatnonzero(np.diff(block.regions)) + 1).tolist()
         for start, end in zip([0, *cuts], [*cuts, len(block.nodes)], strict=True):
             if start < end:
                 region = int(block.regions[start])
-                wanted = "g " + _words(convert.marker_name(mesh, block.dimension, region))
+                wanted = "g " + _words(convert.marker_name(mesh, block.cell.dimension, region))
                 if wanted != group and (group or region or (block.dimension, region) in mesh.region_names):
                     yield f"{wanted}\n".encode()
                     group = wanted

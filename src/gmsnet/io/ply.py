@@ -127,7 +127,7 @@ def _fields(words: Words, parts: list[Table], counts: list[int]) -> dict[str, ND
 def write(mesh: Mesh) -> Written:
     """See Format. Text, coordinates in double precision; faces and edges, with the regions as a property."""
     convert.check_kinds(mesh, name, ("vertex", "line", "triangle", "quad", "polygon"))
-    if not any(len(block.nodes) for block in mesh.cells if block.dimension > 0):
+    if not any(len(block.nodes) for block in mesh.cells if block.cell.dimension > 0):
         raise FormatError("PLY holds faces and edges only, and this mesh has none")
     lost = [*convert.lost_cells(mesh, name, (0,)), *convert.lost_names(mesh, name, (1, 2))]
     lost += convert.lost_data(mesh, name, [*mesh.point_data, *mesh.cell_data])

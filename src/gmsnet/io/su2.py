@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import nodes_of
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
 from gmsnet.io.cells import cell_blocks, check_nodes, distinct, numbered
@@ -28,7 +29,7 @@ name = "SU2"
 suffixes = (".su2",)
 
 CODES = {1: "vertex", 3: "line", 5: "triangle", 9: "quad"}
-SIZES = {1: 1, 3: 2, 5: 3, 9: 4}
+SIZES = {code: nodes_of(kind) for code, kind in CODES.items()}
 COUNTS = {"NDIME": "dimensions", "NZONE": "zones", "NPOIN": "points", "NELEM": "elements", "NMARK": "markers",
           "MARKER_ELEMS": "marker elements"}  # fmt: skip
 COMMENT = b"%"
@@ -78,7 +79,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
         if rows is None:
             raise FormatError(f"the marker {tag[:24]!r} has no MARKER_ELEMS: the file is cut off")
         blocks = _cells(text, rows, len(points), numbers[tag], {1: "vertex", 3: "line"})
-        names |= {(b.dimension, numbers[tag]): tag for b in blocks}
+        names |= {(b.cell.dimension, numbers[tag]): tag for b in blocks}
         cells += blocks
     unread = [f"the keyword {key}" for key in found.others]
     return Parsed(points, cells, TextSlots(starts, ends), names, unread=unread)
@@ -226,9 +227,9 @@ def _text(mesh: Mesh, points: NDArray[np.float64]) -> Iterator[Piece]:
     yield from convert.rows(b"% % %\n", points, np.arange(len(points)))
     markers: dict[str, list[tuple[int, NDArray[np.int64]]]] = {}
     for block in mesh.cells:
-        if block.dimension < 2:
+        if block.cell.dimension < 2:
             for region in distinct(block.regions):
-                tag = _tag(convert.marker_name(mesh, block.dimension, region))
+                tag = _tag(convert.marker_name(mesh, block.cell.dimension, region))
                 markers.setdefault(tag, []).append((code[block.kind], block.nodes[block.regions == region]))
     yield b"NMARK= %d\n" % len(markers)
     for tag, parts in markers.items():

@@ -163,17 +163,17 @@ def write(mesh: Mesh) -> Written:
 def _markers(mesh: Mesh) -> tuple[NDArray[np.int64], list[str]]:
     """A boundary marker for each point, and what of the line and vertex cells is lost thereby."""
     markers = np.zeros(len(mesh.points), dtype=np.int64)
-    used = sorted({(b.dimension, r) for b in mesh.cells if b.dimension < 2 for r in distinct(b.regions)})
+    used = sorted({(b.cell.dimension, r) for b in mesh.cells if b.cell.dimension < 2 for r in distinct(b.regions)})
     plain = len({r for _, r in used}) == len(used) and all(r != 0 for _, r in used)
     number = {pair: pair[1] if plain else k for k, pair in enumerate(used, 1)}
     lines = sum(len(block.nodes) for block in mesh.cells if block.dimension == 1)
     several = np.zeros(len(markers), dtype=bool)
     for block in mesh.cells:
-        if block.dimension < 2:
+        if block.cell.dimension < 2:
             for region in distinct(block.regions):
                 nodes = block.nodes[block.regions == region]
-                several[nodes] |= ~np.isin(markers[nodes], (0, number[block.dimension, region]))
-                markers[nodes] = number[block.dimension, region]
+                several[nodes] |= ~np.isin(markers[nodes], (0, number[block.cell.dimension, region]))
+                markers[nodes] = number[block.cell.dimension, region]
     lost = []
     if lines:
         told = convert.listed([str(k) for (dim, _), k in number.items() if dim == 1])

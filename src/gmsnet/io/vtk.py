@@ -26,11 +26,12 @@ from gmsnet.io.vtk_fields import attribute, field_arrays, keyword
 from gmsnet.io.vtk_stream import TYPES, Array, Line, Stream, word_of
 from gmsnet.kernels.text import text as kernels
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX
 
 name = "VTK"
 suffixes = (".vtk",)
 
-LISTS = {"VERTICES": vtk_cells.POLYVERTEX, "LINES": vtk_cells.POLYLINE, "POLYGONS": vtk_cells.POLYGON}
+LISTS = {"VERTICES": POLYVERTEX, "LINES": POLYLINE, "POLYGONS": POLYGON}
 TYPE_NAMES = {kind: called for called, kind in TYPES.items() if called not in ("vtkidtype", "signed_char")} | {
     "i8": "long",
     "u8": "unsigned_long",

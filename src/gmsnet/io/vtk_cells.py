@@ -18,26 +18,16 @@ from gmsnet.io.splice import Slots
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import names_a_region, regions_of
+from gmsnet.mesh.vtk_types import POLYGON, POLYHEDRON, POLYLINE, POLYVERTEX, STRIP, VTK_KINDS, VTK_ORDERS
 
 Fields = Sequence[tuple[str, NDArray[Any]]]  # name and values, in the order of the file
 
-POLYVERTEX, POLYLINE, POLYGON = 2, 4, 7
-
-KINDS = {
-    1: Kind("vertex"), POLYVERTEX: Kind("vertex"), 3: Kind("line"), POLYLINE: Kind("line"), 5: Kind("triangle"),
-    POLYGON: Kind("polygon"), 8: Kind("quad", (0, 1, 3, 2)), 9: Kind("quad"), 10: Kind("tetra"),
-    11: Kind("hexahedron", (0, 1, 3, 2, 4, 5, 7, 6)), 12: Kind("hexahedron"), 13: Kind("wedge"), 14: Kind("pyramid"),
-    21: Kind("line3"), 22: Kind("triangle6"), 23: Kind("quad8"), 24: Kind("tetra10"), 25: Kind("hexahedron20"),
-    26: Kind("wedge15"), 27: Kind("pyramid13"), 28: Kind("quad9"), 29: Kind("hexahedron27"), 34: Kind("triangle7"),
-    35: Kind("line4"),
-}  # fmt: skip
-
+UNSUPPORTED = {STRIP: "triangle strips", POLYHEDRON: "polyhedra"}  # the others have no name that users know
+KINDS = {code: Kind(kind, VTK_ORDERS.get(code)) for code, kind in VTK_KINDS.items() if code not in UNSUPPORTED}
 CODES = {kind.name: code for code, kind in KINDS.items() if kind.order is None and code not in (POLYVERTEX, POLYLINE)}
 
 _TOGETHER = 1 << 16  # cells that are written at once
 _WIDTH = 12  # integers in a line
-
-UNSUPPORTED = {6: "triangle strips", 42: "polyhedra"}  # the others have no name that users know
 
 
 def parsed(

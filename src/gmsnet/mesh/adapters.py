@@ -15,25 +15,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gmsnet.cells.table import CELLS, face_name
 from gmsnet.errors import InputError
 from gmsnet.mesh.arrays import coordinates, plain_array, whole_numbers
-from gmsnet.mesh.cell_block import DIMENSION, NODES, CellBlock
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import combined, names_a_region
+from gmsnet.mesh.vtk_types import PIXEL, POLYLINE, POLYVERTEX, STRIP, VTK_KINDS, VTK_ORDERS
 
 Restore = Callable[[NDArray[np.float64]], Any]
 
-VTK_KIND = {
-    1: "vertex", 3: "line", 5: "triangle", 7: "polygon", 8: "pixel", 9: "quad", 10: "tetra", 11: "voxel",
-    12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line3", 22: "triangle6", 23: "quad8", 24: "tetra10",
-    25: "hexahedron20", 28: "quad9", 34: "triangle7", 35: "line4",
-}  # fmt: skip
 NOWHERE = np.zeros((), dtype=np.int64)  # the region of cells without any, once for all of them
 NOWHERE.flags.writeable = False
-VTK_CHAINS = {2: ("vertex", 1), 4: ("line", 2)}  # cells of any number of nodes that are taken as their pieces
+UNKNOWN = -1  # the dimension of cells of a kind that is not known
+VTK_CHAINS = {POLYVERTEX: ("vertex", 1), POLYLINE: ("line", 2)}  # of any number of nodes, taken as their pieces
 
-# meshio's names of cells, those of higher order ("tetra35") included.
-KIND = re.compile(r"vertex|(line|triangle|quad|polygon|tetra|hexahedron|wedge|pyramid)\d*|VTK_LAGRANGE_[A-Z]+")
+# meshio's names of cells, those of higher order ("tetra35") included: their nodes are held.
+FAMILIES = "|".join(kind.name for kind in CELLS.values() if kind.order == 1 and kind.dimension)
+KIND = re.compile(rf"vertex|({FAMILIES})\d*|VTK_LAGRANGE_[A-Z]+")
 
 
 def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
@@ -129,10 +128,12 @@ def _from_pyvista(thing: Any) -> tuple[Mesh, Restore]:
             kind, width = VTK_CHAINS[code]
             nodes = np.lib.stride_tricks.sliding_window_view(nodes, width, axis=1).reshape(-1, width)
             cells = np.repeat(cells, size - width + 1)
-        elif code == 6:
+        elif code == STRIP:
             raise InputError(f"cell {start} (counted from 0) is a triangle strip: call .triangulate() first")
         else:
-            kind = VTK_KIND.get(code, f"VTK type {code}")
+            kind = VTK_KINDS.get(code, f"VTK type {code}")
+            if code in VTK_ORDERS:
+                nodes = nodes[:, VTK_ORDERS[code]]
         blocks.append(_face(kind, nodes))
         source.append(cells)
         start = end
@@ -160,7 +161,8 @@ def _mesh(
     region_names: dict[tuple[int, int], str] = {}
     if cell_data or cell_sets:
         region = np.zeros(len(region), dtype=np.int64)
-        dimension = np.repeat([DIMENSION.get(kind, 3) for kind, _ in blocks], counts).astype(np.int64)
+        dimensions = [CELLS[kind].dimension if kind in CELLS else UNKNOWN for kind, _ in blocks]
+        dimension = np.repeat(dimensions, counts).astype(np.int64)
         physical = cell_data.get("gmsh:physical")
         for dim in np.unique(dimension).tolist():
             of_dim = np.flatnonzero(dimension == dim)
@@ -223,11 +225,11 @@ def _indices(nodes: Any, what: str) -> NDArray[np.int64]:
 
 
 def _known(kind: Any) -> str:
-    """The name of a type of cells. Raises InputError where it is none, for any other would count as volumes."""
+    """The name of a type of cells. Raises InputError where it is none that meshio has either: it is misspelt."""
     if isinstance(kind, str) and KIND.fullmatch(kind):
         return kind
-    near = difflib.get_close_matches(str(kind).lower(), NODES, n=2, cutoff=0.5)
-    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known are {', '.join(NODES)}"
+    near = difflib.get_close_matches(str(kind).lower(), CELLS, n=2, cutoff=0.5)
+    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known are {', '.join(CELLS)}"
     raise InputError(f"unknown type of cells {kind!r}; {hint}")
 
 
@@ -263,9 +265,9 @@ def _even(kind: str, data: Any) -> Iterator[tuple[str, NDArray[np.int64]]]:
 def _face(kind: str, nodes: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
     """A face by the name that a Mesh has for it."""
     if kind == "pixel":  # VTK counts its corners row by row
-        return "quad", nodes[:, [0, 1, 3, 2]]
+        return "quad", nodes[:, VTK_ORDERS[PIXEL]]
     if kind.startswith("polygon") and nodes.ndim == 2:
-        return {3: "triangle", 4: "quad"}.get(nodes.shape[1], "polygon"), nodes
+        return face_name(nodes.shape[1]), nodes
     return kind, nodes
 
 

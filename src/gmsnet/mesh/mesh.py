@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.mesh.arrays import plain_array
-from gmsnet.mesh.cell_block import CORNERS, CellBlock
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.checks import (
     arrays_per_block,
     cell_blocks,
@@ -179,7 +179,9 @@ class Mesh:
         nodes: dict[str, list[NDArray[np.int64]]] = {name: [ids] for name, ids in self.node_sets.items()}
         for block in self.cells:
             for region in np.unique(block.regions).tolist():
-                name = self.region_names.get((block.dimension, region), str(region) if block.dimension < 2 else None)
+                name = str(region) if block.dimension in (0, 1) else None
+                if block.dimension is not None:
+                    name = self.region_names.get((block.dimension, region), name)
                 if name is None:  # most often 0, the region of all cells: holding it would hold the whole mesh
                     continue
                 nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
@@ -187,9 +189,21 @@ class Mesh:
 
 
 def unmeasured(mesh: Mesh) -> str:
-    """How many faces of which kind are no triangles, in words: no quality is known of them. "" if there are none."""
+    """How many cells of which kind are no triangles, in words: no quality is known of them. "" if there are none.
+
+    Those of a kind that is not known count among them, as they may be faces; vertices, lines and volumes do not.
+    """
+    return _counted(block for block in mesh.cells if block.dimension in (2, None) and not block.triangular)
+
+
+def unknown_cells(mesh: Mesh) -> str:
+    """How many cells are of a kind that is not known, in words: their nodes are held. "" if there are none."""
+    return _counted(block for block in mesh.cells if block.dimension is None)
+
+
+def _counted(blocks: Iterable[CellBlock]) -> str:
     counts: dict[str, int] = {}
-    for block in mesh.cells:
-        if block.dimension == 2 and CORNERS.get(block.kind) != 3 and len(block.nodes):
+    for block in blocks:
+        if len(block.nodes):
             counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
     return ", ".join(f"{count:,} {kind} cell{'s' if count > 1 else ''}" for kind, count in counts.items())

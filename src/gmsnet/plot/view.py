@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.measure.report import QualityReport, measure
-from gmsnet.mesh.cell_block import CORNERS, CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.plot.figure import AFTER
 from gmsnet.topology.topology import Topology
@@ -33,12 +32,8 @@ def check_mesh(mesh: Mesh) -> None:
     """Raise what plotting this mesh would raise, before any work: InputError unless it is planar and has triangles."""
     if mesh.plane is None:
         raise InputError("a picture shows planar meshes only, and this one varies in x, y and z")
-    if not any(_is_triangular(block) and len(block.nodes) for block in mesh.cells):
+    if not any(block.triangular and len(block.nodes) for block in mesh.cells):
         raise InputError("a picture shows the quality of triangles, and this mesh has none")
-
-
-def _is_triangular(block: CellBlock) -> bool:
-    return block.dimension == 2 and CORNERS.get(block.kind) == 3
 
 
 @dataclass(frozen=True)
@@ -61,9 +56,9 @@ class View:
     def of(cls, mesh: Mesh, title: str = "", colour: str = AFTER, topology: Topology | None = None) -> View:
         """A planar mesh; with the topology of another state of it, cells that have turned over since are inverted."""
         assert mesh.plane is not None
-        triangles = [block.nodes[:, :3] for block in mesh.cells if _is_triangular(block)]
-        faces = [b for b in mesh.cells if b.dimension == 2 and len(b.nodes) and not _is_triangular(b)]
-        others = [block.nodes[:, : CORNERS.get(block.kind, block.nodes.shape[1])] for block in faces]
+        triangles = [block.nodes[:, :3] for block in mesh.cells if block.triangular]
+        faces = [b for b in mesh.cells if b.dimension == 2 and len(b.nodes) and not b.triangular]
+        others = [block.nodes[:, : block.corners] for block in faces]
         lines = [block.nodes[:, :2] for block in mesh.cells if block.dimension == 1]
         return cls(
             title,

@@ -17,8 +17,7 @@ from gmsnet.measure.report import QualityReport, measure
 from gmsnet.measure.target import Target
 from gmsnet.measure.totals import Totals
 from gmsnet.mesh.adapters import to_mesh
-from gmsnet.mesh.cell_block import CORNERS
-from gmsnet.mesh.mesh import Mesh, unmeasured
+from gmsnet.mesh.mesh import Mesh, unknown_cells, unmeasured
 from gmsnet.mesh.selection import fixed_mask
 from gmsnet.methods import Smoother, StarSmoother, smoother
 from gmsnet.methods.auto import Auto
@@ -96,7 +95,7 @@ def smooth(
     target, chosen = Target(target_quality, target_angle), create()
     given, restore = to_mesh(mesh)
     check_mesh(given, target)
-    others = unmeasured(given) if target else ""
+    others, unknown = unmeasured(given) if target else "", unknown_cells(given)
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     threads = threads or available_threads()
     apart = threads if len(given.points) >= MANY else 1
@@ -129,6 +128,8 @@ def smooth(
         count = np.count_nonzero(asked)
         named = "1 node is" if count == 1 else f"{count:,} nodes are"
         notes.append(f"fixed: {named} named, and held for other reasons anyway")
+    if unknown:
+        notes.append(f"the nodes of {unknown} are held: gmsnet does not know this type of cells")
     if others:
         notes.append(f"the target is asked of triangles alone, not of {others}")
 
@@ -212,12 +213,17 @@ def quality(mesh: Any) -> QualityReport:
 def check_mesh(mesh: Mesh, target: Target) -> None:
     """InputError for volume meshes and curved surfaces, which cannot be smoothed yet, and targets of no triangle."""
     others = unmeasured(mesh) if target else ""
-    if others and not any(len(block.nodes) for block in mesh.cells if CORNERS.get(block.kind) == 3):
+    if others and not any(len(block.nodes) for block in mesh.cells if block.triangular):
         raise InputError(f"a target is asked of triangles, and this mesh has none: {others} cannot be measured so far")
     volumes = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
     if mesh.plane is None and volumes:
         raise InputError(
             f"this is a volume mesh ({', '.join(volumes)}): only planar triangle meshes can be smoothed so far"
+        )
+    if mesh.plane is None and (unknown := unknown_cells(mesh)):
+        raise InputError(
+            f"the mesh varies in x, y and z and has cells of a type that gmsnet does not know ({unknown}): "
+            "only planar triangle meshes can be smoothed so far"
         )
     if mesh.plane is None:
         extent = np.ptp(mesh.points, axis=0)

@@ -34,7 +34,7 @@ def known_marks(mesh: Mesh, fixed: NDArray[np.bool_] | None, position: Ints) -> 
     for block in mesh.cells:
         if block.kind not in SMOOTHED:
             marks[position[block.nodes.ravel()]] |= np.uint16(
-                marks_of.LINE if block.dimension < 2 else marks_of.UNSUPPORTED_CELL
+                marks_of.LINE if block.dimension in (0, 1) else marks_of.UNSUPPORTED_CELL
             )
     if fixed is not None and fixed.any():
         marks[position[fixed]] |= np.uint16(marks_of.CHOSEN)

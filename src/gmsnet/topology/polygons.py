@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology import layout
-from gmsnet.mesh.cell_block import CORNERS, CellBlock
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 Ints = NDArray[np.int32]
@@ -52,7 +52,7 @@ class Faces:
             before += len(block.nodes)
         return cls(
             first=_first(blocks),
-            corner=_joined([block.nodes[:, : corners_of(block)].reshape(-1) for block in blocks], np.int32),
+            corner=_joined([block.nodes[:, : block.corners].reshape(-1) for block in blocks], np.int32),
             region=_joined([block.regions for block in blocks] if _differ(blocks) else [], np.int64),
             cell=cells[0] if len(cells) == 1 else _joined(cells, np.int64),
         )
@@ -97,24 +97,19 @@ class NearFaces(Faces):
     begin: Ints
 
 
-def corners_of(block: CellBlock) -> int:
-    """How many corners each of these faces has."""
-    return CORNERS[block.kind] if block.kind in CORNERS else int(block.nodes.shape[1])
-
-
 def check_size(mesh: Mesh) -> int:
     """How many corners the faces of a mesh have. Raises InputError for more nodes or faces than int32 can number."""
     blocks = [block for block in mesh.cells if block.dimension == 2]
     for count, what in ((len(mesh.points), "nodes"), (sum(len(block.nodes) for block in blocks), "cells")):
         if count > MOST:
             raise InputError(f"the mesh has {count:,} {what}: gmsnet can number at most {MOST:,}")
-    return sum(len(block.nodes) * corners_of(block) for block in blocks)
+    return sum(len(block.nodes) * block.corners for block in blocks)
 
 
 def _first(blocks: list[CellBlock]) -> Offsets | None:
-    if all(corners_of(block) == 3 for block in blocks):
+    if all(block.corners == 3 for block in blocks):
         return None
-    return _starts(np.repeat([corners_of(block) for block in blocks], [len(block.nodes) for block in blocks]))
+    return _starts(np.repeat([block.corners for block in blocks], [len(block.nodes) for block in blocks]))
 
 
 def _starts(sizes: NDArray[Any]) -> Offsets:
