@@ -37,8 +37,8 @@ class Outline:
 def outline_of(mesh: Mesh) -> Outline:
     """The outline of a mesh; linear in its faces."""
     faces, nodes = Faces.of(mesh), len(mesh.points)
-    twin, head = _twins(faces, nodes), _heads(faces)
-    halves, kinds, regions = _sides(faces, twin)
+    twin, head = twins(faces, nodes), heads(faces)
+    halves, kinds, regions = sides(faces, twin)
     side_keys = _keys(faces.corner[halves], head[halves], nodes)
     lines, marks, still = _lines(mesh)
     line_keys = _keys(lines[:, 0], lines[:, 1], nodes)
@@ -66,7 +66,7 @@ def _keys(one: NDArray[np.integer], other: NDArray[np.integer], nodes: int) -> L
     return keys
 
 
-def _twins(faces: Faces, nodes: int) -> Offsets:
+def twins(faces: Faces, nodes: int) -> Offsets:
     """The twin of each half-edge (kernels.topology.winding)."""
     kind = offset_type(len(faces.corner))
     twin, by_low = np.empty(len(faces.corner), dtype=kind), np.empty(len(faces.corner), dtype=kind)
@@ -75,7 +75,7 @@ def _twins(faces: Faces, nodes: int) -> Offsets:
     return twin
 
 
-def _heads(faces: Faces) -> Ints:
+def heads(faces: Faces) -> Ints:
     """(H,) the node that each half-edge goes to."""
     head = np.roll(faces.corner, -1)
     if len(head):
@@ -84,7 +84,7 @@ def _heads(faces: Faces) -> Ints:
     return head
 
 
-def _sides(faces: Faces, twin: Offsets) -> tuple[Longs, Longs, Longs]:
+def sides(faces: Faces, twin: Offsets) -> tuple[Longs, Longs, Longs]:
     """Half-edges of boundary, interface and non-manifold edges, the kind of each, and its two regions (S, 2)."""
     if len(faces.region):
         face = np.arange(len(twin)) // 3 if faces.face is None else faces.face
@@ -136,7 +136,7 @@ def _still(mesh: Mesh, faces: Faces, twin: Offsets, halves: Longs) -> Flags:
     still[(sizes >= 0) & (sizes != at)] = True
     chains.repeated_corners(faces.first, faces.corner, len(faces), still)
     crowded = np.flatnonzero(twin == winding.NON_MANIFOLD)
-    still[faces.corner[crowded]] = still[_heads(faces)[crowded]] = True
+    still[faces.corner[crowded]] = still[heads(faces)[crowded]] = True
     for block in mesh.cells:
         if block.dimension == 3 or (block.dimension == 2 and block.nodes.shape[1] > corners_of(block)):
             still[block.nodes] = True
