@@ -2,39 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.curve import ArcSpline, arc_spline, through
 from gmsnet.constraints.features import Curves
+from gmsnet.constraints.geometry import Entity, Geometry, named
 from gmsnet.errors import InputError
 from gmsnet.kernels.star.constraint import ARCS, LINE, SAME_X, SAME_Y, Constraint
 from gmsnet.topology.polygons import Ints
 
 Floats = NDArray[np.float64]
 SAMPLES = 4  # places at which a geometry is asked for each edge of a curve
-
-
-class Entity(NamedTuple):
-    """Which curve of a mesh is meant. dimension: 1. number: among its curves. markers: whose line cells are on it."""
-
-    dimension: int
-    number: int
-    markers: tuple[str, ...]
-
-
-class Geometry(Protocol):
-    """The true shape of the curves of a mesh, in the mesh's own coordinates along the two axes of its plane."""
-
-    def project(self, entity: Entity, points: Floats) -> tuple[Floats, Floats]:
-        """The places (K, 2) on an entity nearest to points (K, 2), and their parameters (K,) there."""
-        ...
-
-    def tangent(self, entity: Entity, parameters: Floats) -> Floats:
-        """Tangents (K, 2) of an entity at parameters (K,), of any length, in either direction."""
-        ...
 
 
 def constraint_of(
@@ -104,7 +83,7 @@ def _on_geometry(curves: Curves, points: Floats, geometry: Geometry, exponent: i
     chains, tangents = list[Floats](), list[Floats]()
     for c in range(len(curves)):
         p = points[curves.nodes_of(c)]
-        if len(p) == 2:  # no node slides on it
+        if not curves.slides[curves.nodes_of(c)[:-1]].any():
             chains.append(_samples(p))
             tangents.append(np.repeat(p[1:] - p[:1], SAMPLES + 1, axis=0))
             continue
@@ -117,15 +96,18 @@ def _on_geometry(curves: Curves, points: Floats, geometry: Geometry, exponent: i
             places[-1], direction[-1] = places[0], direction[0]
         else:
             places[0], places[-1] = p[0], p[-1]
-        step = np.diff(places, axis=0)
-        step = np.vstack([step, step[:1] if curves.closed[c] else step[-1:]])
-        chains.append(places)
-        tangents.append(np.where((step * direction).sum(axis=1, keepdims=True) < 0.0, -direction, direction))
-        if ((step * np.diff(wanted, axis=0, append=wanted[-1:])).sum(axis=1)[:-1] <= 0.0).any():
+        ahead, along = np.diff(places, axis=0), np.diff(wanted, axis=0)
+        around = ahead[:1] if curves.closed[c] else ahead[-1:]
+        backward = (np.vstack([ahead, around]) * direction).sum(axis=1, keepdims=True) < 0.0
+        direction = np.where(backward, -direction, direction)
+        if ((ahead * along).sum(axis=1) <= 0.0).any() or ((ahead * direction[1:]).sum(axis=1) < 0.0).any():
             raise InputError(
-                f"the places that geometry.project gives for {_named(entity)} do not follow each other as its nodes do: "
-                "take a geometry that lies nearer to the mesh, or leave this curve out of slide"
+                f"the places that geometry.project gives for {named(entity)} do not follow each other as its nodes do, "
+                "or turn by more than 90 degrees from one to the next: take a geometry that lies nearer to the mesh, "
+                "or leave this curve out of slide"
             )
+        chains.append(places)
+        tangents.append(direction)
     spline = through(chains, curves.closed, tangents)
     return ArcSpline(spline.first, spline.piece, spline.closed, spline.per_edge * SAMPLES)
 
@@ -142,9 +124,5 @@ def _checked(values: object, shape: tuple[int, ...], what: str, entity: Entity) 
     except (TypeError, ValueError):
         array = np.zeros(0)
     if array.shape != shape or not np.isfinite(array).all():
-        raise InputError(f"the {what} that geometry gives for {_named(entity)} must be {shape} finite numbers")
+        raise InputError(f"the {what} that geometry gives for {named(entity)} must be {shape} finite numbers")
     return array
-
-
-def _named(entity: Entity) -> str:
-    return f"the curve {entity.number}" + (f" ({', '.join(entity.markers)})" if entity.markers else "")

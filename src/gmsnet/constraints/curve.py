@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.features import Curves
-from gmsnet.errors import InputError
 from gmsnet.kernels.star import constraint as kernels
 
 Floats = NDArray[np.float64]
@@ -68,7 +67,7 @@ def through(chains: list[Floats], closed: NDArray[np.bool_], tangent: list[Float
     """Arcs through chains of points (K, 2), K ≥ 2, no two in a row equal unless there are only two.
 
     tangent: of each chain (K, 2), in its direction; without, those of circles through three points. A chain of two
-    points is one segment then. Raises InputError where a tangent is more than 90° off the way to the next point.
+    points is one segment then. Tangents must be at most 90° off the way to the next point and from the last one.
     """
     sizes = np.array([len(chain) for chain in chains], dtype=np.int64)
     if tangent is None:
@@ -102,7 +101,7 @@ def _times(p: Floats, q: Floats, conjugate: bool = False) -> Floats:
 
 def _half(e: Floats) -> Floats:
     """Unit complex numbers of half the angle, for angles between −180° and 180°."""
-    return _unit(e + [1.0, 0.0])
+    return _unit(e + np.array([1.0, 0.0]))
 
 
 def _circle_tangents(p: Floats, ring: bool) -> tuple[Floats, Floats]:
@@ -126,10 +125,7 @@ def _circle_tangents(p: Floats, ring: bool) -> tuple[Floats, Floats]:
 def _edge_angles(p: Floats, direction: Floats) -> tuple[Floats, Floats]:
     """The same for given tangents at the nodes."""
     way, at = _unit(np.diff(p, axis=0)), _unit(direction)
-    start, end = _times(at[:-1], way, conjugate=True), _times(way, at[1:], conjugate=True)
-    if (start[:, 0] < 0.0).any() or (end[:, 0] < 0.0).any():
-        raise InputError("a tangent is more than 90 degrees off the way to the next point: take more points there")
-    return start, end
+    return _times(at[:-1], way, conjugate=True), _times(way, at[1:], conjugate=True)
 
 
 def _segment(p: Floats) -> Floats:
