@@ -144,8 +144,8 @@ def test_only_nodes_of_named_markers_slide():
 def stadium():
     """Two half circles and two straight sides of five edges, counter-clockwise; no corner turns by more than 10°."""
     arc = np.pi * np.arange(21) / 20 - np.pi / 2
-    side = np.arange(1, 5)[:, None] / 5
-    right, left = on_circle(arc) + (2.0, 0.0), on_circle(arc + np.pi) - (2.0, 0.0)
+    side, middle = np.arange(1, 5)[:, None] / 5, np.array([2.0, 0.0])
+    right, left = on_circle(arc) + middle, on_circle(arc + np.pi) - middle
     return np.vstack([right, right[-1] + side * (left[0] - right[-1]), left, left[-1] + side * (right[0] - left[-1])])
 
 
@@ -221,8 +221,8 @@ print(json.dumps([(bool(closed), nodes.tolist()) for nodes, closed in Curves(mes
 @pytest.mark.parametrize(
     "name",
     [
-        "mesh_NACA0012_inv.su2", "internal.msh", "japan_sea.msh", "ex28.msh", "osteonT1_11.mesh",
-        "helmholtz_apartment.vtk", "insulated.msh", "n0012_113-33.su2", "square_triquad.mesh", "quadratic_quad.msh", "star-mixed-p2.vtk",
+        "mesh_NACA0012_inv.su2", "internal.msh", "japan_sea.msh", "ex28.msh", "osteonT1_11.mesh", "insulated.msh",
+        "helmholtz_apartment.vtk", "n0012_113-33.su2", "square_triquad.mesh", "quadratic_quad.msh", "star-mixed-p2.vtk",
     ],
 )  # fmt: skip
 def test_curves_are_those_of_the_referee_or_cut_finer(real_meshes, name):

@@ -138,7 +138,7 @@ def sagittas(p: np.ndarray, closed: bool) -> np.ndarray:
         if closed or 0 < k < last:
             a, b, c = p[k - 1 if k else last - 1], p[k], p[k + 1 if k < last else 1]
             sides = math.dist(a, b) * math.dist(b, c) * math.dist(a, c)
-            area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+            area = (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
             curvature[k] = 2.0 * abs(area) / sides if sides > 0.0 else 0.0
     out = np.zeros(last)
     for k in range(last):
