@@ -93,14 +93,17 @@ def one_fan(pairs: list[tuple[int, int]]) -> bool:
     return len(seen) == len(links)
 
 
-def patchwork(seed: int, *, lines: bool = True) -> Mesh:
-    """A jittered grid of triangles and quads of two regions with holes, turned faces, marked lines and a vertex."""
+def patchwork(seed: int, *, even: bool = False) -> Mesh:
+    """A jittered grid of triangles and quads of two regions with holes, turned faces, marked lines and a vertex.
+
+    even: the nodes lie on the grid.
+    """
     rng = np.random.default_rng(seed)
     wide, high = rng.integers(2, 7, 2)
     x, y = np.meshgrid(np.arange(wide + 1.0), np.arange(high + 1.0))
-    points = np.column_stack([x.ravel(), y.ravel()]) + rng.choice([0.0, 0.0, 0.1, 0.25]) * rng.standard_normal(
-        ((wide + 1) * (high + 1), 2)
-    )
+    points = np.column_stack([x.ravel(), y.ravel()])
+    if not even:
+        points += rng.choice([0.0, 0.0, 0.1, 0.25]) * rng.standard_normal(points.shape)
     triangles, quads = [], []
     for i in range(wide):
         for j in range(high):
@@ -118,13 +121,13 @@ def patchwork(seed: int, *, lines: bool = True) -> Mesh:
             turned = rng.random(len(table)) < rng.choice([0.0, 0.3])
             table[turned] = table[turned, ::-1]
             blocks.append(CellBlock(kind, table, rng.integers(0, rng.integers(1, 3), len(table))))
-    if lines and rng.random() < 0.7:
+    if rng.random() < 0.7:
         count = int(rng.integers(1, 12))
         ends = rng.integers(0, len(points) - wide - 1, count)
         other = ends + rng.choice([1, wide + 1, wide + 1, wide + 2], count)
         other = np.minimum(other, len(points) - 1)
         blocks.append(CellBlock("line", np.column_stack([ends, other]), rng.integers(1, 3, count)))
-    if lines and rng.random() < 0.3:
+    if rng.random() < 0.3:
         blocks.append(CellBlock("vertex", rng.integers(0, len(points), (1, 1)), np.zeros(1, int)))
     return Mesh(points, tuple(blocks), {(1, 1): "one", (1, 2): "two"}, single=True)
 
@@ -159,5 +162,6 @@ def naive_arc(piece: np.ndarray, x: float, y: float) -> tuple[float, float, floa
     centre = (a + b) / 2.0 - 1j * (b - a) / abs(b - a) * radius * math.cos(angle)
     u = (complex(x, y) - centre) / (a - centre)
     swept = -math.atan2(u.imag, u.real)  # the way of an arc to the left is clockwise
+    swept += 2.0 * math.pi * round((angle - swept) / (2.0 * math.pi))  # behind the nearer end, on the far side too
     place = centre + (a - centre) * u / abs(u)
     return swept / (2.0 * angle), place.real, place.imag

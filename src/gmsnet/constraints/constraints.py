@@ -85,7 +85,8 @@ def _on_geometry(curves: Curves, points: Floats, geometry: Geometry, exponent: i
         p = points[curves.nodes_of(c)]
         if not curves.slides[curves.nodes_of(c)[:-1]].any():
             chains.append(_samples(p))
-            tangents.append(np.repeat(p[1:] - p[:1], SAMPLES + 1, axis=0))
+            edge = np.diff(p, axis=0)
+            tangents.append(np.vstack([np.repeat(edge, SAMPLES, axis=0), edge[-1:]]))
             continue
         entity = Entity(1, c, curves.names[c])
         wanted = _samples(p)
