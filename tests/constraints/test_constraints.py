@@ -134,6 +134,22 @@ def test_a_node_pushed_far_goes_nine_tenths_of_the_way_to_its_neighbour():
     assert u > 2.0 - 1e-14
 
 
+@pytest.mark.parametrize("shape", ["circle", "square"])
+def test_garbage_moves_no_node(shape):
+    mesh = random_mesh(100, shape, boundary="random", seed=4)
+    curves, points = curves_of(mesh), planar_points(mesh)
+    constraint = constraint_by_ids(mesh, curves)
+    for node in np.flatnonzero(curves.slides):
+        for aim in ((np.nan, 0.0), (0.0, np.nan), (np.nan, np.nan), (np.inf, -np.inf), (1e308, -1e308)):
+            x, y, u = snap(constraint, node, *aim)
+            low, high = limits(constraint, constraint.row[node])
+            assert np.isfinite([x, y, u]).all()
+            count = constraint.first[constraint.curve[constraint.row[node]] + 1]
+            assert any(low < v < high for v in (u - count, u, u + count)) or shape == "square"
+            if np.isnan(aim).any():
+                np.testing.assert_allclose((x, y), points[node], atol=1e-16)
+
+
 def test_snapping_where_a_node_is_does_not_move_it():
     for shape in ("circle", "square"):
         mesh = random_mesh(100, shape, boundary="random", seed=4)

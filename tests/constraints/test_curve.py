@@ -52,9 +52,11 @@ def check(points: np.ndarray, closed: bool) -> None:
         along = (over - points[k]) @ edge / (edge @ edge)
         assert (np.diff(along) > -1e-9).all()
     joints = len(spline.piece)
+    shortest = np.hypot(*np.diff(points, axis=0).T).min()
+    tilt = 1e-12 + 1e-14 * abs(points).max() / shortest  # what rounding of a joint's coordinates does to its tangents
     for k in range(joints if closed else joints - 1):
         end, begin = piece_tangent(spline.piece, k, 1.0), piece_tangent(spline.piece, (k + 1) % joints, 0.0)
-        assert np.hypot(end[0] - begin[0], end[1] - begin[1]) < 1e-9
+        assert np.hypot(end[0] - begin[0], end[1] - begin[1]) < tilt
 
 
 def polyline(turns: list[float], lengths: list[float]) -> np.ndarray:

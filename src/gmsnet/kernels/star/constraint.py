@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.jit.compile import inlined, kernel, part
 
 ARCS, LINE, SAME_X, SAME_Y = range(4)  # kinds of curves; nodes of the last two keep the very bits of a coordinate
 WAY = 0.9  # of the way to the next node on the curve is the most that a node goes in one move
@@ -46,7 +46,7 @@ class Constraint(NamedTuple):
     single: bool
 
 
-@part
+@inlined
 def piece_parameter(piece, k, x, y):
     """t of the point of the circle of piece k that is nearest to (x, y): below 0 before its beginning, above 1 behind
     its end.
@@ -98,7 +98,7 @@ def piece_tangent(piece, k, t):
     return tx / length, ty / length
 
 
-@part
+@inlined
 def piece_at(constraint, curve, u):
     """The row in ``piece`` of parameter u of a curve, and t. u may be outside of [0, n] on a closed curve."""
     first = constraint.first[curve]
@@ -110,7 +110,7 @@ def piece_at(constraint, curve, u):
     return first + number, u - number
 
 
-@part
+@inlined
 def limits(constraint, row):
     """Between which parameters a node must stay: those of its neighbours. On a closed curve unrolled around its own."""
     curve, u = constraint.curve[row], constraint.parameter[row]
@@ -124,27 +124,25 @@ def limits(constraint, row):
     return low, high
 
 
-@part
+@inlined
 def nearest(constraint, curve, u, low, high, x, y):
     """The parameter of the place nearest to (x, y), sought from u on along the curve, no further than low and high.
 
     Normals of neighbouring pieces agree where they join, so a point behind the end of one is not before the beginning
     of the next, but for rounding.
     """
-    number = np.floor(u)
+    number, way = np.floor(u), 0
     if number >= high:  # u is the end of a curve
         number -= 1.0
-    k, _ = piece_at(constraint, curve, number)
-    t = piece_parameter(constraint.piece, k, x, y)
-    while t < 0.0 and number > low:
-        number -= 1.0
+    while True:
         k, _ = piece_at(constraint, curve, number)
-        t = min(piece_parameter(constraint.piece, k, x, y), 1.0)
-    while t > 1.0 and number + 1.0 < high:
-        number += 1.0
-        k, _ = piece_at(constraint, curve, number)
-        t = max(piece_parameter(constraint.piece, k, x, y), 0.0)
-    return number + min(max(t, 0.0), 1.0)
+        t = piece_parameter(constraint.piece, k, x, y)
+        if t < 0.0 and way <= 0 and number > low:
+            number, way = number - 1.0, -1
+        elif t > 1.0 and way >= 0 and number + 1.0 < high:
+            number, way = number + 1.0, 1
+        else:
+            return number + min(max(t, 0.0), 1.0)
 
 
 @part
