@@ -1,0 +1,234 @@
+"""Nodes that slide: the tangent of a node's curve, and the place on the curve nearest to where a node would go.
+
+A curve is a chain of pieces, each a circular arc or a segment. A piece from P to Q = P + c with the angle α between its
+first tangent and its chord is, with complex numbers,
+
+    P + c·z(t),   z(t) = t·e / (1 − t + t·e),   e = cos α + i·sin α,   0 ≤ t ≤ 1:
+
+z/(1 − z) = e·t/(1 − t) has the constant argument α, which is the theorem of the inscribed angle. So arcs and segments
+(α = 0) need neither a centre nor angles, and sums, products and one square root give the same bits everywhere.
+
+The parameter of a node is the number of its piece on the curve plus t; on a closed curve of n pieces it lies in [0, n).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.jit.compile import inlined, kernel, part
+
+ARCS, LINE, SAME_X, SAME_Y = range(4)  # kinds of curves; nodes of the last two keep the very bits of a coordinate
+WAY = 0.9  # of the way to the next node on the curve is the most that a node goes in one move
+
+
+class Constraint(NamedTuple):
+    """The curves that nodes slide on, and where on them they are; nodes by places in memory.
+
+    row: (N,) int32, the row of each node that is an inner one of a curve, else −1. By rows (R,): curve int32; before,
+    after int32, the rows of its neighbours on the curve, −1 where that is an end of the curve; parameter float64, which
+    changes as nodes move: what keeps points for later keeps a copy of it beside them. By curves (C,): kind int8; closed
+    bool; first (C + 1,) int64, whose pieces are first[c] … first[c + 1] − 1. piece: (P, 6) float64: P, Q, cos α, sin α.
+    single: new coordinates are rounded to float32.
+    """
+
+    row: NDArray[np.int32]
+    curve: NDArray[np.int32]
+    before: NDArray[np.int32]
+    after: NDArray[np.int32]
+    parameter: NDArray[np.float64]
+    kind: NDArray[np.int8]
+    closed: NDArray[np.bool_]
+    first: NDArray[np.int64]
+    piece: NDArray[np.float64]
+    single: bool
+
+
+@inlined
+def piece_parameter(piece, k, x, y):
+    """t of the point of the circle of piece k that is nearest to (x, y): below 0 before its beginning, above 1 behind
+    its end.
+
+    With N, S the components of (x, y) − P along the first normal and tangent over |c|, and U the vector from the centre
+    over the radius: U = (2 sin α·S, 1 + 2 sin α·N), and t = 2S/(|U| + 1 + 2 sin α·N + 2(1 − cos α)·S).
+    """
+    px, py, cosine, sine = piece[k, 0], piece[k, 1], piece[k, 4], piece[k, 5]
+    cx, cy = piece[k, 2] - px, piece[k, 3] - py
+    square = cx * cx + cy * cy
+    if not square > 0.0:
+        return 0.0
+    dx, dy = x - px, y - py
+    zx, zy = (dx * cx + dy * cy) / square, (dy * cx - dx * cy) / square
+    s, n = cosine * zx + sine * zy, cosine * zy - sine * zx
+    ux, uy = 2.0 * sine * s, 1.0 + 2.0 * sine * n
+    below = np.sqrt(ux * ux + uy * uy) + uy + 2.0 * (sine * sine / (1.0 + cosine)) * s
+    if below == 0.0:
+        return 0.5 if s == 0.0 else np.copysign(np.inf, s)
+    return 2.0 * s / below
+
+
+@part
+def piece_point(piece, k, t):
+    """The point of piece k at t in [0, 1]: its very ends at 0 and 1. From the nearer end on, which rounds less."""
+    cosine, sine = piece[k, 4], piece[k, 5]
+    cx, cy = piece[k, 2] - piece[k, 0], piece[k, 3] - piece[k, 1]
+    r = 1.0 - t
+    below = r * r + 2.0 * r * t * cosine + t * t
+    if t < 0.5:
+        zx, zy = t * (r * cosine + t) / below, t * r * sine / below
+        return piece[k, 0] + (cx * zx - cy * zy), piece[k, 1] + (cx * zy + cy * zx)
+    zx, zy = r * (r + t * cosine) / below, -r * t * sine / below
+    return piece[k, 2] - (cx * zx - cy * zy), piece[k, 3] - (cx * zy + cy * zx)
+
+
+@part
+def piece_tangent(piece, k, t):
+    """The unit tangent of piece k at t: c/|c|·e·g²/|g|² with g = 1 − t + t·ē. (1, 0) where the piece has no length."""
+    cosine, sine = piece[k, 4], piece[k, 5]
+    cx, cy = piece[k, 2] - piece[k, 0], piece[k, 3] - piece[k, 1]
+    gx, gy = 1.0 - t + t * cosine, -t * sine
+    dx, dy = gx * gx - gy * gy, 2.0 * gx * gy
+    ex, ey = cosine * dx - sine * dy, cosine * dy + sine * dx
+    tx, ty = cx * ex - cy * ey, cx * ey + cy * ex
+    length = np.sqrt(tx * tx + ty * ty)
+    if not length > 0.0:
+        return 1.0, 0.0
+    return tx / length, ty / length
+
+
+@inlined
+def piece_at(constraint, curve, u):
+    """The row in ``piece`` of parameter u of a curve, and t. u may be outside of [0, n] on a closed curve."""
+    first = constraint.first[curve]
+    count = constraint.first[curve + 1] - first
+    number = np.int64(np.floor(u))
+    if constraint.closed[curve]:
+        return first + number % count, u - number
+    number = min(max(number, 0), count - 1)
+    return first + number, u - number
+
+
+@inlined
+def limits(constraint, row):
+    """Between which parameters a node must stay: those of its neighbours. On a closed curve unrolled around its own."""
+    curve, u = constraint.curve[row], constraint.parameter[row]
+    count = float(constraint.first[curve + 1] - constraint.first[curve])
+    before, after = constraint.before[row], constraint.after[row]
+    low = constraint.parameter[before] if before >= 0 else 0.0
+    high = constraint.parameter[after] if after >= 0 else count
+    if constraint.closed[curve]:
+        low -= count if low >= u else 0.0
+        high += count if high <= u else 0.0
+    return low, high
+
+
+@inlined
+def nearest(constraint, curve, u, low, high, x, y):
+    """The parameter of the place nearest to (x, y), sought from u on along the curve, no further than low and high.
+
+    Normals of neighbouring pieces agree where they join, so a point behind the end of one is not before the beginning
+    of the next, but for rounding.
+    """
+    number, way = np.floor(u), 0
+    if number >= high:  # u is the end of a curve
+        number -= 1.0
+    while True:
+        k, _ = piece_at(constraint, curve, number)
+        t = piece_parameter(constraint.piece, k, x, y)
+        if t < 0.0 and way <= 0 and number > low:
+            number, way = number - 1.0, -1
+        elif t > 1.0 and way >= 0 and number + 1.0 < high:
+            number, way = number + 1.0, 1
+        else:
+            return number + min(max(t, 0.0), 1.0)
+
+
+@part
+def tangent_at(constraint, node):
+    """The unit tangent of the curve at a node that has a row."""
+    row = constraint.row[node]
+    k, t = piece_at(constraint, constraint.curve[row], constraint.parameter[row])
+    return piece_tangent(constraint.piece, k, t)
+
+
+@part
+def snap(constraint, node, x, y):
+    """Where a node that has a row goes if it would go to (x, y): x, y, and its parameter there.
+
+    It is the nearest place on the curve from where the node is, but no further than WAY of the way to either
+    neighbour's parameter: nodes keep their order strictly, however often they move one after the other. Nodes that move
+    at the same time must be no neighbours. Nothing is stored.
+
+    On a line, the place is P + t·(Q − P); on one along an axis, one coordinate is that of P, the other is kept.
+    """
+    row = constraint.row[node]
+    curve, u = constraint.curve[row], constraint.parameter[row]
+    low, high = limits(constraint, row)
+    v = nearest(constraint, curve, u, low, high, x, y)
+    least, most = u - WAY * (u - low), u + WAY * (high - u)
+    cut = v < least or v > most
+    v = min(max(v, least), most)
+    if not low < v < high:  # no float is left between the neighbours
+        v, cut = u, True
+    k, t = piece_at(constraint, curve, v)
+    kind = constraint.kind[curve]
+    px, py = piece_point(constraint.piece, k, t)
+    if kind == SAME_X:
+        px = constraint.piece[k, 0]
+        py = py if cut else y
+    elif kind == SAME_Y:
+        py = constraint.piece[k, 1]
+        px = px if cut else x
+    if constraint.single:
+        px, py = float(np.float32(px)), float(np.float32(py))
+    if constraint.closed[curve]:
+        count = float(constraint.first[curve + 1] - constraint.first[curve])
+        v += count if v < 0.0 else 0.0
+        v -= count if v >= count else 0.0
+    return px, py, v
+
+
+@kernel
+def locate(constraint, points):
+    """Writes the parameter of each node that has a row anew, from the coordinates (N, 2) that it has.
+
+    For coordinates that were kept without their parameters. Sought along the curve from the parameter before, between
+    the ends of the curve.
+    """
+    for node in range(len(constraint.row)):
+        row = constraint.row[node]
+        if row < 0:
+            continue
+        curve, u = constraint.curve[row], constraint.parameter[row]
+        count = float(constraint.first[curve + 1] - constraint.first[curve])
+        low, high = (u - 0.5 * count, u + 0.5 * count) if constraint.closed[curve] else (0.0, count)
+        v = nearest(constraint, curve, u, low, high, points[node, 0], points[node, 1])
+        if constraint.closed[curve]:
+            v += count if v < 0.0 else 0.0
+            v -= count if v >= count else 0.0
+        constraint.parameter[row] = v
+
+
+@kernel
+def project(piece, points, closed, parameters, places):
+    """The place nearest to each point (K, 2) on a curve of some pieces (P, 6): parameters (K,) and places (K, 2)."""
+    for i in range(len(points)):
+        best = np.inf
+        for k in range(len(piece)):
+            t = min(max(piece_parameter(piece, k, points[i, 0], points[i, 1]), 0.0), 1.0)
+            x, y = piece_point(piece, k, t)
+            away = (x - points[i, 0]) * (x - points[i, 0]) + (y - points[i, 1]) * (y - points[i, 1])
+            if away < best:
+                best, parameters[i], places[i, 0], places[i, 1] = away, k + t, x, y
+        if closed and parameters[i] >= len(piece):
+            parameters[i] = 0.0
+
+
+@kernel
+def tangents(piece, parameters, out):
+    """The unit tangents (K, 2) of a curve of some pieces at parameters (K,)."""
+    for i in range(len(parameters)):
+        k = min(max(np.int64(np.floor(parameters[i])), 0), len(piece) - 1)
+        out[i, 0], out[i, 1] = piece_tangent(piece, k, parameters[i] - k)
