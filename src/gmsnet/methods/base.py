@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.guard import (
     STAR,
     VALID,
@@ -38,12 +39,14 @@ class Field:
     precision: Precision
     level: int = VALID
     floor: Floor = field(default_factory=Floor)
+    constraint: Constraint | None = None
 
     def guard(self, share: Share) -> Guard:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
         if self.level == WORST:
-            return MeshGuard(*self.precision, self.floor.of(self.points, self.topology, self.precision, share))
-        guard = plain_guard(self.precision)
+            floor = self.floor.of(self.points, self.topology, self.precision, share)
+            return MeshGuard(*self.precision, floor, self.constraint)
+        guard = plain_guard(self.precision, self.constraint)
         if self.level == STAR:
             floors = np.empty(len(self.points))
             ringed = self.topology.near_ringed

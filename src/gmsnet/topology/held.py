@@ -41,6 +41,14 @@ def known_marks(mesh: Mesh, fixed: NDArray[np.bool_] | None, position: Ints) -> 
     return marks
 
 
+def released(marks: Marks, sliding: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Of some nodes (N, by places in memory), those that are held for being on a curve alone; they lose their marks."""
+    curve = np.uint16(marks_of.BOUNDARY | marks_of.INTERFACE | marks_of.LINE)
+    freed: NDArray[np.bool_] = sliding & (marks & curve != 0) & (marks & ~curve == 0)
+    marks[freed] = 0
+    return freed
+
+
 def sorted_out(marks: Marks, position: Ints) -> tuple[dict[str, NDArray[np.int64]], Ints, Ints]:
     """Reason → ids, each node under the first that applies to it; the ids of the free nodes, and their places."""
     by_id = marks.take(position)

@@ -20,6 +20,7 @@ AT_NODE = (WEIGHTS[SQUARE, 0], WEIGHTS[SQUARE, 1], WEIGHTS[SQUARE, 2])
 AT_A = (WEIGHTS[SQUARE, 0], WEIGHTS[SQUARE, 2], WEIGHTS[SQUARE, 1])
 AT_B = (WEIGHTS[SQUARE, 2], WEIGHTS[SQUARE, 0], WEIGHTS[SQUARE, 1])
 ROUND = tuple(WEIGHTS[EQUILATERAL])
+MOST, OPEN = 2**31 - 1, 2**62  # parts of the number of a kind of star: its quads; whether each cell has its own nodes
 
 
 class Links(NamedTuple):
@@ -28,16 +29,21 @@ class Links(NamedTuple):
     """
 
     stars: Stars
-    simplices: Simplices
+    simplices: Simplices | None
 
     @classmethod
-    def of(cls, faces: NearFaces, orientation: NDArray[np.int8], fan_start: Offsets, fan: Ints) -> Links:
-        """From the faces by places in memory, how each is read, and the neighbours around each node that has a fan."""
-        assert faces.first is not None
-        chosen = np.diff(fan_start) > 0
+    def of(
+        cls, faces: NearFaces, orientation: NDArray[np.int8], fan_start: Offsets, fan: Ints, sliding: Flags
+    ) -> Links:
+        """From the faces by places in memory, how each is read, and the neighbours around each node that has a fan.
+
+        sliding: (N,) nodes that have a star, too, though it may not be closed.
+        """
+        first = np.arange(0, len(faces.corner) + 1, 3, dtype=np.int64) if faces.first is None else faces.first
+        chosen = (np.diff(fan_start) > 0) | sliding
         triangles, quads = np.zeros((2, len(chosen)), dtype=np.int32)
-        links.count_cells(faces.first, faces.corner, chosen, triangles, quads)
-        both = (triangles > 0) & (quads > 0)
+        links.count_cells(first, faces.corner, chosen, triangles, quads)
+        both = ((triangles > 0) & (quads > 0)) | sliding
         size = np.where(both, 2 * triangles + 3 * quads, triangles + 2 * quads)
         start = np.zeros(len(chosen) + 1, dtype=offset_type(int(size.sum())))
         np.cumsum(size, out=start[1:])
@@ -45,13 +51,14 @@ class Links(NamedTuple):
         order = np.empty(len(faces), dtype=np.int32)
         order[faces.origin] = np.arange(len(faces), dtype=np.int32)
         links.list_nodes(
-            faces.first, faces.corner, orientation, order, chosen, triangles, quads, fan_start, fan, start, around
+            first, faces.corner, orientation, order, chosen, both, triangles, quads, fan_start, fan, start, around
         )
-        code = np.concatenate([[0], triangles.astype(np.int64) << 32 | quads])  # that of no cells is number 0
+        code = (both.astype(np.int64) * OPEN) | triangles.astype(np.int64) << 31 | quads
+        code = np.concatenate([[0], code])  # that of no cells is number 0
         kinds, number = np.unique(code, return_inverse=True)
-        patterns = patterns_of([(int(kind) >> 32, int(kind) & 0xFFFFFFFF) for kind in kinds])
+        patterns = patterns_of([((kind & ~OPEN) >> 31, kind & MOST, kind >= OPEN) for kind in kinds.tolist()])
         stars = Stars(start, around, number[1:].astype(np.int32), patterns)
-        return cls(stars, simplices_of(faces, orientation))
+        return cls(stars, None if faces.first is None else simplices_of(faces, orientation))
 
 
 def simplices_of(faces: NearFaces, orientation: NDArray[np.int8]) -> Simplices:
@@ -65,14 +72,14 @@ def simplices_of(faces: NearFaces, orientation: NDArray[np.int8]) -> Simplices:
     return Simplices(rows, np.ones(count, dtype=np.int8), shapes, cells)
 
 
-def patterns_of(kinds: list[tuple[int, int]]) -> Patterns:
-    """The table for stars of so many triangles and quads each."""
+def patterns_of(kinds: list[tuple[int, int, bool]]) -> Patterns:
+    """The table for stars of so many triangles and quads each, and whether each cell has nodes of its own in the
+    star."""
     pairs: list[tuple[int, int, int]] = []
     weights: list[tuple[float, ...]] = []
     neighbour: list[float] = []
     first, row, sums = [0], [0], []
-    for triangles, quads in kinds:
-        both = triangles > 0 and quads > 0
+    for triangles, quads, both in kinds:
         for k in range(triangles):
             a, b = (2 * k, 2 * k + 1) if both else (k - 1 if k else triangles - 1, k)
             pairs.append((a, b, a))

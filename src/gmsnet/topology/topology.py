@@ -24,7 +24,7 @@ from gmsnet.mesh.plane import in_plane
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
 from gmsnet.topology.fans import closed_fans
-from gmsnet.topology.held import MOST_NEIGHBOURS, known_marks, sorted_out
+from gmsnet.topology.held import MOST_NEIGHBOURS, known_marks, released, sorted_out
 from gmsnet.topology.links import Links
 from gmsnet.topology.polygons import Faces, Offsets, check_size
 from gmsnet.topology.stars import Colouring, Flags, Ints, Stars
@@ -69,18 +69,20 @@ class Topology:
     quad_orientation: NDArray[np.int8] = field(default_factory=lambda: np.empty(0, dtype=np.int8))
 
     @classmethod
-    def of(cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1) -> Topology:
+    def of(cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1, sliding: Flags | None = None) -> Topology:
         """The topology of a mesh; ``fixed`` (N,) bool holds further nodes ("fixed by the user").
+
+        sliding: (N,) bool, nodes of boundaries, interfaces and line cells that may move all the same, along curves.
 
         threads: one or two; more have nothing to do.
 
         Raises InputError for more nodes or faces than int32 can number, and where memory does not suffice.
         """
-        return cls.and_points(mesh, fixed, threads)[0]
+        return cls.and_points(mesh, fixed, threads, sliding)[0]
 
     @classmethod
     def and_points(
-        cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1
+        cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1, sliding: Flags | None = None
     ) -> tuple[Topology, NDArray[np.float64]]:
         """The same, and the mesh's ``near_points``, which were needed for it."""
         nodes, corners = len(mesh.points), check_size(mesh)
@@ -91,6 +93,7 @@ class Topology:
         marks = known_marks(mesh, fixed, position)
         points = None if mesh.plane is None else planar
         near_orientation, start, ring = closed_fans(faces, points, marks, memory, MOST_NEIGHBOURS)
+        near_sliding = released(marks, np.zeros(nodes, dtype=bool) if sliding is None else sliding[memory])
         held, free, places = sorted_out(marks, position)
         three, triangles = written.with_corners(3)
         whole, near = faces.with_corners(3)
@@ -113,8 +116,8 @@ class Topology:
             near_free=marks == 0,
             colouring=Colouring(places, start, ring),
         )
-        if any(block.kind == "quad" and len(block.nodes) for block in mesh.cells):
-            topology = topology.linked(Links.of(faces, near_orientation, start, topology.near_ring))
+        if near_sliding.any() or any(block.kind == "quad" and len(block.nodes) for block in mesh.cells):
+            topology = topology.linked(Links.of(faces, near_orientation, start, topology.near_ring, near_sliding))
             four, quads = written.with_corners(4)
             topology = replace(topology, quads=quads, quad_cell=written.cell[four], quad_orientation=orientation[four])
         return topology, planar
@@ -122,6 +125,7 @@ class Topology:
     def linked(self, links: Links) -> Topology:
         """The same, its stars and cells given by links instead of fans."""
         stars, simplices = links
+        simplices = simplices or self.simplices
         return replace(
             self,
             near=simplices.rows,

@@ -28,6 +28,7 @@ from gmsnet.kernels.simplex.mean_ratio2 import half_lengths, pull, roundness
 from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.block import MARGIN, PAIRS, REACH, SIZE, ask_ahead, gather, ring_row
 from gmsnet.kernels.star.certificate import COARSE, NARROWEST, WIDER, error_bound
+from gmsnet.kernels.star.constraint import along_curve, slides
 from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at, weights_of
 
@@ -115,6 +116,23 @@ def derive(local, n, pattern, power, sums):
                 sums[YY * LANES + lane] += e * (gy * gy) + gy * ty
                 sums[ROUND * LANES + lane] += roundness(u, weights)
                 sums[LEAST * LANES + lane] = min(sums[LEAST * LANES + lane], d)
+
+
+@part
+def restrict(constraint, centre, sums):
+    """The derivatives of the nodes that slide, for steps along their curves. ``propose`` says how they are kept."""
+    if constraint is not None:
+        real = sums.dtype.type
+        for lane in range(LANES):
+            if constraint.row[centre[lane]] < 0:
+                continue
+            even = np.float64(sums[ROUND * LANES + lane])
+            xx, xy, yy = sums[XX * LANES + lane] + even, 0.5 * sums[XY * LANES + lane], sums[YY * LANES + lane] + even
+            gx, gy = np.float64(sums[GX * LANES + lane]), np.float64(sums[GY * LANES + lane])
+            gx, gy, xx, xy, yy = along_curve(constraint, centre[lane], gx, gy, xx, xy, yy)
+            sums[GX * LANES + lane], sums[GY * LANES + lane] = real(gx), real(gy)
+            sums[XX * LANES + lane], sums[YY * LANES + lane] = real(xx), real(yy)
+            sums[XY * LANES + lane], sums[ROUND * LANES + lane] = real(2.0 * xy), real(0.0)
 
 
 @inlined
@@ -206,11 +224,11 @@ def settle(sums, most, step, mean, mean_sums, with_mean):
 
 
 @part
-def refine(star, n, pattern, count, work, power, sums, shift):
+def refine(star, n, pattern, centre, constraint, count, work, power, sums, shift):
     """The shifts of the lanes that are to be done over, as ``descend`` finds them."""
     for lane in range(count):
         if sums[REDO * LANES + lane] > 0.0:
-            dx, dy = descend(star, n, pattern, lane, power)
+            dx, dy = descend(star, n, pattern, lane, power, constraint, centre[lane])
             shift[lane] = dx / work[SIZE * LANES + lane]
             shift[LANES + lane] = dy / work[SIZE * LANES + lane]
 
@@ -270,6 +288,7 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
         ask_ahead(points, blocks, block + 1)
         relate(star, n, guard, work, workspace.sums, local, sums)
         derive(local, n, pattern, power, sums)
+        restrict(guard.constraint, stars.centre_of(blocks, block), sums)
         propose(sums, relaxation, power.ratio, step)
         judge(local, n, pattern, power, step, floor, sums)
         if stretch > 0.0:
@@ -280,11 +299,12 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
             shift[k] = step[k]
         uncertified = certify(sums, step, guard.unit, work)
         if uncertified:
-            refine(star, n, pattern, count, work, power, sums, shift)
-        if len(guard) == WITH_FLOORS:
+            centre = stars.centre_of(blocks, block)
+            refine(star, n, pattern, centre, guard.constraint, count, work, power, sums, shift)
+        if len(guard) == WITH_FLOORS or slides(guard.constraint):
             stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
             continue
-        stars.aim(work, shift, guard.single)
+        stars.aim(blocks, block, work, shift, guard)
         stars.store(points, blocks, block, workspace, shift, guard, workspace.counts)
     for k in range(len(tally)):
         tally[k] += workspace.counts[k]

@@ -8,6 +8,7 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, inlined, part
 from gmsnet.kernels.simplex.mean_ratio2 import half_lengths, pull, roundness
+from gmsnet.kernels.star.constraint import along_curve
 from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, weights_of
 
 MOST = 50.0  # times a Newton step: the longest one
@@ -97,7 +98,7 @@ def newton_step(gx, gy, xx, xy, yy):
 
 
 @part
-def descend(star, n, pattern, lane, power):
+def descend(star, n, pattern, lane, power, constraint, node):
     """The shift of one star from (x, y): steps, halved until F falls, on and on
     until a whole one leaves it above FAR of what it was.
 
@@ -113,6 +114,7 @@ def descend(star, n, pattern, lane, power):
                 dx += weight * ax
                 dy += weight * ay
             return dx / neighbours(pattern, n), dy / neighbours(pattern, n)
+        gx, gy, xx, xy, yy = along_curve(constraint, node, gx, gy, xx, xy, yy)
         sx, sy = newton_step(gx, gy, xx, xy, yy)
         share = 1.0 / max(1.0 - power.ratio * (gx * sx + gy * sy) / value, 1.0 / MOST)
         after, whole = np.inf, True

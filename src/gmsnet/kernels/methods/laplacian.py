@@ -17,6 +17,7 @@ from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.block import MARGIN, REACH, SIZE, ask_ahead
 from gmsnet.kernels.star.certificate import COARSE, WIDER, error_bound
+from gmsnet.kernels.star.constraint import slides
 from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at, weights_of
 
@@ -180,8 +181,8 @@ def sweep(points, blocks, first, last, guard, variant, tally):
         n = stars.fetch(points, blocks, block, workspace, local)
         ask_ahead(points, blocks, block + 1)
         propose(local, n, pattern_at(blocks.patterns, blocks.pattern, block), variant, floor, row, shift)
-        if variant == SMART and len(guard) != WITH_FLOORS:
-            stars.aim(workspace.work, shift, guard.single)
+        if variant == SMART and len(guard) != WITH_FLOORS and not slides(guard.constraint):
+            stars.aim(blocks, block, workspace.work, shift, guard)
             certify_smart(row, guard.unit, guard.grain, workspace.work)
             stars.store(points, blocks, block, workspace, shift, guard, workspace.counts)
         else:

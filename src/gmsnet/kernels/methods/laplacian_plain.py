@@ -25,6 +25,7 @@ from gmsnet.kernels.star.block import (
     ring_row,
 )
 from gmsnet.kernels.star.certificate import COARSE, NARROWEST, WIDER, error_bound, margin_of, widest
+from gmsnet.kernels.star.constraint import slides
 from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at, weights_of
 
@@ -138,6 +139,15 @@ def prepare(star, n, work, shift, steps):
             work[REACH * LANES + lane] = max(work[REACH * LANES + lane], max(abs(p[2 * lane]), abs(p[2 * lane + 1])))
 
 
+@part
+def scale(work, shift, steps):
+    """The shifts ([lane][axis]) over SIZE as ``stars.localise`` leaves it, [axis][lane]."""
+    for lane in range(LANES):
+        size = work[SIZE * LANES + lane]
+        inverse = 1.0 / size if size > 0.0 else 0.0
+        steps[lane], steps[LANES + lane] = inverse * shift[2 * lane], inverse * shift[2 * lane + 1]
+
+
 @kernel
 def sweep(points, blocks, first, last, guard, tally):
     """Smooths the blocks first…last (of one colour) once: gather, aim, certify, commit. tally: (3,), added to."""
@@ -150,8 +160,12 @@ def sweep(points, blocks, first, last, guard, tally):
         gather(points, blocks, block, n, star)
         ask_ahead(points, blocks, block + 1)
         aim(star, n, pattern, guard.single, shift, work)
-        if len(guard) == WITH_FLOORS:
-            prepare(star, n, work, shift, steps)
+        if len(guard) == WITH_FLOORS or slides(guard.constraint):
+            if slides(guard.constraint):
+                stars.localise(star, n, work, local)
+                scale(work, shift, steps)
+            else:
+                prepare(star, n, work, shift, steps)
             stars.commit(points, blocks, block, workspace, local, steps, guard, workspace.counts)
             continue
         relate(star, n, work, flat, local)
@@ -159,7 +173,7 @@ def sweep(points, blocks, first, last, guard, tally):
             put(points, blocks, block, star, work, workspace.counts)
         else:
             prepare(star, n, work, shift, steps)
-            stars.aim(work, steps, guard.single)
+            stars.aim(blocks, block, work, steps, guard)
             stars.store(points, blocks, block, workspace, steps, guard, workspace.counts)
     for k in range(len(tally)):
         tally[k] += workspace.counts[k]

@@ -18,6 +18,7 @@ import numpy as np
 from gmsnet.kernels.jit.compile import inlined, part
 from gmsnet.kernels.methods.barrier_star import newton_step
 from gmsnet.kernels.simplex.mean_ratio2 import half_lengths, pull, roundness
+from gmsnet.kernels.star.constraint import along_curve, on_curve
 from gmsnet.kernels.star.guard import WITH_FLOORS, margin_above, margin_above_zero, permitted
 from gmsnet.kernels.star.pattern import (
     count_of,
@@ -74,7 +75,7 @@ def value_at(ring, n, pattern, x, y, inverse, doublings):
 
 
 @part
-def newton(ring, n, pattern, x, y, inverse, doublings):
+def newton(ring, n, pattern, x, y, inverse, doublings, constraint, node):
     """F with the free node at (x, y), 1/M given; the step from there; and the minimum D."""
     p = 2.0**doublings
     least = np.inf
@@ -99,25 +100,26 @@ def newton(ring, n, pattern, x, y, inverse, doublings):
         xx += t * (ux * ((p - 1.0) * ux + 2.0 * vx) + even)
         xy += t * ((p - 1.0) * (ux * uy) + (vx * uy + ux * vy))
         yy += t * (uy * ((p - 1.0) * uy + 2.0 * vy) + even)
+    gx, gy, xx, xy, yy = along_curve(constraint, node, gx, gy, xx, xy, yy)
     dx, dy = newton_step(gx, gy, xx, xy, yy)
     longer = 1.0 / max(1.0 - (p + 1.0) * (gx * dx + gy * dy) / value, 1.0 / MOST)
     return value, longer * dx, longer * dy, least
 
 
 @part
-def descend(ring, n, pattern, x, y, scale, doublings):
+def descend(ring, n, pattern, x, y, scale, doublings, constraint, node):
     """Where the free node at (x, y) is to go: nowhere else if F falls nowhere; to the mean if the star is tangled.
 
     scale: the value to take for 1/M if no power of it is lost to rounding with that; else the star's own is taken.
     """
     inverse = scale
     for step in range(STEPS):
-        value, dx, dy, least = newton(ring, n, pattern, x, y, inverse, doublings)
+        value, dx, dy, least = newton(ring, n, pattern, x, y, inverse, doublings, constraint, node)
         if step == 0 and not least > 0.0:
             return mean(ring, n, pattern)
         if not (SMALLEST < value < 1.0 / SMALLEST):
             inverse = 1.0 / largest(ring, n, pattern, x, y)
-            value, dx, dy, least = newton(ring, n, pattern, x, y, inverse, doublings)
+            value, dx, dy, least = newton(ring, n, pattern, x, y, inverse, doublings, constraint, node)
         after, whole = np.inf, True
         for _ in range(SHORTENINGS):
             after = value_at(ring, n, pattern, x + dx, y + dy, inverse, doublings)
@@ -209,7 +211,7 @@ def allowed(star, n, pattern, x, y, tx, ty, delta):
 
 
 @part
-def way_there(star, n, pattern, x, y, tx, ty, unit, grain, single):
+def way_there(star, n, pattern, x, y, tx, ty, guard, node):
     """How far (x, y) may go to (tx, ty): the halved shift that the guard allows (kernels.star.truncation), how often
     halved.
 
@@ -218,11 +220,12 @@ def way_there(star, n, pattern, x, y, tx, ty, unit, grain, single):
     dx, dy, reach = tx - x, ty - y, star[2 * n + count_of(pattern, n)]
     for halving in range(HALVINGS):
         tx, ty = x + dx, y + dy
-        if single:
+        if guard.single:
             tx, ty = np.float64(np.float32(tx)), np.float64(np.float32(ty))
+        tx, ty = on_curve(guard.constraint, node, tx, ty)
         if tx == x and ty == y:
             break
-        delta = unit * max(reach, max(abs(tx), abs(ty))) + grain
+        delta = guard.unit * max(reach, max(abs(tx), abs(ty))) + guard.grain
         if certified(star, n, pattern, tx, ty, delta) or allowed(star, n, pattern, x, y, tx, ty, delta):
             return tx, ty, halving
         dx *= 0.5

@@ -11,6 +11,7 @@ from gmsnet.kernels.methods.missing import any_missing
 from gmsnet.kernels.methods.ranking import free_nodes, least, shapes_of, smallest
 from gmsnet.kernels.methods.worst_first import descend, gather, way_there
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
+from gmsnet.kernels.star.constraint import follow
 from gmsnet.kernels.star.pattern import count_of, pattern_at
 from gmsnet.kernels.star.truncation import HALVINGS
 
@@ -49,7 +50,6 @@ def visit(points, nodes, stars, guard, doublings, sweeps, scale, target, awake, 
     after: a node is left out while neither it nor a neighbour has moved since it was found to move no more. tried:
     (N,) bool, to become True of the nodes that the target has not left out, if there is one.
     """
-    unit, grain, single = guard.unit, guard.grain, guard.single
     start, around = stars.start, stars.around
     most = 0
     for i in nodes:
@@ -68,14 +68,15 @@ def visit(points, nodes, stars, guard, doublings, sweeps, scale, target, awake, 
                 if not any_missing(star, n, pattern, x, y, target[0], target[1]):
                     continue
                 tried[i] = True
-            tx, ty = descend(star, n, pattern, x, y, scale, doublings)
+            tx, ty = descend(star, n, pattern, x, y, scale, doublings, guard.constraint, i)
             if tx == x and ty == y:
                 continue
-            tx, ty, halvings = way_there(star, n, pattern, x, y, tx, ty, unit, grain, single)
+            tx, ty, halvings = way_there(star, n, pattern, x, y, tx, ty, guard, i)
             tally[DROPPED] += halvings == HALVINGS
             tally[TRUNCATED] += 0 < halvings < HALVINGS
             tally[MOVED] += halvings < HALVINGS
             points[i, 0], points[i, 1] = tx, ty
+            follow(guard.constraint, i, tx, ty)
             dx, dy, sx, sy = tx - x, ty - y, star[0] - x, star[1] - y
             if dx * dx + dy * dy > STILL * (sx * sx + sy * sy):
                 awake[i] = True

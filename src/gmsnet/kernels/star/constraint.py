@@ -190,6 +190,46 @@ def snap(constraint, node, x, y):
     return px, py, v
 
 
+@inlined
+def slides(constraint):
+    """May any node slide?"""
+    return constraint is not None
+
+
+@part
+def on_curve(constraint, node, x, y):
+    """Where a node goes that would go to (x, y): there, or, if it slides, where ``snap`` says."""
+    if constraint is None:
+        return x, y
+    if constraint.row[node] < 0:
+        return x, y
+    px, py, _ = snap(constraint, node, x, y)
+    return px, py
+
+
+@part
+def follow(constraint, node, x, y):
+    """Takes note that a node has gone to (x, y), a place on its curve if it slides."""
+    if constraint is not None:
+        row = constraint.row[node]
+        if row >= 0:
+            _, _, constraint.parameter[row] = snap(constraint, node, x, y)
+
+
+@part
+def along_curve(constraint, node, gx, gy, xx, xy, yy):
+    """Gradient and Hessian for a step that, if the node slides, is Newton's along the tangent t of its curve.
+
+    They become (g·t) t and (tᵀHt) I, whose step is (g·t)/(tᵀHt) t.
+    """
+    if constraint is not None and constraint.row[node] >= 0:
+        tx, ty = tangent_at(constraint, node)
+        slope = gx * tx + gy * ty
+        bend = tx * (xx * tx + xy * ty) + ty * (xy * tx + yy * ty)
+        return slope * tx, slope * ty, bend, 0.0 * xy, bend
+    return gx, gy, xx, xy, yy
+
+
 @kernel
 def locate(constraint, points):
     """Writes the parameter of each node that has a row anew, from the coordinates (N, 2) that it has.

@@ -36,6 +36,7 @@ from gmsnet.kernels.simplex.mean_ratio2 import (
     weights_in,
 )
 from gmsnet.kernels.simplex.predicates import SHEWCHUK, UNDERFLOW, UNIT, determinant_and_bound
+from gmsnet.kernels.star.constraint import Constraint
 
 LEVELS = ("valid", "worst", "star")
 VALID, WORST, STAR = range(3)
@@ -67,13 +68,15 @@ class Precision(NamedTuple):
 class MeshGuard(NamedTuple):
     """What a sweep must keep. unit, grain, single: see Precision.
 
-    floor: of D/L for the whole mesh, −∞ at the level VALID.
+    floor: of D/L for the whole mesh, −∞ at the level VALID. constraint: the curves that nodes slide on; None: no node
+    does.
     """
 
     unit: float
     grain: float
     single: bool
     floor: float
+    constraint: Constraint | None = None
 
 
 class StarGuard(NamedTuple):
@@ -83,6 +86,7 @@ class StarGuard(NamedTuple):
     grain: float
     single: bool
     floor: float
+    constraint: Constraint | None
     floors: NDArray[np.float64]
 
 
@@ -91,9 +95,12 @@ Guard = MeshGuard | StarGuard
 WITH_FLOORS = len(StarGuard._fields)
 
 
-def plain_guard(precision: Precision = Precision()) -> MeshGuard:  # noqa: B008 (a tuple of constants)
+def plain_guard(
+    precision: Precision = Precision(),  # noqa: B008 (a tuple of constants)
+    constraint: Constraint | None = None,
+) -> MeshGuard:
     """The guard of the level VALID."""
-    return MeshGuard(*precision, -math.inf)
+    return MeshGuard(*precision, -math.inf, constraint)
 
 
 @inlined

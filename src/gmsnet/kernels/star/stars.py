@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import LANES, part
+from gmsnet.kernels.jit.compile import LANES, inlined, part
 from gmsnet.kernels.star.block import (
     CENTRE,
     DROPPED,
@@ -26,6 +26,7 @@ from gmsnet.kernels.star.block import (
 from gmsnet.kernels.star.block import Blocks as Blocks
 from gmsnet.kernels.star.block import workspace_for as workspace_for
 from gmsnet.kernels.star.certificate import certify, certify_stars, gather_floors
+from gmsnet.kernels.star.constraint import follow, snap
 from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.pattern import pattern_at
 from gmsnet.kernels.star.truncation import halve_in_lanes, truncate
@@ -75,6 +76,12 @@ def localise(star, n, work, local):
             q[LANES + lane] = work[low + 2 * lane + 1]
 
 
+@inlined
+def centre_of(blocks, block):
+    """The free nodes of a block."""
+    return blocks.centre[block * LANES : (block + 1) * LANES]
+
+
 @part
 def take_centres(star, work):
     """The rows CENTRE."""
@@ -91,26 +98,46 @@ def commit(points, blocks, block, workspace, local, shift, guard, tally):
     """
     n, work = blocks.degree[block], workspace.work
     pattern = pattern_at(blocks.patterns, blocks.pattern, block)
-    aim(work, shift, guard.single)
+    aim(blocks, block, work, shift, guard)
     if len(guard) == WITH_FLOORS:
         gather_floors(blocks, block, guard, work)
         certify_stars(workspace.star, n, pattern, 1.0, guard.unit, guard.grain, work)
-        halve_in_lanes(n, pattern, workspace, shift, guard)
+        halve_in_lanes(n, pattern, centre_of(blocks, block), workspace, shift, guard)
     else:
         certify(local, n, pattern, shift, max(guard.floor, 0.0), guard.unit, guard.grain, work, workspace.sums)
     store(points, blocks, block, workspace, shift, guard, tally)
 
 
 @part
-def aim(work, shift, single):
-    """The targets: the free nodes plus size·shift."""
+def aim(blocks, block, work, shift, guard):
+    """The targets: the free nodes plus size·shift; of those that slide, the place on the curve that this leads to.
+
+    The shift of such a node becomes what leads there.
+    """
     for lane in range(LANES):
         size = work[SIZE * LANES + lane]
         work[TARGET * LANES + lane] = work[CENTRE * LANES + lane] + size * shift[lane]
         work[(TARGET + 1) * LANES + lane] = work[(CENTRE + 1) * LANES + lane] + size * shift[LANES + lane]
-    if single:
+    if guard.single:
         for k in range(TARGET * LANES, (TARGET + 2) * LANES):
             work[k] = np.float64(np.float32(work[k]))
+    snap_targets(guard.constraint, centre_of(blocks, block), work, shift)
+
+
+@part
+def snap_targets(constraint, centre, work, shift):
+    """The targets of the nodes that slide go to their curves, and their shifts with them."""
+    if constraint is not None:
+        for lane in range(LANES):
+            i, size = centre[lane], work[SIZE * LANES + lane]
+            if constraint.row[i] < 0:
+                continue
+            tx, ty = work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane]
+            x, y, _ = snap(constraint, i, tx, ty)
+            work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane] = x, y
+            if size > 0.0:
+                shift[lane] = (x - work[CENTRE * LANES + lane]) / size
+                shift[LANES + lane] = (y - work[(CENTRE + 1) * LANES + lane]) / size
 
 
 @part
@@ -121,7 +148,7 @@ def store(points, blocks, block, workspace, shift, guard, tally):
     """
     n, count, work = blocks.degree[block], blocks.filled[block], workspace.work
     to_the_star = len(guard) == WITH_FLOORS
-    centre = blocks.centre[block * LANES : (block + 1) * LANES]
+    centre = centre_of(blocks, block)
     refused, moved = 0, 0
     for lane in range(LANES):
         refused += not work[MARGIN * LANES + lane] > 0.0
@@ -135,6 +162,7 @@ def store(points, blocks, block, workspace, shift, guard, tally):
             i = np.uint32(centre[lane])
             points[i, 0] = work[TARGET * LANES + lane]
             points[i, 1] = work[(TARGET + 1) * LANES + lane]
+            follow(guard.constraint, i, points[i, 0], points[i, 1])
     else:
         pattern = pattern_at(blocks.patterns, blocks.pattern, block)
         gather_floors(blocks, block, guard, work)
@@ -143,6 +171,7 @@ def store(points, blocks, block, workspace, shift, guard, tally):
             if work[MARGIN * LANES + lane] > 0.0:
                 points[i, 0] = work[TARGET * LANES + lane]
                 points[i, 1] = work[(TARGET + 1) * LANES + lane]
+                follow(guard.constraint, i, points[i, 0], points[i, 1])
             elif shift[lane] == 0.0 and shift[LANES + lane] == 0.0:
                 continue  # nothing is held back
             elif to_the_star and work[MARGIN * LANES + lane] == -np.inf:

@@ -19,6 +19,7 @@ from gmsnet.kernels.star.block import (
     TRUNCATED,
 )
 from gmsnet.kernels.star.certificate import certify_stars
+from gmsnet.kernels.star.constraint import follow, on_curve
 from gmsnet.kernels.star.guard import margin_above, permitted
 from gmsnet.kernels.star.pattern import count_of, pair_of, weights_of
 
@@ -26,7 +27,7 @@ HALVINGS, FEW_HALVINGS = 20, 6
 
 
 @part
-def halve_in_lanes(n, pattern, workspace, shift, guard):
+def halve_in_lanes(n, pattern, centre, workspace, shift, guard):
     """Halves the shifts of the lanes that are not allowed, all at once, until none is left or FEW_HALVINGS are made.
 
     For the level STAR, which refuses many moves whatever their length: those that make the worst cell of a star worse
@@ -49,6 +50,7 @@ def halve_in_lanes(n, pattern, workspace, shift, guard):
         if guard.single:
             for k in range(TARGET * LANES, (TARGET + 2) * LANES):
                 work[k] = np.float64(np.float32(work[k]))
+        snap_back(guard.constraint, centre, work)
         if refused == 0:
             return
         certify_stars(star, n, pattern, 1.0, guard.unit, guard.grain, work)
@@ -85,6 +87,7 @@ def truncate(points, i, n, pattern, lane, workspace, shift, guard, tally):
         ty = y + dy
         if single:
             tx, ty = np.float64(np.float32(tx)), np.float64(np.float32(ty))
+        tx, ty = on_curve(guard.constraint, i, tx, ty)
         if tx == x and ty == y:
             break
         delta = guard.unit * max(work[REACH * LANES + lane], max(abs(tx), abs(ty))) + guard.grain
@@ -96,12 +99,22 @@ def truncate(points, i, n, pattern, lane, workspace, shift, guard, tally):
         ):
             points[i, 0] = tx
             points[i, 1] = ty
+            follow(guard.constraint, i, tx, ty)
             tally[MOVED] += 1
             tally[TRUNCATED] += halving > 0
             return
         dx *= 0.5
         dy *= 0.5
     tally[DROPPED] += 1
+
+
+@part
+def snap_back(constraint, centre, work):
+    """The targets of the nodes that slide go to their curves."""
+    if constraint is not None:
+        for lane in range(LANES):
+            tx, ty = on_curve(constraint, centre[lane], work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane])
+            work[TARGET * LANES + lane], work[(TARGET + 1) * LANES + lane] = tx, ty
 
 
 @part

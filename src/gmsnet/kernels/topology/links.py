@@ -35,19 +35,20 @@ def around_corner(first, corner, orientation, f, h):
 
 
 @kernel
-def list_nodes(first, corner, orientation, order, chosen, triangles, quads, fan_start, fan, start, around):
+def list_nodes(first, corner, orientation, order, chosen, apart, triangles, quads, fan_start, fan, start, around):
     """Writes the nodes around each chosen node, in CSR form.
 
     order: (F,) the faces in the order of the file, on which alone the order of cells depends. fan_start, fan: the
     neighbours of each chosen node in CSR form, counter-clockwise. start: (N + 1,) has where the nodes of each begin.
-    Of a node with triangles alone they are its neighbours; of one with quads alone, neighbour and diagonal node in
-    turn; of one with both, for each triangle the next two nodes, and for each quad the next three, counter-clockwise.
+    apart: (N,) the nodes around are listed cell by cell: for each triangle the next two, and then for each quad the
+    next three, counter-clockwise. Else a node has triangles alone, and they are its neighbours, or quads alone:
+    neighbour and diagonal node in turn.
     """
     at = np.empty((2, len(triangles)), dtype=np.int64)
     for v in range(len(triangles)):
         at[0, v] = start[v]
         at[1, v] = start[v] + 2 * triangles[v]
-        if chosen[v] and quads[v] == 0:
+        if chosen[v] and quads[v] == 0 and not apart[v]:
             for k in range(triangles[v]):
                 around[start[v] + k] = fan[fan_start[v] + k]
     for f in order:
@@ -56,7 +57,7 @@ def list_nodes(first, corner, orientation, order, chosen, triangles, quads, fan_
             continue
         for h in range(first[f], first[f + 1]):
             v = corner[h]
-            if not chosen[v] or quads[v] == 0:
+            if not chosen[v] or (quads[v] == 0 and not apart[v]):
                 continue
             after, before = around_corner(first, corner, orientation, f, h)
             if n == 3:
@@ -64,7 +65,7 @@ def list_nodes(first, corner, orientation, order, chosen, triangles, quads, fan_
                 at[0, v] += 2
                 continue
             diagonal = corner[h + 2 if h + 2 < first[f + 1] else h - 2]
-            if triangles[v] == 0:
+            if not apart[v]:
                 k = 0
                 while fan[fan_start[v] + k] != after:
                     k += 1
