@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.topology import chains, winding
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.topology.polygons import Faces, Ints, Offsets, corners_of, offset_type
+from gmsnet.topology.polygons import Faces, Ints, Offsets, offset_type
 
 Flags = NDArray[np.bool_]
 Longs = NDArray[np.int64]
@@ -138,7 +138,7 @@ def _still(mesh: Mesh, faces: Faces, twin: Offsets, halves: Longs) -> Flags:
     crowded = np.flatnonzero(twin == winding.NON_MANIFOLD)
     still[faces.corner[crowded]] = still[heads(faces)[crowded]] = True
     for block in mesh.cells:
-        if block.dimension == 3 or (block.dimension == 2 and block.nodes.shape[1] > corners_of(block)):
+        if block.dimension in (None, 3) or (block.dimension == 2 and block.nodes.shape[1] > block.corners):
             still[block.nodes] = True
     return still
 
