@@ -185,6 +185,10 @@ def test_nodes_of_second_order_cells_end_curves():
         ("japan_sea.msh", 262, 793, 531, 0),
         ("ex28.msh", 4, 104, 100, 0),
         ("osteonT1_11.mesh", 152, 678, 526, 0),
+        ("square_quad_10_rand.vtk", 4, 40, 36, 0),
+        ("n0012_113-33.su2", 3, 240, 237, 0),
+        ("mesh_NACA0012_lam_hybrid_v1.su2", 2, 250, 249, 1),
+        ("square_triquad.mesh", 7, 100, 93, 0),
     ],
 )
 def test_curves_of_real_meshes(real_meshes, name, curves, edges, sliding, closed):
@@ -239,3 +243,11 @@ def test_curves_are_those_of_the_referee_or_cut_finer(real_meshes, name):
         assert all(any(edges <= whole for _, whole in wanted) for _, edges in found)
     else:
         assert found == wanted
+
+
+def test_nodes_of_cells_of_an_unknown_kind_end_curves():
+    mesh = ring_mesh(on_circle(2.0 * np.pi * np.arange(20) / 20))
+    more = (*mesh.cells, CellBlock("blob", [[3, 4, 5]], [0]))
+    curves = curves_of(Mesh(mesh.points, more))
+    assert sorted(np.flatnonzero(curves.curve[:20] < 0).tolist()) == [3, 4, 5]
+    assert curves.slides.sum() == 17

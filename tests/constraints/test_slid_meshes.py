@@ -43,8 +43,12 @@ def check(mesh: Mesh, before, after, *options: str) -> dict[str, dict]:
 
 
 @pytest.mark.parametrize(
-    "name", ["mesh_NACA0012_inv.su2", "internal.msh", "japan_sea.msh", "ex28.msh", "osteonT1_11.mesh"]
-)
+    "name",
+    [
+        "mesh_NACA0012_inv.su2", "internal.msh", "japan_sea.msh", "ex28.msh", "osteonT1_11.mesh", "square_triquad.mesh",
+        "square_quad_10_rand.vtk", "n0012_113-33.su2", "mesh_NACA0012_lam_hybrid_v1.su2",
+    ],
+)  # fmt: skip
 def test_real_meshes(real_meshes, tmp_path, name):
     check(gmsnet.read(real_meshes / name), real_meshes / name, tmp_path / name)
 

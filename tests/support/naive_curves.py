@@ -8,13 +8,12 @@ from collections import defaultdict
 import numpy as np
 
 from gmsnet import CellBlock, Mesh
-from gmsnet.topology.polygons import corners_of
 
 
 def naive_chains(mesh: Mesh, angle: float) -> set[tuple[bool, frozenset[tuple[int, int]]]]:
     """(closed, edges) of each chain, as docs/sliding.md defines it but for straight runs."""
     faces = [
-        (row[: corners_of(block)], region)
+        (row[: block.corners], region)
         for block in mesh.cells
         if block.dimension == 2
         for row, region in zip(block.nodes.tolist(), block.regions.tolist(), strict=True)
@@ -28,7 +27,7 @@ def naive_chains(mesh: Mesh, angle: float) -> set[tuple[bool, frozenset[tuple[in
         if len(set(corners)) < len(corners):
             still |= {node for node in corners if corners.count(node) > 1}
     for block in mesh.cells:
-        if block.dimension == 0 or block.kind == "line3" or block.nodes.shape[1] > max(corners_count(block), 2):
+        if block.dimension == 0 or block.nodes.shape[1] > block.corners:
             still |= set(block.nodes.ravel().tolist())
         if block.dimension == 1:
             for row, mark in zip(block.nodes.tolist(), block.regions.tolist(), strict=True):
@@ -69,10 +68,6 @@ def naive_chains(mesh: Mesh, angle: float) -> set[tuple[bool, frozenset[tuple[in
                 left -= set(at[node])
         found.add(({node for edge in chain for node in edge} <= through, frozenset(chain)))
     return found
-
-
-def corners_count(block: CellBlock) -> int:
-    return corners_of(block) if block.dimension == 2 else block.nodes.shape[1]
 
 
 def edge_of(a: int, b: int) -> tuple[int, int]:

@@ -28,12 +28,13 @@ def push(constraint: Constraint, points: np.ndarray, node: int, x: float, y: flo
 def slid_at_random(mesh: Mesh, curves: Curves, seed: int, rounds: int = 3, reach: float = 0.6) -> Mesh:
     """The mesh after so many rounds of random moves of all nodes that slide.
 
-    reach: how far, over the shortest edge at the node. A move that takes a triangle's area below a tenth of the least
-    it had is halved, snapping anew, and then left out.
+    reach: how far, over the shortest edge at the node. A move that takes the area of a triangle, or at a quad's corner,
+    below a tenth of the least there was is halved, snapping anew, and then left out.
     """
     rng, points = np.random.default_rng(seed), planar_points(mesh)
     constraint = constraint_by_ids(mesh, curves)
-    triangles = np.concatenate([block.nodes for block in mesh.cells if block.kind == "triangle"])
+    corners = {"triangle": [[0, 1, 2]], "quad": [[0, 1, 3], [1, 2, 0], [2, 3, 1], [3, 0, 2]]}
+    triangles = np.concatenate([block.nodes[:, c] for block in mesh.cells for c in corners.get(block.kind, [])])
     around = [[] for _ in points]
     for t, row in enumerate(triangles.tolist()):
         for node in row:

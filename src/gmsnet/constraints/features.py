@@ -98,7 +98,7 @@ def _may_slide(mesh: Mesh, names: Sequence[str] | None, held: Flags | None) -> F
     if held is not None:
         may &= ~held
     for block in mesh.cells:
-        if (block.dimension is None or block.dimension >= 2) and block.kind not in SMOOTHED:
+        if block.dimension not in (0, 1) and block.kind not in SMOOTHED:
             may[block.nodes] = False
     return may
 

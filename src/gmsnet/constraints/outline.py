@@ -138,7 +138,7 @@ def _still(mesh: Mesh, faces: Faces, twin: Offsets, halves: Longs) -> Flags:
     crowded = np.flatnonzero(twin == winding.NON_MANIFOLD)
     still[faces.corner[crowded]] = still[heads(faces)[crowded]] = True
     for block in mesh.cells:
-        if block.dimension == 3 or (block.dimension == 2 and block.nodes.shape[1] > block.corners):
+        if block.dimension in (None, 3) or (block.dimension == 2 and block.nodes.shape[1] > block.corners):
             still[block.nodes] = True
     return still
 
