@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 from gmsnet.io.pieces import Pieces
 from gmsnet.io.splice import Slots
 from gmsnet.mesh.cell_block import CellBlock

@@ -18,9 +18,9 @@ from gmsnet.io import convert
 from gmsnet.io import gmsh_sections as sections
 from gmsnet.io.cell_table import table_blocks
 from gmsnet.io.cells import counted, distinct, first_repeated, places_of
+from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.gmsh_sections import KINDS, Contents, Elements, Nodes, Source
-from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.text import quoted
 from gmsnet.mesh.mesh import Mesh

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gmsnet.cells.table import nodes_of
 from gmsnet.io.cell_table import Kind
 from gmsnet.io.cells import joined
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 from gmsnet.io.places import Addresses, Lattice, Places, chained, lists, pick, shifted
 from gmsnet.io.splice import Slots
 from gmsnet.io.text import Text, fail, quoted

@@ -17,8 +17,8 @@ from gmsnet.cells.table import nodes_of
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
 from gmsnet.io.cells import cell_blocks, check_nodes, distinct, numbered
+from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Rows, Starts, Text, quoted
