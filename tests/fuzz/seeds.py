@@ -21,6 +21,7 @@ import test_off
 import test_ply
 import test_stl
 import test_su2
+import test_su2_periodic
 import test_triangle
 import test_vtk
 import test_vtu
@@ -104,7 +105,9 @@ ENTITIES = '<FieldData><Array type="String" Name="who" format="ascii">65 0</Arra
 
 def seeds() -> Iterator[tuple[str, bytes]]:
     """(key of the format, file) of every seed."""
-    yield from (("su2", data) for data in (test_su2.PLAIN, SU2, SU2.replace(b"\n", b"\r\n")))
+    yield from (
+        ("su2", data) for data in (test_su2.PLAIN, SU2, SU2.replace(b"\n", b"\r\n"), test_su2_periodic.PERIODIC)
+    )
     yield from (("medit", data) for data in (test_medit.PLAIN, MEDIT))
     yield from (("gmsh", data) for data in gmsh_variants.VARIANTS.values())
     yield "gmsh", gmsh_variants.new(groups={21: [3, 4], 22: [-4]})

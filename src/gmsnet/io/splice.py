@@ -125,7 +125,8 @@ class FileSource:
     format: its name in the table of formats. data: the file that holds the coordinates, under the suffix ``main``.
     points, cells, region_names, point_data, cell_data: as read (see Mesh). companions: other files of the same mesh by
     suffix, which never change (Triangle's ``.ele``). unread: what else there is in the file (see Parsed). stamps: of
-    the files, so that what others write into them meanwhile is not overwritten.
+    the files, so that what others write into them meanwhile is not overwritten. matched: (pairs, 2) nodes that the file
+    says to be images of each other (see Parsed), read-only.
     """
 
     format: str
@@ -140,6 +141,7 @@ class FileSource:
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
     unread: tuple[str, ...] = ()
     stamps: Stamps = field(default_factory=Stamps, repr=False)
+    matched: NDArray[np.int64] | None = field(default=None, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle: the bytes of the files themselves."""
@@ -147,7 +149,7 @@ class FileSource:
         names, fields, cell_fields = (dict(each) for each in (self.region_names, self.point_data, self.cell_data))
         return FileSource, (
             self.format, self.main, self.data[:], self.points, self.slots, self.cells, files,
-            names, fields, cell_fields, self.unread, self.stamps,
+            names, fields, cell_fields, self.unread, self.stamps, self.matched,
         )  # fmt: skip
 
     def fits(self, mesh: Mesh) -> bool:
