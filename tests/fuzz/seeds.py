@@ -15,6 +15,7 @@ from gmsnet.io.formats import FORMATS
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "io"))  # the tests of the readers, and what they share
 
+import test_gmsh_partitions
 import test_medit
 import test_obj
 import test_off
@@ -110,6 +111,9 @@ def seeds() -> Iterator[tuple[str, bytes]]:
     )
     yield from (("medit", data) for data in (test_medit.PLAIN, MEDIT))
     yield from (("gmsh", data) for data in gmsh_variants.VARIANTS.values())
+    yield from (
+        ("gmsh", make(order, "cut")) for make in (test_gmsh_partitions.new, test_gmsh_partitions.old) for order in "<>"
+    )
     yield "gmsh", gmsh_variants.new(groups={21: [3, 4], 22: [-4]})
     head, rest = gmsh_variants.new().split(b"$Entities")
     yield "gmsh", head + PARTITIONED + b"$Entities" + rest
