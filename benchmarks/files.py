@@ -11,8 +11,7 @@ CPU is the time of the processor, which on a busy machine says more.
 disk: what it takes to write as many bytes with nothing else done, and to wait for the disk, as gmsnet does before it
 replaces a file; it is noisy, and part of the seconds of ``write``. first: all of it with the small mesh, compiling
 included where kernels are not cached yet. mesh: the arrays of the mesh. peak: the most memory that reading and writing
-take beyond what the process had before: the mesh, the file (which is mapped into memory, and can be dropped from it at
-any time) and all that was made on the way.
+take beyond what the process had before: the mesh, the bytes of the file and all that was made on the way.
 """
 
 from __future__ import annotations

@@ -137,6 +137,9 @@ What the names of facts mean that do not say it themselves:
 - *point data*, *cell data* of OBJ and OFF: colours; of binary STL: attributes. *comments* of VTK: the title.
 - *markers*: lines in two groups. *curved*: triangles of six nodes. *other plane*: z = 5.
 
+SU2's markers `SEND_RECEIVE` (periodic boundaries, parts of a partitioned mesh) are vertices, so their nodes are held;
+`NPERIODIC` and `PERIODIC_INDEX` are kept.
+
 ## Smoothing: the same file with other coordinates
 
 The sample is made of the decimals of its points. It is read and written without smoothing: the same bytes. It is

@@ -14,7 +14,7 @@ import numpy as np
 
 import gmsnet
 from gmsnet.errors import InputError
-from gmsnet.io import cells, gmsh_sections, mapped, places, splice, stl, text
+from gmsnet.io import cells, contents, gmsh_sections, places, splice, stl, text
 from gmsnet.io.formats import FORMATS
 from gmsnet.io.splice import FileSource
 from gmsnet.mesh.mesh import Mesh
@@ -25,9 +25,9 @@ LONGEST = 500  # characters of a message, without the name of the file
 PAIR = b"\0"  # between the two files of Triangle, where both are one input
 
 
-# What is looked at together, so small that a file of a few lines has many seams; and any file is mapped into memory.
+# What is looked at together, so small that a file of a few lines has many seams; and any file counts as large.
 SEAMS: dict[ModuleType, dict[str, int]] = {
-    mapped: {"LEAST": 1},
+    contents: {"LARGE": 1},
     cells: {"MOST_BLOCKS": 3},
     places: {"MOST_LATTICES": 3},
     text: {"MOST_ROWS": 2},
@@ -50,7 +50,7 @@ def parts(key: str, data: bytes) -> dict[str, bytes]:
 def examine(key: str, data: bytes, folder: Path) -> str:
     """Reads a file, moves its points, and reads it again. Returns what the file was refused with, or "".
 
-    Files of an odd length are read with many seams, and mapped. Raises Broken, or whatever the reader lets through.
+    Files of an odd length are read with many seams, and as large ones. Raises Broken, or what the reader lets through.
     """
     with ExitStack() as stack:
         for module, limits in SEAMS.items() if len(data) % 2 else ():

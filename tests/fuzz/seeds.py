@@ -15,12 +15,14 @@ from gmsnet.io.formats import FORMATS
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "io"))  # the tests of the readers, and what they share
 
+import test_gmsh_partitions
 import test_medit
 import test_obj
 import test_off
 import test_ply
 import test_stl
 import test_su2
+import test_su2_periodic
 import test_triangle
 import test_vtk
 import test_vtu
@@ -104,9 +106,14 @@ ENTITIES = '<FieldData><Array type="String" Name="who" format="ascii">65 0</Arra
 
 def seeds() -> Iterator[tuple[str, bytes]]:
     """(key of the format, file) of every seed."""
-    yield from (("su2", data) for data in (test_su2.PLAIN, SU2, SU2.replace(b"\n", b"\r\n")))
+    yield from (
+        ("su2", data) for data in (test_su2.PLAIN, SU2, SU2.replace(b"\n", b"\r\n"), test_su2_periodic.PERIODIC)
+    )
     yield from (("medit", data) for data in (test_medit.PLAIN, MEDIT))
     yield from (("gmsh", data) for data in gmsh_variants.VARIANTS.values())
+    yield from (
+        ("gmsh", make(order, "cut")) for make in (test_gmsh_partitions.new, test_gmsh_partitions.old) for order in "<>"
+    )
     yield "gmsh", gmsh_variants.new(groups={21: [3, 4], 22: [-4]})
     head, rest = gmsh_variants.new().split(b"$Entities")
     yield "gmsh", head + PARTITIONED + b"$Entities" + rest

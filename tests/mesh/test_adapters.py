@@ -216,13 +216,18 @@ def test_meshio_keeps_everything_but_the_points(library):
     assert given.cells[1].data[0].tolist() == [0, 1, 4]
 
 
-@pytest.mark.parametrize("name", ["gmsh:physical", "medit:ref", "material", "Mat_ID", "CellEntityIds", "attribute"])
+REGIONS = ["gmsh:physical", "medit:ref", "material", "Mat_ID", "CellEntityIds", "attribute", "label", "Labels",
+           "PhysicalIds", "subdomain", "group", "part", "zone", "domain", "marker", "MaterialID", "GeometryIds",
+           "mesh_tags", "cell_tags", "Cell tags", "FamilyIdCell", "ObjectId", "block_id", "RegionId"]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REGIONS)
 def test_region_fields_number_the_regions(library, name):
     given = library.Mesh(POINTS, [("triangle", FAN)], cell_data={name: [np.array([4, 4, 9, 9])]})
     assert to_mesh(given)[0].cells[0].regions.tolist() == [4, 4, 9, 9]
 
 
-@pytest.mark.parametrize("name", ["gmsh:geometrical", "pressure", "matter", "quality"])
+@pytest.mark.parametrize("name", ["gmsh:geometrical", "pressure", "matter", "quality", "id", "cell_id", "ElementId"])
 def test_other_fields_do_not(library, name):
     given = library.Mesh(POINTS, [("triangle", FAN)], cell_data={name: [np.array([4, 4, 9, 9])]})
     assert to_mesh(given)[0].cells[0].regions.tolist() == [0, 0, 0, 0]

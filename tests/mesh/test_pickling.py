@@ -12,7 +12,7 @@ import pytest
 
 import gmsnet
 from gmsnet.errors import InputError
-from gmsnet.io import FORMATS, mapped, read, write
+from gmsnet.io import FORMATS, contents, read, write
 from gmsnet.io.formats import FORMATS as TABLE
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -80,7 +80,7 @@ def test_points_alone_stay_in_their_plane(full):
 def test_the_file_goes_along(key, large, tmp_path, monkeypatch):
     """What is written afterwards is the file with new coordinates, byte for byte; also if the file is gone."""
     if large:
-        monkeypatch.setattr(mapped, "LEAST", 1)
+        monkeypatch.setattr(contents, "LARGE", 1)
     suffix = TABLE[key].suffixes[0]
     for name in ("in", "out", "expected"):
         write(gmsnet.random_mesh(60, seed=2), tmp_path / f"{name}{suffix}")
@@ -100,7 +100,7 @@ def test_the_file_goes_along(key, large, tmp_path, monkeypatch):
 def test_an_encoded_file_goes_along(compressor, large, tmp_path, monkeypatch):
     meshio = pytest.importorskip("meshio")
     if large:
-        monkeypatch.setattr(mapped, "LEAST", 1)
+        monkeypatch.setattr(contents, "LARGE", 1)
     made = gmsnet.random_mesh(60, seed=2)
     points = np.column_stack([made.points, np.zeros(len(made.points))])
     meshio.vtu.write(
@@ -112,16 +112,6 @@ def test_an_encoded_file_goes_along(compressor, large, tmp_path, monkeypatch):
     assert write(again(mesh).with_points(moved), tmp_path / "out.vtu") == []
     assert (tmp_path / "out.vtu").read_bytes() == (tmp_path / "expected.vtu").read_bytes()
     assert (tmp_path / "out.vtu").read_bytes() != (tmp_path / "in.vtu").read_bytes()
-
-
-def test_a_file_that_has_changed_does_not_go_along(tmp_path, monkeypatch):
-    monkeypatch.setattr(mapped, "LEAST", 1)
-    write(gmsnet.random_mesh(60, seed=2), tmp_path / "in.su2")
-    mesh = read(tmp_path / "in.su2")
-    with (tmp_path / "in.su2").open("ab") as file:
-        file.write(b"% more\n")
-    with pytest.raises(InputError, match=r"in\.su2: the file has changed since it was read: read it again"):
-        pickle.dumps(mesh)
 
 
 @pytest.mark.parametrize("options", [{}, {"target_quality": 0.5}, {"method": "gmsnet"}, {"max_sweeps": 0}])

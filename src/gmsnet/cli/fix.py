@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import re
+from array import array
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -13,6 +15,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from gmsnet.mesh.mesh import Mesh
+
+LIST_BYTES, LIST_BYTES_PER_NODE = 1 << 20, 64  # that a list in a file takes at most: ids, and what is said of them
 
 
 def fixed_nodes(mesh: Mesh, given: Sequence[str]) -> NDArray[np.bool_]:
@@ -37,22 +41,25 @@ def fixed_nodes(mesh: Mesh, given: Sequence[str]) -> NDArray[np.bool_]:
     return mask
 
 
-def _from_file(path: str, count: int) -> list[int]:
+def _from_file(path: str, count: int) -> NDArray[np.int64]:
+    import numpy as np
+
+    from gmsnet.io.contents import small
+
     try:
-        with open(path, encoding="utf-8") as file:
-            lines = file.read().splitlines()
+        data = small(path, LIST_BYTES + LIST_BYTES_PER_NODE * count, f"a list of {count:,} nodes")
     except OSError as error:
         raise InputError(f"{path}: the list of nodes cannot be read: {error.strerror}") from error
+    ids = array("q")
+    try:
+        for number, line in enumerate(io.TextIOWrapper(io.BytesIO(data), encoding="utf-8"), start=1):
+            for text in line.partition("#")[0].replace(",", " ").split():
+                ids.append(_node(text, count, f"{path}, line {number}"))
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: this is not a list of nodes: give whole numbers, counted from 0") from error
-    ids = [
-        _node(text, count, f"{path}, line {number}")
-        for number, line in enumerate(lines, start=1)
-        for text in line.partition("#")[0].replace(",", " ").split()
-    ]
     if not ids:
         raise InputError(f"{path}: the list names no node: leave out --fix, or put ids into it")
-    return ids
+    return np.array(ids, dtype=np.int64)
 
 
 def _node(text: str, count: int, where: str) -> int:

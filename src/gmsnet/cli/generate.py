@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
+RINGS_BYTES = 1 << 28  # of a file of rings at most: some ten million nodes on the boundary
+
 
 def generate(
     out: Annotated[str, typer.Argument(metavar="OUT", help="The file to write; its suffix tells the format.")],
@@ -66,9 +68,10 @@ def generate(
 def _read_rings(path: Path) -> list[Any]:
     """What stands in a JSON file of rings; ``random_mesh`` checks the rings themselves."""
     from gmsnet.errors import InputError
+    from gmsnet.io.contents import small
 
     try:
-        given = json.loads(path.read_text(encoding="utf-8"))
+        given = json.loads(small(str(path), RINGS_BYTES, "rings").decode("utf-8"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:

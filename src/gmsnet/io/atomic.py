@@ -10,21 +10,24 @@ from collections.abc import Iterable, Mapping
 
 from gmsnet.errors import InputError
 from gmsnet.io.pieces import Piece
+from gmsnet.io.stamps import Stamp, Stamps
 from gmsnet.io.streams import is_special
 from gmsnet.io.temporary import Temporary, remove_leftovers
 
 
-def replace_files(files: Mapping[str, bytes | Iterable[Piece]]) -> None:
+def replace_files(files: Mapping[str, bytes | Iterable[Piece]], stamps: Stamps | None = None) -> None:
     """Writes files (path → bytes, or pieces made as they are written): each new content goes to a temporary file beside
     its target, reaches the disk, and only when all of them have done so are the targets replaced.
 
     A link is followed, an existing file keeps its permissions. What is no regular file (a pipe, a device) is written
-    straight. Raises InputError where a target cannot be written, BrokenPipeError where nobody reads a pipe any more;
-    then, as after any other interruption, no temporary file is left and no target is half-written. What killed
-    processes have left in the folders is removed.
+    straight. What killed processes have left in the folders is removed.
+
+    stamps: of the files that were read, which are replaced only if they are as they were then. Raises InputError where
+    they are not or a target cannot be written, BrokenPipeError where nobody reads a pipe any more; then, as after any
+    other interruption, no temporary file is left and no target is half-written.
     """
     with contextlib.ExitStack() as made:
-        finished: list[tuple[Temporary, str]] = []
+        finished: list[tuple[Temporary, str, str, Stamp]] = []
         for path, contents in files.items():
             pieces = [contents] if isinstance(contents, bytes) else contents
             try:
@@ -37,18 +40,22 @@ def replace_files(files: Mapping[str, bytes | Iterable[Piece]]) -> None:
                     target = os.path.realpath(path)
                     remove_leftovers(os.path.dirname(target))
                     temporary = made.enter_context(Temporary(os.path.dirname(target)))
-                    _write(temporary, target, pieces)
-                    finished.append((temporary, target))
+                    stamp = _write(temporary, target, pieces)
+                    finished.append((temporary, target, path, stamp))
             except BrokenPipeError:  # no fault of the user's
                 raise
             except OSError as error:
                 raise InputError(f"{path}: cannot be written: {reason(error)}") from None
-        for temporary, target in finished:
+        stamps = stamps or Stamps()
+        for _, _, path, _ in finished:
+            stamps.check(path)
+        for temporary, target, path, stamp in finished:
             try:
                 temporary.become(target)
             except OSError as error:
                 raise InputError(f"{target}: cannot be written: {reason(error)}") from None
-        for folder in {os.path.dirname(target) for _, target in finished}:
+            stamps.update(path, stamp)
+        for folder in {os.path.dirname(target) for _, target, _, _ in finished}:
             _settle(folder)
 
 
@@ -97,7 +104,7 @@ def _check(path: str) -> None:
         raise InputError(f"{path}: the folder {folder} is write-protected")
 
 
-def _write(temporary: Temporary, target: str, pieces: Iterable[Piece]) -> None:
+def _write(temporary: Temporary, target: str, pieces: Iterable[Piece]) -> Stamp:
     """Fills a file that has the permissions and owner of the target, if that exists; on the disk when this returns.
 
     Until it has them nobody else may open it: the target may be private.
@@ -116,6 +123,7 @@ def _write(temporary: Temporary, target: str, pieces: Iterable[Piece]) -> None:
                     os.fchown(stream.fileno(), old.st_uid, old.st_gid)
                 os.fchmod(stream.fileno(), stat.S_IMODE(old.st_mode))
         os.fsync(stream.fileno())
+        return Stamp.of(os.fstat(stream.fileno()))
 
 
 def _settle(folder: str) -> None:

@@ -82,7 +82,7 @@ def distinct(values: NDArray[Any]) -> list[int]:
     return np.unique(values).tolist()  # type: ignore[no-any-return]
 
 
-def joined(parts: Sequence[NDArray[Any]], kind: type[np.integer[Any]] = np.int64) -> NDArray[Any]:
+def joined(parts: Sequence[NDArray[Any]], kind: type[np.generic] = np.int64) -> NDArray[Any]:
     """The arrays one behind the other; of the given type where there are none."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts or [np.empty(0, dtype=kind)])
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 from gmsnet.io.pieces import Pieces
 from gmsnet.io.splice import Slots
 from gmsnet.mesh.cell_block import CellBlock
@@ -20,7 +20,8 @@ from gmsnet.mesh.mesh import Mesh
 class Parsed:
     """The facts of a file: the fields of a Mesh, and where its coordinates stand.
 
-    unread: what else the file holds, in words; it stays in the file, but no conversion can keep it.
+    unread: what else the file holds, in words; it stays in the file, but no conversion can keep it. matched: (pairs, 2)
+    nodes that the file says to be images of each other, such as those of periodic boundaries; None where it has none.
     """
 
     points: NDArray[np.float64]
@@ -31,6 +32,7 @@ class Parsed:
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
     single: bool = False
     unread: Sequence[str] = ()
+    matched: NDArray[np.int64] | None = None
 
 
 @dataclass(frozen=True)

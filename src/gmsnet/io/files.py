@@ -11,13 +11,14 @@ from typing import Any
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.atomic import reason, refuse_folder, replace_files
 from gmsnet.io.cells import sealed
+from gmsnet.io.contents import Data, is_open_pipe, load, refuse_unless_regular
 from gmsnet.io.convert import listed
 from gmsnet.io.document import Parsed
 from gmsnet.io.formats import FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
-from gmsnet.io.mapped import Data, load
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import FileSource
-from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_input, standard_output
+from gmsnet.io.stamps import Stamp, Stamps
+from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_output
 from gmsnet.mesh.mesh import Mesh, Source
 
 
@@ -28,17 +29,18 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     table of formats (su2, gmsh, vtk, vtu, medit, triangle, stl, obj, off, ply); by default the suffix tells, or the
     contents where there is none to tell (standard input, pipes).
 
-    Raises InputError where the file cannot be opened or the format is unknown, FormatError (naming the line) where it
-    is damaged or not of that format.
+    Raises InputError where the file cannot be opened or is no regular file, where others change it while it is read,
+    or where the format is unknown; FormatError (naming the line) where it is damaged or not of that format.
     """
     name = _name(path)
     shown = "standard input" if name in STANDARD_INPUT else name
-    entry, files = _open(name, shown, format)
+    entry, opened = _open(name, shown, format)
+    files = {suffix: data for suffix, (_, data, _) in opened.items()}
     if len(files) > 1:
         shown = _beside(name, entry.suffixes[0])
     try:
         check_contents(files[entry.suffixes[0]], entry.key)
-        return _mesh(entry.load().read(files), entry, files)
+        return _mesh(entry.load().read(files), entry, files, Stamps.of(opened.values()))
     except MemoryError:
         raise InputError(f"{shown}: there is not enough memory for this mesh") from None
     except InputError as error:
@@ -58,30 +60,32 @@ def _name(path: Any) -> str:
     return os.fsdecode(path)
 
 
-def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, Data]]:
-    """The format and the bytes of each file of the mesh by suffix."""
-    stream = name in STANDARD_INPUT or is_special(name)
+def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, tuple[str, Data, Stamp | None]]]:
+    """The format and, by suffix, the path, the bytes and the stamp of each file of the mesh."""
+    stream = name in STANDARD_INPUT or is_open_pipe(name)
     refuse_folder(name)
-    if not stream and not os.path.exists(name):
-        raise InputError(f"{name}: there is no such file")
+    if not stream:
+        if not os.path.exists(name):
+            raise InputError(f"{name}: there is no such file")
+        refuse_unless_regular(name)
     if format is None and stream:
-        data = _bytes(name)
-        key = sniff(data)
+        opened = _loaded(name)
+        key = sniff(opened[1])
         if key is None:
             raise InputError(f"{shown}: its format cannot be seen; name it with --format ({', '.join(FORMATS)})")
         entry = FORMATS[key]
-        return entry, {entry.suffixes[0]: data}
+        return entry, {entry.suffixes[0]: opened}
     entry = entry_of(format) if format is not None else FORMATS[format_of_suffix(name, os.path.splitext(name)[1])]
     if len(entry.suffixes) == 1:
-        return entry, {entry.suffixes[0]: _bytes(name)}
+        return entry, {entry.suffixes[0]: _loaded(name)}
     if stream:
         raise InputError(f"{shown}: {entry.title} takes several files and cannot be read from a stream")
-    return entry, {suffix: _bytes(_beside(name, suffix)) for suffix in entry.suffixes}
+    return entry, {suffix: _loaded(_beside(name, suffix)) for suffix in entry.suffixes}
 
 
-def _bytes(name: str) -> Data:
+def _loaded(name: str) -> tuple[str, Data, Stamp | None]:
     try:
-        return standard_input().read() if name in STANDARD_INPUT else load(name)
+        return name, *load(name)
     except FileNotFoundError:
         raise InputError(f"{name}: there is no such file") from None
     except IsADirectoryError:
@@ -100,7 +104,7 @@ def _beside(name: str, suffix: str) -> str:
     return stem + (suffix.upper() if given.isupper() else suffix)
 
 
-def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data]) -> Mesh:
+def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamps) -> Mesh:
     if not len(parsed.points):
         raise FormatError("the file holds no points")
     if not any(len(block.nodes) for block in parsed.cells):
@@ -117,7 +121,7 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data]) -> Mesh:
     companions = {suffix: data for suffix, data in files.items() if suffix != main}
     source = FileSource(
         entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions,
-        mesh.region_names, mesh.point_data, mesh.cell_data, tuple(parsed.unread),
+        mesh.region_names, mesh.point_data, mesh.cell_data, tuple(parsed.unread), stamps, parsed.matched,
     )  # fmt: skip
     return replace(mesh, source=source)
 
@@ -132,7 +136,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     replaced in one step, once all is on the disk. format: as in ``read``; by default the suffix tells, or the format
     that the mesh was read from where there is none to tell.
 
-    Raises InputError where the file cannot be written, FormatError where the format cannot hold the mesh.
+    Raises InputError where the file cannot be written, or is the one that the mesh was read from and others have
+    changed or replaced it since; FormatError where the format cannot hold the mesh.
     """
     name = _name(path)
     if not isinstance(mesh, Mesh):
@@ -142,7 +147,7 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     source = mesh.source
     lost: list[str] = []
     try:
-        if isinstance(source, FileSource) and source.format == entry.key and source.fits(mesh) and source.intact():
+        if isinstance(source, FileSource) and source.format == entry.key and source.fits(mesh):
             files = source.splice(mesh.points)
         else:
             written = entry.load().write(mesh)
@@ -154,22 +159,18 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     pieces = {suffix: _with_memory(shown, part) for suffix, part in files.items()}
     if name in STANDARD_OUTPUT:
         _to_standard_output(*pieces.values())
-    elif len(files) > 1:
-        replace_files({_beside(name, suffix): part for suffix, part in pieces.items()})
     else:
-        replace_files(dict.fromkeys([name], *pieces.values()))
+        stamps = source.stamps if isinstance(source, FileSource) else None
+        several = len(files) > 1
+        replace_files({_beside(name, suffix) if several else name: part for suffix, part in pieces.items()}, stamps)
     return lost
 
 
 def _unread(source: Source | None) -> Iterator[str]:
     """What a conversion leaves behind in the file that was read, in words."""
-    if not isinstance(source, FileSource):
-        return
-    if source.unread:
+    if isinstance(source, FileSource) and source.unread:
         title = FORMATS[source.format].title
         yield f"only the {title} file that was read holds {listed(source.unread)}: left out"
-    if not source.intact():
-        yield "the file that was read has changed since: what gmsnet does not know of it was left out"
 
 
 def _with_memory(shown: str, pieces: Pieces) -> Iterator[Piece]:

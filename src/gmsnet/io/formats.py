@@ -8,8 +8,8 @@ from importlib import import_module
 from typing import cast
 
 from gmsnet.errors import FormatError, InputError
+from gmsnet.io.contents import Data
 from gmsnet.io.document import Format
-from gmsnet.io.mapped import Data
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,10 @@ from gmsnet.io import convert
 from gmsnet.io import gmsh_sections as sections
 from gmsnet.io.cell_table import table_blocks
 from gmsnet.io.cells import counted, distinct, first_repeated, places_of
+from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.gmsh_entities import merge_groups, read_entities, without_interfaces
 from gmsnet.io.gmsh_sections import KINDS, Contents, Elements, Nodes, Source
-from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.text import quoted
 from gmsnet.mesh.mesh import Mesh
@@ -106,7 +107,7 @@ def _section(source: Source, title: bytes, found: Contents, old: bool) -> None:
         elif title == b"Elements":
             found.elements = sections.elements_old(words, count) if old else sections.elements_new(words)
         else:
-            found.physical |= sections.entities(words, title == b"PartitionedEntities")
+            read_entities(words, title == b"PartitionedEntities", found)
         source.close(title, words)
 
 
@@ -137,16 +138,21 @@ def _assemble(found: Contents, nodes: Nodes, elements: Elements) -> Parsed:
     if unknown >= 0:
         where, named = int(elements.at[unknown]), elements.nodes[unknown]
         elements.words.fail(where, f"an element names the node {named}, which is not in $Nodes")
-    names = dict(found.names)
+    names = merge_groups(found, elements)
     regions = elements.physical
     if regions is None:
         regions = _regions(found, elements, names)
-    cells, _ = table_blocks(KINDS, elements.codes, elements.sizes, place, regions, {})
+    unread = _unread(found, nodes, elements, regions)
+    kept, between = without_interfaces(found, elements)
+    codes, sizes = elements.codes, elements.sizes
+    if between:
+        codes, regions, place, sizes = codes[kept], regions[kept], place[np.repeat(kept, sizes)], sizes[kept]
+    cells, _ = table_blocks(KINDS, codes, sizes, place, regions, {})
     for block in cells:  # a negative tag means: the same group, turned round
         for region in np.unique(block.regions[block.regions < 0]).tolist():
             if (block.cell.dimension, -region) in names:
                 names.setdefault((block.cell.dimension, region), names[block.cell.dimension, -region])
-    return Parsed(nodes.points, cells, nodes.slots, names, unread=_unread(found, nodes, elements, regions))
+    return Parsed(nodes.points, cells, nodes.slots, names, unread=[*unread, *between])
 
 
 def _unread(found: Contents, nodes: Nodes, elements: Elements, regions: NDArray[np.int64]) -> list[str]:

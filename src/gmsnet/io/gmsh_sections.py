@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gmsnet.cells.table import nodes_of
 from gmsnet.io.cell_table import Kind
 from gmsnet.io.cells import joined
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 from gmsnet.io.places import Addresses, Lattice, Places, chained, lists, pick, shifted
 from gmsnet.io.splice import Slots
 from gmsnet.io.text import Text, fail, quoted
@@ -34,6 +34,7 @@ KINDS = {
 }  # fmt: skip
 SIZES = np.array([nodes_of(KINDS[code].name) if code in KINDS else 0 for code in range(max(KINDS) + 1)], dtype=np.int8)
 
+PARTITIONED = 4  # tags of an element in version 2.2: group, entity, number of partitions, partitions
 _TOGETHER = 1 << 20  # numbers of elements that are looked at together
 
 
@@ -42,7 +43,7 @@ class Elements:
     """Elements one after another. nodes: tags, those of an element behind those of the one before; at: their addresses.
 
     entity: (blocks, 2) dimension and tag of the entity of each block, and number: (blocks,) of its elements (of version
-    4.1). physical: (n,) the physical tag of each (of version 2.2).
+    4.1). physical: (n,) the physical tag of each, and partitioned: (n,) whether it names a partition (of version 2.2).
     """
 
     codes: NDArray[np.int8]
@@ -52,6 +53,7 @@ class Elements:
     entity: NDArray[np.int64] | None = None
     number: NDArray[np.int64] | None = None
     physical: NDArray[np.int64] | None = None
+    partitioned: NDArray[np.bool_] | None = None
 
     @property
     def sizes(self) -> NDArray[np.int8]:
@@ -74,11 +76,13 @@ class Nodes:
 class Contents:
     """What the sections of a file add up to.
 
-    physical: (dimension, entity) → its physical tags. others: the titles of sections that are not read.
+    physical: (dimension, entity) → its physical tags. parents: of the entities that partitioning made, the dimension of
+    those that they are parts of. others: the titles of sections that are not read.
     """
 
     names: dict[tuple[int, int], str] = field(default_factory=dict)
     physical: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
+    parents: dict[tuple[int, int], int] = field(default_factory=dict)
     nodes: Nodes | None = None
     elements: Elements | None = None
     others: dict[str, None] = field(default_factory=dict)
@@ -163,25 +167,6 @@ def skip(words: Words, *numbers: tuple[int, str]) -> int:
     return start
 
 
-def entities(words: Words, partitioned: bool) -> dict[tuple[int, int], tuple[int, ...]]:
-    """(dimension, tag) → physical tags of each geometrical entity of version 4.1."""
-    found = {}
-    if partitioned:
-        counts(words, 1)  # partitions
-        skip(words, (2 * counts(words, 1)[0], "i4"))  # ghost entities
-    for dimension, count in enumerate(counts(words, 4)):
-        for _ in range(count):
-            (tag,) = ints(words, 1)
-            if partitioned:
-                skip(words, (2, "i4"))  # the entity that was cut
-                skip(words, (counts(words, 1)[0], "i4"))  # the partitions
-            skip(words, (6 if dimension else 3, "f8"))
-            found[dimension, tag] = tuple(ints(words, counts(words, 1)[0]))
-            if dimension:
-                skip(words, (counts(words, 1)[0], "i4"))
-    return found
-
-
 def nodes_old(words: Words, count: int) -> Nodes:
     """Nodes of version 2.2: rows of a tag and three coordinates."""
     start, tag, unit = skip(words, (count, "i4"), (3 * count, "f8")), words.size("i4"), words.size("f8")
@@ -239,7 +224,7 @@ def elements_old(words: Words, total: int) -> Elements:
     """Elements of version 2.2: in a text rows of tag, type, number of tags, tags, nodes; in a binary file blocks."""
     if isinstance(words, ByteWords):
         return _elements_of_bytes(words, total)
-    codes, physical, nodes, places, found, most = [], [], [], list[Addresses](), 0, _TOGETHER
+    codes, physical, parted, nodes, places, found, most = [], [], [], [], list[Addresses](), 0, _TOGETHER
     while found < total:
         start = words.at
         values = words.values(Places(Lattice(start, min(most, words.end - start), 1)), "i4")
@@ -256,10 +241,14 @@ def elements_old(words: Words, total: int) -> Elements:
         at = lists(first, 3 + tags + sizes, 3 + tags, sizes)
         codes.append(code)
         physical.append(np.where(tags > 0, values[np.minimum(first + 3, len(values) - 1)], 0))
+        parted.append(tags >= PARTITIONED)
         nodes.append(pick(values, at))
         places.append(shifted(at, start))
         words.at, found = start + end, found + count
-    return Elements(joined(codes, np.int8), joined(nodes), chained(places), words, physical=joined(physical))
+    return Elements(
+        joined(codes, np.int8), joined(nodes), chained(places), words,
+        physical=joined(physical), partitioned=joined(parted, np.bool_),
+    )  # fmt: skip
 
 
 def _blame(words: Words, values: NDArray[np.int64], found: int, total: int) -> NoReturn:
@@ -274,6 +263,7 @@ def _blame(words: Words, values: NDArray[np.int64], found: int, total: int) -> N
 def _elements_of_bytes(words: ByteWords, total: int) -> Elements:
     """Elements of version 2.2 in a binary file: blocks with one type and number of tags have a head each."""
     head, codes, physical, places, done = struct.Struct(words.order + "3i"), [], [], [], 0
+    parted: list[NDArray[np.bool_]] = []
     while done < total:
         at = skip(words, (3, "i4"))
         code, count, tags = head.unpack_from(words.data, at)
@@ -285,10 +275,14 @@ def _elements_of_bytes(words: ByteWords, total: int) -> Elements:
         codes.append(np.full(count, code, dtype=np.int8))
         physical.append(words.values(Places(Lattice(start + 4, count if tags else 0, row)), "i4"))
         physical.append(np.zeros(0 if tags else count, dtype=np.int64))
+        parted.append(np.full(count, tags >= PARTITIONED))
         places.append(Lattice(start, count, row, tuple(4 * (1 + tags + k) for k in range(size))))
         done += count
     at_nodes = Places(*places)
-    return Elements(joined(codes, np.int8), words.values(at_nodes, "i4"), at_nodes, words, physical=joined(physical))
+    return Elements(
+        joined(codes, np.int8), words.values(at_nodes, "i4"), at_nodes, words,
+        physical=joined(physical), partitioned=joined(parted, np.bool_),
+    )  # fmt: skip
 
 
 def node_count(words: Words, at: int, code: int) -> int:

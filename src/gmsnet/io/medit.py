@@ -16,8 +16,8 @@ from gmsnet.cells.table import nodes_of
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
 from gmsnet.io.cells import check_nodes, distinct, sealed
+from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Starts, Text

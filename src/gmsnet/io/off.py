@@ -10,8 +10,8 @@ import numpy as np
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
 from gmsnet.io.cells import cell_blocks, check_nodes, polygon_kinds
+from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import ranges
 from gmsnet.io.splice import TextSlots

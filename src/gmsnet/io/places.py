@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 
 MOST_LATTICES = 1000  # where records differ more often than that, addresses are kept one by one
 

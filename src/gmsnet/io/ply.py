@@ -16,8 +16,8 @@ from gmsnet.errors import FormatError
 from gmsnet.io import convert, ply_header
 from gmsnet.io.cell_table import Kind, check_range, table_blocks
 from gmsnet.io.cells import joined
+from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import side_by_side
 from gmsnet.io.ply_rows import Column, Table, tables

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 
 from gmsnet.errors import FormatError
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 from gmsnet.io.text import fail
 
 TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4"}

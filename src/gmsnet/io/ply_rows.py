@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 from gmsnet.io.places import Addresses, Lattice, Places, ranges
 from gmsnet.io.ply_header import Element, Header, Property
 from gmsnet.io.text import Text

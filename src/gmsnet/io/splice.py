@@ -14,9 +14,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.io.mapped import Data, changed, held
+from gmsnet.io.contents import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Lattice, Places
+from gmsnet.io.stamps import Stamps
 from gmsnet.io.text import Starts, Text
 from gmsnet.kernels.text import text as kernels
 from gmsnet.mesh.cell_block import CellBlock
@@ -123,7 +124,9 @@ class FileSource:
 
     format: its name in the table of formats. data: the file that holds the coordinates, under the suffix ``main``.
     points, cells, region_names, point_data, cell_data: as read (see Mesh). companions: other files of the same mesh by
-    suffix, which never change (Triangle's ``.ele``). unread: what else there is in the file (see Parsed).
+    suffix, which never change (Triangle's ``.ele``). unread: what else there is in the file (see Parsed). stamps: of
+    the files, so that what others write into them meanwhile is not overwritten. matched: (pairs, 2) nodes that the file
+    says to be images of each other (see Parsed), read-only.
     """
 
     format: str
@@ -137,14 +140,16 @@ class FileSource:
     point_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
     unread: tuple[str, ...] = ()
+    stamps: Stamps = field(default_factory=Stamps, repr=False)
+    matched: NDArray[np.int64] | None = field(default=None, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For pickle: the bytes themselves, wherever they are kept. Raises InputError where they are gone."""
-        files = {suffix: held(data) for suffix, data in self.companions.items()}
+        """For pickle: the bytes of the files themselves."""
+        files = {suffix: data[:] for suffix, data in self.companions.items()}
         names, fields, cell_fields = (dict(each) for each in (self.region_names, self.point_data, self.cell_data))
         return FileSource, (
-            self.format, self.main, held(self.data), self.points, self.slots, self.cells, files,
-            names, fields, cell_fields, self.unread,
+            self.format, self.main, self.data[:], self.points, self.slots, self.cells, files,
+            names, fields, cell_fields, self.unread, self.stamps, self.matched,
         )  # fmt: skip
 
     def fits(self, mesh: Mesh) -> bool:
@@ -168,10 +173,6 @@ class FileSource:
                 )  # one a block, and the blocks are equal
             )
         )
-
-    def intact(self) -> bool:
-        """Whether the bytes are still there: a large file stays on the disk, where others may write into it."""
-        return not any(map(changed, (self.data, *self.companions.values())))
 
     def splice(self, points: Points) -> dict[str, Pieces]:
         """Suffix → each file of the mesh, with the coordinates of ``points`` (N×dim) in their slots."""

@@ -17,10 +17,11 @@ from gmsnet.cells.table import nodes_of
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
 from gmsnet.io.cells import cell_blocks, check_nodes, distinct, numbered
+from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
+from gmsnet.io.su2_markers import COPIED, Marker, check_transformation, matched, send
 from gmsnet.io.text import Rows, Starts, Text, quoted
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -31,7 +32,7 @@ suffixes = (".su2",)
 CODES = {1: "vertex", 3: "line", 5: "triangle", 9: "quad"}
 SIZES = {code: nodes_of(kind) for code, kind in CODES.items()}
 COUNTS = {"NDIME": "dimensions", "NZONE": "zones", "NPOIN": "points", "NELEM": "elements", "NMARK": "markers",
-          "MARKER_ELEMS": "marker elements"}  # fmt: skip
+          "MARKER_ELEMS": "marker elements", "NPERIODIC": "periodic transformations"}  # fmt: skip
 COMMENT = b"%"
 MOST_KEYWORDS = 100_000  # each costs time; a mesh has two for each marker
 _LINE_END = re.compile(rb"[\r\n]")
@@ -56,7 +57,8 @@ class Contents:
     counts: dict[str, int] = field(default_factory=dict)
     points: Rows | None = None
     elements: Rows | None = None
-    markers: list[tuple[str, Rows | None]] = field(default_factory=list)
+    markers: list[Marker] = field(default_factory=list)
+    periodic: int = 0
     others: dict[str, None] = field(default_factory=dict)
 
 
@@ -71,18 +73,23 @@ def read(files: Mapping[str, Data]) -> Parsed:
     if found.counts["NMARK"] != len(found.markers):
         raise FormatError(f"NMARK announces {found.counts['NMARK']} markers, but the file has {len(found.markers)}")
 
+    if (announced := found.counts.get("NPERIODIC", found.periodic)) != found.periodic:
+        raise FormatError(f"NPERIODIC announces {announced} transformations, but the file has {found.periodic}")
+
     points, ends = text.spans(starts := _points(text, found.points))
     cells = _cells(text, found.elements, len(points), 0, CODES)
-    numbers = numbered([tag for tag, _ in found.markers])
-    names = {(1, number): tag for tag, number in numbers.items()}
-    for tag, rows in found.markers:
-        if rows is None:
-            raise FormatError(f"the marker {tag[:24]!r} has no MARKER_ELEMS: the file is cut off")
-        blocks = _cells(text, rows, len(points), numbers[tag], {1: "vertex", 3: "line"})
-        names |= {(b.cell.dimension, numbers[tag]): tag for b in blocks}
+    numbers = numbered([marker.tag for marker in found.markers])
+    names = {(1, numbers[marker.tag]): marker.tag for marker in found.markers if marker.sent is None}
+    for marker in found.markers:
+        if marker.rows is None:
+            last = "MARKER_ELEMS" if marker.count is None else f"{marker.count} rows behind a SEND_TO"
+            raise FormatError(f"the marker {marker.tag[:24]!r} has no {last}: the file is cut off")
+        kinds = {1: "vertex"} if marker.sent is not None else {1: "vertex", 3: "line"}
+        blocks = _cells(text, marker.rows, len(points), numbers[marker.tag], kinds, 1 + (marker.sent is not None))
+        names |= {(b.cell.dimension, numbers[marker.tag]): marker.tag for b in blocks}
         cells += blocks
     unread = [f"the keyword {key}" for key in found.others]
-    return Parsed(points, cells, TextSlots(starts, ends), names, unread=unread)
+    return Parsed(points, cells, TextSlots(starts, ends), names, unread=unread, matched=matched(text, found.markers))
 
 
 def _sections(text: Text) -> Iterator[Section]:
@@ -118,11 +125,16 @@ def _collect(text: Text) -> Contents:
         if key == "MARKER_TAG":
             if not len(value):
                 text.fail(at, "MARKER_TAG has no name")
-            found.markers.append((b" ".join(map(text.token, value)).decode("utf-8", "backslashreplace"), None))
-        elif key not in COUNTS:
+            found.markers.append(Marker(b" ".join(map(text.token, value)).decode("utf-8", "backslashreplace")))
+        elif key not in COUNTS or key == "NPERIODIC":
             found.others[key] = None
         if key in COUNTS:
             _count(text, section, found)
+        elif key == "SEND_TO":
+            send(text, at, value, rows, found.markers)
+        elif key == "PERIODIC_INDEX":
+            found.periodic += 1
+            check_transformation(text, at, rows)
         elif len(rows) and not key.startswith("FFD_"):
             text.fail(
                 rows.where(0),
@@ -145,17 +157,20 @@ def _count(text: Text, section: Section, found: Contents) -> None:
         if key in found.counts:
             text.fail(at, f"{key} is given twice")
         found.counts[key] = count
-    if len(rows) != count * (key in ROWS):
-        wanted = count * (key in ROWS)
+    copied = key == "MARKER_ELEMS" and found.markers and found.markers[-1].tag == COPIED
+    wanted = count * (key in ROWS)
+    if len(rows) != wanted and (len(rows) or not copied):  # those of nodes that are copied stand behind SEND_TO
         text.fail(at, f"{key}= {count} is followed by {len(rows)} rows instead of {wanted}: is the file cut off?")
     if key == "NPOIN":
         found.points = rows
     elif key == "NELEM":
         found.elements = rows
     elif key == "MARKER_ELEMS":
-        if not found.markers or found.markers[-1][1] is not None:
+        if not found.markers or found.markers[-1].count is not None:
             text.fail(at, "MARKER_ELEMS without a MARKER_TAG before it")
-        found.markers[-1] = found.markers[-1][0], rows
+        found.markers[-1].count = count
+        if len(rows) == count:
+            found.markers[-1].rows = rows
 
 
 def _points(text: Text, rows: Rows) -> Starts:
@@ -173,8 +188,10 @@ def _points(text: Text, rows: Rows) -> Starts:
     return rows.columns(0, 2)
 
 
-def _cells(text: Text, rows: Rows, count: int, region: int, kinds: Mapping[int, str]) -> list[CellBlock]:
-    """Rows of a type, its nodes and perhaps an index."""
+def _cells(
+    text: Text, rows: Rows, count: int, region: int, kinds: Mapping[int, str], most_extra: int = 1
+) -> list[CellBlock]:
+    """Rows of a type, its nodes and up to ``most_extra`` other numbers, such as an index."""
     codes, sizes = np.empty(len(rows), dtype=np.int8), np.zeros(len(rows), dtype=np.int8)
     nodes, found = np.empty(len(rows.starts) - len(rows), dtype=np.int64), 0
     for k, part in rows.parts():
@@ -188,7 +205,7 @@ def _cells(text: Text, rows: Rows, count: int, region: int, kinds: Mapping[int, 
             text.fail(part.where(bad), f"a cell of type {code[bad]} cannot be read here; known are {words}")
         codes[k : k + len(part)] = code
         extra = part.lengths - 1 - size
-        if (wrong := (extra < 0) | (extra > 1)).any():
+        if (wrong := (extra < 0) | (extra > most_extra)).any():
             bad = int(np.argmax(wrong))
             told = f"a {kinds[int(code[bad])]} has {size[bad]} nodes, found {part.lengths[bad] - 1} numbers"
             text.fail(part.where(bad), told)
@@ -240,4 +257,5 @@ def _text(mesh: Mesh, points: NDArray[np.float64]) -> Iterator[Piece]:
 
 def _tag(marker: str) -> str:
     """A marker's name as SU2 can hold it: one word without the signs that mean something else."""
-    return "_".join(marker.replace("%", " ").replace("=", " ").split()) or "marker"
+    tag = "_".join(marker.replace("%", " ").replace("=", " ").split()) or "marker"
+    return tag.lower() if tag == COPIED else tag  # which would have to say where its nodes are copied to

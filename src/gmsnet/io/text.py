@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 from gmsnet.io.places import ranges
 from gmsnet.kernels.text import text as kernels
 from gmsnet.kernels.topology.weld import match_words

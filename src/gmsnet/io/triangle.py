@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from gmsnet.errors import FormatError
 from gmsnet.io import convert
 from gmsnet.io.cells import counted, distinct, first_repeated, places_of, sealed
+from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Rows, Text

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from gmsnet.errors import FormatError
 from gmsnet.io import convert, vtk_cells
 from gmsnet.io.cells import joined
+from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Addresses, Lattice, Places, lists, pick
 from gmsnet.io.vtk_fields import attribute, field_arrays, keyword

@@ -10,7 +10,7 @@ from urllib.parse import unquote_to_bytes
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 from gmsnet.io.places import Places
 from gmsnet.io.text import Text, fail, quoted
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at

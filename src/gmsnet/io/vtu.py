@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
 from gmsnet.io import convert, vtk_cells
+from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.mapped import Data
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Lattice, Places
 from gmsnet.io.splice import BinarySlots, EncodedSlots, Slots

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 from gmsnet.io.text import Text, fail
 from gmsnet.io.vtu_arrays import Encoded, Encoding, decode
 from gmsnet.io.vtu_xml import DataArray, parse

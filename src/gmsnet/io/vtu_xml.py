@@ -12,10 +12,8 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from gmsnet.errors import FormatError
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 from gmsnet.io.text import fail
-
-SECTIONS = ("PointData", "CellData", "Points", "Cells")
 
 MOST_DEEP, MOST_ARRAYS = 100, 100_000  # elements inside one another, arrays: no grid has so many
 

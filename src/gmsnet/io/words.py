@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io.mapped import Data
+from gmsnet.io.contents import Data
 from gmsnet.io.places import Addresses, Lattice, Places, pick
 from gmsnet.io.splice import BinarySlots, Slots, TextSlots
 from gmsnet.io.text import Starts, Text

@@ -9,14 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-WORDS = (
+WORDS = (  # FreeFEM writes Label, deal.II MaterialID, MFEM attribute, Gmsh CellEntityIds, Elmer GeometryIds
     *("mat", "material", "region", "zone", "domain", "subdomain", "physical", "attribute"),
-    *("entity", "ref", "tag", "part", "block", "group"),
+    *("entity", "ref", "tag", "part", "block", "group", "label", "marker", "geometry", "family"),
 )
-REGION_NAMES = frozenset(
+NUMBERED = 64  # cells: where so many or more all have different values, these number cells and tell no regions apart
+OTHER_NAMES = frozenset(("familyidcell", "med:familyidcell", "objectid"))  # of Salome, and of Exodus files
+REGION_NAMES = OTHER_NAMES | frozenset(
     "".join(parts)
     for parts in product(
-        ("", "gmsh:", "medit:", "cell"),
+        ("", "gmsh:", "medit:", "cell", "mesh"),
         ("", "_"),
         WORDS,
         ("", "s"),
@@ -27,7 +29,7 @@ REGION_NAMES = frozenset(
 
 def names_a_region(name: str) -> bool:
     """Whether a cell field of this name tells regions apart (``material``, ``region_id``, ``gmsh:physical``, …)."""
-    return name.lower() in REGION_NAMES
+    return name.lower().replace(" ", "_") in REGION_NAMES
 
 
 def regions_of(fields: Iterable[tuple[str, NDArray[Any]]], count: int) -> NDArray[np.int64]:
@@ -43,10 +45,12 @@ def combined(fields: Sequence[NDArray[Any]], count: int) -> NDArray[np.int64]:
 
     0 without a field. One field of whole numbers gives its own numbers. Else the distinct values, of several fields the
     distinct combinations, are counted from 1. Values count, not their spelling in a file: ``1`` and ``1.0`` are equal.
+    Fields of one number that is another for each of many cells count for nothing.
     """
-    if not fields or not count:
+    tables = [np.asarray(field).reshape(count, -1) for field in fields] if count else []
+    tables = [table for table in tables if table.shape[1] != 1 or not _numbers_cells(table.ravel())]
+    if not tables:
         return np.zeros(count, dtype=np.int64)
-    tables = [np.asarray(field).reshape(count, -1) for field in fields]
     if len(tables) == 1 and tables[0].shape[1] == 1 and _whole(tables[0]):
         return tables[0].ravel().astype(np.int64)
     region = np.zeros(count, dtype=np.int64)
@@ -55,6 +59,12 @@ def combined(fields: Sequence[NDArray[Any]], count: int) -> NDArray[np.int64]:
         which = np.unique(rows, axis=0, return_inverse=True)[1].reshape(count)
         region = np.unique(region * (int(which.max()) + 1) + which, return_inverse=True)[1].reshape(count)
     return region + 1
+
+
+def _numbers_cells(values: NDArray[Any]) -> bool:
+    """Whether each of many cells has a value of its own."""
+    count = len(values)  # that the first of them differ is seldom, and quickly told
+    return count >= NUMBERED and all(len(np.unique(part)) == len(part) for part in (values[:NUMBERED], values))
 
 
 def _whole(values: NDArray[Any]) -> bool:

@@ -1,0 +1,79 @@
+"""Geometrical entities of a Gmsh file, and what partitioning a mesh makes of them and of their groups.
+
+Gmsh cuts each entity at the partitions and adds lines and points between partitions, which are no part of the geometry.
+On demand (Mesh.PartitionCreatePhysicals) it replaces each physical group by one for each of its parts.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.cells.table import CELLS
+from gmsnet.io import gmsh_sections as sections
+from gmsnet.io.gmsh_sections import KINDS, SIZES, Contents, Elements
+from gmsnet.io.words import Words
+
+# What Gmsh calls the part of a physical group in a partition, or between several.
+_PART = re.compile(r"_part\{(\d+(?:,\d+)*)\}_physical\{(\d+)\}_dim\{[0-3]\}")
+_DIMENSIONS = np.array([CELLS[KINDS[code].name].dimension if code in KINDS else 3 for code in range(len(SIZES))])
+
+
+def read_entities(words: Words, partitioned: bool, found: Contents) -> None:
+    """The physical tags, and of partitions the parents, of each geometrical entity of version 4.1."""
+    if partitioned:
+        sections.counts(words, 1)  # partitions
+        sections.skip(words, (2 * sections.counts(words, 1)[0], "i4"))  # ghost entities
+    for dimension, count in enumerate(sections.counts(words, 4)):
+        for _ in range(count):
+            (tag,) = sections.ints(words, 1)
+            if partitioned:
+                found.parents[dimension, tag] = sections.ints(words, 2)[0]
+                sections.skip(words, (sections.counts(words, 1)[0], "i4"))  # the partitions
+            sections.skip(words, (6 if dimension else 3, "f8"))
+            found.physical[dimension, tag] = tuple(sections.ints(words, sections.counts(words, 1)[0]))
+            if dimension:
+                sections.skip(words, (sections.counts(words, 1)[0], "i4"))
+
+
+def merge_groups(found: Contents, elements: Elements) -> dict[tuple[int, int], str]:
+    """The names of the physical groups, with those parts put together again that partitioning made of a group.
+
+    What is between partitions belongs to no group.
+    """
+    parts = {key: match for key, name in found.names.items() if (match := _PART.fullmatch(name))}
+    if not parts:
+        return dict(found.names)
+    whole = {key: 0 if "," in match[1] and key[0] < 2 else int(match[2]) for key, match in parts.items()}
+    for entity, tags in found.physical.items():
+        groups = dict.fromkeys(whole.get((entity[0], tag), tag) for tag in tags)
+        found.physical[entity] = tuple(group for group in groups if group)
+    if elements.physical is not None:
+        dimensions, physical = _DIMENSIONS[elements.codes], elements.physical.copy()
+        for (dimension, tag), group in whole.items():
+            physical[(dimensions == dimension) & (elements.physical == tag)] = group
+        elements.physical = physical
+    return {key: name for key, name in found.names.items() if key not in parts}
+
+
+def without_interfaces(found: Contents, elements: Elements) -> tuple[NDArray[np.bool_], list[str]]:
+    """(n,) which elements are no mere lines or points between partitions; and how many are, in words, if any are.
+
+    In version 4.1 their entity is a part of one of more dimensions. In version 2.2 they name no partition, while faces
+    and other lines or points do. Whatever belongs to a physical group is kept.
+    """
+    if elements.entity is not None and elements.number is not None:
+        keys = [(dim, tag) for dim, tag in elements.entity.tolist()]
+        between = [key[0] < min(2, found.parents.get(key, 0)) and not found.physical.get(key) for key in keys]
+        kept = np.repeat(~np.array(between, dtype=bool), elements.number)
+    else:
+        assert elements.physical is not None
+        assert elements.partitioned is not None
+        small = _DIMENSIONS[elements.codes] < 2
+        kept = np.ones(len(small), dtype=bool)
+        if (elements.partitioned & small).any() and (elements.partitioned & ~small).any():
+            kept = ~small | elements.partitioned | (elements.physical != 0)
+    count = int(np.count_nonzero(~kept))
+    return kept, [f"{count} lines and points between partitions"] if count else []
