@@ -1,16 +1,19 @@
-"""Whole-mesh L-BFGS on Σ (q/top)^p over the cells of a mesh or of a part of it, with p a power of two.
+"""Whole-mesh L-BFGS on Σ (q/top)^p over the simplices of a mesh or of a part of it, with p a power of two.
 
-A barrier: q of a triangle of area zero or less is +∞. With a vertex at the origin, the others at a and b
-counter-clockwise, D = a×b, κ = 1/√3 and w = ∇D = (a_y − b_y, b_x − a_x):
+The simplices are triangles, whose ideal is equilateral, and the corners of quads, whose ideal is half a square. A
+barrier: q of a simplex of area zero or less is +∞. With the corner at the origin, the others at a and b
+counter-clockwise, D = a×b and w = ∇D = (a_y − b_y, b_x − a_x), derivatives by the corner's place:
 
-    q = κ(|a|² + |b|² − a·b)/D,   ∇q = −(κ(a + b) + q w)/D,   ∇²q = (2κI − w∇qᵀ − ∇q wᵀ)/D
+    q = α(|a|² + |b|² − γ a·b)/D,   ∇q = −(α(2 − γ)(a + b) + q w)/D,   ∇²q = (2α(2 − γ)I − w∇qᵀ − ∇q wᵀ)/D
 
-and q^p has p q^{p−1} ∇q and p q^{p−1} ∇²q + p(p − 1) q^{p−2} ∇q∇qᵀ. In the coordinates of one node it is convex, so
-the 2×2 blocks of the Hessian on the diagonal are positive definite: their inverses, at the place where the step starts
-or some steps before it, are L-BFGS's H₀ (times the usual γ; Nocedal, Wright: Numerical Optimization, section 7.2).
-Cells of q 1e6 beside cells of q 1 need that. The line search brackets a step that fulfils the weak Wolfe conditions
-(Lewis, Overton: Nonsmooth optimization via quasi-Newton methods, 2013, algorithm 4.6) between 0 and the largest step at
-which no triangle has come to area zero, which is exact: D is a quadratic function of the step.
+with α = 1/√3, γ = 1 for an equilateral ideal, α = 1/2, γ = 0 for a right one. By the other end of a the numerator has
+the derivative α(2a − γb) and the second one 2αI. q^p has p q^{p−1} ∇q and p q^{p−1} ∇²q + p(p − 1) q^{p−2} ∇q∇qᵀ. In
+the coordinates of one node it is convex, so the 2×2 blocks of the Hessian on the diagonal are positive definite: their
+inverses, at the place where the step starts or some steps before it, are L-BFGS's H₀ (times the usual γ; Nocedal,
+Wright: Numerical Optimization, section 7.2). Cells of q 1e6 beside cells of q 1 need that. The line search brackets a
+step that fulfils the weak Wolfe conditions (Lewis, Overton: Nonsmooth optimization via quasi-Newton methods, 2013,
+algorithm 4.6) between 0 and the largest step at which no triangle has come to area zero, which is exact: D is a
+quadratic function of the step.
 """
 
 from __future__ import annotations
@@ -32,10 +35,14 @@ UNSTEADY, REFRESH = 100, 20  # the blocks are computed in each of the first iter
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """triangles: (T, 3) rows of points, counter-clockwise. free: (N,) bool, which of the points may move."""
+    """triangles: (T, 3) rows of points, counter-clockwise, the corner first. free: (N,) bool, which points may move.
+
+    right: (T,) bool, which of the triangles are corners of quads.
+    """
 
     triangles: np.ndarray
     free: np.ndarray
+    right: np.ndarray
 
     def part(self, cells: np.ndarray, rings: int) -> tuple[Problem, np.ndarray]:
         """The problem of the free nodes of some cells and of so many rings around them; and its points' rows here."""
@@ -44,8 +51,9 @@ class Problem:
         for _ in range(rings):
             moves[self.triangles[moves[self.triangles].any(axis=1)]] = True
         moves &= self.free
-        nodes, local = np.unique(self.triangles[moves[self.triangles].any(axis=1)], return_inverse=True)
-        return Problem(local.reshape(-1, 3).astype(np.int32), moves[nodes]), nodes
+        touched = moves[self.triangles].any(axis=1)
+        nodes, local = np.unique(self.triangles[touched], return_inverse=True)
+        return Problem(local.reshape(-1, 3).astype(np.int32), moves[nodes], self.right[touched]), nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,18 +75,20 @@ class Minimum:
 
 
 @kernel
-def aspects(points, triangles, out):
+def aspects(points, triangles, right, out):
     """(T,) q of each triangle; +∞ from area zero on."""
     for t in range(len(triangles)):
+        alpha, gamma = (0.5, 0.0) if right[t] else (KAPPA, 1.0)
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
         bx, by = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1]
         d = ax * by - ay * bx
-        out[t] = KAPPA * (ax * ax + ay * ay + bx * bx + by * by - ax * bx - ay * by) / d if d > 0.0 else np.inf
+        numerator = alpha * (ax * ax + ay * ay + bx * bx + by * by - gamma * (ax * bx) - gamma * (ay * by))
+        out[t] = numerator / d if d > 0.0 else np.inf
 
 
 @kernel
-def evaluate(points, triangles, top, doublings, gradient, blocks):
+def evaluate(points, triangles, right, top, doublings, gradient, blocks):
     """The mean of (q/top)^p, p = 2^doublings; +∞ where a triangle has no area.
 
     gradient: (N, 2). blocks: (N, 3) xx, xy, yy of the Hessian, or of length 0 if not wanted.
@@ -88,6 +98,7 @@ def evaluate(points, triangles, top, doublings, gradient, blocks):
     with_blocks = len(blocks) > 0
     total, p, inverse = 0.0, 2.0**doublings, 1.0 / len(triangles)
     for t in range(len(triangles)):
+        alpha, gamma = (0.5, 0.0) if right[t] else (KAPPA, 1.0)
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
         bx, by = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1]
@@ -95,33 +106,35 @@ def evaluate(points, triangles, top, doublings, gradient, blocks):
         if not d > 0.0:
             return np.inf
         over = 1.0 / d
-        q = KAPPA * (ax * ax + ay * ay + bx * bx + by * by - ax * bx - ay * by) * over
+        q = alpha * (ax * ax + ay * ay + bx * bx + by * by - gamma * (ax * bx) - gamma * (ay * by)) * over
         power = q / top
         for _ in range(doublings):
             power *= power
         total += power
         slope = p * power / q * inverse
         bend = (p - 1.0) / q
-        gx = gy = 0.0
-        for corner in range(3):
+        for corner in range(3):  # (nx, ny) = −∇ of the numerator, curve half its second derivative
             if corner == 0:
-                node = i
+                node, curve = i, alpha * (2.0 - gamma)
                 ux, uy, vx, vy = ax, ay, bx, by
+                nx, ny = curve * (ux + vx), curve * (uy + vy)
             elif corner == 1:
-                node = j
+                node, curve = j, alpha
                 ux, uy, vx, vy = bx - ax, by - ay, -ax, -ay
+                nx, ny = alpha * ((gamma * bx - ax) - ax), alpha * ((gamma * by - ay) - ay)
             else:
-                node = k
+                node, curve = k, alpha
                 ux, uy, vx, vy = -bx, -by, ax - bx, ay - by
+                nx, ny = alpha * ((gamma * ax - bx) - bx), alpha * ((gamma * ay - by) - by)
             wx, wy = uy - vy, vx - ux
-            gx = -(KAPPA * (ux + vx) + q * wx) * over
-            gy = -(KAPPA * (uy + vy) + q * wy) * over
+            gx = -(nx + q * wx) * over
+            gy = -(ny + q * wy) * over
             gradient[node, 0] += slope * gx
             gradient[node, 1] += slope * gy
             if with_blocks:
-                blocks[node, 0] += slope * (2.0 * (KAPPA - wx * gx) * over + bend * gx * gx)
+                blocks[node, 0] += slope * (2.0 * (curve - wx * gx) * over + bend * gx * gx)
                 blocks[node, 1] += slope * (-(wx * gy + wy * gx) * over + bend * gx * gy)
-                blocks[node, 2] += slope * (2.0 * (KAPPA - wy * gy) * over + bend * gy * gy)
+                blocks[node, 2] += slope * (2.0 * (curve - wy * gy) * over + bend * gy * gy)
     return total * inverse
 
 
@@ -226,14 +239,14 @@ def minimise(problem: Problem, start: np.ndarray, power: int, *, top: float = 1.
     doublings = power.bit_length() - 1
     if power < 1 or power != 1 << doublings:
         raise ValueError(f"the power must be 1, 2, 4, 8, …; got {power}")
-    triangles, free = problem.triangles, problem.free
+    triangles, free, right = problem.triangles, problem.free, problem.right
     points = start.copy()
     gradient, blocks = np.empty_like(points), np.empty((len(points), 3))
     trial_gradient, none = np.empty_like(points), np.empty((0, 3))
     steps, changes = np.zeros((PAIRS, *points.shape)), np.zeros((PAIRS, *points.shape))
     work, direction, sizes = np.empty_like(points), np.empty_like(points), np.empty(len(points))
     mean_distance(points, triangles, sizes)
-    value = evaluate(points, triangles, top, doublings, gradient, blocks)
+    value = evaluate(points, triangles, right, top, doublings, gradient, blocks)
     if not np.isfinite(value):
         raise ValueError("a triangle of the start has no area: there is no barrier to stay inside of")
     gradient[~free] = 0.0
@@ -254,7 +267,7 @@ def minimise(problem: Problem, start: np.ndarray, power: int, *, top: float = 1.
         length = min(1.0, high)
         for _ in range(TRIALS):
             trial = points + length * direction
-            found = evaluate(trial, triangles, top, doublings, trial_gradient, none)
+            found = evaluate(trial, triangles, right, top, doublings, trial_gradient, none)
             evaluations += 1
             trial_gradient[~free] = 0.0
             if not found <= value + ARMIJO * length * slope:
@@ -275,7 +288,7 @@ def minimise(problem: Problem, start: np.ndarray, power: int, *, top: float = 1.
         points = trial
         value, gradient, trial_gradient = found, trial_gradient, gradient
         if iteration < UNSTEADY or iteration % REFRESH == 0:
-            evaluate(points, triangles, top, doublings, gradient, blocks)
+            evaluate(points, triangles, right, top, doublings, gradient, blocks)
             gradient[~free] = 0.0
             mean_distance(points, triangles, sizes)
     return Minimum(points, value, float(np.linalg.norm(gradient)), step, iteration, evaluations, step <= tolerance)

@@ -4,6 +4,8 @@
 
 The meshes are random squares. What stands in the file already is not computed again.
 
+For quads and mixed meshes there is a reference only (``quad_ceiling``; quads.py).
+
 *Reference*: L-BFGS (``barrier``) over all free nodes at once on the mean of q, from there on that of q², and from there
 on that of q⁴, each until no node alone would still go 1e-6 of its mean distance from its neighbours. From two starts,
 the mesh itself and the mesh after five smart Laplacian sweeps; the end with the larger q̂ counts. (On all meshes of
@@ -32,6 +34,7 @@ from pathlib import Path
 
 import numpy as np
 from barrier import Minimum, Problem, aspects, minimise
+from corners import Corners
 from machine import describe
 
 import gmsnet
@@ -67,7 +70,8 @@ class Plane:
     def of(cls, mesh: Mesh) -> Plane:
         topology = Topology.of(mesh)
         triangles = np.where(topology.near_orientation[:, None] > 0, topology.near, topology.near[:, ::-1])
-        problem = Problem(np.ascontiguousarray(triangles, dtype=np.int32), topology.near_colours >= 0)
+        right = np.zeros(len(triangles), dtype=bool)
+        problem = Problem(np.ascontiguousarray(triangles, dtype=np.int32), topology.near_colours >= 0, right)
         return cls(mesh, topology, problem, planar_points(mesh)[topology.memory])
 
     def written(self, planar: np.ndarray) -> np.ndarray:
@@ -123,6 +127,20 @@ def lbfgs(mesh: Mesh, powers: Sequence[int] = POWERS) -> np.ndarray:
     return plane.written(max(ends, key=lambda points: plane.figures(points)["qhat"]))
 
 
+def quad_ceiling(mesh: Mesh, powers: Sequence[int] = POWERS) -> tuple[np.ndarray, dict[str, float]]:
+    """The reference of a planar mesh of quads, or of quads and triangles: (N, dim) points, and ``Corners.figures``.
+
+    The means are over the simplices, of which a quad has four. There is one start, the mesh itself. Raises ValueError
+    for cells of other kinds, and if a corner of the mesh is not positive.
+    """
+    corners = Corners.of(mesh)
+    found = planar_points(mesh)
+    for power in powers:
+        found = minimise(corners.problem, found, power).points
+    points = corners.written(found)
+    return points, corners.figures(points)
+
+
 def ceiling(mesh: Mesh, start_points: Sequence[np.ndarray]) -> np.ndarray:
     """(N, dim) points with the best q̂ met on the roads from these starts, (N, dim) each, all cells positive."""
     plane = Plane.of(mesh)
@@ -156,7 +174,7 @@ def road(plane: Plane, start: np.ndarray, rings: int) -> Iterator[np.ndarray]:
     for _ in range(ROUNDS):
         before = gained
         for share, power in SCHEDULE:
-            aspects(points, plane.problem.triangles, q)
+            aspects(points, plane.problem.triangles, plane.problem.right, q)
             count = min(max(FEWEST, round(share * len(q))), len(q))
             part, nodes = plane.problem.part(np.argpartition(q, len(q) - count)[len(q) - count :], rings)
             if not part.free.any():

@@ -7,7 +7,7 @@ import numpy as np
 
 from peers.peer import Plane
 
-LINE, TRIANGLE = 1, 2
+LINE, TRIANGLE, QUAD = 1, 2, 3
 CORNERS = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 
 gmsh.initialize()
@@ -18,7 +18,7 @@ gmsh.option.setNumber("Mesh.Renumber", 0)
 
 class Optimize:
     def __init__(self, plane: Plane, method: str) -> None:
-        self.method = method
+        self.method, self.mixed = method, len(plane.quads) > 0
         gmsh.clear()
         geometry, mesh = gmsh.model.geo, gmsh.model.mesh
         ends = [geometry.addPoint(x, y, 0.0) for x, y in CORNERS]
@@ -40,7 +40,9 @@ class Optimize:
         inner = np.flatnonzero(~plane.held)
         places = points[inner].ravel()
         mesh.addNodes(2, self.surface, tags[inner], places, gmsh.model.getParametrization(2, self.surface, places))
-        mesh.addElementsByType(self.surface, TRIANGLE, [], tags[plane.cells].ravel())
+        for kind, cells in ((TRIANGLE, plane.cells), (QUAD, plane.quads)):
+            if len(cells):
+                mesh.addElementsByType(self.surface, kind, [], tags[cells].ravel())
 
     def smooth(self, effort: int) -> None:
         gmsh.model.mesh.optimize(self.method, niter=effort)
@@ -51,5 +53,7 @@ class Optimize:
         points[tags.astype(np.int64) - 1] = places.reshape(-1, 3)
         return points
 
-    def cells(self) -> np.ndarray:
+    def cells(self) -> np.ndarray | None:
+        if self.mixed:
+            return None
         return gmsh.model.mesh.getElementsByType(TRIANGLE, self.surface)[1].astype(np.int64).reshape(-1, 3) - 1

@@ -1,6 +1,7 @@
 """MFEM (PyMFEM): TMOP, Newton's method on the whole mesh, with ideal shapes as targets and the boundary held.
 
-On linear triangles T is constant, so a rule with one point integrates exactly. Metric 2 is q − 1, metric 58 4q(q − 1).
+On linear triangles T is constant, so a rule with one point integrates exactly; on quads the rule has the four corners.
+Metric 2 is q − 1, metric 58 4q(q − 1).
 The linear systems are solved by MINRES with a Jacobi preconditioner, to a tolerance that falls with the residual, as in
 MFEM's own mesh-optimizer (-ls 3 -art 2): with a fixed tolerance it takes longer, up to four times. Its L-BFGS (-st 1)
 does not take a first step on these meshes.
@@ -18,16 +19,21 @@ from peers.peer import Plane
 class Tmop:
     def __init__(self, plane: Plane, metric: int, linear_iterations: int, adaptive: int, tolerance: float) -> None:
         self.linear_iterations, self.adaptive, self.tolerance = linear_iterations, adaptive, tolerance
-        self.count = len(plane.points)
+        self.count, self.mixed = len(plane.points), len(plane.quads) > 0
         segments = plane.segments
-        self.mesh = mfem.Mesh(2, self.count, len(plane.cells), len(segments))
+        self.mesh = mfem.Mesh(2, self.count, len(plane.cells) + len(plane.quads), len(segments))
         for x, y in plane.points.tolist():
             self.mesh.AddVertex(x, y)
         for triangle in plane.cells.tolist():
             self.mesh.AddTriangle(*triangle)
+        for quad in plane.quads.tolist():
+            self.mesh.AddQuad(*quad)
         for segment in segments.tolist():
             self.mesh.AddBdrSegment(*segment)
-        self.mesh.FinalizeTriMesh(1, 0, False)
+        if len(plane.quads):
+            self.mesh.FinalizeMesh(0, False)
+        else:
+            self.mesh.FinalizeTriMesh(1, 0, False)
         self.mesh.EnsureNodes()
         self.collection = mfem.H1_FECollection(1, 2)
         self.space = mfem.FiniteElementSpace(self.mesh, self.collection, 2)
@@ -36,9 +42,11 @@ class Tmop:
         self.metric = {2: tmop.TMOP_Metric_002, 58: tmop.TMOP_Metric_058}[metric]()
         self.targets = tmop.TargetConstructor(tmop.TargetConstructor.IDEAL_SHAPE_UNIT_SIZE)
         self.targets.SetNodes(self.nodes)
-        self.rule = mfem.IntRules.Get(mfem.Geometry.TRIANGLE, 1)
+        self.rules = mfem.IntegrationRules(0, mfem.Quadrature1D.GaussLobatto)
+        # The solver looks at determinants in the points of one rule: the corners of quads do for triangles as well.
+        self.rule = self.rules.Get(mfem.Geometry.SQUARE if self.mixed else mfem.Geometry.TRIANGLE, 1)
         self.integrator = tmop.TMOP_Integrator(self.metric, self.targets)
-        self.integrator.SetIntRule(self.rule)
+        self.integrator.SetIntegrationRules(self.rules, 1)
         self.integrator.thisown = False  # it is the form's from here on
         self.form = mfem.NonlinearForm(self.space)
         self.form.AddDomainIntegrator(self.integrator)
@@ -67,5 +75,7 @@ class Tmop:
         by_node = self.space.GetOrdering() == mfem.Ordering.byVDIM
         return values.reshape(self.count, 2) if by_node else values.reshape(2, self.count).T
 
-    def cells(self) -> np.ndarray:
+    def cells(self) -> np.ndarray | None:
+        if self.mixed:
+            return None
         return np.array([self.mesh.GetElementVertices(k) for k in range(self.mesh.GetNE())])

@@ -12,6 +12,7 @@ from gmsnet.mesh.adapters import to_mesh
 from gmsnet.methods import smoother
 from gmsnet.run.run import Run
 from gmsnet.topology.topology import Topology
+from peers.mixed import mesh_of
 from peers.peer import Plane
 
 EVERY, APART, MOST = 12, 1.25, 400  # efforts one by one up to EVERY, then each APART times the last; sweeps at most
@@ -19,7 +20,8 @@ EVERY, APART, MOST = 12, 1.25, 400  # efforts one by one up to EVERY, then each 
 
 class Smooth:
     def __init__(self, plane: Plane, method: str, threads: int = 1, **options: str) -> None:
-        self.arrays, self.method, self.options, self.threads = (plane.points, plane.cells), method, options, threads
+        self.arrays = mesh_of(plane) if len(plane.quads) else (plane.points, plane.cells)
+        self.method, self.options, self.threads = method, options, threads
 
     def smooth(self, effort: int) -> None:
         self.result = gmsnet.smooth(self.arrays, self.method, max_sweeps=effort, threads=self.threads, **self.options)
@@ -27,8 +29,8 @@ class Smooth:
     def points(self) -> np.ndarray:
         return self.result.points
 
-    def cells(self) -> np.ndarray:
-        return self.result.mesh[1]
+    def cells(self) -> np.ndarray | None:
+        return self.result.mesh[1] if isinstance(self.arrays, tuple) else None
 
     def efforts(self) -> tuple[int, ...]:
         """From one sweep to all that the method makes."""

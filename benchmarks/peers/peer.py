@@ -44,30 +44,35 @@ class Tool(Protocol):
         """(N, 2) or (N, 3), in the order of the input."""
 
     def cells(self) -> np.ndarray | None:
-        """(T, 3) as the tool has them now, by numbers of the input; None for a tool that has no cells of its own."""
+        """(T, 3) as the tool has them now, by numbers of the input.
+
+        None for a tool that has no cells of its own, and of mixed meshes.
+        """
 
 
 @dataclass(frozen=True, eq=False)
 class Plane:
     """The mesh that a tool gets: points (N, 2) float64, cells (T, 3) int64, counter-clockwise, of the unit square.
 
-    The other properties are for tools that need to be told; they are computed when they are asked for, in the set-up
-    of those tools.
+    quads: (Q, 4) int64, the other cells of a mixed mesh. The other properties are for tools that need to be told; they
+    are computed when they are asked for, in the set-up of those tools.
     """
 
     points: np.ndarray
     cells: np.ndarray
+    quads: np.ndarray = field(default_factory=lambda: np.empty((0, 4), dtype=np.int64))
 
     @classmethod
     def load(cls, path: str | Path) -> Plane:
         with np.load(path) as arrays:
-            return cls(arrays["points"], arrays["cells"])
+            return cls(**arrays)
 
     @cached_property
     def edges(self) -> tuple[np.ndarray, np.ndarray]:
-        """The tail and the head of each triangle's edges, (3T,) int32 each: inner edges come in both directions."""
-        cells = self.cells.astype(np.int32).T
-        return cells.ravel(), cells[[1, 2, 0]].ravel()
+        """The tail and the head of each cell's edges, (3T + 4Q,) int32 each: inner edges come in both directions."""
+        kinds = [cells.astype(np.int32).T for cells in (self.cells, self.quads)]
+        tail = np.concatenate([cells.ravel() for cells in kinds])
+        return tail, np.concatenate([np.roll(cells, -1, axis=0).ravel() for cells in kinds])
 
     @cached_property
     def held(self) -> np.ndarray:

@@ -179,7 +179,7 @@ def short(peer: Peer, record: Mapping[str, Any], mesh: Mapping[str, Any]) -> lis
     names = [DEFAULT, PLAIN] if peer.kind == AVERAGING else [DEFAULT]
     ours = [found[name] for name in names if usable(found.get(name))]
     texts = []
-    for key, words in ((MEAN, "99 % of its mean"), (MIN, "99 % of its least 1/q")):
+    for key, words in ((MEAN, "99 % of its mean"), (MIN, "99 % of its minimum 1/q")):
         against = [pair(record, each, mesh["input"])[key] for each in ours]
         if against[0]["goal"] is None or against[0]["in_input"] or (key == MIN and peer.kind == AVERAGING):
             continue
@@ -193,7 +193,7 @@ def short(peer: Peer, record: Mapping[str, Any], mesh: Mapping[str, Any]) -> lis
             )
             texts.append(f"{ratios}, {wanted:.0f} wanted")
     ahead = better(found[DEFAULT], record)
-    texts += [f"its {words} is better" for key, words in ((MIN, "least 1/q"), (QHAT, "q̂")) if not ahead[key]]
+    texts += [f"its {words} is better" for key, words in ((MIN, "minimum 1/q"), (QHAT, "q̂")) if not ahead[key]]
     return texts
 
 

@@ -23,7 +23,9 @@ def versions(peer: Peer) -> dict[str, str]:
     return {name: version(name) for name in peer.packages}
 
 
-def run_peer(peer: Peer, mesh: Path, small: Path, nodes: int, options: dict[str, Any]) -> dict[str, Any]:
+def run_peer(
+    peer: Peer, mesh: Path, small: Path, nodes: int, options: dict[str, Any], module: str = "peers.worker"
+) -> dict[str, Any]:
     """The record of a tool on a mesh: what was measured, or in ``status`` and ``reason`` why nothing was."""
     try:
         found: dict[str, Any] = {"versions": versions(peer)}
@@ -33,7 +35,7 @@ def run_peer(peer: Peer, mesh: Path, small: Path, nodes: int, options: dict[str,
         return found | {"status": "left out", "reason": f"above {peer.most_nodes:,.0f} nodes it takes too long"}
     job = {"peer": peer.name, "mesh": str(mesh), "small": str(small)}
     job |= {name: options[name] for name in ("repeats", "patience")}
-    return found | in_a_process("peers.worker", job, ONE_THREAD, options["limit"], Path(options["folder"]))
+    return found | in_a_process(module, job, ONE_THREAD, options["limit"], Path(options["folder"]))
 
 
 def in_a_process(

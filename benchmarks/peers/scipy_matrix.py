@@ -33,7 +33,7 @@ def in_good_order(plane: Plane) -> Plane:
     order = reverse_cuthill_mckee(graph)
     place = np.empty(count, dtype=np.int64)
     place[order] = np.arange(count)
-    return Plane(plane.points[order], place[plane.cells])
+    return Plane(plane.points[order], place[plane.cells], place[plane.quads])
 
 
 class Laplacian:

@@ -70,7 +70,7 @@ def tool_of(peer: Peer) -> Any:
 def fresh(plane: Plane) -> Plane:
     """A copy of the mesh, so that nothing is left from the run before."""
     gc.collect()
-    return Plane(plane.points.copy(), plane.cells.copy())
+    return Plane(plane.points.copy(), plane.cells.copy(), plane.quads.copy())
 
 
 def run(peer: Peer, arrays: Plane, effort: int) -> Run:

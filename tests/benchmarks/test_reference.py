@@ -47,7 +47,7 @@ def mean_power(problem, points, power, top):
 
 def value_at(problem, points, power, top):
     gradient, blocks = np.empty_like(points), np.empty((len(points), 3))
-    value = barrier.evaluate(points, problem.triangles, top, power.bit_length() - 1, gradient, blocks)
+    value = barrier.evaluate(points, problem.triangles, problem.right, top, power.bit_length() - 1, gradient, blocks)
     return value, gradient, blocks
 
 

@@ -1,4 +1,4 @@
-"""gmsnet generate: random test meshes in any format that is written."""
+"""gmsnet generate: test meshes in any format that is written."""
 
 from __future__ import annotations
 
@@ -14,51 +14,100 @@ RINGS_BYTES = 1 << 28  # of a file of rings at most: some ten million nodes on t
 
 def generate(
     out: Annotated[str, typer.Argument(metavar="OUT", help="The file to write; its suffix tells the format.")],
+    pattern: Annotated[
+        str,
+        typer.Option(help="random, structured (rows and columns), o-grid (layers around a body) or kershaw (zigzag)."),
+    ] = "random",
+    cells: Annotated[
+        str | None,
+        typer.Option(help="triangle, quad or mixed.", show_default="triangle if random, mixed if o-grid, else quad"),
+    ] = None,
     shape: Annotated[
-        str, typer.Option(help="square, circle, plate (a square with a round hole) or lshape.")
-    ] = "square",
+        str | None,
+        typer.Option(help="square, circle, plate (a square with a round hole) or lshape.", show_default="square"),
+    ] = None,
     rings: Annotated[
         Path | None,
         typer.Option(help="Instead of --shape: a JSON file [[[x, y], …], …], the outer ring first, then its holes."),
     ] = None,
-    nodes: Annotated[int, typer.Option(help="Random nodes inside.")] = 1000,
-    size: Annotated[float, typer.Option(help="Side of the square around the shape; factor for --rings.")] = 1.0,
-    boundary: Annotated[str, typer.Option(help="Spacing of the nodes on the boundary: even or random.")] = "even",
+    nodes: Annotated[
+        int | None, typer.Option(help="Random nodes inside; of quads and grids about so many.", show_default="1000")
+    ] = None,
+    size: Annotated[
+        float, typer.Option(help="Side of the square around the shape; chord of the body; factor for --rings.")
+    ] = 1.0,
+    boundary: Annotated[
+        str | None, typer.Option(help="Spacing of the nodes on the boundary: even or random.", show_default="even")
+    ] = None,
+    settle: Annotated[
+        int | None, typer.Option(help="Of random: sweeps of Laplacian smoothing of the triangles.", show_default="0")
+    ] = None,
+    columns: Annotated[int | None, typer.Option(help="Of structured and kershaw: columns of quads.")] = None,
+    rows: Annotated[int | None, typer.Option(help="Of structured and kershaw: rows of quads.")] = None,
+    flatness: Annotated[
+        float | None, typer.Option(help="Of kershaw: height of the flattest quads over the mean.", show_default="0.3")
+    ] = None,
+    share: Annotated[
+        float | None, typer.Option(help="Of structured mixed: area of the patch of quads.", show_default="0.5")
+    ] = None,
+    interface: Annotated[
+        bool, typer.Option("--interface", help="Of structured mixed: the patch is a region of its own.")
+    ] = False,
+    layers: Annotated[int | None, typer.Option(help="Of o-grid: rows of stretched cells.", show_default="20")] = None,
+    aspect: Annotated[
+        float | None, typer.Option(help="Of o-grid: ratio of the sides at the wall.", show_default="1000")
+    ] = None,
+    around: Annotated[int | None, typer.Option(help="Of o-grid: nodes on the wall.", show_default="120")] = None,
+    body: Annotated[str | None, typer.Option(help="Of o-grid: airfoil or circle.", show_default="airfoil")] = None,
     seed: Annotated[int, typer.Option(help="The same seed makes the same mesh.")] = 0,
     jitter: Annotated[
-        float, typer.Option(help="Then throw each inner node up to this many of its mean edge lengths away.")
+        float, typer.Option(help="Then throw each inner node up to this many of its edge lengths away.")
     ] = 0.0,
+    jitter_edge: Annotated[
+        str | None, typer.Option(help="With --jitter: the node's mean or shortest edge.", show_default="mean")
+    ] = None,
     tangled: Annotated[bool, typer.Option("--tangled", help="With --jitter: let cells be inverted by it.")] = False,
     format: Annotated[str | None, typer.Option(help="The format, where the suffix does not tell it.")] = None,
 ) -> None:
-    """Make a random Delaunay mesh, with bad elements on purpose, and write it to OUT.
+    """Make a mesh for tests and write it to OUT: random Delaunay triangles, or quads and mixed cells by a pattern.
 
     Nodes are uniform in the shape; the boundary is held by markers (bottom, right, circle, hole, …).
     """
     import numpy as np
 
+    from gmsnet.cli.patterns import chosen
     from gmsnet.errors import InputError
-    from gmsnet.generate import disturb, random_mesh
+    from gmsnet.generate import disturb
     from gmsnet.io import write
     from gmsnet.io.streams import is_standard_output
 
-    if tangled and not jitter:
-        raise InputError("--tangled needs --jitter: how far may nodes be thrown?")
+    for name, value in (("--tangled", tangled), ("--jitter-edge", jitter_edge)):
+        if value and not jitter:
+            raise InputError(f"{name} needs --jitter: how far may nodes be thrown?")
     if not (math.isfinite(jitter) and jitter >= 0):
         raise InputError(f"--jitter must be 0 or more, got {jitter}")
-    outline = shape if rings is None else _read_rings(rings)
-    mesh = random_mesh(nodes, outline, size=size, boundary=boundary, seed=seed)
-    triangles, lines = mesh.cells
+    options = {
+        "shape": shape, "rings": rings, "nodes": nodes, "boundary": boundary, "settle": settle, "columns": columns,
+        "rows": rows, "flatness": flatness, "share": share, "interface": interface or None, "layers": layers,
+        "aspect": aspect, "around": around, "body": body,
+    }  # fmt: skip
+    given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
+    kind, generator = chosen(pattern, cells, given)
+    if rings is not None:
+        given["rings"] = _read_rings(rings)
+    mesh = generator.make(given, size, seed)
+    lines = mesh.cells[-1]
     if jitter:
         inner = np.ones(len(mesh.points), dtype=bool)
         inner[lines.nodes] = False
-        mesh = disturb(mesh, inner, jitter, seed=seed, keep_valid=not tangled)
+        mesh = disturb(mesh, inner, jitter, seed=seed, keep_valid=not tangled, edge=jitter_edge or "mean")
     aside = is_standard_output(out)  # where the mesh itself goes; a file is another one once it is replaced
     lost = write(mesh, out, format)
+    what = f"{pattern} {kind}" if pattern != "random" else str(rings or shape or "square")
+    counts = ", ".join(f"{len(block.nodes):,} {block.kind}s" for block in mesh.cells[:-1])
     typer.echo(
-        f"{'standard output' if out == '-' else out}: {shape if rings is None else rings} "
-        f"with {len(mesh.points):,} nodes, {len(triangles.nodes):,} triangles and {len(lines.nodes):,} boundary edges "
-        f"(seed {seed})",
+        f"{'standard output' if out == '-' else out}: {what} with {len(mesh.points):,} nodes, {counts} and "
+        f"{len(lines.nodes):,} {'marked' if interface else 'boundary'} edges (seed {seed})",
         err=aside,
     )
     for loss in lost:

@@ -1,14 +1,17 @@
-"""Test meshes: Delaunay triangulations of random points, good meshes, boundary layers, nodes thrown out of place."""
+"""Test meshes: random triangles and quads, good meshes, boundary layers, grids, nodes thrown out of place."""
 
 from gmsnet.generate.curves import Curve
 from gmsnet.generate.disturb import disturb
 from gmsnet.generate.good import good_mesh
 from gmsnet.generate.graded import graded_mesh
+from gmsnet.generate.hybrid import hybrid_mesh
 from gmsnet.generate.layered import layered_mesh
 from gmsnet.generate.outline import SHAPES
 from gmsnet.generate.random import random_mesh
+from gmsnet.generate.recombine import random_quad_mesh, recombine, split_into_quads
 from gmsnet.generate.settle import settle
 from gmsnet.generate.split import split_edges
+from gmsnet.generate.structured import kershaw_mesh, structured_mesh
 
 __all__ = [
     "SHAPES",
@@ -16,8 +19,14 @@ __all__ = [
     "disturb",
     "good_mesh",
     "graded_mesh",
+    "hybrid_mesh",
+    "kershaw_mesh",
     "layered_mesh",
     "random_mesh",
+    "random_quad_mesh",
+    "recombine",
     "settle",
     "split_edges",
+    "split_into_quads",
+    "structured_mesh",
 ]

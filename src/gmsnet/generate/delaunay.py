@@ -12,8 +12,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay, QhullError
 
 from gmsnet.errors import InputError
+from gmsnet.generate.marked import marked
 from gmsnet.generate.outline import inside
-from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -64,14 +64,7 @@ def labelled(mesh: Triangulation, markers: Sequence[str], *, scale: float = 1.0)
 
     markers: of each side. scale: factor for the coordinates.
     """
-    names = list(dict.fromkeys(markers))
-    number = np.array([names.index(name) + 1 for name in markers], dtype=np.int64)
-    region_names = {(1, k): name for k, name in enumerate(names, start=1)} | {(2, 1): "domain"}
-    cells = (
-        CellBlock("triangle", mesh.triangles, np.ones(len(mesh.triangles), dtype=np.int64)),
-        CellBlock("line", mesh.segments, number[mesh.side]),
-    )
-    return Mesh(mesh.points * scale, cells, region_names)
+    return marked(mesh.points, {"triangle": mesh.triangles}, mesh.segments, mesh.side, markers, scale=scale)
 
 
 def unique_edges(triangles: Ints) -> Ints:

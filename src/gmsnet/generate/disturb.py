@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gmsnet.errors import InputError
+from gmsnet.generate.arguments import one_of
 from gmsnet.generate.random import generator
 from gmsnet.kernels.simplex.predicates import signs
 from gmsnet.mesh.mesh import Mesh
@@ -15,18 +16,25 @@ from gmsnet.mesh.mesh import Mesh
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+EDGES = ("mean", "shortest")
 
-def disturb(mesh: Mesh, free: ArrayLike, amount: float, *, seed: int = 0, keep_valid: bool = True) -> Mesh:
+
+def disturb(
+    mesh: Mesh, free: ArrayLike, amount: float, *, seed: int = 0, keep_valid: bool = True, edge: str = "mean"
+) -> Mesh:
     """The mesh with each free node thrown to a random place around it.
 
-    free: mask (N,) or ids of the nodes that may move. amount: radius of the disc in which they land, in mean lengths of
-    the node's edges. keep_valid: halve the throws until no corner of a face changes its orientation (a corner whose
-    orientation is not certain stands still); otherwise inverted cells are to be expected.
+    free: mask (N,) or ids of the nodes that may move. amount: radius of the disc in which they land, in lengths of the
+    node's edges. edge: which length, the "mean" of the node's edges or that of the "shortest". keep_valid: halve the
+    throws until no corner of a face changes its orientation (a corner whose orientation is not certain stands still);
+    otherwise inverted cells are to be expected.
 
-    Raises InputError if the mesh is not planar, for nodes that do not exist, and for a negative amount.
+    Raises InputError if the mesh is not planar, for nodes that do not exist, for a negative amount, and for
+    another ``edge``.
     """
     if not (np.isfinite(amount) and amount >= 0):
         raise InputError(f"the amount of a disturbance must be 0 or more, got {amount!r}")
+    one_of(edge, "edge", EDGES)
     if mesh.plane is None:
         raise InputError("only planar meshes can be disturbed; this one varies along all three axes")
     axes = list(mesh.plane)
@@ -34,10 +42,10 @@ def disturb(mesh: Mesh, free: ArrayLike, amount: float, *, seed: int = 0, keep_v
     rings = [block.nodes[:, : block.corners] for block in mesh.cells if block.dimension == 2]
     rng = generator(seed)
     radius, angle = np.sqrt(rng.random(len(old))), 2 * np.pi * rng.random(len(old))
-    throw = radius * _mean_edge(old, rings) * amount * _mask(free, len(old))
+    throw = radius * _edge_lengths(old, rings, edge) * amount * _mask(free, len(old))
     shift = throw[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     if keep_valid:
-        keep_orientation(old, shift, _corners(rings), single=mesh.single)
+        keep_orientation(old, shift, corner_triangles(rings), single=mesh.single)
     points = mesh.points.copy()
     points[:, axes] = _landed(old, shift, single=mesh.single)
     return mesh.with_points(points)
@@ -66,15 +74,15 @@ def _landed(old: Floats, shift: Floats, *, single: bool) -> Floats:
 
 def keep_orientation(old: Floats, shift: Floats, corners: Ints, *, single: bool) -> None:
     """Halves shifts (N × 2, in place) until every corner (T × 3) has its old orientation."""
-    sign = _orientation(old, corners)
+    sign = orientations(old, corners)
     shift[np.unique(corners[sign == 0])] = 0.0
     halvings = 0
-    while (broken := _orientation(_landed(old, shift, single=single), corners) != sign).any():
+    while (broken := orientations(_landed(old, shift, single=single), corners) != sign).any():
         shift[np.unique(corners[broken])] *= 0.5 if halvings < 60 else 0.0
         halvings += 1
 
 
-def _corners(rings: Sequence[Ints]) -> Ints:
+def corner_triangles(rings: Sequence[Ints]) -> Ints:
     """(T × 3) the triangle at each corner of each face; a triangle has only one, the same at all of its corners."""
     triangles = [np.empty((0, 3), dtype=np.int64)]
     for ring in rings:
@@ -83,18 +91,22 @@ def _corners(rings: Sequence[Ints]) -> Ints:
     return np.concatenate(triangles)
 
 
-def _mean_edge(points: Floats, rings: Sequence[Ints]) -> Floats:
-    """(N,) mean length of the edges at each node; 0 where it has none."""
+def _edge_lengths(points: Floats, rings: Sequence[Ints], which: str) -> Floats:
+    """(N,) mean or shortest length of the edges at each node; 0 where it has none."""
     pairs = [np.empty((0, 2), dtype=np.int64)]
     pairs += [np.stack([ring, np.roll(ring, -1, axis=1)], axis=2).reshape(-1, 2) for ring in rings]
     edges = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    if which == "shortest":
+        shortest = np.full(len(points), np.inf)
+        np.minimum.at(shortest, edges.ravel(), np.repeat(length, 2))
+        return np.where(np.isfinite(shortest), shortest, 0.0)
     count = np.bincount(edges.ravel(), minlength=len(points))
     total = np.bincount(edges.ravel(), weights=np.repeat(length, 2), minlength=len(points))
     return np.asarray(total / np.maximum(count, 1))
 
 
-def _orientation(points: Floats, triangles: Ints) -> NDArray[np.int8]:
+def orientations(points: Floats, triangles: Ints) -> NDArray[np.int8]:
     """(T,) +1 counter-clockwise, −1 clockwise, 0 where float64 cannot tell for certain."""
     sign = np.empty(len(triangles), dtype=np.int8)
     signs(points, triangles, np.ones(len(triangles), dtype=np.int8), 0.0, sign)

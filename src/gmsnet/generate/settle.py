@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
+from gmsnet.generate.arguments import whole_number
 from gmsnet.generate.delaunay import unique_edges
 from gmsnet.generate.disturb import keep_orientation
 from gmsnet.mesh.mesh import Mesh
@@ -19,6 +20,7 @@ def settle(mesh: Mesh, sweeps: int) -> Mesh:
     Shifts are halved where they would change the orientation of a triangle. The first cells must be triangles in the
     plane (N × 2). For meshes that are to be the same whatever becomes of the smoothers of ``gmsnet.methods``.
     """
+    whole_number(sweeps, "the number of sweeps", 0)
     if mesh.cells[0].kind != "triangle" or mesh.points.shape[1] != 2:
         raise InputError("only meshes of triangles in the plane (N × 2) can settle")
     triangles = mesh.cells[0].nodes

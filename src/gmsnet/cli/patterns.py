@@ -1,0 +1,138 @@
+"""Which generator `gmsnet generate` calls for a pattern and its cells, and which options that one takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from gmsnet.errors import InputError
+
+if TYPE_CHECKING:
+    from gmsnet.mesh.mesh import Mesh
+
+Given = Mapping[str, Any]  # name of an option → what the user gave; without those that were not given
+
+NODES = 1000
+
+
+@dataclass(frozen=True)
+class Generator:
+    """make: the mesh, from the options that were given, the size and the seed. takes: names of options."""
+
+    make: Callable[[Given, float, int], Mesh]
+    takes: frozenset[str]
+
+
+def _random(given: Given, size: float, seed: int) -> Mesh:
+    from gmsnet.generate import random_mesh, settle
+
+    mesh = random_mesh(given.get("nodes", NODES), _outline(given), size=size, seed=seed, **_boundary(given))
+    return settle(mesh, given["settle"]) if "settle" in given else mesh
+
+
+def _random_quads(cells: str) -> Callable[[Given, float, int], Mesh]:
+    def make(given: Given, size: float, seed: int) -> Mesh:
+        from gmsnet.generate import random_quad_mesh
+
+        return random_quad_mesh(
+            given.get("nodes", NODES), _outline(given), cells=cells, settled=given.get("settle", 0),
+            size=size, seed=seed, **_boundary(given),
+        )  # fmt: skip
+
+    return make
+
+
+def _structured(given: Given, size: float, seed: int) -> Mesh:
+    from gmsnet.generate import structured_mesh
+
+    return structured_mesh(*_grid(given), size=size)
+
+
+def _kershaw(given: Given, size: float, seed: int) -> Mesh:
+    from gmsnet.generate import kershaw_mesh
+
+    return kershaw_mesh(*_grid(given), size=size, **_named(given, "flatness"))
+
+
+def _hybrid(given: Given, size: float, seed: int) -> Mesh:
+    from gmsnet.generate import hybrid_mesh
+
+    return hybrid_mesh(given.get("nodes", NODES), size=size, seed=seed, **_named(given, "share", "interface"))
+
+
+def _o_grid(cells: str) -> Callable[[Given, float, int], Mesh]:
+    def make(given: Given, size: float, seed: int) -> Mesh:
+        from gmsnet.generate import layered_mesh
+        from gmsnet.generate.arguments import positive
+
+        positive(size, "the size")
+        mesh = layered_mesh(cells=cells, **_named(given, "layers", "aspect", "around", "body"))
+        return mesh.with_points(mesh.points * size)
+
+    return make
+
+
+RANDOM = frozenset({"nodes", "shape", "rings", "boundary", "settle"})
+GRID = frozenset({"nodes", "columns", "rows"})
+LAYERS = frozenset({"layers", "aspect", "around", "body"})
+
+PATTERNS: dict[str, dict[str, Generator]] = {  # pattern → its cells, the default first → generator
+    "random": {
+        "triangle": Generator(_random, RANDOM),
+        "quad": Generator(_random_quads("quad"), RANDOM),
+        "mixed": Generator(_random_quads("mixed"), RANDOM),
+    },
+    "structured": {
+        "quad": Generator(_structured, GRID),
+        "mixed": Generator(_hybrid, frozenset({"nodes", "share", "interface"})),
+    },
+    "o-grid": {
+        "mixed": Generator(_o_grid("mixed"), LAYERS),
+        "quad": Generator(_o_grid("quad"), LAYERS),
+        "triangle": Generator(_o_grid("triangle"), LAYERS),
+    },
+    "kershaw": {"quad": Generator(_kershaw, GRID | {"flatness"})},
+}
+
+
+def chosen(pattern: str, cells: str | None, given: Given) -> tuple[str, Generator]:
+    """The cells and the generator of a pattern. Raises InputError for unknown names and for options of another one."""
+    if pattern not in PATTERNS:
+        raise InputError(f"unknown pattern {pattern!r}; there are {', '.join(PATTERNS)}")
+    makes = PATTERNS[pattern]
+    kind = next(iter(makes)) if cells is None else cells
+    if kind not in makes:
+        raise InputError(f"--pattern {pattern} makes --cells {' or '.join(makes)}, not {kind!r}")
+    for name in given:
+        if name not in makes[kind].takes:
+            fit = [f"{p} {c}" for p, kinds in PATTERNS.items() for c, each in kinds.items() if name in each.takes]
+            raise InputError(f"--{name} is an option for {', '.join(fit)}, not for {pattern} {kind}: leave it out")
+    if {"shape", "rings"} <= given.keys():
+        raise InputError("--rings stands instead of --shape: leave one of them out")
+    if "nodes" in given and given.keys() & {"columns", "rows"}:
+        raise InputError("--columns and --rows stand instead of --nodes: leave one or the other out")
+    return kind, makes[kind]
+
+
+def _outline(given: Given) -> Any:
+    return given.get("rings", given.get("shape", "square"))
+
+
+def _boundary(given: Given) -> dict[str, Any]:
+    return _named(given, "boundary")
+
+
+def _named(given: Given, *names: str) -> dict[str, Any]:
+    return {name: given[name] for name in names if name in given}
+
+
+def _grid(given: Given) -> tuple[int, int]:
+    """Columns and rows: as given, the one as many as the other; or as many as the inner nodes ask for."""
+    if given.keys() & {"columns", "rows"}:
+        columns = given.get("columns", given.get("rows"))
+        return columns, given.get("rows", columns)
+    nodes = given.get("nodes", NODES)
+    if nodes < 1:
+        raise InputError(f"a mesh needs at least 1 node inside, got --nodes {nodes}")
+    return 2 * (1 + round(nodes**0.5),)

@@ -1,0 +1,99 @@
+"""`gmsnet generate` with patterns of quads: the same meshes as the functions make, contradictions refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import typer
+from support import quads as twin
+from typer.testing import CliRunner
+
+import gmsnet
+from gmsnet.cli import main
+from gmsnet.cli.generate import generate
+from gmsnet.errors import InputError
+from gmsnet.generate import disturb, hybrid_mesh, kershaw_mesh, layered_mesh, random_mesh, random_quad_mesh, settle
+from gmsnet.generate import structured_mesh as grid
+
+app = typer.Typer()
+app.command()(generate)
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, list(map(str, arguments)))
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ("--nodes 50 --settle 2", lambda: settle(random_mesh(50), 2)),
+        ("--cells triangle --nodes 50 --seed 3", lambda: random_mesh(50, seed=3)),
+        ("--cells quad --nodes 90 --seed 3 --shape plate", lambda: random_quad_mesh(90, "plate", seed=3)),
+        ("--cells mixed --nodes 90 --settle 2 --boundary random --size 3",
+         lambda: random_quad_mesh(90, cells="mixed", settled=2, boundary="random", size=3.0)),
+        ("--pattern structured --nodes 82", lambda: grid(10)),
+        ("--pattern structured --columns 3 --rows 5 --size 2", lambda: grid(3, 5, size=2.0)),
+        ("--pattern structured --rows 4", lambda: grid(4)),
+        ("--pattern structured --cells quad --columns 9 --jitter 0.4 --jitter-edge shortest --seed 4",
+         lambda: disturb(m := grid(9), sorted(twin.free(m)), 0.4, seed=4, edge="shortest")),
+        ("--pattern structured --columns 9 --jitter 3 --tangled",
+         lambda: disturb(m := grid(9), sorted(twin.free(m)), 3.0, keep_valid=False)),
+        ("--pattern structured --cells mixed --nodes 200 --share 0.3 --seed 2",
+         lambda: hybrid_mesh(200, share=0.3, seed=2)),
+        ("--pattern structured --cells mixed --nodes 200 --interface", lambda: hybrid_mesh(200, interface=True)),
+        ("--pattern kershaw --columns 6 --rows 4 --flatness 0.1", lambda: kershaw_mesh(6, 4, flatness=0.1)),
+        ("--pattern kershaw", lambda: kershaw_mesh(33)),
+        ("--pattern o-grid --layers 4 --aspect 50 --around 40", lambda: layered_mesh(4, 50.0, 40, cells="mixed")),
+        ("--pattern o-grid --layers 2 --around 30 --cells quad --body circle --aspect 9",
+         lambda: layered_mesh(2, 9.0, 30, cells="quad", body="circle")),
+        ("--pattern o-grid --layers 2 --around 30 --cells triangle --aspect 9", lambda: layered_mesh(2, 9.0, 30)),
+    ],
+)  # fmt: skip
+def test_command_makes_what_the_functions_make(tmp_path, options, expected):
+    path, wanted = tmp_path / "mesh.msh", expected()
+    result = run(path, *options.split())
+    assert result.exit_code == 0, result.output
+    mesh = gmsnet.read(path)
+    assert np.array_equal(mesh.points[:, :2], wanted.points)
+    assert sorted(map(sorted, twin.faces(mesh))) == sorted(map(sorted, twin.faces(wanted)))
+    assert set(mesh.markers) == set(wanted.markers)
+    for block in wanted.cells[:-1]:
+        assert f"{len(block.nodes):,} {block.kind}s" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("--pattern zigzag", "unknown pattern 'zigzag'; there are random, structured, o-grid, kershaw"),
+        ("--cells hex", "--pattern random makes --cells triangle or quad or mixed, not 'hex'"),
+        ("--pattern kershaw --cells mixed", "--pattern kershaw makes --cells quad, not 'mixed'"),
+        ("--pattern structured --cells triangle", "--pattern structured makes --cells quad or mixed, not 'triangle'"),
+        ("--columns 3", "--columns is an option for structured quad, kershaw quad, not for random triangle"),
+        ("--pattern kershaw --share 0.5", "--share is an option for structured mixed, not for kershaw quad"),
+        ("--pattern structured --interface", "--interface is an option for structured mixed"),
+        ("--pattern structured --cells mixed --rows 3", "--rows is an option for structured quad, kershaw quad"),
+        ("--pattern o-grid --nodes 50", "--nodes is an option for random triangle, random quad"),
+        ("--pattern structured --shape square", "--shape is an option for random triangle"),
+        ("--pattern structured --rings x.json", "--rings is an option for random triangle"),
+        ("--layers 3", "--layers is an option for o-grid mixed, o-grid quad, o-grid triangle"),
+        ("--shape square --rings x.json", "--rings stands instead of --shape"),
+        ("--pattern structured --nodes 5 --columns 3", "--columns and --rows stand instead of --nodes"),
+        ("--pattern structured --nodes 0", "a mesh needs at least 1 node inside, got --nodes 0"),
+        ("--pattern structured --columns 0", "number of columns must be a whole number of at least 1"),
+        ("--pattern o-grid --aspect 0.5", "the aspect must be a number of at least 1"),
+        ("--pattern o-grid --size 0", "the size must be a positive number"),
+        ("--jitter-edge shortest", "--jitter-edge needs --jitter"),
+        ("--jitter 1 --jitter-edge longest", "edge must be 'mean' or 'shortest', got 'longest'"),
+        ("--settle -1", "the number of sweeps must be a whole number of at least 0"),
+    ],
+)
+def test_command_refuses_contradictions_and_writes_nothing(tmp_path, options, message):
+    result = run(tmp_path / "out.msh", *options.split())
+    assert isinstance(result.exception, InputError)
+    assert message in str(result.exception)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_refusals_end_with_exit_code_2(tmp_path, capsys):
+    assert main(["generate", str(tmp_path / "o.su2"), "--pattern", "kershaw", "--cells", "mixed"]) == 2
+    assert capsys.readouterr().err == "gmsnet: error: --pattern kershaw makes --cells quad, not 'mixed'\n"
