@@ -17,7 +17,8 @@ from gmsnet.kernels.simplex import predicates
 from gmsnet.kernels.simplex.exact import exact
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.plane import exponent_of
-from gmsnet.parallel.threads import Share, serial, workers
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 from gmsnet.topology.topology import Topology, near_points, planar_points
 
 SHAPE, ASPECT = "shape", "aspect"  # with which 1/q meshes on the way are compared: the loss's or Verdict's
@@ -48,13 +49,18 @@ class Totals:
     uncertain: int
 
     @classmethod
-    def of(cls, parts: Iterable[Floats], triangles: int) -> Totals:
-        """From what kernels.simplex.measures.summarise says of the parts of a mesh; so many triangles, at least one."""
+    def of(cls, parts: Iterable[Floats], triangles: int, executor: Executor = serial) -> Totals:
+        """From what kernels.simplex.measures.summarise says of the parts of a mesh; so many triangles, at least one.
+
+        executor: forms the figures of the whole mesh.
+        """
         figures = np.array(list(parts))
-        sums = figures[:, : kernels.EXTREME].sum(axis=0)  # exact: see kernels.simplex.measures.grids
-        low, high, shape, aspect = ((sums[: kernels.FINE] + sums[kernels.FINE :]) / triangles).tolist()
-        least, most = figures.min(axis=0).tolist(), figures.max(axis=0).tolist()
-        inverted, uncertain = (int(figures[:, count].sum()) for count in (kernels.INVERTED, kernels.UNCERTAIN))
+        sums = executor.total(figures.sum(axis=0))  # of those before EXTREME: exact, see kernels.simplex.measures.grids
+        means = (sums[: kernels.FINE] + sums[kernels.FINE : kernels.EXTREME]) / triangles
+        low, high, shape, aspect = means.tolist()
+        least = executor.minimum(figures.min(axis=0)).tolist()
+        most = (-executor.minimum(-figures.max(axis=0))).tolist()
+        inverted, uncertain = (int(sums[count]) for count in (kernels.INVERTED, kernels.UNCERTAIN))
         return cls(
             low, least[kernels.EXTREME + kernels.LOW], high, most[kernels.EXTREME + kernels.HIGH],
             shape, least[kernels.EXTREME + kernels.SHAPE], aspect, least[kernels.EXTREME + kernels.ASPECT],
@@ -236,7 +242,7 @@ def percentile(values: Floats, percent: int) -> float:
 
 
 def measure(
-    mesh: Mesh, topology: Topology | None = None, near: Floats | None = None, threads: int = 1,
+    mesh: Mesh, topology: Topology | None = None, near: Floats | None = None, executor: Executor = serial,
     totals: Totals | None = None, shapes: NDArray[np.float32] = NOWHERE,
 ) -> QualityReport:  # fmt: skip
     """The measures of a mesh; ``topology`` saves building it again (it must belong to the same connectivity).
@@ -258,8 +264,8 @@ def measure(
         return report
     if totals is None:
         near = near_points(mesh, topology) if near is None else near
-        with workers(threads, -(-len(topology.near) // LANES)) as share:
-            totals = totals_of(near, topology.near, topology.near_orientation, share, shapes)
+        executor = executor.for_blocks(-(-len(topology.near) // LANES))
+        totals = totals_of(near, topology.near, topology.near_orientation, executor, shapes)
     assert totals is not None
     signs = exact_signs(planar_points(mesh), topology.triangles, topology.orientation) if totals.uncertain else None
     return QualityReport(topology.cell, totals, triangles, signs)
@@ -269,20 +275,21 @@ def totals_of(
     points: Floats,
     corners: NDArray[np.int32],
     orientation: NDArray[np.int8],
-    share: Share = serial,
+    executor: Executor = serial,
     shapes: NDArray[np.float32] = NOWHERE,
 ) -> Totals | None:
     """Means and extremes of some triangles (T, 3) of planar points; None where there are none.
 
-    share: how blocks of LANES triangles are shared out to threads. shapes: (T,), for 1/q of each, if it is wanted.
+    executor: takes blocks of LANES triangles. shapes: (T,), for 1/q of each, if it is wanted.
     """
-    grids = kernels.grids(len(corners))
+    triangles = int(executor.total(np.array(len(corners))))
+    grids = kernels.grids(triangles)
 
     def part(first: int, last: int) -> Floats:
         figures: Floats = kernels.summarise(points, corners, orientation, first, last, *grids, shapes)
         return figures
 
-    return Totals.of(share(part, 0, -(-len(corners) // LANES)), len(corners)) if len(corners) else None
+    return Totals.of(executor.map(part, 0, -(-len(corners) // LANES)), triangles, executor) if triangles else None
 
 
 def exact_signs(points: Floats, triangles: NDArray[np.int32], orientation: NDArray[np.int8]) -> NDArray[np.int8]:
