@@ -54,6 +54,10 @@ class Target:
     def _missed_in(self, report: QualityReport) -> tuple[NDArray[np.int32], Floats]:
         """And their 1/q."""
         triangles = report.cells
+        if triangles.order is not None:
+            low, _, shape, _ = triangles.columns()
+            every = np.flatnonzero(self.missed(shape, low)).astype(np.int32)
+            return every, shape[every]
         points = planar_points(triangles)
         rows = missed(points, Simplices(triangles.corners, triangles.orientation), *self.limits)
         low, _, shape, _ = triangles.columns(rows)

@@ -189,11 +189,17 @@ class Mesh:
 
 
 def unmeasured(mesh: Mesh) -> str:
-    """How many cells of which kind are no triangles, in words: no quality is known of them. "" if there are none.
+    """How many cells of which kind are no triangles and no plane quads, in words: no quality is known of them.
 
-    Those of a kind that is not known count among them, as they may be faces; vertices, lines and volumes do not.
+    "" if there are none. Those of a kind that is not known count among them, as they may be faces; vertices, lines and
+    volumes do not.
     """
-    return _counted(block for block in mesh.cells if block.dimension in (2, None) and not block.triangular)
+    return _counted(block for block in mesh.cells if block.dimension in (2, None) and not measured(mesh, block))
+
+
+def measured(mesh: Mesh, block: CellBlock) -> bool:
+    """Is the quality of these cells known: are they triangles, or quads in a plane?"""
+    return block.triangular or (block.kind == "quad" and mesh.plane is not None)
 
 
 def unknown_cells(mesh: Mesh) -> str:
