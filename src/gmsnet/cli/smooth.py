@@ -84,6 +84,17 @@ def smooth(
             help="Hold these nodes too: a marker's name, node ids from 0 (3,7,12), or @FILE with ids. Repeatable.",
         ),
     ] = None,
+    slide: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WHAT",
+            help="Let nodes of boundaries, interfaces and markers move along their curves: all, or a marker's name. "
+            "Repeatable.",
+        ),
+    ] = None,
+    feature_angle: Annotated[
+        float, typer.Option(help="With --slide: a curve ends where it turns by more degrees than this.")
+    ] = 30.0,
     threads: Annotated[
         int | None,
         typer.Option(min=1, help="Use at most so many processors (default: all). Same result for any number."),
@@ -147,6 +158,7 @@ def smooth(
         method=method, variant=variant, objective=objective, max_sweeps=max_sweeps, threads=threads,
         target_quality=target_quality, target_angle=target_angle, preserve=preserve, fix_layers=fix_layers,
         untangle=untangle, guard=guard, seed=seed, callback=after_sweep, weights=weights, best_by=best_by,
+        slide=True if slide and "all" in slide else slide or None, feature_angle=feature_angle,
     )  # fmt: skip
     written: str | None = None
     lost: list[str] = []

@@ -28,6 +28,15 @@ def check_slide(
     Raises InputError for names that the mesh does not have (listing those it has), anything else than these forms,
     angles out of range, objects that are no geometry, and meshes that are not planar while nodes are to slide.
     """
+    check_sliding(feature_angle, geometry)
+    names = _names_of(mesh, slide)
+    if names != () and mesh.plane is None:
+        raise InputError("nodes slide in planar meshes alone, and this one varies in x, y and z: leave slide out")
+    return names
+
+
+def check_sliding(feature_angle: Any, geometry: Any) -> None:
+    """InputError for what cannot be used of any mesh: see ``check_slide``."""
     numbers = (int, float, np.integer, np.floating)
     angle = isinstance(feature_angle, numbers) and not isinstance(feature_angle, bool)
     if not (angle and 0.0 < feature_angle < 180.0):
@@ -38,10 +47,6 @@ def check_slide(
                 f"geometry must be an object with the methods project and tangent, "
                 f"but {type(geometry).__name__} has no {name}"
             )
-    names = _names_of(mesh, slide)
-    if names != () and mesh.plane is None:
-        raise InputError("nodes slide in planar meshes alone, and this one varies in x, y and z: leave slide out")
-    return names
 
 
 def _names_of(mesh: Mesh, slide: SlideChoice) -> tuple[str, ...] | None:

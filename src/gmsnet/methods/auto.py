@@ -171,4 +171,5 @@ METHOD = Method(
     summary="the default: Newton's method on a barrier, then the worst cells alone, then the mean, while each pays",
     source="this package; docs/auto.md",
     create=lambda options: Auto(),
+    slides=True,
 )

@@ -65,4 +65,5 @@ METHOD = Method(
     source="Knupp: Algebraic mesh quality metrics (2001), for q; Nocedal, Wright: Numerical Optimization, chapter 3",
     create=lambda options: Barrier(options.objective),
     objectives=tuple(POWERS),
+    slides=True,
 )

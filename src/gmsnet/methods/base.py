@@ -134,7 +134,8 @@ class MethodOptions:
 class Method:
     """A row of the table of methods.
 
-    variants, objectives: the names that may be chosen from, the default first. weighted: it takes weights.
+    variants, objectives: the names that may be chosen from, the default first. weighted: it takes weights. slides: it
+    can let nodes slide along curves.
     """
 
     name: str
@@ -144,3 +145,4 @@ class Method:
     variants: tuple[str, ...] = ()
     objectives: tuple[str, ...] = ()
     weighted: bool = False
+    slides: bool = False

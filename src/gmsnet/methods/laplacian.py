@@ -56,4 +56,5 @@ METHOD = Method(
     source="Field: Laplacian smoothing and Delaunay triangulations (1988)",
     create=lambda options: Laplacian(options.variant),
     variants=tuple(VARIANTS),
+    slides=True,
 )

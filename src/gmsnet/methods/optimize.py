@@ -75,4 +75,5 @@ METHOD = Method(
     create=create,
     variants=("adam", "newton"),
     objectives=objectives.NAMES,
+    slides=True,
 )

@@ -59,4 +59,5 @@ METHOD = Method(
     summary="shape and size: to where the cells of the star are good and as large as they were",
     source="this package; Knupp: Algebraic mesh quality metrics (2001), the relative size metric",
     create=lambda options: Sized(),
+    slides=True,
 )

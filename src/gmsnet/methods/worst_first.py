@@ -106,4 +106,5 @@ METHOD = Method(
     summary="Newton steps on high powers of q at the free nodes of the worst cells alone",
     source="Freitag, Plassmann: Local optimization-based simplicial mesh untangling and improvement (2000), its aim",
     create=create,
+    slides=True,
 )

@@ -38,6 +38,9 @@ def smooth(
     callback: Callable[[Sweep], bool | None] | None = None,
     weights: str | os.PathLike[str] | None = None,
     best_by: str = "shape",
+    slide: Any = None,
+    feature_angle: float = 30.0,
+    geometry: Any = None,
 ) -> SmoothResult:
     """Moves the free nodes of a planar triangle mesh so that its elements become better; changes nothing else.
 
@@ -59,7 +62,9 @@ def smooth(
     for methods that draw random numbers (none does so far). callback: called after each look at the mesh, with most
     methods after each sweep; a true answer stops the run. weights: a safetensors file for methods with weights.
     best_by: which 1/q enters the q̂ that says which mesh is the best: "shape" (1/q) or "aspect" (1/q_V, with which
-    the paper's tables are formed).
+    the paper's tables are formed). slide: whether nodes of boundaries, interfaces and line cells move along their
+    curves: None (they stay), True, or names of markers whose nodes may. feature_angle: degrees; a curve ends where it
+    turns by more. geometry: what to slide on instead of arcs through the input's nodes (docs/sliding.md).
 
     Raises InputError for what cannot be used, and where memory does not suffice, before anything is moved. A
     KeyboardInterrupt (Ctrl-C, or raised by the callback) reaches the caller; its attribute ``result`` is then the
@@ -69,6 +74,7 @@ def smooth(
         method=method, variant=variant, objective=objective, max_sweeps=max_sweeps, threads=threads,
         target_quality=target_quality, target_angle=target_angle, preserve=preserve, fix_layers=fix_layers,
         untangle=untangle, guard=guard, seed=seed, callback=callback, weights=weights, best_by=best_by,
+        slide=slide, feature_angle=feature_angle, geometry=geometry,
     )  # fmt: skip
     return smooth_with(mesh, options, fixed)
 

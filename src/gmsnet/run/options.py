@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from gmsnet.constraints.geometry import Geometry
+from gmsnet.constraints.options import FEATURE_ANGLE, SlideChoice, check_sliding
 from gmsnet.errors import InputError
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.measure.report import ASPECT, SHAPE
 from gmsnet.measure.target import Target
-from gmsnet.methods import Method, MethodOptions, Smoother, chosen
+from gmsnet.methods import METHODS, Method, MethodOptions, Smoother, chosen
 from gmsnet.parallel.threads import available_threads
 from gmsnet.preserve.protection import PRESERVE, method_for
 from gmsnet.run.sweep import Sweep
@@ -43,6 +45,9 @@ class SmoothOptions:
     callback: Callable[[Sweep], bool | None] | None = None
     weights: str | os.PathLike[str] | None = None
     best_by: str = SHAPE
+    slide: SlideChoice = None
+    feature_angle: float = FEATURE_ANGLE
+    geometry: Geometry | None = None
 
     def __post_init__(self) -> None:
         _check_whole("max_sweeps", self.max_sweeps, 0)
@@ -67,6 +72,7 @@ class SmoothOptions:
         _check_name("preserve", self.preserve, PRESERVE)
         _check_flag("fix_layers", self.fix_layers)
         _check_flag("untangle", self.untangle)
+        check_sliding(self.feature_angle, self.geometry)
         self._method()
 
     @property
@@ -82,7 +88,15 @@ class SmoothOptions:
     def smoother(self) -> Smoother:
         """The method, ready for one run. Raises InputError for weights that cannot be read."""
         method, options = self._method()
+        if self.slides and not method.slides:
+            able = ", ".join(name for name, row in METHODS.items() if row.slides)
+            raise InputError(f"{method.name} cannot let nodes slide: leave out slide, or choose one of {able}")
         return method.create(options)
+
+    @property
+    def slides(self) -> bool:
+        """May nodes of curves move along them?"""
+        return self.slide is not None and self.slide is not False
 
     def _method(self) -> tuple[Method, MethodOptions]:
         name = method_for(self.method, self.variant, self.preserve, self.target)

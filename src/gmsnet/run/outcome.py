@@ -22,7 +22,7 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.state import Ending, State
 from gmsnet.run.untangle_stage import still_inverted
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.topology import Topology, near_points, planar_points
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +60,10 @@ def _notes(state: State) -> list[str]:
     protection, near_walls = state.protection, []
     if protection.kept is not None:
         near_walls.append(wall_note(len(protection.topology.held.get(WALL, ())), moved=state.released))
-    return [*protection.notes, *near_walls, *state.untangling, *state.remarks]
+    slid = []
+    if state.sliding is not None and state.ending is not None:
+        slid.append(state.sliding.note(planar_points(state.mesh.with_points(state.ending.points)), state.ending.moved))
+    return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks]
 
 
 def outcome(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.star.block import MOVED
+from gmsnet.kernels.star.constraint import Constraint, locate
 from gmsnet.kernels.star.guard import LEVELS, Precision
 from gmsnet.measure.totals import totals_of
 from gmsnet.mesh.mesh import Mesh
@@ -35,7 +36,7 @@ LEAST_GAIN = 1e-4
 class Start(NamedTuple):
     """Where a run starts. points: (N, 2) in memory order, not changed. precision: of the mesh (``precision_of``).
 
-    score: of the points, where it is known. history: to go on with.
+    score: of the points, where it is known. history: to go on with. constraint: the curves that nodes slide on.
     """
 
     topology: Topology
@@ -43,6 +44,7 @@ class Start(NamedTuple):
     precision: Precision
     score: Score | None = None
     history: Sequence[Sweep] = ()
+    constraint: Constraint | None = None
 
     @classmethod
     def of(cls, mesh: Mesh, topology: Topology) -> Start:
@@ -65,7 +67,9 @@ class Run:
         self.topology, self.smoother, self.options, self.missing = start.topology, smoother, options, missing
         self.executor = executor.for_blocks(len(start.topology.free) // LANES)
         level = LEVELS.index(options.guard)
-        self.field = Field(start.points.copy(), start.topology, start.precision, level)
+        self.field = Field(start.points.copy(), start.topology, start.precision, level, constraint=start.constraint)
+        if start.constraint is not None:
+            locate(start.constraint, self.field.points)
         self.fewest: list[int] = []  # cells that missed the target, up to each look
         self.history: list[Sweep] = [*start.history]
         self.sweeps = self.history[-1].index if self.history else 0

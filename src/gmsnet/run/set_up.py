@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.sliding import Sliding, curves_to_slide_on
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology.connectivity import CHOSEN
 from gmsnet.measure.report import QualityReport, measure
@@ -44,7 +45,11 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     threads = options.thread_count if len(given.points) >= MANY else 1
     asked = fixed_mask(given, fixed)
-    topology, start = Topology.and_points(given, asked, threads)
+    curves = curves_to_slide_on(given, options.slide, options.feature_angle, asked)
+    topology, start = Topology.and_points(given, asked, threads, None if curves is None else curves.slides)
+    sliding = None
+    if curves is not None:
+        sliding = Sliding.of(given, curves, topology.memory, topology.free, options.geometry)
     if asked.any() and REASONS[CHOSEN] not in topology.held:
         count = np.count_nonzero(asked)
         named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
@@ -66,7 +71,19 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
     else:  # most often nothing is protected, and these are the stars that are smoothed
         (before, protection), _ = side_by_side(threads, partial(looked_at, start), lambda: topology.stars)
     totals = before.totals if topology.near_shapes is None else None  # else a run compares some of the cells
-    return State(given, restore, smoother, before, protection, start, start, shapes, tuple(remarks), totals=totals)
+    return State(
+        given,
+        restore,
+        smoother,
+        before,
+        protection,
+        start,
+        start,
+        shapes,
+        tuple(remarks),
+        totals=totals,
+        sliding=sliding,
+    )
 
 
 def check_mesh(mesh: Mesh, target: Target) -> None:

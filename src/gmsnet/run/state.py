@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.sliding import Sliding
+from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.measure.report import QualityReport
 from gmsnet.measure.totals import Totals
@@ -43,8 +45,9 @@ class State:
     about the input. totals: of the points, where they are known. untangling: what was done about inverted cells,
     reasons: why some are left, by the nodes of each, ascending. history: one Sweep for each look. stop_reason: one of
     ``run.stop``, "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
-    interruption: what ends the smoothing before its end. ending: once the mesh is written back to the order of the
-    input; start, points and shapes are then empty, lest the result needs more memory than the stages.
+    sliding: the nodes that move along curves, if any. interruption: what ends the smoothing before its end. ending:
+    once the mesh is written back to the order of the input; start, points and shapes are then empty, lest the result
+    needs more memory than the stages.
     """
 
     mesh: Mesh
@@ -64,6 +67,7 @@ class State:
     released: bool = False
     interruption: KeyboardInterrupt | None = None
     ending: Ending | None = None
+    sliding: Sliding | None = None
 
     @property
     def topology(self) -> Topology:
@@ -78,7 +82,12 @@ class State:
     def run_start(self, best_by: str) -> Start:
         """Where a run over the whole mesh starts."""
         score = None if self.totals is None else Score.of(self.totals, best_by)
-        return Start(self.topology, self.points, self.precision, score, self.history)
+        return Start(self.topology, self.points, self.precision, score, self.history, self.constraint)
+
+    @property
+    def constraint(self) -> Constraint | None:
+        """The curves that nodes slide on."""
+        return None if self.sliding is None else self.sliding.constraint
 
     def ended(self, stop_reason: str, interruption: KeyboardInterrupt | None = None) -> State:
         """The same, and why the sweeps ended."""

@@ -77,7 +77,13 @@ def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterato
         missing = partial(corners_missing, topology=patch, target=target)
         measure = partial(totals_of, state.points, patch.scored)
         before = Score(measure, options.best_by, corners if clear else missing(state.points), positive)
-        run = Run(Start(patch, state.points, precision, before, state.history), smoother, options, executor, missing)
+        run = Run(
+            Start(patch, state.points, precision, before, state.history, state.constraint),
+            smoother,
+            options,
+            executor,
+            missing,
+        )
         reason = run.to_the_end()
         after = run.best_score
         state = replace(state, history=tuple(run.history), totals=None)

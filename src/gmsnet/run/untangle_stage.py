@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.sliding import REASON
 from gmsnet.measure.report import QualityReport
 from gmsnet.parallel.executor import Executor
 from gmsnet.run.options import SmoothOptions
@@ -42,6 +43,8 @@ def _untangled(state: State) -> State:
     from gmsnet.untangle import untangle  # what it needs of SciPy takes 0.15 s more to import
 
     topology = state.topology
+    if state.sliding is not None:
+        topology = topology.holding(state.sliding.nodes, REASON)
     done = untangle(state.points, topology, state.precision)
     steps = ", ".join(f"{step.name} ({step.sweeps})" for step in done.steps) or "nothing to try"
     left = f"{done.after:,} of {done.before:,} inverted cells are left" if done.after else f"all {done.before:,} mended"

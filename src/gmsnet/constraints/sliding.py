@@ -1,0 +1,67 @@
+"""The nodes of one run that slide: which, on what, and by how much the areas that their curves enclose change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.constraints.area import Borders, area_changes, borders_of
+from gmsnet.constraints.constraints import constraint_of
+from gmsnet.constraints.features import Curves, curves_of
+from gmsnet.constraints.geometry import Geometry
+from gmsnet.kernels.star.constraint import Constraint
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.topology import planar_points
+
+Flags = NDArray[np.bool_]
+REASON = "node of a curve that slides"  # why such nodes stand still while cells are untangled
+
+
+@dataclass(frozen=True, eq=False)
+class Sliding:
+    """curves: of the mesh. borders: of its regions. start: (N, 2) planar points of the input by ids.
+
+    nodes: (N,) bool by ids, those that slide. constraint: for the kernels; None where no node slides.
+    """
+
+    curves: Curves
+    borders: Borders
+    start: NDArray[np.float64]
+    nodes: Flags
+    constraint: Constraint | None
+
+    @classmethod
+    def of(
+        cls, mesh: Mesh, curves: Curves, memory: NDArray[np.int32], free: NDArray[np.int32], geometry: Geometry | None
+    ) -> Sliding:
+        """Of a mesh and its curves; memory, free: of its topology.
+
+        Raises InputError for a geometry that does not fit the mesh.
+        """
+        points = planar_points(mesh)
+        nodes = np.zeros(len(points), dtype=bool)
+        nodes[free] = True
+        nodes &= curves.slides
+        constraint = constraint_of(curves, points, memory, mesh.single, geometry, mesh.exponent)
+        return cls(curves, borders_of(mesh, points), points, nodes, constraint if nodes.any() else None)
+
+    def note(self, after: NDArray[np.float64], moved: Flags) -> str:
+        """What to say of it. after: (N, 2) planar points by ids. moved: (N,) bool."""
+        if self.constraint is None:
+            return "slide: no node of a boundary, interface or marker can move along a curve"
+        slid, curves = int((self.nodes & moved).sum()), len(np.unique(self.curves.curve[self.nodes]))
+        change = float(np.abs(area_changes(self.borders, self.start, after)).max(initial=0.0))
+        return (
+            f"slide: {slid:,} of {int(self.nodes.sum()):,} nodes have moved along {curves:,} "
+            f"curve{'s' if curves != 1 else ''}; the area of no region changes by more than {change:.2g} of itself"
+        )
+
+
+def curves_to_slide_on(mesh: Mesh, slide: Any, feature_angle: float, fixed: Flags) -> Curves | None:
+    """The curves of a planar mesh; None where no node is to slide. fixed: (N,) bool, nodes that stay."""
+    if slide is None or slide is False:
+        return None
+    return curves_of(mesh, slide, feature_angle, held=fixed)
