@@ -69,7 +69,7 @@ def worst_cells(mesh: Mesh, report: QualityReport, held: NDArray[np.bool_] | Non
             "shape": float(report.shape[row]),
             "min_angle": float(report.min_angle[row]),
             "max_angle": float(report.max_angle[row]),
-            "inverted": bool(report.valid[row] <= 0),
+            "inverted": not report.valid[row],
             "centre": report.centre[row].tolist(),
         }
         if held is not None:

@@ -105,7 +105,7 @@ class Outcome:
     def tangle(self) -> str:
         """Which cells are inverted still, where, and why as far as that is known."""
         after = self.result.after
-        rows = np.flatnonzero(after.valid <= 0)
+        rows = np.flatnonzero(~after.valid)
         why = {cell.cell: cell.reason for cell in self.result.unmended}
         first = [
             f"cell {cell} at {' '.join(f'{value:.6g}' for value in centre)}: {why.get(cell, UNKNOWN)}"

@@ -34,7 +34,8 @@ class QualityReport:
     Verdict's aspect ratio, which the paper's tables fit. Both carry the sign of S after neighbours have been wound
     alike; on a surface that is not planar they are unsigned. Of a quad, shape is 2D/(|e₁|² + |e₂|²) of its worst
     corner, D = e₁ × e₂, angles are those at its corners, and aspect is nan. scaled_jacobian: (T,) the least of
-    D/(|e₁||e₂|) over the corners, of a triangle times 2/√3. valid: (T,) int8, the exact sign of S in float64.
+    D/(|e₁||e₂|) over the corners, of a triangle times 2/√3. sign: (T,) int8, the exact sign of S in float64: 1, 0 or
+    −1. valid: (T,) bool, whether it is positive.
 
     ``inverted`` and q̂ are known from the beginning, and so are the totals: means and extremes, None where there are no
     triangles. The columns are made when one of them is first asked for, of the triangles as they were measured.
@@ -61,9 +62,14 @@ class QualityReport:
         return float("nan") if self.totals is None else self.totals.qhat_aspect
 
     @cached_property
-    def valid(self) -> NDArray[np.int8]:
-        """(T,) the exact sign of each area."""
+    def sign(self) -> NDArray[np.int8]:
+        """(T,) int8, the exact sign of each area: 1, 0 or −1."""
         return np.ones(len(self.cell), dtype=np.int8) if self.signs is None else self.signs
+
+    @cached_property
+    def valid(self) -> NDArray[np.bool_]:
+        """(T,) bool, whether each area is positive: exact."""
+        return np.ones(len(self.cell), dtype=bool) if self.signs is None else self.signs > 0
 
     @cached_property
     def centre(self) -> Floats:
