@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gmsnet.cli import output, report
 from gmsnet.cli.target import shown
 from gmsnet.measure.target import Target
+from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.protection import LAYER
 from gmsnet.run import stop
@@ -113,7 +114,7 @@ class Outcome:
         ][: report.NAMED]
         more = f"; and {len(rows) - len(first):,} more" if len(rows) > len(first) else ""
         hint = "; stretched layers are held: --preserve none lets them move" if LAYER in self.result.held else ""
-        cells = report.amount(len(rows), "cell")
+        cells = amount(len(rows), "cell")
         return f"{cells} (numbers from 0): {'; '.join(first)}{more}{hint}"
 
     @cached_property
@@ -145,7 +146,7 @@ class Outcome:
             console.print(self.nearness())
         if result.held and self.free:
             held = len(self.mesh.points) - self.free
-            console.print(f"held: {held:,} of {report.amount(len(self.mesh.points), 'node')} ({self._reasons()})")
+            console.print(f"held: {held:,} of {amount(len(self.mesh.points), 'node')} ({self._reasons()})")
         if self.written is None:
             console.print(f"left as it is: {self.input}")
         elif not aside:
@@ -161,15 +162,15 @@ class Outcome:
         if result.stop_reason == stop.NOTHING_TO_MOVE and self.free:
             return f"nothing to move: of the cells that miss the target all nodes are held ({self._reasons()})"
         if result.stop_reason == stop.NOTHING_TO_MOVE:
-            return f"nothing to move: all {report.amount(len(self.mesh.points), 'node')} are held ({self._reasons()})"
+            return f"nothing to move: all {amount(len(self.mesh.points), 'node')} are held ({self._reasons()})"
         given = [self.choice.get(key) for key in ("variant", "objective", "weights")]
         method = " ".join([self.method, *(each for each in given if each is not None)])
-        run = f"{method}, {report.amount(result.sweeps, 'sweep')} in {result.seconds:.3g} s: {result.stop_reason}"
+        run = f"{method}, {amount(result.sweeps, 'sweep')} in {result.seconds:.3g} s: {result.stop_reason}"
         if not result.moved.any():
             if result.stop_reason == stop.TARGET_REACHED and self.target_met:
                 return "nothing was moved: the target is met already"
             return f"no gain: no mesh on the way was better than the input ({run})"
-        return f"{int(result.moved.sum()):,} of {report.amount(self.free, 'free node')} moved ({run})"
+        return f"{int(result.moved.sum()):,} of {amount(self.free, 'free node')} moved ({run})"
 
     @property
     def free(self) -> int:

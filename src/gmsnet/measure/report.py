@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -13,6 +14,7 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex import measures as kernels
 from gmsnet.measure.cells import MeasuredCells
 from gmsnet.measure.totals import NOWHERE, Totals, totals_of
+from gmsnet.mesh.display import html_table, text_table
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.threads import workers
 from gmsnet.topology.topology import Topology, near_points
@@ -45,6 +47,28 @@ class QualityReport:
     totals: Totals | None = field(repr=False)
     cells: MeasuredCells = field(repr=False)
     signs: NDArray[np.int8] | None = field(repr=False)  # None where all are certainly positive
+
+    def __repr__(self) -> str:
+        """A line for each of ``figures``."""
+        return text_table([("QualityReport", ""), *self.figures()])
+
+    def _repr_html_(self) -> str:
+        """For a notebook."""
+        return html_table("QualityReport", [("", ""), *self.figures()])
+
+    def figures(self) -> list[tuple[str, str]]:
+        """(name, value) of the few figures that say the most, of those that there are."""
+        counts = [("cells", f"{len(self.cell):,}"), ("inverted", f"{self.inverted:,}")]
+        if self.totals is None:
+            return counts
+        known = [
+            ("1/q, least", self.totals.shape_min, 4),
+            ("1/q, mean", self.totals.shape_mean, 4),
+            ("min angle, least", self.totals.low_min, 2),
+            ("max angle, greatest", self.totals.high_max, 2),
+            ("q-hat with 1/q", self.qhat, 4),
+        ]
+        return [*counts, *((name, f"{value:.{places}f}") for name, value, places in known if not math.isnan(value))]
 
     @property
     def inverted(self) -> int:

@@ -37,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.measure.bounds import groups
+from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.topology import Topology, planar_points
 
@@ -65,6 +66,10 @@ class Limits:
     cell: Ints
     held: NDArray[np.bool_]
     points: Floats
+
+    def __repr__(self) -> str:
+        """One line: the ceiling, and how many groups there are."""
+        return f"<Limits: ceiling {self.ceiling:.4f}, {amount(len(self.bound), 'group')} of cells>"
 
     @property
     def ceiling(self) -> float:
