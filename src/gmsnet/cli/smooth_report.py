@@ -203,7 +203,7 @@ class Outcome:
                 "stop_reason": result.stop_reason,
                 "target_quality": self.target.quality,
                 "target_angle": self.target.angle,
-                "target_met": self.target_met,
+                "target_met": self.target_met if self.target else None,
                 "below_target": len(self.missed),
                 "ceiling": result.limits.ceiling,
                 "notes": result.notes,
