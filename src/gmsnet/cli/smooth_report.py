@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gmsnet.cli import output, report
 from gmsnet.cli.target import shown
 from gmsnet.measure.target import Target
-from gmsnet.mesh.display import amount
+from gmsnet.mesh.display import amount, plain
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.protection import LAYER
 from gmsnet.run import stop
@@ -165,7 +165,7 @@ class Outcome:
             return f"nothing to move: all {amount(len(self.mesh.points), 'node')} are held ({self._reasons()})"
         given = [self.choice.get(key) for key in ("variant", "objective", "weights")]
         method = " ".join([self.method, *(each for each in given if each is not None)])
-        run = f"{method}, {amount(result.sweeps, 'sweep')} in {result.seconds:.3g} s: {result.stop_reason}"
+        run = f"{method}, {amount(result.sweeps, 'sweep')} in {plain(result.seconds)} s: {result.stop_reason}"
         if not result.moved.any():
             if result.stop_reason == stop.TARGET_REACHED and self.target_met:
                 return "nothing was moved: the target is met already"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gmsnet.measure.bounds.bounds import Limits, limits
 from gmsnet.measure.report import QualityReport
 from gmsnet.mesh.adapters import to_mesh
-from gmsnet.mesh.display import amount, html_table, text_table
+from gmsnet.mesh.display import amount, html_table, plain, text_table
 from gmsnet.run.sweep import Sweep as Sweep
 from gmsnet.run.untangle_stage import StillInvertedCell
 from gmsnet.topology.topology import Topology
@@ -70,7 +70,7 @@ class SmoothResult:
     def _done(self) -> str:
         free = len(self.points) - sum(map(len, self.held.values()))
         moved = f"{np.count_nonzero(self.moved):,} of {amount(free, 'free node')} moved"
-        return f"{moved}, {amount(self.sweeps, 'sweep')} in {self.seconds:.3g} s, {self.stop_reason}"
+        return f"{moved}, {amount(self.sweeps, 'sweep')} in {plain(self.seconds)} s, {self.stop_reason}"
 
     @property
     def _figures(self) -> list[tuple[str, ...]]:
