@@ -160,7 +160,8 @@ def smooth(
                 target = replace(target, format=mesh.source.format)
             fixed = fixed_nodes(mesh, fix or [])
             _check_conversion(mesh, target)
-            progress.stage("preparing (the first run compiles: some twenty seconds)")
+            progress.stage("preparing")
+            compiled = progress.compilation.seconds
             result = run(
                 mesh,
                 method,
@@ -169,6 +170,7 @@ def smooth(
                 **options,
                 **choice,
             )
+            compiled = progress.compilation.seconds - compiled
             interruption.begin()
             if not in_place or result.moved.any():  # else there is nothing to write
                 progress.stage(f"writing {target.path}")
@@ -180,7 +182,7 @@ def smooth(
                 _draw(mesh, result.mesh, plot, written)
 
         outcome = Outcome(
-            input, written, method, mesh, result, Target(target_quality, target_angle), lost, plot, choice
+            input, written, method, mesh, result, Target(target_quality, target_angle), lost, plot, choice, compiled
         )  # fmt: skip
         if json:
             outcome.print_json()

@@ -30,7 +30,7 @@ class Outcome:
     """A finished run.
 
     written: the file that was written, None where there was no need to. lost: by conversion. choice: variant, objective
-    and weights as they were given, or None.
+    and weights as they were given, or None. compiled: the seconds of those of the result that went into compilation.
     """
 
     input: str
@@ -42,6 +42,7 @@ class Outcome:
     lost: list[str]
     plot: str | None
     choice: Mapping[str, Any] = field(default_factory=dict)
+    compiled: float = 0.0
 
     @property
     def least(self) -> float:
@@ -165,7 +166,10 @@ class Outcome:
             return f"nothing to move: all {amount(len(self.mesh.points), 'node')} are held ({self._reasons()})"
         given = [self.choice.get(key) for key in ("variant", "objective", "weights")]
         method = " ".join([self.method, *(each for each in given if each is not None)])
-        run = f"{method}, {amount(result.sweeps, 'sweep')} in {plain(result.seconds)} s: {result.stop_reason}"
+        seconds = f"{plain(result.seconds - self.compiled)} s"
+        if self.compiled:
+            seconds += f" (and {plain(self.compiled)} s to compile kernels, once)"
+        run = f"{method}, {amount(result.sweeps, 'sweep')} in {seconds}: {result.stop_reason}"
         if not result.moved.any():
             if result.stop_reason == stop.TARGET_REACHED and self.target_met:
                 return "nothing was moved: the target is met already"
@@ -212,5 +216,6 @@ class Outcome:
                 "lost": self.lost,
                 "history": [asdict(sweep) for sweep in result.history],
                 "seconds": result.seconds,
+                "seconds_compiling": self.compiled,
             }
         )
