@@ -9,19 +9,18 @@ import gmsnet
 
 
 def test_gmsnet_gains_what_the_optimum_of_its_loss_gains():
-    """Twenty random squares of 1,000 nodes, 20 sweeps: at least 96 % of the gain in mean 1/q."""
+    """Twenty random squares of 1,000 nodes, 20 sweeps: at least 96.5 % of the gain in mean 1/q."""
     gains = []
     for seed in range(20):
         mesh = gmsnet.random_mesh(1000, seed=seed)
-        result = gmsnet.smooth(mesh, max_sweeps=20)
+        result = gmsnet.smooth(mesh, "gmsnet", max_sweeps=20)
         optimum = gmsnet.quality(mesh.with_points(metric_loss_optimum(mesh, 40))).shape.mean()
         start = result.before.shape.mean()
         gains.append((result.after.shape.mean() - start) / (optimum - start))
         assert result.after.min_angle.mean() >= 43
         assert result.after.inverted == 0
-        # The best mesh by q-hat is returned, which may be an early one; on the way the mean goes further.
-        assert max(sweep.mean_shape for sweep in result.history) - start >= 0.955 * (optimum - start)
-    assert np.mean(gains) >= 0.96
+    assert np.mean(gains) >= 0.965
+    assert min(gains) >= 0.955
 
 
 def test_the_reference_has_settled():

@@ -21,6 +21,7 @@ def test_every_public_name_is_there():
         assert getattr(gmsnet, name) is not None
         assert name in dir(gmsnet)
     assert gmsnet.__version__
+    assert dir(gmsnet) == sorted([*gmsnet.__all__, "__version__"])
     with pytest.raises(AttributeError, match="no attribute 'smoth'"):
         _ = gmsnet.smoth
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from gmsnet.generate import random_mesh
     from gmsnet.io import read, write
     from gmsnet.measure.report import QualityReport
+    from gmsnet.mesh.array_forms import mesh_from_arrays
     from gmsnet.mesh.cell_block import CellBlock
     from gmsnet.mesh.mesh import Mesh
     from gmsnet.methods import METHODS
@@ -42,6 +43,7 @@ _HOME = {
     "QualityReport": "measure.report",
     "CellBlock": "mesh.cell_block",
     "Mesh": "mesh.mesh",
+    "mesh_from_arrays": "mesh.array_forms",
     "METHODS": "methods",
 }
 
@@ -56,6 +58,7 @@ __all__ = [
     "QualityReport",
     "SmoothResult",
     "Sweep",
+    "mesh_from_arrays",
     "quality",
     "random_mesh",
     "read",
@@ -77,4 +80,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__, "__version__"])
+    return sorted([*__all__, "__version__"])

@@ -75,7 +75,9 @@ def test_json_holds_everything(run, square, tmp_path):
     assert document["stop_reason"] == stop.MAX_SWEEPS
     assert len(document["worst"]) == 5
     assert any("bottom" in loss for loss in document["lost"])
-    assert document["target_met"] is True
+    assert document["target_met"] is None  # none was asked for
+    met = run("smooth", square, out, "--json", "--target-quality", 0.001)
+    assert json.loads(met.out)["target_met"] is True
 
 
 def test_quiet_says_nothing(run, square, tmp_path):

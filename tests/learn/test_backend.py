@@ -31,7 +31,10 @@ def run(code):
 
 @pytest.mark.parametrize("name", ["torch", "torch_geometric"])
 def test_a_missing_package_names_the_command_that_installs_it(name):
-    expected = f'missing: training needs {name}, which is not installed: pip install "gmsnet[train]"'
+    expected = (
+        f'missing: training needs {name}, which is not installed: install the extra "train", '
+        'in the folder of the sources by pip install ".[train]"'
+    )
     assert run(BLOCK.format(name=name)) == expected
 
 

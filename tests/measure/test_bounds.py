@@ -11,6 +11,7 @@ from scipy.spatial import Delaunay
 
 import gmsnet
 from gmsnet.generate import disturb
+from gmsnet.measure.bounds import apexes
 from gmsnet.measure.bounds.bounds import limits
 from gmsnet.measure.bounds.groups import CORNER, FREE_CORNER, HELD, RING, best_with_corner
 from gmsnet.mesh.cell_block import CellBlock
@@ -85,19 +86,64 @@ def test_regular_fans_are_as_good_as_their_bounds(n):
     assert found.ceiling == found.bound.min()
 
 
-@given(seed=st.integers(0, 2**32 - 1), n=st.integers(3, 8))
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(3, 12))
 @settings(max_examples=60)
 def test_held_rings_are_tight(seed, n):
     """The discs of all edges of a held ring: an optimiser comes to the bound, and not beyond it."""
-    rng = np.random.default_rng(seed)
-    turn = 2.0 * np.pi * (np.arange(n) + 0.8 * rng.random(n)) / n
-    ring = (0.3 + rng.random(n))[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
-    mesh = fan(ring)
+    mesh = fan(ring_of(np.random.default_rng(seed), n))
     found = bounds(mesh)
     (group,) = np.flatnonzero(found.kind == RING)
     best = reached(mesh, 0, found.cells(group))
     assert best <= found.bound[group] + ROUNDING
     assert best >= found.bound[group] - 1e-4 or found.bound[group] < 2e-4
+
+
+def ring_of(rng, n):
+    """A star-shaped polygon of unequal edges."""
+    turn = 2.0 * np.pi * (np.arange(n) + 0.8 * rng.random(n)) / n
+    return (0.3 + rng.random(n))[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+def edges_of(ring):
+    along = np.roll(ring, -1, axis=0) - ring
+    return ring + 0.5 * along, np.column_stack([-along[:, 1], along[:, 0]])
+
+
+@given(seed=st.integers(0, 2**32 - 1), numbers=st.lists(st.integers(1, 14), min_size=1, max_size=6))
+@settings(max_examples=60)
+def test_a_few_edges_at_a_time_give_the_bound_of_all(seed, numbers):
+    """Against all pairs of discs, for rings of any numbers of edges at once; no bound is below the true one."""
+    rng = np.random.default_rng(seed)
+    rings = [edges_of(ring_of(rng, n)) for n in numbers]
+    middle, upright = (np.concatenate([ring[k] for ring in rings]) for k in range(2))
+    bound = apexes.best_apex_of_many(middle, upright, apexes.starts(np.array(numbers)), 1.0)
+    every = np.array([apexes.best_apex(m[None], u[None])[0] for m, u in rings])
+    assert (bound >= every - ROUNDING).all()
+    np.testing.assert_allclose(bound, every, atol=1e-6)
+
+
+def test_the_work_on_a_hub_does_not_grow_with_the_square_of_its_degree(monkeypatch):
+    """4,000 held edges around one free node: never are more than a few discs met with each other."""
+    sizes = []
+    meeting = apexes.common_point
+    monkeypatch.setattr(apexes, "common_point", lambda m, u, t: sizes.append(m.shape[1]) or meeting(m, u, t))
+    mesh = fan(polygon(4000) * (1.0 + 1e-4 * np.random.default_rng(0).random((4000, 1))))
+    found = bounds(mesh)
+    assert 0 < max(sizes) <= apexes.FEW
+    assert len(sizes) <= apexes.ROUNDS * (apexes.BISECTIONS + 2)
+    (group,) = np.flatnonzero(found.kind == RING)
+    assert len(found.cells(group)) == 4000
+    assert 0.0 < gmsnet.quality(mesh).shape.min() <= found.bound[group] < 0.01
+
+
+def test_edges_of_no_length_bound_nothing():
+    ring = np.repeat(polygon(8), 2, axis=0)
+    middle, upright = edges_of(ring)
+    whole, twice = (
+        apexes.best_apex_of_many(m, u, np.array([0, len(m)]), 1.0) for m, u in (edges_of(polygon(8)), (middle, upright))
+    )
+    assert twice[0] == pytest.approx(whole[0], abs=1e-6)
+    assert twice[0] == pytest.approx(best_with_corner(np.pi / 4), abs=1e-6)
 
 
 @given(seed=st.integers(0, 2**32 - 1), nodes=st.integers(5, 60), share=st.sampled_from([0.0, 0.2, 0.6]))

@@ -40,6 +40,22 @@ def test_every_measure_equals_its_twin():
         assert report.aspect[t] == pytest.approx(abs(aspect), rel=1e-12)
 
 
+def test_valid_is_a_mask_and_sign_is_apart():
+    """Wound alike by their shared edges: one cell folded over, one of no area."""
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.9, 0.5], [2.0, 0.0]])
+    report = measure(triangles_mesh(points, [[0, 1, 2], [0, 2, 3], [1, 4, 2], [0, 5, 1]]))
+    assert report.valid.dtype == bool
+    assert report.sign.dtype == np.int8
+    assert report.sign.tolist() == [1, 1, -1, 0]
+    assert report.valid.tolist() == [True, True, False, False]
+    assert not report.valid.all()
+    assert report.inverted == (~report.valid).sum() == 2
+    whole = measure(gmsnet.random_mesh(50, seed=0))
+    assert whole.valid.dtype == bool
+    assert whole.valid.all()
+    assert whole.sign.tolist() == [1] * len(whole.cell)
+
+
 def true_measures(mpmath, a, b, c):
     """Smallest and largest angle, 1/q, 1/q_V to 50 digits, and the ratio of the longest to the shortest side."""
     corners = [[mpmath.mpf(float(v)) for v in p] for p in (a, b, c)]
@@ -140,7 +156,7 @@ def test_what_is_changed_later_does_not_change_a_report():
     result.mesh[0][:] = 0.0
     triangles[:] = 0
     for made, known in ((report, wanted[0]), (result.before, wanted[0]), (result.after, wanted[1])):
-        for name in ("min_angle", "max_angle", "shape", "aspect", "centre", "valid"):
+        for name in ("min_angle", "max_angle", "shape", "aspect", "centre", "valid", "sign"):
             np.testing.assert_array_equal(getattr(made, name), getattr(known, name))
         assert made.summary() == known.summary()
 

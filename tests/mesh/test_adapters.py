@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 import gmsnet
 from gmsnet.errors import InputError
-from gmsnet.mesh.adapters import KIND, to_mesh
+from gmsnet.mesh.adapters import to_mesh
+from gmsnet.mesh.array_forms import KIND
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -139,7 +140,9 @@ def test_restored_points_belong_to_the_caller():
         (np.ma.masked_less(POINTS, 1), FAN, "masked"),
         (np.where(POINTS == 3.0, np.nan, POINTS), FAN, "node 5 .* not finite"),
         (POINTS, FAN.astype(float), r"cells\.astype\(int\)"),
-        (POINTS, FAN.T, 'shape .3, 4.: give other cells by their kind, such as {"triangle"'),
+        (POINTS, FAN[:, [0, 1, 2, 0, 1]], r'shape .4, 5.: give other cells by their kind, such as \[."triangle"'),
+        (in_space(POINTS), FAN[:, [0, 1, 2, 0]], r'quads or tetrahedra .* as \[."quad", cells.\] or'),
+        (POINTS, [FAN], r"shape .1, 4, 3."),
         (POINTS, [[0, 1, 2], [0, 1]], "cells cannot be made an array"),
         (POINTS, FAN + 5, "names the nodes"),
         (POINTS, FAN - 1, "names the nodes"),
@@ -162,7 +165,7 @@ def test_wrong_arrays_say_what_to_mend(points, cells, message):
 
 @pytest.mark.parametrize(
     ("thing", "message"),
-    [("wing.su2", r"gmsnet\.io\.read"), (None, "NoneType is not a mesh"), ((POINTS, FAN, FAN), "tuple"), (3, "int")],
+    [("wing.su2", r"gmsnet\.read"), (None, "NoneType is not a mesh"), ((POINTS, FAN, FAN), "tuple"), (3, "int")],
 )
 def test_what_is_no_mesh_is_refused(thing, message):
     with pytest.raises(InputError, match=message):
@@ -385,9 +388,10 @@ def test_a_point_set_can_be_held():
 
 def test_no_library_is_imported():
     code = (
-        "import sys, numpy; from gmsnet.mesh.adapters import KIND, to_mesh;"
+        "import sys, numpy; from gmsnet.mesh.adapters import to_mesh;"
         "to_mesh((numpy.zeros((3, 2)), [[0, 1, 2]]));"
-        "print([m for m in ('pyvista', 'meshio', 'meshlane', 'torch', 'matplotlib') if m in sys.modules])"
+        "others = ('pyvista', 'meshio', 'meshlane', 'torch', 'matplotlib', 'skfem', 'scipy');"
+        "print([m for m in others if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -126,4 +126,4 @@ def test_so_does_the_whole_from_input_to_output_at_any_stop(level, seed, nodes, 
         changed = [k for k in range(len(triangles)) if free[k]]
         place = {k: i for i, k in enumerate(changed)}
         check(whole, [before[k] for k in changed], [after[k] for k in changed], [[place[k] for k in r] for r in rows])
-    assert result.after.valid.tolist() == naive.signs(result.points, triangles, orientation)
+    assert result.after.sign.tolist() == naive.signs(result.points, triangles, orientation)

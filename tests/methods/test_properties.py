@@ -92,8 +92,8 @@ def test_nothing_valid_is_inverted_and_nothing_held_moves(method, seed, nodes, t
     turn = Topology.of(mesh).orientation
     before, after = exact_signs(mesh, turn), exact_signs(result.mesh, turn)
     assert (after[before > 0] > 0).all()
-    assert result.before.valid.tolist() == before.tolist()
-    assert result.after.valid.tolist() == after.tolist()
+    assert result.before.sign.tolist() == before.tolist()
+    assert result.after.sign.tolist() == after.tolist()
     held = naive.held_nodes(nodes, mesh.cells[0].nodes.tolist(), mesh.cells[0].regions.tolist())
     still = np.array(sorted(held | set(np.flatnonzero(chosen).tolist())), dtype=int)
     assert mesh.points[still].tobytes() == result.points[still].tobytes()

@@ -88,6 +88,8 @@ def test_too_much_is_refused_with_both_amounts(monkeypatch):
     refuse_unless_free(3 * 10**9, "this")
     with pytest.raises(InputError, match=r"^this needs about 3.25 GB of memory, but only 3 GB are free$"):
         refuse_unless_free(3_250_000_000, "this")
+    with pytest.raises(InputError, match=r"^this needs about 1,250 GB of memory, but only 3 GB are free$"):
+        refuse_unless_free(1_250_000_000_000, "this")
     monkeypatch.setattr(available_memory, "available", lambda: None)
     refuse_unless_free(10**18, "this")
 

@@ -12,7 +12,7 @@ from gmsnet.generate.layered import layered_mesh
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.paper.cases import CASES
-from gmsnet.preserve.layers import stretched_layers
+from gmsnet.preserve.layers import Layers, stretched_layers
 from gmsnet.topology.topology import Topology
 
 WIDTH = 0.05
@@ -215,3 +215,13 @@ def test_disturbed_cells_next_to_layers_are_not_taken_for_layers(amount):
     assert layers.nodes[: 20 * 120].all()
     assert layers.nodes[20 * 120 : 21 * 120].mean() > 0.8
     assert layers.nodes[21 * 120 :].mean() < 0.01
+
+
+def test_figures_of_layers_are_plain():
+    """Almost all of a thousand cells, stretched by more than a thousand."""
+    cells = np.arange(1000) > 3
+    layers = Layers(np.zeros(9, dtype=bool), cells, 1257.3, 123456.0, 0)
+    assert layers.summary == (
+        "the mesh looks anisotropic on purpose: 996 cells (100 %) are stretched alike, "
+        "by 1,260 in the median and 123,000 at most"
+    )

@@ -210,7 +210,7 @@ def test_calls_from_many_threads_give_what_each_gives_alone(tmp_path):
 def test_one_report_may_be_asked_by_many_threads():
     def look(report, start, found):
         start.wait()
-        found.append((report.shape.tobytes(), report.valid.tobytes(), report.centre.tobytes()))
+        found.append((report.shape.tobytes(), report.sign.tobytes(), report.centre.tobytes()))
 
     for _ in range(20):
         report, start, found = gmsnet.smooth(MESH, max_sweeps=2).after, threading.Barrier(4), []

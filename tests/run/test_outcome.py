@@ -42,7 +42,7 @@ def test_nodes_that_do_not_move_keep_their_bits(size, axis):
     again = measure(mesh.with_points(points), topology)
     assert after.totals == again.totals
     np.testing.assert_array_equal(after.shape, again.shape)
-    np.testing.assert_array_equal(after.valid, again.valid)
+    np.testing.assert_array_equal(after.sign, again.sign)
 
 
 def test_what_is_not_better_is_not_taken():

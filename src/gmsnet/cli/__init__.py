@@ -21,7 +21,7 @@ from gmsnet.cli.visible import visible
 from gmsnet.errors import GmsnetError
 from gmsnet.parallel.interrupts import interruptible
 
-DONE, TARGET_NOT_MET, BAD_INPUT = 0, 1, 2
+DONE, BAD_INPUT = 0, 2
 MANY_OBJECTS = (
     200_000  # before cycles are looked for: what imports make is kept, and rounds over it took a tenth of a run
 )

@@ -9,6 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from gmsnet.cli.output import table
+from gmsnet.mesh.display import amount, cells_in_words
 from gmsnet.mesh.mesh import Mesh
 
 if TYPE_CHECKING:
@@ -48,15 +49,7 @@ def figures(reports: Mapping[str, QualityReport]) -> Table:
 
 def counts(mesh: Mesh) -> str:
     """How many nodes and cells of which kind a mesh has, in words."""
-    cells: dict[str, int] = {}
-    for block in mesh.cells:
-        cells[block.kind] = cells.get(block.kind, 0) + len(block.nodes)
-    return ", ".join([amount(len(mesh.points), "node"), *(amount(n, f"{kind} cell") for kind, n in cells.items())])
-
-
-def amount(count: int, what: str) -> str:
-    """A count with its noun, in the plural where it needs one."""
-    return f"{count:,} {what}" if count == 1 else f"{count:,} {what}s"
+    return ", ".join([amount(len(mesh.points), "node"), *cells_in_words(mesh.cells)])
 
 
 def worst_cells(mesh: Mesh, report: QualityReport, held: NDArray[np.bool_] | None = None) -> list[dict[str, Any]]:
@@ -69,7 +62,7 @@ def worst_cells(mesh: Mesh, report: QualityReport, held: NDArray[np.bool_] | Non
             "shape": float(report.shape[row]),
             "min_angle": float(report.min_angle[row]),
             "max_angle": float(report.max_angle[row]),
-            "inverted": bool(report.valid[row] <= 0),
+            "inverted": not report.valid[row],
             "centre": report.centre[row].tolist(),
         }
         if held is not None:

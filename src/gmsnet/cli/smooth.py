@@ -176,11 +176,13 @@ def smooth(
                 destination = replace(destination, format=mesh.source.format)
             fixed = fixed_nodes(mesh, fix) if fix else None
             _check_conversion(mesh, destination)
-            progress.begin("preparing (the first run compiles: some twenty seconds)")
+            progress.begin("preparing")
+            compiled = progress.compilation.seconds
             try:
                 result = smooth_with(mesh, options, fixed)
             except KeyboardInterrupt as interrupted:
                 result = _best_so_far(interrupted)
+            compiled = progress.compilation.seconds - compiled
             interruption.begin()
             if not in_place or result.moved.any():  # else there is nothing to write
                 progress.begin(f"writing {destination.path}")
@@ -192,7 +194,9 @@ def smooth(
                 _draw(mesh, result.mesh, plot, written)
 
         choice = {"variant": variant, "objective": objective, "weights": weights}
-        outcome = Outcome(input, written, method, mesh, result, options.target, lost, plot, choice)
+        outcome = Outcome(
+            input, written, method, mesh, result, options.target, lost, plot, choice, compiled
+        )  # fmt: skip
         if json:
             outcome.print_json()
         elif not quiet:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gmsnet.cli import output, report
 from gmsnet.cli.destination import shown
 from gmsnet.measure.target import Target
+from gmsnet.mesh.display import amount, plain
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.protection import LAYER
 from gmsnet.run import stop
@@ -29,7 +30,7 @@ class Outcome:
     """A finished run.
 
     written: the file that was written, None where there was no need to. lost: by conversion. choice: variant, objective
-    and weights as they were given, or None.
+    and weights as they were given, or None. compiled: the seconds of those of the result that went into compilation.
     """
 
     input: str
@@ -41,6 +42,7 @@ class Outcome:
     lost: list[str]
     plot: str | None
     choice: Mapping[str, Any] = field(default_factory=dict)
+    compiled: float = 0.0
 
     @property
     def least(self) -> float:
@@ -105,7 +107,7 @@ class Outcome:
     def tangle(self) -> str:
         """Which cells are inverted still, where, and why as far as that is known."""
         after = self.result.after
-        rows = np.flatnonzero(after.valid <= 0)
+        rows = np.flatnonzero(~after.valid)
         why = {cell.cell: cell.reason for cell in self.result.unmended}
         first = [
             f"cell {cell} at {' '.join(f'{value:.6g}' for value in centre)}: {why.get(cell, UNKNOWN)}"
@@ -113,7 +115,7 @@ class Outcome:
         ][: report.NAMED]
         more = f"; and {len(rows) - len(first):,} more" if len(rows) > len(first) else ""
         hint = "; stretched layers are held: --preserve none lets them move" if LAYER in self.result.held else ""
-        cells = report.amount(len(rows), "cell")
+        cells = amount(len(rows), "cell")
         return f"{cells} (numbers from 0): {'; '.join(first)}{more}{hint}"
 
     @cached_property
@@ -145,7 +147,7 @@ class Outcome:
             console.print(self.nearness())
         if result.held and self.free:
             held = len(self.mesh.points) - self.free
-            console.print(f"held: {held:,} of {report.amount(len(self.mesh.points), 'node')} ({self._reasons()})")
+            console.print(f"held: {held:,} of {amount(len(self.mesh.points), 'node')} ({self._reasons()})")
         if self.written is None:
             console.print(f"left as it is: {self.input}")
         elif not aside:
@@ -161,15 +163,18 @@ class Outcome:
         if result.stop_reason == stop.NOTHING_TO_MOVE and self.free:
             return f"nothing to move: of the cells that miss the target all nodes are held ({self._reasons()})"
         if result.stop_reason == stop.NOTHING_TO_MOVE:
-            return f"nothing to move: all {report.amount(len(self.mesh.points), 'node')} are held ({self._reasons()})"
+            return f"nothing to move: all {amount(len(self.mesh.points), 'node')} are held ({self._reasons()})"
         given = [self.choice.get(key) for key in ("variant", "objective", "weights")]
         method = " ".join([self.method, *(each for each in given if each is not None)])
-        run = f"{method}, {report.amount(result.sweeps, 'sweep')} in {result.seconds:.3g} s: {result.stop_reason}"
+        seconds = f"{plain(result.seconds - self.compiled)} s"
+        if self.compiled:
+            seconds += f" (and {plain(self.compiled)} s to compile kernels, once)"
+        run = f"{method}, {amount(result.sweeps, 'sweep')} in {seconds}: {result.stop_reason}"
         if not result.moved.any():
             if result.stop_reason == stop.TARGET_REACHED and self.target_met:
                 return "nothing was moved: the target is met already"
             return f"no gain: no mesh on the way was better than the input ({run})"
-        return f"{int(result.moved.sum()):,} of {report.amount(self.free, 'free node')} moved ({run})"
+        return f"{int(result.moved.sum()):,} of {amount(self.free, 'free node')} moved ({run})"
 
     @property
     def free(self) -> int:
@@ -202,7 +207,7 @@ class Outcome:
                 "stop_reason": result.stop_reason,
                 "target_quality": self.target.quality,
                 "target_angle": self.target.angle,
-                "target_met": self.target_met,
+                "target_met": self.target_met if self.target else None,
                 "below_target": len(self.missed),
                 "ceiling": result.limits.ceiling,
                 "notes": result.notes,
@@ -211,5 +216,6 @@ class Outcome:
                 "lost": self.lost,
                 "history": [asdict(sweep) for sweep in result.history],
                 "seconds": result.seconds,
+                "seconds_compiling": self.compiled,
             }
         )

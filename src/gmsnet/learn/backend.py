@@ -20,7 +20,8 @@ except ModuleNotFoundError as error:
     if error.name not in ("torch", "torch_geometric"):
         raise  # it is there, but something that it needs is not
     raise MissingExtraError(
-        f'training needs {error.name}, which is not installed: pip install "gmsnet[train]"'
+        f'training needs {error.name}, which is not installed: install the extra "train", in the folder of the sources '
+        'by pip install ".[train]"'
     ) from error
 
 __all__ = ["Data", "GCNConv", "GraphNorm", "LambdaLR", "ReduceLROnPlateau", "gcn_norm", "torch"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -13,6 +14,7 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex import measures as kernels
 from gmsnet.measure.cells import MeasuredCells
 from gmsnet.measure.totals import NOWHERE, Totals, totals_of
+from gmsnet.mesh.display import html_table, text_table
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
@@ -35,7 +37,8 @@ class QualityReport:
     Verdict's aspect ratio, which the paper's tables fit. Both carry the sign of S after neighbours have been wound
     alike; on a surface that is not planar they are unsigned. Of a quad, shape is 2D/(|e₁|² + |e₂|²) of its worst
     corner, D = e₁ × e₂, angles are those at its corners, and aspect is nan. scaled_jacobian: (T,) the least of
-    D/(|e₁||e₂|) over the corners, of a triangle times 2/√3. valid: (T,) int8, the exact sign of S in float64.
+    D/(|e₁||e₂|) over the corners, of a triangle times 2/√3. sign: (T,) int8, the exact sign of S in float64: 1, 0 or
+    −1. valid: (T,) bool, whether it is positive.
 
     ``inverted`` and q̂ are known from the beginning, and so are the totals: means and extremes, None where there are no
     triangles. The columns are made when one of them is first asked for, of the triangles as they were measured.
@@ -45,6 +48,28 @@ class QualityReport:
     totals: Totals | None = field(repr=False)
     cells: MeasuredCells = field(repr=False)
     signs: NDArray[np.int8] | None = field(repr=False)  # None where all are certainly positive
+
+    def __repr__(self) -> str:
+        """A line for each of ``figures``."""
+        return text_table([("QualityReport", ""), *self.figures()])
+
+    def _repr_html_(self) -> str:
+        """For a notebook."""
+        return html_table("QualityReport", [("", ""), *self.figures()])
+
+    def figures(self) -> list[tuple[str, str]]:
+        """(name, value) of the few figures that say the most, of those that there are."""
+        counts = [("cells", f"{len(self.cell):,}"), ("inverted", f"{self.inverted:,}")]
+        if self.totals is None:
+            return counts
+        known = [
+            ("1/q, least", self.totals.shape_min, 4),
+            ("1/q, mean", self.totals.shape_mean, 4),
+            ("min angle, least", self.totals.low_min, 2),
+            ("max angle, greatest", self.totals.high_max, 2),
+            ("q-hat with 1/q", self.qhat, 4),
+        ]
+        return [*counts, *((name, f"{value:.{places}f}") for name, value, places in known if not math.isnan(value))]
 
     @property
     def inverted(self) -> int:
@@ -62,9 +87,14 @@ class QualityReport:
         return float("nan") if self.totals is None else self.totals.qhat_aspect
 
     @cached_property
-    def valid(self) -> NDArray[np.int8]:
-        """(T,) the exact sign of each area."""
+    def sign(self) -> NDArray[np.int8]:
+        """(T,) int8, the exact sign of each area: 1, 0 or −1."""
         return np.ones(len(self.cell), dtype=np.int8) if self.signs is None else self.signs
+
+    @cached_property
+    def valid(self) -> NDArray[np.bool_]:
+        """(T,) bool, whether each area is positive: exact."""
+        return np.ones(len(self.cell), dtype=bool) if self.signs is None else self.signs > 0
 
     @cached_property
     def centre(self) -> Floats:

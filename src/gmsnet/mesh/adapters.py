@@ -1,4 +1,4 @@
-"""Arrays, meshio, meshlane and PyVista objects as a Mesh, and back: the type that came in goes out.
+"""Arrays and other libraries' objects as a Mesh, and back: the type that came in goes out.
 
 Types are told by the names of their modules, so none of the libraries is imported here.
 """
@@ -6,44 +6,47 @@ Types are told by the names of their modules, so none of the libraries is import
 from __future__ import annotations
 
 import copy
-import difflib
 import itertools
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gmsnet.cells.table import CELLS, face_name
 from gmsnet.errors import InputError
-from gmsnet.mesh.arrays import coordinates, plain_array, whole_numbers
+from gmsnet.mesh.array_forms import (
+    Restore,
+    dimension_of,
+    face,
+    from_mapping,
+    from_pair,
+    in_precision_of,
+    indices,
+    members,
+)
+from gmsnet.mesh.arrays import coordinates
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import combined, names_a_region
-from gmsnet.mesh.vtk_types import PIXEL, POLYLINE, POLYVERTEX, STRIP, VTK_KINDS, VTK_ORDERS
-
-Restore = Callable[[NDArray[np.float64]], Any]
+from gmsnet.mesh.triangulations import from_delaunay, from_skfem, from_triangulation
+from gmsnet.mesh.vtk_types import POLYLINE, POLYVERTEX, STRIP, VTK_KINDS, VTK_ORDERS
 
 NOWHERE = np.zeros((), dtype=np.int64)  # the region of cells without any, once for all of them
 NOWHERE.flags.writeable = False
-UNKNOWN = -1  # the dimension of cells of a kind that is not known
 VTK_CHAINS = {POLYVERTEX: ("vertex", 1), POLYLINE: ("line", 2)}  # of any number of nodes, taken as their pieces
-
-# meshio's names of cells, those of higher order ("tetra35") included: their nodes are held.
-FAMILIES = "|".join(kind.name for kind in CELLS.values() if kind.order == 1 and kind.dimension)
-KIND = re.compile(rf"vertex|({FAMILIES})\d*|VTK_LAGRANGE_[A-Z]+")
 
 
 def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
     """A mesh in whatever form it came, and the way back.
 
-    thing: ``(points, cells)`` arrays, with the cells an M×3 array of triangles, a mapping of kind → array or a list of
-    (kind, array) pairs; a Mesh; a ``Mesh`` of meshio or meshlane; an ``UnstructuredGrid`` or ``PolyData`` of PyVista.
+    thing: a Mesh; ``(points, cells)`` arrays or a mapping ``{"points": …, "cells": …, "regions": …, "markers": …}``
+    (see ``mesh_from_arrays``); a ``Mesh`` of meshio or meshlane; an ``UnstructuredGrid`` or ``PolyData`` of PyVista; a
+    ``MeshTri`` or ``MeshQuad`` of scikit-fem; a ``Triangulation`` of Matplotlib; a ``Delaunay`` of SciPy.
     Points in single precision give a Mesh with ``single`` set.
 
     restore(points): points (N×dim, float64) → the type that came in, with these coordinates and all else equal. The
-    thing itself is never changed. Points come back as float64, or as float32 where they were float32.
+    thing itself is never changed. Points come back as float64, or as float32 where they were float32. A ``Delaunay``
+    comes back as (points, simplices): triangles that were smoothed are no Delaunay triangulation of their points.
 
     Raises InputError where the thing is none of these, or its arrays do not describe a mesh.
     """
@@ -54,26 +57,26 @@ def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
         return _from_meshio(thing)
     if names & {("pyvista", "UnstructuredGrid"), ("pyvista", "PolyData")}:
         return _from_pyvista(thing)
-    if isinstance(thing, (tuple, list)) and len(thing) == 2:
-        return _from_arrays(thing)
     libraries = {library for library, _ in names}
+    if "skfem" in libraries:
+        return from_skfem(thing)
+    if ("matplotlib", "Triangulation") in names:
+        return from_triangulation(thing)
+    if ("scipy", "Delaunay") in names:
+        return from_delaunay(thing)
+    if isinstance(thing, Mapping):
+        return from_mapping(thing)
+    if isinstance(thing, (tuple, list)) and len(thing) == 2:
+        return from_pair(thing)
     if "pyvista" in libraries:
         mend = "call its .cast_to_unstructured_grid() first (or .combine(), where it holds several blocks)"
     elif "vtkmodules" in libraries:
         mend = "wrap it with pyvista.wrap() first"
     elif isinstance(thing, str) or hasattr(thing, "__fspath__"):
-        mend = "read the file first, with gmsnet.io.read()"
+        mend = "read the file first, with gmsnet.read()"
     else:
-        mend = "give (points, cells) arrays, or a mesh of gmsnet, meshio, meshlane or PyVista"
+        mend = "give (points, cells) arrays, or a mesh of gmsnet, meshio, meshlane, PyVista, scikit-fem or Matplotlib"
     raise InputError(f"{type(thing).__module__}.{type(thing).__qualname__} is not a mesh that gmsnet knows: {mend}")
-
-
-def _from_arrays(thing: Any) -> tuple[Mesh, Restore]:
-    points, given = thing
-    blocks = [_face(_known(kind), _indices(nodes, kind)) for kind, nodes in _pairs(given)]
-    mesh, back = _mesh(points, blocks), _back(points)
-    same = list if isinstance(thing, list) else tuple
-    return mesh, lambda new: same((back(new), given))
 
 
 def _from_meshio(thing: Any) -> tuple[Mesh, Restore]:
@@ -94,7 +97,7 @@ def _from_meshio(thing: Any) -> tuple[Mesh, Restore]:
     sets = {
         name: np.concatenate(
             [
-                _members(ids, len(block.data), name) + at
+                members(ids, len(block.data), f"set {name!r}") + at
                 for ids, block, at in zip(per_block, thing.cells, start, strict=False)
             ]
             or [np.zeros(0, dtype=np.int64)]
@@ -102,7 +105,9 @@ def _from_meshio(thing: Any) -> tuple[Mesh, Restore]:
         for name, per_block in (thing.cell_sets or {}).items()
         if not name.startswith("gmsh:")  # meshio keeps other things of Gmsh under such names
     }
-    node_sets = {name: _members(ids, len(thing.points), name) for name, ids in (thing.point_sets or {}).items()}
+    node_sets = {
+        name: members(ids, len(thing.points), f"set {name!r}") for name, ids in (thing.point_sets or {}).items()
+    }
     mesh = _mesh(thing.points, blocks, cell_data, thing.point_data, names, sets, node_sets)
     return mesh, _refill(lambda: copy.deepcopy(thing), thing.points)
 
@@ -134,7 +139,7 @@ def _from_pyvista(thing: Any) -> tuple[Mesh, Restore]:
             kind = VTK_KINDS.get(code, f"VTK type {code}")
             if code in VTK_ORDERS:
                 nodes = nodes[:, VTK_ORDERS[code]]
-        blocks.append(_face(kind, nodes))
+        blocks.append(face(kind, nodes))
         source.append(cells)
         start = end
     taken = np.concatenate(source) if source else np.zeros(0, dtype=np.int64)
@@ -161,7 +166,7 @@ def _mesh(
     region_names: dict[tuple[int, int], str] = {}
     if cell_data or cell_sets:
         region = np.zeros(len(region), dtype=np.int64)
-        dimensions = [CELLS[kind].dimension if kind in CELLS else UNKNOWN for kind, _ in blocks]
+        dimensions = [dimension_of(kind) for kind, _ in blocks]
         dimension = np.repeat(dimensions, counts).astype(np.int64)
         physical = cell_data.get("gmsh:physical")
         for dim in np.unique(dimension).tolist():
@@ -195,53 +200,8 @@ def _mesh(
     )
 
 
-def _pairs(cells: Any) -> list[tuple[str, Any]]:
-    """The (kind, nodes) pairs of what a user gives as cells."""
-    if isinstance(cells, Mapping):
-        return list(cells.items())
-    if isinstance(cells, (list, tuple)) and cells:
-        if all(hasattr(block, "type") and hasattr(block, "data") for block in cells):
-            return [(block.type, block.data) for block in cells]
-        if all(isinstance(block, (list, tuple)) and len(block) == 2 and isinstance(block[0], str) for block in cells):
-            return [(kind, nodes) for kind, nodes in cells]
-    nodes = _indices(cells, "cells")
-    if nodes.size == 0:
-        nodes = nodes.reshape(0, 3)
-    if nodes.ndim != 2 or nodes.shape[1] != 3:
-        raise InputError(
-            f"cells must be an M×3 array of the nodes of triangles, got shape {nodes.shape}: "
-            'give other cells by their kind, such as {"triangle": …, "quad": …}'
-        )
-    return [("triangle", nodes)]
-
-
-def _indices(nodes: Any, what: str) -> NDArray[np.int64]:
-    array = plain_array(nodes, what)
-    if array.size and array.dtype.kind not in "iu":
-        raise InputError(
-            f"{what} must be whole numbers, got {array.dtype}: give node indices, such as cells.astype(int)"
-        )
-    return whole_numbers(array, what)
-
-
-def _known(kind: Any) -> str:
-    """The name of a type of cells. Raises InputError where it is none that meshio has either: it is misspelt."""
-    if isinstance(kind, str) and KIND.fullmatch(kind):
-        return kind
-    near = difflib.get_close_matches(str(kind).lower(), CELLS, n=2, cutoff=0.5)
-    hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"known are {', '.join(CELLS)}"
-    raise InputError(f"unknown type of cells {kind!r}; {hint}")
-
-
-def _back(points: Any) -> Callable[[NDArray[np.float64]], NDArray[Any]]:
-    """How new coordinates become the points of the object that came in: in its own precision."""
-    dtype = np.asarray(points).dtype
-    kept = dtype if dtype.kind == "f" and dtype.itemsize == 4 else np.dtype(np.float64)
-    return lambda new: np.array(new, dtype=kept)
-
-
 def _refill(copied: Callable[[], Any], points: Any) -> Restore:
-    back = _back(points)
+    back = in_precision_of(points)
 
     def restore(new: NDArray[np.float64]) -> Any:
         made = copied()
@@ -256,27 +216,7 @@ def _even(kind: str, data: Any) -> Iterator[tuple[str, NDArray[np.int64]]]:
     if kind.startswith("polyhedron"):
         raise InputError("the mesh has polyhedra, which are volumes: gmsnet smooths planar meshes")
     if isinstance(data, np.ndarray):
-        yield _face(kind, _indices(data, f"{kind} cells"))
+        yield face(kind, indices(data, f"{kind} cells"))
         return
     for _, run in itertools.groupby(data, key=len):
-        yield _face(kind, _indices(list(run), f"{kind} cells"))
-
-
-def _face(kind: str, nodes: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
-    """A face by the name that a Mesh has for it."""
-    if kind == "pixel":  # VTK counts its corners row by row
-        return "quad", nodes[:, VTK_ORDERS[PIXEL]]
-    if kind.startswith("polygon") and nodes.ndim == 2:
-        return face_name(nodes.shape[1]), nodes
-    return kind, nodes
-
-
-def _members(ids: Any, count: int, name: str) -> NDArray[np.int64]:
-    """The ids of a named set, which may be a mask."""
-    array = np.zeros(0, dtype=np.int64) if ids is None else np.ravel(plain_array(ids, f"set {name!r}"))
-    if array.dtype.kind == "b" and len(array) == count:
-        return np.flatnonzero(array)
-    members = _indices(array, f"set {name!r}")
-    if members.size and (members.min() < 0 or members.max() >= count):
-        raise InputError(f"set {name!r} names {int(members[np.argmax(np.abs(members))])}, but there are only {count}")
-    return members
+        yield face(kind, indices(list(run), f"{kind} cells"))

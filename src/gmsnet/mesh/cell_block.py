@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gmsnet.cells.table import CELLS, CellKind
 from gmsnet.errors import InputError
 from gmsnet.mesh.arrays import whole_numbers
+from gmsnet.mesh.display import amount
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +45,12 @@ class CellBlock:
             raise InputError(f"{len(nodes)} {self.kind} cells need one region each, got shape {regions.shape}")
         object.__setattr__(self, "nodes", nodes)
         object.__setattr__(self, "regions", regions)
+
+    def __repr__(self) -> str:
+        """One line: of what kind, how many, and the numbers of their regions."""
+        low, high = (self.regions.min(), self.regions.max()) if len(self.regions) else (0, 0)
+        regions = f"region {low}" if low == high else f"regions {low} to {high}"
+        return f"<CellBlock: {amount(len(self.nodes), f'{self.kind} cell')}, {regions}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle, which knows nothing of arrays that are read-only: the block is made, and checked, anew."""

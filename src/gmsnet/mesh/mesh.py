@@ -24,6 +24,7 @@ from gmsnet.mesh.checks import (
     region_names_of,
     rows_of,
 )
+from gmsnet.mesh.display import amount, cells_in_words, html_table, listed
 from gmsnet.mesh.plane import exponent_of
 
 
@@ -100,6 +101,20 @@ class Mesh:
         object.__setattr__(self, "cells", cells)
         for field_name, value in checked.items():
             object.__setattr__(self, field_name, MappingProxyType(value))
+
+    def __repr__(self) -> str:
+        """One line: how many nodes and cells of which kind, and what has a name."""
+        return f"<Mesh: {'; '.join(self._in_words())}>"
+
+    def _repr_html_(self) -> str:
+        """For a notebook: the same, a line each."""
+        nodes, *others = self._in_words()
+        return html_table("Mesh", [[nodes], *([line] for line in others)])
+
+    def _in_words(self) -> list[str]:
+        names = dict.fromkeys([*self.region_names.values(), *self.node_sets])
+        lines = [f"{amount(len(self.points), 'node')} in {self.points.shape[1]}D", *cells_in_words(self.cells)]
+        return [*lines, f"named {listed(names)}"] if names else lines
 
     def __copy__(self) -> Mesh:
         """Itself: nothing can change it."""

@@ -19,7 +19,6 @@ from gmsnet.paper.units import Context, Unit
 from gmsnet.topology.topology import Topology
 
 SHOWN = (OPTIM, NN, GMSNET)
-NN_DEGREES = range(3, 10)  # each with a network of its own
 DEGREES = (*range(3, 13), 20, 50, 100)
 STARS = 10  # random ones of each degree
 PERMUTATIONS = 50  # of each star's ring

@@ -30,7 +30,8 @@ def available(root: Path = Path("/")) -> int | None:
 
 
 def _gigabytes(amount: int) -> str:
-    return f"{amount / 1e9:.3g} GB"
+    gigabytes = amount / 1e9
+    return f"{gigabytes:,.0f} GB" if gigabytes >= 100 else f"{gigabytes:.3g} GB"
 
 
 def _of_system(root: Path) -> int | None:

@@ -52,4 +52,7 @@ def _need_matplotlib() -> None:
     except ModuleNotFoundError as error:
         if error.name != "matplotlib":
             raise
-        raise MissingExtraError('pictures need matplotlib: pip install "gmsnet[view]"') from error
+        raise MissingExtraError(
+            'pictures need matplotlib, which is not installed: install the extra "view", in the folder of the sources '
+            'by pip install ".[view]"'
+        ) from error

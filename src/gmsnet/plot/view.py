@@ -114,7 +114,7 @@ def draw(axes: Axes, view: View, box: NDArray[np.float64] | None = None) -> Scal
     rows = rows[np.argsort(-view.report.shape[rows], kind="stable")]
     polygons = view.points[view.corners[rows]]
     colours = mappable.to_rgba(view.report.shape[rows])
-    colours[view.report.valid[rows] <= 0] = to_rgba(INVERTED)
+    colours[~view.report.valid[rows]] = to_rgba(INVERTED)
     # White edges fade out where cells are specks; slivers are outlined in their own colour, or they would drown in it.
     thickness = _thickness(polygons) / max(span.max(), np.finfo(float).tiny) * POINTS
     white = np.clip((thickness - 2.0) / 4.0, 0.0, 0.9)[:, None]

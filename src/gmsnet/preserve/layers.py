@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.simplex import stretch
 from gmsnet.kernels.topology import connectivity
 from gmsnet.kernels.topology.components import pieces, surroundings
+from gmsnet.mesh.display import plain
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.preserve.survey import FEW, MOST, SEED, Survey
@@ -66,11 +67,11 @@ class Layers:
         if not self:
             return ""
         count, share = int(self.cells.sum()), self.cells.mean()
-        where = "all cells" if share == 1.0 else f"{count:,} cells ({max(100.0 * share, 0.1):.2g} %)"
+        where = "all cells" if share == 1.0 else f"{count:,} cells ({plain(max(100.0 * share, 0.1), 2)} %)"
         damaged = f"; {self.damaged:,} of them are damaged" if self.damaged else ""
         return (
             f"the mesh looks anisotropic on purpose: {where} are stretched alike, "
-            f"by {self.median:.3g} in the median and {self.largest:.3g} at most{damaged}"
+            f"by {plain(self.median)} in the median and {plain(self.largest)} at most{damaged}"
         )
 
 

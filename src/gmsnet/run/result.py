@@ -12,11 +12,21 @@ from numpy.typing import NDArray
 from gmsnet.measure.bounds.bounds import Limits, limits
 from gmsnet.measure.report import QualityReport
 from gmsnet.mesh.adapters import to_mesh
+from gmsnet.mesh.display import amount, html_table, plain, text_table
 from gmsnet.run.sweep import Sweep as Sweep
 from gmsnet.run.untangle_stage import StillInvertedCell
 from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
+
+
+class HeldNodes(dict[str, NDArray[np.int64]]):
+    """Reason → ids of the nodes that are held for it. It shows how many they are."""
+
+    def __repr__(self) -> str:
+        """Reason → count."""
+        counts = (f"{reason!r}: {amount(len(ids), 'node')}" for reason, ids in self.items())
+        return f"{{{', '.join(counts)}}}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +54,34 @@ class SmoothResult:
     unmended: list[StillInvertedCell]
     topology: Topology
     seconds: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "held", HeldNodes(self.held))
+
+    def __repr__(self) -> str:
+        """What was done, the most telling figures before and after, and what there is to know: one screen."""
+        return "\n".join([f"SmoothResult: {self._done}", text_table(self._figures), *self._remarks])
+
+    def _repr_html_(self) -> str:
+        """The same for a notebook."""
+        return html_table(f"SmoothResult: {self._done}", self._figures, self._remarks)
+
+    @property
+    def _done(self) -> str:
+        free = len(self.points) - sum(map(len, self.held.values()))
+        moved = f"{np.count_nonzero(self.moved):,} of {amount(free, 'free node')} moved"
+        return f"{moved}, {amount(self.sweeps, 'sweep')} in {plain(self.seconds)} s, {self.stop_reason}"
+
+    @property
+    def _figures(self) -> list[tuple[str, ...]]:
+        pairs = zip(self.before.figures(), self.after.figures(), strict=True)
+        return [("", "before", "after"), *((*before, after) for before, (_, after) in pairs)]
+
+    @property
+    def _remarks(self) -> list[str]:
+        reasons = ", ".join(f"{reason} {len(ids):,}" for reason, ids in self.held.items())
+        inverted = f"inverted still: {amount(len(self.unmended), 'cell')}, see unmended"
+        return [*([f"held: {reasons}"] if reasons else []), *([inverted] if self.unmended else []), *self.notes]
 
     @cached_property
     def limits(self) -> Limits:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 
 @dataclass(frozen=True)
@@ -22,3 +22,9 @@ class Sweep:
     qhat: float
     min_shape: float
     mean_shape: float
+
+    def __repr__(self) -> str:
+        """As of any record, with four digits."""
+        values = (getattr(self, each.name) for each in fields(self))
+        texts = (f"{value:.4g}" if isinstance(value, float) else repr(value) for value in values)
+        return f"Sweep({', '.join(f'{each.name}={text}' for each, text in zip(fields(self), texts, strict=True))})"

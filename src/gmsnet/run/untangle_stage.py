@@ -64,7 +64,7 @@ def beside(reasons: Reasons, topology: Topology) -> NDArray[np.bool_]:
 
 def still_inverted(after: QualityReport, topology: Topology, reasons: Reasons) -> list[StillInvertedCell]:
     """The cells of zero or negative area that have a reason for it."""
-    rows = np.flatnonzero(after.valid <= 0) if reasons else np.empty(0, dtype=int)
+    rows = np.flatnonzero(~after.valid) if reasons else np.empty(0, dtype=int)
     nodes = map(tuple, np.sort(topology.triangles[rows], axis=1).tolist())
     cells = after.cell[rows].tolist()
     return [StillInvertedCell(cell, reasons[key]) for cell, key in zip(cells, nodes, strict=True) if key in reasons]

@@ -24,7 +24,9 @@ cells whose boundary does not cross itself.)
 
 the apex lies in a disc over the edge. The largest t for which the discs of all held edges of a star have a point in
 common bounds those cells. Discs that meet do so in a centre or in a point shared by two of their circles; t is found by
-bisection, and rounded up by 1e-6.
+bisection, and rounded up by 1e-6. Of a star of more than six held edges, six at a time are looked at, those that stand
+most in the way: still an upper bound, and nearly always the same (gmsnet.measure.bounds.apexes). So the work grows with
+the number of cells, whatever the degrees of the nodes are.
 """
 
 from __future__ import annotations
@@ -35,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.measure.bounds import groups
+from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.topology import Topology, planar_points
 
@@ -63,6 +66,10 @@ class Limits:
     cell: Ints
     held: NDArray[np.bool_]
     points: Floats
+
+    def __repr__(self) -> str:
+        """One line: the ceiling, and how many groups there are."""
+        return f"<Limits: ceiling {self.ceiling:.4f}, {amount(len(self.bound), 'group')} of cells>"
 
     @property
     def ceiling(self) -> float:

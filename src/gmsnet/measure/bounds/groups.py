@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.measure.bounds.apexes import ROOT3, best_apex, meet
+from gmsnet.measure.bounds.apexes import FEW, ROOT3, best_apex, best_apex_of_many, meet, starts
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -61,11 +61,6 @@ class Corners(NamedTuple):
     def taken(self, chosen: Flags | Places) -> Corners:
         """Some of them."""
         return Corners(*(each[chosen] for each in self))
-
-
-def starts(count: Places) -> Places:
-    """(G + 1,) where each of the groups of so many begins."""
-    return np.concatenate([[0], np.cumsum(count, dtype=np.intp)])
 
 
 def spread(first: Places, count: Places) -> Places:
@@ -139,7 +134,8 @@ def rings(points: Floats, around: Corners, free: Flags, below: float) -> Iterato
     """The cells around each free node whose opposite edges are held, if there are two or more; by their number."""
     edges = around.taken(free[around.node] & ~free[around.left] & ~free[around.right])
     nodes, first, count = np.unique(edges.node, return_index=True, return_counts=True)
-    for number in np.unique(count[count > 1]).tolist():
+    yield large_rings(points, edges, count, below)
+    for number in np.unique(count[(count > 1) & (count <= FEW)]).tolist():
         chosen = count == number
         at = first[chosen][:, None] + np.arange(number)
         start, end = points[edges.left[at]], points[edges.right[at]]
@@ -152,6 +148,23 @@ def rings(points: Floats, around: Corners, free: Flags, below: float) -> Iterato
             RING, nodes[chosen][tight], np.zeros(len(tight)), bound, np.full(len(tight), number),
             edges.row[at[tight]].ravel(),
         )  # fmt: skip
+
+
+def large_rings(points: Floats, edges: Corners, count: Places, below: float) -> Groups:
+    """Of ``rings``, those of more than FEW edges. count: (nodes,) of the edges, those of one node in a row."""
+    edges = edges.taken(np.repeat(count > FEW, count))
+    count = count[count > FEW]
+    first = starts(count)
+    begin, end = points[edges.left], points[edges.right]
+    along = end - begin
+    middle = begin - np.repeat(begin[first[:-1]], count, axis=0) + 0.5 * along
+    upright = np.column_stack([-along[:, 1], along[:, 0]])
+    bound = best_apex_of_many(middle, upright, first, below - ABOVE) + ABOVE
+    tight = bound < below
+    return Groups.of(
+        RING, edges.node[first[:-1][tight]], np.zeros(np.count_nonzero(tight)), bound[tight], count[tight],
+        edges.row[np.repeat(tight, count)],
+    )  # fmt: skip
 
 
 def between_held_edges(points: Floats, around: Corners, free: Flags, below: float) -> Groups:

@@ -1,0 +1,65 @@
+"""How counts, figures and small tables read: in messages, at a prompt, in a notebook."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gmsnet.mesh.cell_block import CellBlock
+
+NAMES = 6  # at most of them are shown of a mesh
+
+
+def amount(count: int, what: str) -> str:
+    """A count with its noun, in the plural where it needs one."""
+    return f"{count:,} {what}" if count == 1 else f"{count:,} {what}s"
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """A figure to so many digits, never with an exponent where whole numbers or a few decimals do: 1,260, 0.0123.
+
+    Below 1e-4 and from 1e9 on it has an exponent.
+    """
+    rounded = float(f"{value:.{digits}g}")
+    if rounded == 0.0 or not 1e-4 <= abs(rounded) < 1e9:
+        return f"{rounded:g}"
+    return f"{rounded:,.0f}" if abs(rounded) >= 10 ** (digits - 1) else f"{rounded:.{digits}g}"
+
+
+def cells_in_words(cells: Iterable[CellBlock]) -> list[str]:
+    """How many cells there are of each kind, as "12 quad cells"."""
+    counts: dict[str, int] = {}
+    for block in cells:
+        counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
+    return [amount(count, f"{kind} cell") for kind, count in counts.items()]
+
+
+def listed(names: Iterable[str]) -> str:
+    """The first few of some names, and how many more there are."""
+    every = list(names)
+    more = f" and {len(every) - NAMES:,} more" if len(every) > NAMES else ""
+    return ", ".join(map(repr, every[:NAMES])) + more
+
+
+def text_table(rows: Sequence[Sequence[str]]) -> str:
+    """Rows of texts under each other: the first column to the left, all others to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    sides = [str.ljust, *[str.rjust] * (len(widths) - 1)]
+    return "\n".join(
+        "  ".join(side(cell, width) for cell, width, side in zip(row, widths, sides, strict=True)).rstrip()
+        for row in rows
+    )
+
+
+def html_table(caption: str, rows: Sequence[Sequence[str]], below: Sequence[str] = ()) -> str:
+    """The same for a notebook, with a title, and lines below it. All texts are escaped; the first row is a header."""
+    first, *others = ([html.escape(cell) for cell in row] for row in rows)
+    lines = "".join(f"<tr><th>{row[0]}</th>{''.join(f'<td>{cell}</td>' for cell in row[1:])}</tr>" for row in others)
+    head = "".join(f"<th>{cell}</th>" for cell in first)
+    notes = "".join(f"<div>{html.escape(line)}</div>" for line in below)
+    return (
+        f"<table><caption>{html.escape(caption)}</caption><thead><tr>{head}</tr></thead>"
+        f"<tbody>{lines}</tbody></table>{notes}"
+    )
