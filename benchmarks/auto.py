@@ -14,7 +14,7 @@ SciPy's sparse averaging matrix over the coordinates in the same memory order: 2
 seconds of the thread, so that other programs take none of them, and take turns; medians count. At 10,000 and 100,000
 nodes at most 20 L are allowed, 12 are aimed at.
 
---leave-out: besides, ``auto`` without each of its stages in turn, its other rules as they are.
+--leave-out: besides, ``auto`` without each of its phases in turn, its other rules as they are.
 """
 
 from __future__ import annotations
@@ -34,7 +34,9 @@ import gmsnet
 from gmsnet.measure.report import measure
 from gmsnet.methods import smoother
 from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, Auto
-from gmsnet.run.run import Run, outcome, rank_by
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.outcome import outcome, rank_by
+from gmsnet.run.run import Run, Start
 from gmsnet.topology.topology import Topology, planar_points
 
 LESS_MEAN, BELOW_CEILING = 0.004, 0.005
@@ -68,10 +70,13 @@ class Timed:
 
     def turn(self):
         """One run, and a row of L."""
-        run = Run(self.mesh, self.topology, self.create(), 1, "shape", self.guard)
         moments = []
+        options = SmoothOptions(
+            max_sweeps=self.sweeps, guard=self.guard, callback=lambda sweep: moments.append(time.thread_time())
+        )
+        run = Run(Start.of(self.mesh, self.topology), self.create(), options)
         began = time.thread_time()
-        run.to_the_end(self.sweeps, lambda sweep: moments.append(time.thread_time()))
+        run.to_the_end()
         self.seconds.append(time.thread_time() - began)
         self.history, self.moments = run.history, [*self.moments, [moment - began for moment in moments]]
         self.best = run.best
@@ -98,7 +103,7 @@ def study(mesh, wanted, create, guard, sweeps, repeats):
     """What a method makes of a mesh: figures, which checks it passes, and times."""
     timed = Timed(mesh, create, guard, sweeps)
     for _ in range(repeats + 1):
-        timed.orientation()
+        timed.turn()
     seconds, product = timed.to_the_end()
     until = timed.until(wanted)
     points, _, _ = outcome(mesh, timed.topology, timed.best, measure(mesh, timed.topology), rank_by("shape"))
@@ -148,11 +153,11 @@ def summary(rows, sizes):
     return good
 
 
-def stage_table(rows, without, sizes):
-    """What leaving a stage out does: medians over the meshes of a size, and how many pass."""
+def phase_table(rows, without, sizes):
+    """What leaving a phase out does: medians over the meshes of a size, and how many pass."""
     for nodes in sizes:
         print(f"\n  {nodes:,} nodes{'':24} pass       q̂  min 1/q  mean 1/q    time")
-        for label, found in {"all stages": rows, **{f"without {name}": each for name, each in without.items()}}.items():
+        for label, found in {"all phases": rows, **{f"without {name}": each for name, each in without.items()}}.items():
             here = [row for name, row in found.items() if name.startswith(f"{nodes}/")]
             if not here:
                 continue
@@ -163,7 +168,7 @@ def stage_table(rows, without, sizes):
 
 
 def plan(nodes):
-    """The stages of ``auto`` for a mesh of so many free nodes."""
+    """The phases of ``auto`` for a mesh of so many free nodes."""
     return SMALL_PLAN if nodes <= SMALL else LARGE_PLAN
 
 
@@ -214,12 +219,12 @@ def main():
         raise SystemExit(f"gmsnet.smooth makes another mesh than the run that was timed, of {', '.join(differs)}")
     without = {}
     if options.leave_out:
-        for name in dict.fromkeys(stage.name for nodes in sizes for stage in plan(nodes)):
+        for name in dict.fromkeys(phase.name for nodes in sizes for phase in plan(nodes)):
             without[name] = studies(
-                lambda nodes, name=name: Auto([stage for stage in plan(nodes) if stage.name != name]),
-                [nodes for nodes in sizes if name in [stage.name for stage in plan(nodes)]],
+                lambda nodes, name=name: Auto([phase for phase in plan(nodes) if phase.name != name]),
+                [nodes for nodes in sizes if name in [phase.name for phase in plan(nodes)]],
             )
-        stage_table(rows, without, sizes)
+        phase_table(rows, without, sizes)
     if options.json:
         document = {
             "machine": describe(),

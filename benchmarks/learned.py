@@ -33,8 +33,10 @@ from gmsnet import weights
 from gmsnet.generate.graded import graded_mesh
 from gmsnet.methods import smoother
 from gmsnet.methods.base import Smoother
+from gmsnet.parallel.threads import serial
 from gmsnet.plot.figure import new_figure, png_bytes
-from gmsnet.run.run import Run
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.run import Run, Start
 from gmsnet.topology.topology import Topology, planar_points
 
 KINDS = {"random": gmsnet.random_mesh, "graded": graded_mesh}
@@ -108,14 +110,14 @@ class Mesh:
 
     def course(self, create, sweeps=SWEEPS):
         """(seconds so far, standing) before the first and after each sweep, until the method has settled."""
-        run = Run(self.mesh, self.topology, create(), 1, "shape", "worst")
+        run = Run(Start.of(self.mesh, self.topology), create(), SmoothOptions())
         chosen, seconds = run.smoother, 0.0
         states = [(0.0, run.best_score)]
         for _ in range(sweeps):
             began = time.thread_time()
-            chosen.sweep(run.field, alone, lambda: False)
+            chosen.sweep(run.field, serial, lambda: False)
             seconds += time.thread_time() - began
-            standing = run._score(alone)
+            standing = run._score()
             states.append((seconds, standing))
             if chosen.converged:
                 break
@@ -126,11 +128,6 @@ class Mesh:
         plane = Plane.of(self.mesh)
         end = continuation(plane, starts(plane)["laplacian"], (1, 4))[-1].points
         return {"input": plane.figures(plane.start)["qhat"], "reference": plane.figures(end)["qhat"]}
-
-
-def alone(work, first, last):
-    """A share on one thread."""
-    return [work(first, last)]
 
 
 def stored(path, mesh):

@@ -39,7 +39,8 @@ from gmsnet.kernels.star.guard import LARGEST, STAR, Precision, StarGuard
 from gmsnet.measure.report import measure
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, smoother
-from gmsnet.parallel.threads import Share, workers
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 from gmsnet.topology.topology import Topology, planar_points
 
 RECIPE = " ".join(__doc__[__doc__.index("*Reference*") :].split())
@@ -176,9 +177,9 @@ class Capped(Field):
         super().__init__(points, topology, Precision(), STAR)
         self.cap = cap
 
-    def guard(self, share: Share) -> StarGuard:
+    def guard(self, executor: Executor) -> StarGuard:
         """See Field."""
-        guard = super().guard(share)
+        guard = super().guard(executor)
         return guard._replace(floors=np.minimum(guard.floors, self.cap * LARGEST))
 
 
@@ -189,10 +190,9 @@ def polish(plane: Plane, points: np.ndarray) -> Iterator[np.ndarray]:
     for above in ABOVE_WORST:
         field = Capped(points.copy(), plane.topology, above * worst)
         newton = smoother("optimize", variant="newton", objective="metric")
-        with workers(1, 0) as share:
-            for _ in range(POLISH_SWEEPS):
-                newton.sweep(field, share, lambda: False)
-                yield field.points.copy()
+        for _ in range(POLISH_SWEEPS):
+            newton.sweep(field, serial, lambda: False)
+            yield field.points.copy()
 
 
 def study(nodes: int, seed: int) -> dict[str, object]:

@@ -118,13 +118,13 @@ def sweeps(arrays, threads, rounds, patience):
     for method in METHODS:
         fields, jobs, pools = {}, {}, []
         for count in threads:
-            pools.append(workers(count, len(topology.free) // LANES))
-            share, chosen = pools[-1].__enter__(), smoother(method)
+            pools.append(workers(count))
+            executor, chosen = pools[-1].__enter__().for_blocks(len(topology.free) // LANES), smoother(method)
             field = fields[count] = Field(points.copy(), topology, Precision())
 
-            def sweep(chosen=chosen, share=share, field=field):
+            def sweep(chosen=chosen, executor=executor, field=field):
                 for _ in range(often):
-                    chosen.sweep(field, share, lambda: True)
+                    chosen.sweep(field, executor, lambda: True)
 
             jobs[count] = sweep
         for count, (seconds, of_others) in Samples(jobs).take(rounds, patience).least().items():

@@ -65,12 +65,12 @@ def measure(nodes, threads, repeats, methods, guards):
             continue
         for variant in method.variants or [None]:
             for count, guard in product(threads, guards):
-                share = stack.enter_context(workers(count, len(stars.blocks.filled)))
+                executor = stack.enter_context(workers(count)).for_blocks(len(stars.blocks.filled))
                 chosen = smoother(name, variant=variant)
                 field = Field(points.copy(), topology, Precision(), LEVELS.index(guard))
 
-                def sweep(chosen=chosen, share=share, field=field):
-                    chosen.sweep(field, share, lambda: True)
+                def sweep(chosen=chosen, executor=executor, field=field):
+                    chosen.sweep(field, executor, lambda: True)
 
                 label = f"{name} {variant}" if variant else name
                 jobs[f"{label}, {guard}, {count} thread{'s' * (count > 1)}"] = sweep

@@ -6,7 +6,7 @@
 Three meshes: a random square as it comes, and after some smart Laplacian sweeps, with the quantile of 1/q that so many
 cells reach as the target; and the square as a full run leaves it, with nodes thrown out of place until only so many
 cells reach 0.9 times the least 1/q of that run, the target here. Both runs are calls of ``gmsnet.smooth`` on one
-thread; the smoothing itself is what it spends in ``Run`` or in ``reach_target``, apart from topology, stretched layers,
+thread; the smoothing itself is what it spends in the stage ``sweep``, apart from topology, stretched layers,
 measures and result. A third call has a target that is met everywhere, and shows what those cost. Seconds of the thread;
 all three take turns, medians count. A run with a target should take at most a fifth, smoothing alone.
 """
@@ -17,6 +17,7 @@ import argparse
 import json
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -25,7 +26,7 @@ from machine import describe
 
 import gmsnet
 from gmsnet.generate.disturb import disturb
-from gmsnet.run import api as engine
+from gmsnet.run import stages
 from gmsnet.topology.topology import Topology
 
 TIMES = 5.0
@@ -59,17 +60,7 @@ class Clock:
 
     def __init__(self):
         self.seconds = 0.0
-        reach_target, clock = engine.reach_target, self
-
-        class Run(engine.Run):
-            def __init__(self, *arguments, **options):
-                clock(super().__init__, *arguments, **options)
-
-            def to_the_end(self, *arguments, **options):
-                return clock(super().to_the_end, *arguments, **options)
-
-        engine.Run = Run
-        engine.reach_target = lambda *arguments, **options: clock(reach_target, *arguments, **options)
+        stages.STAGES = tuple(partial(self, stage) if stage is stages.sweep else stage for stage in stages.STAGES)
 
     def __call__(self, work, *arguments, **options):
         began = time.thread_time()

@@ -28,8 +28,10 @@ from gmsnet.kernels.star import stars
 from gmsnet.measure.report import measure
 from gmsnet.methods.optimize import Adam
 from gmsnet.paper.cases import CASES
-from gmsnet.parallel.threads import workers
-from gmsnet.run.run import Run, outcome, rank_by
+from gmsnet.parallel.threads import serial
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.outcome import outcome, rank_by
+from gmsnet.run.run import Run, Start
 from gmsnet.topology.topology import Topology
 
 RATES = (0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.2)
@@ -41,6 +43,7 @@ DECAYS = {
     "0.9^t": 0.9**STEPS,
     "0.8^t": 0.8**STEPS,
 }
+OPTIONS = SmoothOptions(best_by="aspect", guard="valid")
 NONE, MANY = np.zeros(1), 0.05 * (1.0 - np.arange(1000) / 1000)
 
 
@@ -66,10 +69,9 @@ class Subject:
 
     def points(self, objective, sweeps):
         """In memory order, after so many sweeps with the tuned step sizes."""
-        run = Run(self.mesh, self.topology, Adam(objective), 1, "aspect", "valid")
-        with workers(1, 0) as share:
-            for _ in range(sweeps):
-                run.smoother.sweep(run.field, share, lambda: False)
+        run = Run(Start.of(self.mesh, self.topology), Adam(objective), OPTIONS)
+        for _ in range(sweeps):
+            run.smoother.sweep(run.field, serial, lambda: False)
         return run.field.points
 
     def values(self, points, objective, sizes):
@@ -78,7 +80,7 @@ class Subject:
         return out[self.own]
 
     def smoothed(self, objective, sizes, sweeps):
-        run = Run(self.mesh, self.topology, Adam(objective, sizes), 1, "aspect", "valid")
+        run = Run(Start.of(self.mesh, self.topology), Adam(objective, sizes), OPTIONS)
         run.to_the_end(sweeps)
         return outcome(self.mesh, self.topology, run.best, self.before, rank_by("aspect"))[2]
 

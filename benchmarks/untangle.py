@@ -94,7 +94,7 @@ def one(name, mesh, severity, seed, repeats):
     return {
         "mesh": name, "severity": severity, "nodes": len(points), "free": len(topology.free), "before": result.before,
         "after": result.after, "taken": result.taken, "seconds": median(ours), "lbfgs_after": left,
-        "lbfgs_seconds": median(theirs), "stages": [list(stage) for stage in result.stages],
+        "lbfgs_seconds": median(theirs), "stages": [list(step) for step in result.steps],
         "reasons": Counter(row.reason for row in result.unmended),
         "places": [row.place for row in result.unmended[:3]],
     }  # fmt: skip

@@ -10,7 +10,9 @@ import numpy as np
 import gmsnet
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.methods import smoother
-from gmsnet.run.run import Run
+from gmsnet.parallel.threads import workers
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.run import Run, Start
 from gmsnet.topology.topology import Topology
 from peers.peer import Plane
 
@@ -43,9 +45,11 @@ class Smooth:
         topology, guard = Topology.of(mesh), self.options.get("guard", "worst")
         names = {key: self.options[key] for key in ("variant", "objective") if key in self.options}
         seconds = []
-        for _ in range(2):  # what is made when it is first asked for is made in the first
-            run = Run(mesh, topology, smoother(self.method, **names), self.threads, "shape", guard)
-            began = clock()
-            run.to_the_end(effort)
-            seconds.append(clock() - began)
+        options = SmoothOptions(guard=guard)
+        with workers(self.threads) as executor:
+            for _ in range(2):  # what is made when it is first asked for is made in the first
+                run = Run(Start.of(mesh, topology), smoother(self.method, **names), options, executor)
+                began = clock()
+                run.to_the_end(effort)
+                seconds.append(clock() - began)
         return seconds[-1]

@@ -188,7 +188,7 @@ def test_a_format_that_cannot_hold_the_cells_is_found_before_the_smoothing(run, 
     def never(*arguments, **options):
         raise AssertionError("the smoothing began")
 
-    monkeypatch.setattr("gmsnet.run.api.smooth", never)
+    monkeypatch.setattr("gmsnet.run.api.smooth_with", never)
     before = contents(folder)
     check(run("smooth", quads, folder / "out.stl"), folder, before, ["out.stl", "STL"])
 

@@ -161,12 +161,13 @@ def test_it_equals_vtk():
 
 @pytest.mark.parametrize("best_by", ["shape", "aspect"])
 def test_the_sums_of_a_sweep_equal_the_report(best_by):
-    from gmsnet.run.run import Run
+    from gmsnet.run.options import SmoothOptions
+    from gmsnet.run.run import Run, Start
     from gmsnet.topology.topology import Topology
 
     mesh = gmsnet.random_mesh(500, seed=1)
     report = measure(mesh)
-    standing = Run(mesh, Topology.of(mesh), None, 1, best_by, "valid").best_score
+    standing = Run(Start.of(mesh, Topology.of(mesh)), None, SmoothOptions(best_by=best_by)).best_score
     assert standing.inverted == report.inverted == 0
     qhat = report.qhat if best_by == "shape" else report.qhat_aspect
     assert standing.qhat == pytest.approx(qhat, abs=1e-13)

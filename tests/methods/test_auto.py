@@ -1,4 +1,4 @@
-"""The stages of the default method, and what the whole is measured against."""
+"""The phases of the default method, and what the whole is measured against."""
 
 from __future__ import annotations
 
@@ -11,26 +11,27 @@ import pytest
 import gmsnet
 from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, Auto, to_come
 from gmsnet.paper.cases import CASES
-from gmsnet.run.run import Run
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.run import Run, Start
 from gmsnet.topology.topology import Topology
 
 
-def runs(mesh, stages, guard="worst"):
-    run = Run(mesh, Topology.of(mesh), Auto(stages), 1, "shape", guard)
-    run.to_the_end(200)
+def runs(mesh, phases, guard="worst"):
+    run = Run(Start.of(mesh, Topology.of(mesh)), Auto(phases), SmoothOptions(max_sweeps=200, guard=guard))
+    run.to_the_end()
     return run
 
 
 def told(history):
-    """The stages in their order, from the texts that looks at the mesh are told with."""
+    """The phases in their order, from the texts that looks at the mesh are told with."""
     return list(dict.fromkeys(name for sweep in history for name in sweep.stage.split(" + ")))
 
 
-def test_stages_come_in_their_order_and_are_told():
+def test_phases_come_in_their_order_and_are_told():
     mesh = gmsnet.random_mesh(1000, seed=1)
     for plan in (SMALL_PLAN, LARGE_PLAN):
         run = runs(mesh, plan)
-        assert told(run.history) == [stage.name for stage in plan]
+        assert told(run.history) == [phase.name for phase in plan]
         assert [sweep.index for sweep in run.history] == sorted({sweep.index for sweep in run.history})
         assert run.history[-1].index == run.sweeps
 
@@ -38,24 +39,24 @@ def test_stages_come_in_their_order_and_are_told():
 @pytest.mark.parametrize(("nodes", "plan"), [(SMALL - 500, SMALL_PLAN), (SMALL + 500, LARGE_PLAN)])
 def test_the_size_of_the_mesh_says_how_much_is_made_of_it(nodes, plan):
     result = gmsnet.smooth(gmsnet.random_mesh(nodes, seed=1))
-    assert told(result.history) == [stage.name for stage in plan]
+    assert told(result.history) == [phase.name for phase in plan]
 
 
 @pytest.mark.parametrize("plan", [SMALL_PLAN, LARGE_PLAN])
-def test_each_stage_is_worth_something(plan):
-    """Leaving a stage out gives a worse mesh, in q-hat or in the mean, as means over random meshes."""
+def test_each_phase_is_worth_something(plan):
+    """Leaving a phase out gives a worse mesh, in q-hat or in the mean, as means over random meshes."""
     meshes = [gmsnet.random_mesh(1000, seed=seed) for seed in range(3)]
     meshes += [CASES["circle"].mesh(run, 0) for run in range(3)]
 
-    def found(stages):
-        best = [runs(mesh, stages).best_score for mesh in meshes]
+    def found(phases):
+        best = [runs(mesh, phases).best_score for mesh in meshes]
         return np.mean([[each.qhat, each.mean_shape] for each in best], axis=0)
 
     whole = found(plan)
     for left_out in plan:
-        without = found([stage for stage in plan if stage is not left_out])
+        without = found([phase for phase in plan if phase is not left_out])
         assert (without < whole - 1e-4).any(), left_out.name
-    assert whole[0] > found([stage for stage in plan if stage.name != "worst first"])[0] + 0.01
+    assert whole[0] > found([phase for phase in plan if phase.name != "worst first"])[0] + 0.01
 
 
 def test_the_default_is_better_than_every_other_method_in_the_worst_cell():

@@ -30,7 +30,7 @@ class Looks:
             self.blocks.append(len(blocks))
             original(points, triangles, orientation, blocks, *others)
 
-        monkeypatch.setattr(module, "most_ratios", counted)
+        monkeypatch.setattr(module, "ratio_upper_bounds", counted)
 
     def look(self, tally=None):
         found = self.floor.of(self.points, self.topology, Precision(), serial)

@@ -150,16 +150,15 @@ def test_the_areas_are_those_at_the_first_sweep():
     """A run of twenty sweeps in two halves by one smoother is the run in one; a new smoother takes the areas anew."""
     from gmsnet.kernels.star.guard import Precision
     from gmsnet.methods import Field
-    from gmsnet.parallel.threads import workers
+    from gmsnet.parallel.threads import serial
 
     mesh = gmsnet.random_mesh(200, seed=1)
     topology = Topology.of(mesh)
 
     def run(smoothers):
         field = Field(planar_points(mesh)[topology.memory], topology, Precision())
-        with workers(1, len(topology.stars.blocks.filled)) as share:
-            for smoother in smoothers:
-                smoother.sweep(field, share, lambda: True)
+        for smoother in smoothers:
+            smoother.sweep(field, serial, lambda: True)
         return field.points
 
     one = Sized()
@@ -172,7 +171,7 @@ def test_bands_hold_whatever_the_smoother_wants():
     """Areas of kept cells stay within a tenth of those of the start, sweep after sweep; shapes gain all the same."""
     from gmsnet.kernels.star.guard import Precision
     from gmsnet.methods import Field
-    from gmsnet.parallel.threads import workers
+    from gmsnet.parallel.threads import serial
 
     mesh = gmsnet.random_mesh(400, seed=2)
     topology = Topology.of(mesh)
@@ -181,12 +180,11 @@ def test_bands_hold_whatever_the_smoother_wants():
     field = Field(start.copy(), topology, Precision())
     smoother = banded(start, kept)
     cells = kept[topology.near].all(axis=1)
-    with workers(1, len(topology.stars.blocks.filled)) as share:
-        for _ in range(10):
-            tally = smoother.sweep(field, share, lambda: True)
-            ratio = doubles(field.points, topology.near) / doubles(start, topology.near)
-            assert np.abs(ratio[cells] - 1.0).max() <= BAND + 1e-9
-            assert tally[0] > 0
+    for _ in range(10):
+        tally = smoother.sweep(field, serial, lambda: True)
+        ratio = doubles(field.points, topology.near) / doubles(start, topology.near)
+        assert np.abs(ratio[cells] - 1.0).max() <= BAND + 1e-9
+        assert tally[0] > 0
     assert np.abs(ratio[~cells] - 1.0).max() > 1.0
     points = mesh.points.copy()
     points[topology.memory] = field.points

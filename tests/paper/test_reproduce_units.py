@@ -11,7 +11,7 @@ from support import reproduce_work as work
 from gmsnet.errors import InputError
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.store import Result, Store
-from gmsnet.paper.units import Stage, Unit, UnitsDone, carry_out, missing
+from gmsnet.paper.units import Batch, Unit, UnitsDone, carry_out, missing
 
 PLAN = Plan(runs=1, sweeps=1, seed=0, quick=True)
 
@@ -27,18 +27,18 @@ def notes(*texts: str) -> list[Unit]:
     return [Unit(f"note/{text}", work.note, {"text": text}) for text in texts]
 
 
-def do(stages, store, should_stop=lambda: False) -> tuple[bool, list[UnitsDone]]:
+def do(batches, store, should_stop=lambda: False) -> tuple[bool, list[UnitsDone]]:
     records: list[UnitsDone] = []
-    return carry_out(stages, PLAN, store, records.append, should_stop), records
+    return carry_out(batches, PLAN, store, records.append, should_stop), records
 
 
 def test_stages_follow_one_another_and_results_are_kept(store):
-    stages = [
-        Stage("alone", notes("a", "b"), alone=True),
-        Stage("together", notes("c", "d")),
-        Stage("after", [Unit("sum", work.add, {"names": ["note/d", "note/a"]})]),
+    batches = [
+        Batch("alone", notes("a", "b"), alone=True),
+        Batch("together", notes("c", "d")),
+        Batch("after", [Unit("sum", work.add, {"names": ["note/d", "note/a"]})]),
     ]
-    finished, records = do(stages, store)
+    finished, records = do(batches, store)
     assert finished
     assert store.load("sum") == {"text": "da"}
     assert store.load("note/a")["process"] != os.getpid()
@@ -50,10 +50,10 @@ def test_stages_follow_one_another_and_results_are_kept(store):
 
 
 def test_what_is_there_is_not_done_again(store):
-    assert do([Stage("first", notes("a"))], store)[0]
+    assert do([Batch("first", notes("a"))], store)[0]
     kept = (store.folder / "units/note/a.json").read_bytes()
-    both = [Stage("first", notes("a", "b"))]
-    assert [unit.name for stage in missing(both, store) for unit in stage.units] == ["note/b"]
+    both = [Batch("first", notes("a", "b"))]
+    assert [unit.name for batch in missing(both, store) for unit in batch.units] == ["note/b"]
     finished, records = do(both, store)
     assert finished
     assert records[0] == UnitsDone(1, 2, "first")
@@ -62,34 +62,34 @@ def test_what_is_there_is_not_done_again(store):
 
 
 def test_a_stop_gives_up_what_is_in_work_and_keeps_the_rest(store):
-    stages = [Stage("first", notes("a")), Stage("second", [Unit("endless", work.endless), *notes("b")], alone=True)]
-    finished, records = do(stages, store, lambda: store.holds("note/a"))
+    batches = [Batch("first", notes("a")), Batch("second", [Unit("endless", work.endless), *notes("b")], alone=True)]
+    finished, records = do(batches, store, lambda: store.holds("note/a"))
     assert not finished
     assert records[-1].done <= 1
     assert store.holds("note/a")
     assert not store.holds("endless")
     assert not store.holds("note/b")
-    stages = [stages[0], Stage("second", notes("b"))]
-    assert do(stages, store)[0]
+    batches = [batches[0], Batch("second", notes("b"))]
+    assert do(batches, store)[0]
 
 
 def test_an_error_comes_through_and_what_was_done_stays(store):
     with pytest.raises(InputError, match="no triangles"):
-        do([Stage("first", notes("a")), Stage("second", [Unit("fails", work.fail), *notes("b")], alone=True)], store)
+        do([Batch("first", notes("a")), Batch("second", [Unit("fails", work.fail), *notes("b")], alone=True)], store)
     assert store.holds("note/a")
     assert not store.holds("fails")
     assert not store.holds("note/b")
 
 
 def test_a_process_that_is_killed_is_told_plainly(store):
-    with pytest.raises(InputError, match=r"of the stage 'second' ended abruptly .* keeps what is done"):
-        do([Stage("first", notes("a")), Stage("second", [Unit("dies", work.die)])], store)
+    with pytest.raises(InputError, match=r"of the batch 'second' ended abruptly .* keeps what is done"):
+        do([Batch("first", notes("a")), Batch("second", [Unit("dies", work.die)])], store)
     assert store.holds("note/a")
     assert not store.holds("dies")
 
 
 def test_processes_use_one_thread(store):
-    assert do([Stage("first", [Unit("threads", work.threads)])], store)[0]
+    assert do([Batch("first", [Unit("threads", work.threads)])], store)[0]
     assert store.load("threads") == {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
 
@@ -112,7 +112,7 @@ def test_folders_that_cannot_be_used(tmp_path):
 
 
 def test_damaged_results_are_named(store):
-    assert do([Stage("first", notes("a"))], store)[0]
+    assert do([Batch("first", notes("a"))], store)[0]
     path = store.folder / "units/note/a.json"
     path.write_text(path.read_text()[:20])
     with pytest.raises(InputError, match=r"a\.json: cannot be read .* delete it, and it is made anew"):

@@ -14,7 +14,7 @@ from gmsnet.parallel.memory import available, refuse_unless_free
 from gmsnet.preserve import layers
 from gmsnet.preserve.layers import stretched_layers
 from gmsnet.preserve.survey import Survey
-from gmsnet.run import api as engine
+from gmsnet.run import set_up as engine
 from gmsnet.topology import topology
 from gmsnet.topology.topology import Topology, near_points
 

@@ -3,11 +3,12 @@
 import itertools
 import threading
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gmsnet.parallel.threads import FEWEST_BLOCKS, pieces, serial, side_by_side, workers
+from gmsnet.parallel.threads import FEWEST_BLOCKS, Threads, pieces, serial, side_by_side, workers
 
 MANY = 100 * FEWEST_BLOCKS
 
@@ -31,17 +32,18 @@ def test_every_piece_is_worked_on_once_and_results_come_in_their_order(threads):
         seen.add(threading.get_ident())
         return list(range(first, last))
 
-    with workers(threads, MANY) as share:
+    with workers(threads) as executor:
         for _ in range(20):
-            assert list(itertools.chain(*share(work, 5, MANY))) == list(range(5, MANY))
+            assert list(itertools.chain(*executor.map(work, 5, MANY))) == list(range(5, MANY))
     assert len(seen) <= threads
 
 
 def test_little_work_stays_in_its_thread():
-    with workers(2, 100) as share:
-        assert share is serial
-    with workers(1, MANY) as share:
-        assert share is serial
+    with workers(2) as executor:
+        assert executor.for_blocks(100) is serial
+        assert executor.for_blocks(MANY) is executor
+    with workers(1) as executor:
+        assert executor is executor.for_blocks(MANY) is serial
 
 
 @pytest.mark.parametrize("bad", [0, MANY - 1])
@@ -50,25 +52,37 @@ def test_what_goes_wrong_in_a_piece_is_raised(bad):
         if first <= bad < last:
             raise ZeroDivisionError
 
-    with workers(3, MANY) as share, pytest.raises(ZeroDivisionError):
-        share(work, 0, MANY)
+    with workers(3) as executor:
+        with pytest.raises(ZeroDivisionError):
+            executor.map(work, 0, MANY)
+        assert sum(executor.map(lambda first, last: last - first, 0, MANY)) == MANY, "it can be used again"
 
 
-def test_after_an_interrupt_nobody_begins_another_piece():
-    begun = []
+def test_after_an_interrupt_nobody_begins_another_piece_and_those_that_are_begun_have_ended():
+    begun, ended = [], []
 
     def work(first, last):
         begun.append(first)
         if threading.current_thread() is threading.main_thread():
             raise KeyboardInterrupt
         caller_is_through.wait(30)
+        ended.append(first)
 
     caller_is_through = threading.Event()
-    with workers(3, MANY) as share:
+    with workers(3) as executor:
         threading.Timer(0.2, caller_is_through.set).start()
         with pytest.raises(KeyboardInterrupt):
-            share(work, 0, MANY)
+            executor.map(work, 0, MANY)
+        assert len(ended) == len(begun) - 1
     assert len(begun) <= 3 < len(pieces(0, MANY, 3)) - 1
+
+
+@pytest.mark.parametrize("executor", [serial, Threads(3)])
+def test_the_figures_of_one_process_are_those_of_the_whole_mesh(executor):
+    figures = np.array([1.0, -2.5, np.inf])
+    assert executor.minimum(0.1) == 0.1
+    assert executor.minimum(figures) is executor.total(figures) is figures
+    assert executor.after_colour(0, figures) is None
 
 
 @pytest.mark.parametrize("threads", [1, 2])

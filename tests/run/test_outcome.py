@@ -8,7 +8,7 @@ import pytest
 import gmsnet
 from gmsnet.measure.report import measure
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.run.run import outcome, rank_by
+from gmsnet.run.outcome import outcome, rank_by
 from gmsnet.topology.topology import Topology, near_points
 
 BEST = rank_by("shape")

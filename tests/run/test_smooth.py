@@ -12,7 +12,7 @@ import gmsnet
 from gmsnet import CellBlock, InputError, Mesh
 from gmsnet.generate import disturb
 from gmsnet.parallel import threads as workers
-from gmsnet.run import run, stop
+from gmsnet.run import stop
 from gmsnet.topology.topology import Topology
 
 
@@ -91,17 +91,6 @@ def test_an_error_in_the_callback_reaches_the_caller(square):
 
     with pytest.raises(ZeroDivisionError, match="mine"):
         gmsnet.smooth(square, callback=fail)
-
-
-def test_an_interrupt_keeps_the_best_so_far(square):
-    def interrupt(sweep):
-        if sweep.index == 5:
-            raise KeyboardInterrupt
-
-    result = gmsnet.smooth(square, "gmsnet", callback=interrupt)
-    assert result.stop_reason == stop.INTERRUPTED
-    assert result.after.qhat == pytest.approx(max(s.qhat for s in result.history), abs=1e-12)
-    assert result.after.qhat > result.before.qhat
 
 
 def test_nothing_to_move_is_said(square):
@@ -248,22 +237,6 @@ def test_single_precision_next_to_zero(square, size):
     result = gmsnet.smooth(mesh, max_sweeps=3)
     np.testing.assert_array_equal(result.points, np.float64(np.float32(result.points)))
     assert (result.after.valid[result.before.valid > 0] > 0).all()
-
-
-def test_an_interrupt_after_the_sweeps_loses_nothing(square, monkeypatch):
-    calls = []
-    measure = run.measure
-
-    def interrupted(*arguments):
-        calls.append(1)
-        if len(calls) == 1:
-            raise KeyboardInterrupt
-        return measure(*arguments)
-
-    monkeypatch.setattr(run, "measure", interrupted)
-    result = gmsnet.smooth(square, max_sweeps=3)
-    assert result.stop_reason == stop.INTERRUPTED
-    assert result.after.qhat > result.before.qhat
 
 
 def test_the_best_mesh_is_chosen_by_the_metric_that_is_asked_for():

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
+import re
+from dataclasses import FrozenInstanceError, fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import gmsnet
+from gmsnet.cli import smooth as command_line
 from gmsnet.errors import InputError
-from gmsnet.run.options import check_arguments
+from gmsnet.run.options import SmoothOptions
 
-USABLE = {
-    "max_sweeps": 100, "threads": None, "target_quality": None, "seed": 0, "callback": None, "weights": None,
-    "best_by": "shape", "guard": "worst",
-    "target_angle": None, "preserve": "shape", "fix_layers": False, "untangle": True,
-}  # fmt: skip
 NO_WHOLE_NUMBERS = [-1, 1.0, 2.5, "3", True, np.True_, np.array([1, 2]), np.array(3), 1j, float("nan")]
 
 
@@ -32,8 +32,8 @@ NO_WHOLE_NUMBERS = [-1, 1.0, 2.5, "3", True, np.True_, np.array([1, 2]), np.arra
         {"target_quality": np.float32(0.5)},
         {"seed": 2**70},
         {"callback": print},
-        {"weights": "a.safetensors"},
-        {"weights": Path("a.safetensors")},
+        {"method": "gmsnet", "weights": "a.safetensors"},
+        {"method": "gmsnet", "weights": Path("a.safetensors")},
         {"best_by": "aspect"},
         {"guard": "star"},
         {"target_angle": 60},
@@ -42,7 +42,7 @@ NO_WHOLE_NUMBERS = [-1, 1.0, 2.5, "3", True, np.True_, np.array([1, 2]), np.arra
     ],
 )
 def test_usable_options_pass(given):
-    check_arguments(**{**USABLE, **given})
+    SmoothOptions(**given)
 
 
 @pytest.mark.parametrize(
@@ -68,4 +68,51 @@ def test_usable_options_pass(given):
 def test_each_option_is_refused_by_its_name(name, values):
     for value in values:
         with pytest.raises(InputError, match=f"^{name} "):
-            check_arguments(**{**USABLE, name: value})
+            SmoothOptions(**{name: value})
+
+
+def test_of_several_options_the_first_is_named():
+    wrong = {"max_sweeps": -1, "threads": 0, "target_quality": 2, "seed": -1, "callback": 1, "preserve": "x"}
+    for name in list(wrong):
+        with pytest.raises(InputError, match=f"^{name} "):
+            SmoothOptions(**wrong, method="none")
+        del wrong[name]
+    with pytest.raises(InputError, match=r"^unknown method 'none'"):
+        SmoothOptions(method="none")
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"method": "none"}, "unknown method 'none'"),
+        ({"variant": "none"}, "auto has no variants"),
+        ({"method": "laplacian", "variant": "none"}, "unknown variant of laplacian 'none'"),
+        ({"method": "laplacian", "objective": "q"}, "laplacian has no objectives"),
+        ({"method": "laplacian", "weights": "a.safetensors"}, "laplacian has no weights"),
+        ({"method": "laplacian", "preserve": "size"}, "laplacian does not keep the sizes of cells"),
+        ({"preserve": "size", "target_quality": 0.3}, "contradict each other"),
+    ],
+)
+def test_what_a_method_does_not_have_is_refused(given, message):
+    with pytest.raises(InputError, match=message):
+        SmoothOptions(**given)
+
+
+def test_options_cannot_be_changed():
+    with pytest.raises(FrozenInstanceError):
+        SmoothOptions().max_sweeps = -1
+
+
+def test_the_options_are_those_of_smooth_and_of_the_command_line():
+    """With the same defaults, in the same order, and each with a word on what it does."""
+    options = {each.name: each.default for each in fields(SmoothOptions)}
+    public = dict(inspect.signature(gmsnet.smooth).parameters)
+    del public["mesh"], public["fixed"]
+    assert {name: each.default for name, each in public.items()} == options
+    assert list(public) == list(options)
+    told = set(re.findall(r"(\w+)(?=[^.]*?:\s)", gmsnet.smooth.__doc__))
+    assert {"mesh", "fixed", *options} <= told
+    command = inspect.signature(command_line.smooth).parameters
+    assert {name: command[name].default for name in options if name != "callback"} == {
+        name: default for name, default in options.items() if name != "callback"
+    }

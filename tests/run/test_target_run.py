@@ -138,22 +138,6 @@ def test_what_a_target_gains_is_kept_though_the_mean_pays_for_it():
         assert (left < below) == result.moved.any()
 
 
-def test_an_interrupt_between_patches_keeps_what_is_done(monkeypatch):
-    mesh, rounds = gmsnet.random_mesh(600, seed=1), []
-    restricted = Topology.restricted
-
-    def interrupt(self, active):
-        rounds.append(active)
-        if len(rounds) == 2:
-            raise KeyboardInterrupt
-        return restricted(self, active)
-
-    monkeypatch.setattr(Topology, "restricted", interrupt)
-    result = gmsnet.smooth(mesh, target_quality=0.6)
-    assert result.stop_reason == stop.INTERRUPTED
-    assert (result.after.shape < 0.6).sum() < (result.before.shape < 0.6).sum()
-
-
 def test_no_star_gets_worse_for_a_target_at_the_level_star():
     for seed in range(3):
         mesh = gmsnet.random_mesh(400, seed=seed)

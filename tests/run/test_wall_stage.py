@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 import gmsnet
-from gmsnet.preserve.walls import near_walls
+from gmsnet.parallel.threads import serial
+from gmsnet.run import stop
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.set_up import first_state
 from gmsnet.run.wall_stage import improve_near_walls
-from gmsnet.topology.topology import Topology, planar_points
+
+OPTIONS = SmoothOptions()
+
+
+def state_of(mesh):
+    """After sweeps that had nothing to gain."""
+    return replace(first_state(mesh, None, OPTIONS.smoother(), OPTIONS, serial), stop_reason=stop.NO_PROGRESS)
 
 
 def doubles(points, triangles):
@@ -17,11 +29,11 @@ def doubles(points, triangles):
 
 def test_the_airfoil_of_the_real_meshes(real_meshes):
     mesh = gmsnet.read(real_meshes / "mesh_NACA0012_inv.su2")
-    topology = Topology.of(mesh)
-    kept = near_walls(mesh, topology)
-    start = planar_points(mesh)[topology.memory]
-    options = {"threads": 1, "best_by": "shape", "guard": "worst"}
-    best, _, history = improve_near_walls(mesh, topology, kept, start, [], **options)
+    first = state_of(mesh)
+    topology, kept, start = first.topology, first.protection.kept, first.start
+    last = improve_near_walls(first, OPTIONS, serial)
+    best, history = last.points, last.history
+    assert last.released
     assert 1 <= len(history) <= 20
     inside = kept[topology.memory]
     assert (best[~inside] == start[~inside]).all()
@@ -36,19 +48,24 @@ def test_the_airfoil_of_the_real_meshes(real_meshes):
     assert before.min() < 0.56
     assert after.min() > 0.62
     assert after.mean() > before.mean()
-    assert len(improve_near_walls(mesh, topology, kept, start, [], max_sweeps=2, **options)[2]) == 2
-    again, _, more = improve_near_walls(mesh, topology, kept, best, history, **options)
-    assert more[: len(history)] == history
-    assert np.abs((doubles(again, topology.near) / doubles(start, topology.near))[cells] - 1.0).max() <= 0.1
+    assert len(improve_near_walls(first, replace(OPTIONS, max_sweeps=2), serial).history) == 2
+    again = improve_near_walls(last, OPTIONS, serial)
+    assert again.history[: len(history)] == history
+    assert np.abs((doubles(again.points, topology.near) / doubles(start, topology.near))[cells] - 1.0).max() <= 0.1
+
+
+@pytest.mark.parametrize("stop_reason", [stop.CALLBACK, stop.MAX_SWEEPS])
+def test_it_is_left_out_where_the_sweeps_did_not_end_of_themselves(real_meshes, stop_reason):
+    first = replace(state_of(gmsnet.read(real_meshes / "mesh_NACA0012_inv.su2")), stop_reason=stop_reason)
+    assert improve_near_walls(first, OPTIONS, serial) is first
 
 
 def test_nothing_to_move():
-    mesh = gmsnet.random_mesh(100, seed=0)
-    topology = Topology.of(mesh)
-    start = planar_points(mesh)[topology.memory]
-    best, reason, history = improve_near_walls(
-        mesh, topology, near_walls(mesh, topology), start, [], threads=1, best_by="shape", guard="worst"
-    )
-    assert best.tobytes() == start.tobytes()
-    assert reason == "nothing to move"
-    assert history == []
+    first = state_of(gmsnet.random_mesh(100, seed=0))
+    assert first.protection.kept is None
+    assert improve_near_walls(first, OPTIONS, serial) is first
+    nobody = replace(first.protection, kept=np.zeros(len(first.start), dtype=bool))
+    last = improve_near_walls(replace(first, protection=nobody), OPTIONS, serial)
+    assert last.points.tobytes() == first.start.tobytes()
+    assert last.stop_reason == stop.NOTHING_TO_MOVE
+    assert last.history == ()

@@ -91,11 +91,11 @@ def test_guarded_sweeps_do_no_harm(seed, part, sweeps):
     points, topology, precision = prepared(thrown(seed, 150, 2.0, part))
     tangle = UntanglingState(points, topology, precision)
     before = share(points, topology.near, topology.near_orientation)
-    stage = sweeps(tangle)
+    step = sweeps(tangle)
     after = share(tangle.points, topology.near, topology.near_orientation)
     assert (after[before > 0] > 0).all()
     assert after[after <= 0].min(initial=np.inf) >= before.min() - 1e-12
-    assert tangle.left == stage.left == (after <= 0).sum() <= (before <= 0).sum()
+    assert tangle.left == step.left == (after <= 0).sum() <= (before <= 0).sum()
 
 
 def test_what_is_taken_inverts_nothing_and_the_rest_goes_back():
@@ -158,6 +158,6 @@ def test_beside_what_cannot_be_mended_the_rest_is():
 
 def test_stages_say_what_was_left():
     result, _, _, _ = untangled(annulus(10, 50, 60))
-    assert [stage.left for stage in result.stages][-1] == 0
-    assert result.sweeps == sum(stage.sweeps for stage in result.stages)
-    assert all(stage.nodes > 0 for stage in result.stages)
+    assert [step.left for step in result.steps][-1] == 0
+    assert result.sweeps == sum(step.sweeps for step in result.steps)
+    assert all(step.nodes > 0 for step in result.steps)

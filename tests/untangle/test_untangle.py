@@ -77,7 +77,7 @@ def test_held_nodes_stay_positive_cells_stay_and_the_same_comes_out_twice(seed, 
     check(result, points, topology)
     again = untangle(points, topology, precision)
     assert again.points.tobytes() == result.points.tobytes()
-    assert again.stages == result.stages
+    assert again.steps == result.steps
     if single:
         changed = (result.points != points).any(axis=1)
         np.testing.assert_array_equal(result.points[changed], np.float64(np.float32(result.points[changed])))
@@ -91,14 +91,14 @@ def mended(mesh, topology=None):
     assert result.taken == ALL
     assert result.why == ""
     assert result.unmended == ()
-    assert result.stages[-1].left == 0
+    assert result.steps[-1].left == 0
     return result, points, topology
 
 
 def test_a_valid_mesh_is_left_alone():
     result, points, _, _ = untangled(grid(5))
     assert (result.points == points).all()
-    assert (result.before, result.after, result.taken, result.stages, result.unmended) == (0, 0, ALL, (), ())
+    assert (result.before, result.after, result.taken, result.steps, result.unmended) == (0, 0, ALL, (), ())
 
 
 def test_a_node_thrown_out_of_its_star():

@@ -19,6 +19,7 @@ from gmsnet.cli import generate, methods, quality, reproduce, smooth, train
 from gmsnet.cli.signals import Interrupted
 from gmsnet.cli.visible import visible
 from gmsnet.errors import GmsnetError
+from gmsnet.parallel.interrupts import interruptible
 
 DONE, TARGET_NOT_MET, BAD_INPUT = 0, 1, 2
 MANY_OBJECTS = (
@@ -81,8 +82,9 @@ def _run(arguments: Sequence[str] | None) -> int:
         if hasattr(stream, "reconfigure"):  # a name that the terminal cannot show must not end the run
             stream.reconfigure(errors="backslashreplace")
     try:
-        code = app(arguments, prog_name="gmsnet", standalone_mode=False)
-        sys.stdout.flush()
+        with interruptible():
+            code = app(arguments, prog_name="gmsnet", standalone_mode=False)
+            sys.stdout.flush()
     except SystemExit as error:
         if isinstance(error.__context__, BrokenPipeError):  # Typer makes an exit of it
             return _close_pipe()

@@ -37,7 +37,7 @@ class Progress:
     def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, at: TracebackType | None) -> None:
         self._bar.stop()
 
-    def stage(self, text: str) -> None:
+    def begin(self, text: str) -> None:
         """Say what begins now."""
         self._bar.update(self._task, description=visible(text), total=None, score="")
 

@@ -20,7 +20,7 @@ def quality(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
     """Measure the triangles of a mesh: angles, 1/q, 1/q_V, inverted cells, and where the worst ones are."""
-    from gmsnet.cli.target import check_drawable, check_picture, shown
+    from gmsnet.cli.destination import check_drawable, check_picture, shown
 
     if threshold is not None and not -1.0 <= threshold <= 1.0:
         raise InputError(f"--threshold is a value of 1/q and must lie between -1 and 1, got {threshold:g}")

@@ -76,4 +76,4 @@ def _bar(total: int) -> Iterator[Callable[[UnitsDone], None]]:
     )
     with columns.Progress(*shown, console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("starting", total=total)
-        yield lambda units: bar.update(task, description=units.stage, completed=units.done)
+        yield lambda units: bar.update(task, description=units.batch, completed=units.done)

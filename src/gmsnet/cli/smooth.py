@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gmsnet.cli.signals import Deferral, Interrupted
 from gmsnet.cli.visible import visible
 from gmsnet.errors import GmsnetError, InputError
+from gmsnet.parallel.interrupts import interruptible
 
 if TYPE_CHECKING:
-    from gmsnet.cli.target import Target as Output
+    from gmsnet.cli.destination import Destination
     from gmsnet.mesh.mesh import Mesh
+    from gmsnet.run.result import SmoothResult
     from gmsnet.run.sweep import Sweep
 
 
@@ -114,78 +116,75 @@ def smooth(
 
     Ctrl-C stops the smoothing; the best mesh so far is written. A second one ends at once and writes nothing.
     """
-    from gmsnet.cli.target import check_drawable, check_picture, shown, target_of
+    from gmsnet.cli.destination import check_drawable, check_picture, destination_of, shown
 
-    target = target_of(input, output, in_place, output_format)
-    if json and target.aside:
-        raise InputError(f"--json and the output {target.path} both want the standard output: write the mesh elsewhere")
+    destination = destination_of(input, output, in_place, output_format)
+    if json and destination.aside:
+        raise InputError(
+            f"--json and the output {destination.path} both want the standard output: write the mesh elsewhere"
+        )
     if plot is not None:
-        check_picture(plot, input, target)
+        check_picture(plot, input, destination)
 
     # Heavy imports only now, when the command line is known to be in order.
     from gmsnet import io
     from gmsnet.cli.fix import fixed_nodes
     from gmsnet.cli.progress import Progress
     from gmsnet.cli.smooth_report import Outcome
-    from gmsnet.measure.target import Target
-    from gmsnet.run.api import check_mesh, check_options
-    from gmsnet.run.api import smooth as run
+    from gmsnet.run.api import smooth_with
+    from gmsnet.run.options import SmoothOptions
+    from gmsnet.run.set_up import check_mesh
 
-    choice: dict[str, Any] = {"variant": variant, "objective": objective, "weights": weights, "seed": seed}
-    options: dict[str, Any] = {
-        "max_sweeps": max_sweeps, "threads": threads, "target_quality": target_quality, "target_angle": target_angle,
-        "best_by": best_by, "guard": guard, "preserve": preserve, "fix_layers": fix_layers, "untangle": untangle,
-    }  # fmt: skip
-    check_options(method, **choice, **options)  # so that what is wrong is told before a large file is read
+    progress, interruption = Progress(max_sweeps, enabled=not quiet), Deferral()
+
+    def after_sweep(sweep: Sweep) -> None:
+        interruption.begin()  # from now on there is something to lose
+        progress.sweep(sweep)
+        if interruption.caught:
+            raise KeyboardInterrupt
+
+    options = SmoothOptions(  # before the file is read, which may be large
+        method=method, variant=variant, objective=objective, max_sweeps=max_sweeps, threads=threads,
+        target_quality=target_quality, target_angle=target_angle, preserve=preserve, fix_layers=fix_layers,
+        untangle=untangle, guard=guard, seed=seed, callback=after_sweep, weights=weights, best_by=best_by,
+    )  # fmt: skip
     written: str | None = None
     lost: list[str] = []
     try:
-        with Progress(max_sweeps, enabled=not quiet) as progress, Deferral() as interruption:
-
-            def after_sweep(sweep: Sweep) -> None:
-                interruption.begin()  # from now on there is something to lose
-                progress.sweep(sweep)
-                if interruption.caught:
-                    raise KeyboardInterrupt  # which the engine knows as the end of the sweeps
-
-            progress.stage(f"reading {shown(input)}")
+        with interruptible(), progress, interruption:
+            progress.begin(f"reading {shown(input)}")
             mesh = io.read(input, format)
             try:
-                check_mesh(mesh, Target(target_quality, target_angle))
+                check_mesh(mesh, options.target)
             except InputError as error:
                 raise InputError(f"{shown(input)}: {error}") from error
             if plot is not None:
                 check_drawable(mesh, input)
             if in_place and mesh.source is not None:
-                target = replace(target, format=mesh.source.format)
-            fixed = fixed_nodes(mesh, fix or [])
-            _check_conversion(mesh, target)
-            progress.stage("preparing (the first run compiles: some twenty seconds)")
-            result = run(
-                mesh,
-                method,
-                fixed=fixed,
-                callback=after_sweep,
-                **options,
-                **choice,
-            )
+                destination = replace(destination, format=mesh.source.format)
+            fixed = fixed_nodes(mesh, fix) if fix else None
+            _check_conversion(mesh, destination)
+            progress.begin("preparing (the first run compiles: some twenty seconds)")
+            try:
+                result = smooth_with(mesh, options, fixed)
+            except KeyboardInterrupt as interrupted:
+                result = _best_so_far(interrupted)
             interruption.begin()
             if not in_place or result.moved.any():  # else there is nothing to write
-                progress.stage(f"writing {target.path}")
-                lost = io.write(result.mesh, target.path, target.format)
-                written = target.path
+                progress.begin(f"writing {destination.path}")
+                lost = io.write(result.mesh, destination.path, destination.format)
+                written = destination.path
             interruption.end()
             if plot is not None:
-                progress.stage(f"drawing {plot}")
+                progress.begin(f"drawing {plot}")
                 _draw(mesh, result.mesh, plot, written)
 
-        outcome = Outcome(
-            input, written, method, mesh, result, Target(target_quality, target_angle), lost, plot, choice
-        )  # fmt: skip
+        choice = {"variant": variant, "objective": objective, "weights": weights}
+        outcome = Outcome(input, written, method, mesh, result, options.target, lost, plot, choice)
         if json:
             outcome.print_json()
         elif not quiet:
-            outcome.print(aside=target.aside)
+            outcome.print(aside=destination.aside)
     except KeyboardInterrupt:
         if written is None:
             raise
@@ -196,16 +195,24 @@ def smooth(
         raise typer.Exit(1)
 
 
-def _check_conversion(mesh: Mesh, target: Output) -> None:
+def _best_so_far(interrupted: KeyboardInterrupt) -> SmoothResult:
+    """What an interrupted run has made; raises the interruption again where that is nothing."""
+    result: SmoothResult | None = getattr(interrupted, "result", None)
+    if result is None or not (result.history or result.moved.any()):
+        raise interrupted
+    return result
+
+
+def _check_conversion(mesh: Mesh, destination: Destination) -> None:
     """Raise now what writing would raise after the work: the format of the output cannot hold the mesh."""
     from gmsnet.io.files import output_format
 
-    entry = output_format(mesh, target.path, target.format)
+    entry = output_format(mesh, destination.path, destination.format)
     if mesh.source is not None and entry.key != mesh.source.format:
         try:
             entry.load().write(mesh)
         except InputError as error:
-            raise InputError(f"{target.path}: {error}") from error
+            raise InputError(f"{destination.path}: {error}") from error
 
 
 def _draw(before: Mesh, after: Mesh, plot: str, written: str | None) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.cli import output, report
-from gmsnet.cli.target import shown
+from gmsnet.cli.destination import shown
 from gmsnet.measure.target import Target
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.protection import LAYER

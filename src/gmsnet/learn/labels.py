@@ -18,6 +18,7 @@ from gmsnet.learn.data import Stars, joined
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, Smoother, smoother
+from gmsnet.parallel.threads import serial
 from gmsnet.topology.topology import Topology
 
 STATES = (0, 1, 2, 5, 20)  # sweeps before the stars are looked at
@@ -92,4 +93,4 @@ def _sweep(optimiser: Smoother, points: NDArray[np.float64], topology: Topology,
     """Moves the points (in memory order) in place, on one thread."""
     field = Field(points, topology, Precision())
     for _ in range(sweeps):
-        optimiser.sweep(field, lambda work, first, last: [work(first, last)], lambda: False)
+        optimiser.sweep(field, serial, lambda: False)

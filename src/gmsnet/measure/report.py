@@ -14,7 +14,8 @@ from gmsnet.kernels.simplex import measures as kernels
 from gmsnet.measure.cells import MeasuredCells
 from gmsnet.measure.totals import NOWHERE, Totals, totals_of
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.parallel.threads import workers
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 from gmsnet.topology.topology import Topology, near_points
 
 SHAPE, ASPECT = "shape", "aspect"  # with which 1/q meshes on the way are compared: the loss's or Verdict's
@@ -141,7 +142,7 @@ def percentile(values: Floats, percent: int) -> float:
 
 
 def measure(
-    mesh: Mesh, topology: Topology | None = None, near: Floats | None = None, threads: int = 1,
+    mesh: Mesh, topology: Topology | None = None, near: Floats | None = None, executor: Executor = serial,
     totals: Totals | None = None, shapes: NDArray[np.float32] = NOWHERE,
 ) -> QualityReport:  # fmt: skip
     """The measures of a mesh; ``topology`` saves building it again (it must belong to the same connectivity).
@@ -161,7 +162,7 @@ def measure(
         return report
     if totals is None:
         near = near_points(mesh, topology) if near is None else near
-        with workers(threads, -(-len(topology.near) // LANES)) as share:
-            totals = totals_of(near, topology.simplices, share, shapes)
+        executor = executor.for_blocks(-(-len(topology.near) // LANES))
+        totals = totals_of(near, topology.simplices, executor, shapes)
     assert totals is not None
     return QualityReport(cell, totals, cells, cells.signs() if totals.uncertain else None)

@@ -13,7 +13,8 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex import cell_measures as cells
 from gmsnet.kernels.simplex import measures as kernels
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
-from gmsnet.parallel.threads import Share, serial
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 
 Floats = NDArray[np.float64]
 
@@ -42,13 +43,18 @@ class Totals:
     uncertain: int
 
     @classmethod
-    def of(cls, parts: Iterable[Floats], triangles: int) -> Totals:
-        """From what kernels.simplex.measures.summarise says of the parts of a mesh; so many triangles, at least one."""
+    def of(cls, parts: Iterable[Floats], triangles: int, executor: Executor = serial) -> Totals:
+        """From what kernels.simplex.measures.summarise says of the parts of a mesh; so many triangles, at least one.
+
+        executor: forms the figures of the whole mesh.
+        """
         figures = np.array(list(parts))
-        sums = figures[:, : kernels.EXTREME].sum(axis=0)  # exact: see kernels.simplex.measures.grids
-        low, high, shape, aspect = ((sums[: kernels.FINE] + sums[kernels.FINE :]) / triangles).tolist()
-        least, most = figures.min(axis=0).tolist(), figures.max(axis=0).tolist()
-        inverted, uncertain = (int(figures[:, count].sum()) for count in (kernels.INVERTED, kernels.UNCERTAIN))
+        sums = executor.total(figures.sum(axis=0))  # of those before EXTREME: exact, see kernels.simplex.measures.grids
+        means = (sums[: kernels.FINE] + sums[kernels.FINE : kernels.EXTREME]) / triangles
+        low, high, shape, aspect = means.tolist()
+        least = executor.minimum(figures.min(axis=0)).tolist()
+        most = (-executor.minimum(-figures.max(axis=0))).tolist()
+        inverted, uncertain = (int(sums[count]) for count in (kernels.INVERTED, kernels.UNCERTAIN))
         return cls(
             low, least[kernels.EXTREME + kernels.LOW], high, most[kernels.EXTREME + kernels.HIGH],
             shape, least[kernels.EXTREME + kernels.SHAPE], aspect, least[kernels.EXTREME + kernels.ASPECT],
@@ -56,12 +62,16 @@ class Totals:
         )  # fmt: skip
 
     @classmethod
-    def of_cells(cls, parts: Iterable[Floats]) -> Totals:
-        """From what kernels.simplex.cell_measures.summarise_cells says of the parts of a mesh, of one cell or more."""
+    def of_cells(cls, parts: Iterable[Floats], executor: Executor = serial) -> Totals:
+        """From what kernels.simplex.cell_measures.summarise_cells says of the parts of a mesh, of one cell or more.
+
+        executor: forms the figures of the whole mesh.
+        """
         figures = np.array(list(parts))
-        sums = figures[:, [cells.COARSE, cells.FINE]].sum(axis=0)  # exact: see kernels.simplex.measures.grids
-        inverted, uncertain, count = figures[:, [cells.INVERTED, cells.UNCERTAIN, cells.COUNT]].sum(axis=0)
-        mean, least, nan = float(sums.sum() / count), float(figures[:, cells.MINIMUM].min()), math.nan
+        sums = executor.total(figures.sum(axis=0))  # but for MINIMUM: exact, see kernels.simplex.measures.grids
+        inverted, uncertain, count = sums[[cells.INVERTED, cells.UNCERTAIN, cells.COUNT]]
+        least, nan = executor.minimum(float(figures[:, cells.MINIMUM].min())), math.nan
+        mean = float((sums[cells.COARSE] + sums[cells.FINE]) / count)
         return cls(nan, nan, nan, nan, mean, least, nan, nan, int(inverted), int(uncertain))
 
     @classmethod
@@ -91,27 +101,28 @@ class Totals:
 
 
 def totals_of(
-    points: Floats, simplices: Simplices, share: Share = serial, shapes: NDArray[np.float32] = NOWHERE
+    points: Floats, simplices: Simplices, executor: Executor = serial, shapes: NDArray[np.float32] = NOWHERE
 ) -> Totals | None:
     """Means and extremes over the cells of some corner simplices of planar points; None where there are none.
 
-    share: how blocks of LANES simplices are shared out to threads. shapes: (T,), for 1/q of each triangle, if it is
-    wanted and all are triangles.
+    executor: takes blocks of LANES simplices. shapes: (T,), for 1/q of each triangle, if it is wanted and all are
+    triangles.
     """
     rows, blocks = simplices.rows, -(-len(simplices.rows) // LANES)
-    if not len(rows):
+    count = int(executor.total(np.array(len(rows))))
+    if not count:
         return None
-    grids = kernels.grids(len(rows))
+    grids = kernels.grids(count)
     if simplices.shapes is not None:
 
         def part_of_cells(first: int, last: int) -> Floats:
             figures: Floats = cells.summarise_cells(points, simplices, first, last, *grids)
             return figures
 
-        return Totals.of_cells(share(part_of_cells, 0, blocks))
+        return Totals.of_cells(executor.map(part_of_cells, 0, blocks), executor)
 
     def part(first: int, last: int) -> Floats:
         figures: Floats = kernels.summarise(points, rows, simplices.orientation, first, last, *grids, shapes)
         return figures
 
-    return Totals.of(share(part, 0, blocks), len(rows))
+    return Totals.of(executor.map(part, 0, blocks), count, executor)

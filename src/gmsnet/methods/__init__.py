@@ -22,7 +22,7 @@ from gmsnet.methods import (
     sized,
     worst_first,
 )
-from gmsnet.methods.base import Field, Method, Options, Smoother, StarSmoother, Tally
+from gmsnet.methods.base import Field, Method, MethodOptions, Smoother, StarSmoother, Tally
 
 METHODS: dict[str, Method] = {
     method.name: method
@@ -49,21 +49,21 @@ def method_named(name: str) -> Method:
     return METHODS[_chosen("method", name, METHODS)]
 
 
-def smoother(
+def chosen(
     name: str,
     *,
     variant: str | None = None,
     objective: str | None = None,
     weights: str | os.PathLike[str] | None = None,
     seed: int = 0,
-) -> Smoother:
-    """A method of the table, ready for one run.
+) -> tuple[Method, MethodOptions]:
+    """A method of the table and its options, the defaults for those that are not given.
 
     Raises InputError for names that are not in the table, with the nearest ones, and for options that the method does
     not have.
     """
     method = method_named(name)
-    options = Options(
+    options = MethodOptions(
         _option(method, "variant", variant, method.variants),
         _option(method, "objective", objective, method.objectives),
         weights,
@@ -73,6 +73,19 @@ def smoother(
         raise InputError(f"{name} has no weights, so none can be given; those with weights: {_those('weighted')}")
     if weights is not None and variant is not None:
         raise InputError(f"variants of {name} are its own weights: give either a variant or weights, not both")
+    return method, options
+
+
+def smoother(
+    name: str,
+    *,
+    variant: str | None = None,
+    objective: str | None = None,
+    weights: str | os.PathLike[str] | None = None,
+    seed: int = 0,
+) -> Smoother:
+    """A method of the table, ready for one run. Raises InputError as ``chosen``, and for weights that are no use."""
+    method, options = chosen(name, variant=variant, objective=objective, weights=weights, seed=seed)
     return method.create(options)
 
 
@@ -104,4 +117,15 @@ def _chosen(kind: str, name: str, names: Iterable[str]) -> str:
     raise InputError(f"unknown {kind} {name!r}; {hint}choose one of: {', '.join(names)}")
 
 
-__all__ = ["METHODS", "Field", "Method", "Options", "Smoother", "StarSmoother", "Tally", "method_named", "smoother"]
+__all__ = [
+    "METHODS",
+    "Field",
+    "Method",
+    "MethodOptions",
+    "Smoother",
+    "StarSmoother",
+    "Tally",
+    "chosen",
+    "method_named",
+    "smoother",
+]

@@ -1,4 +1,4 @@
-"""The default: each stage does what it is best at for its time, and the next one starts where it no longer pays.
+"""The default: each phase does what it is best at for its time, and the next one starts where it no longer pays.
 
 - Newton sweeps on the barrier Σq. The first takes the mean of the ring where Σq falls by it. They bring the mean of 1/q
   and keep cells from collapsing.
@@ -10,8 +10,8 @@ On meshes of up to SMALL free nodes, where all this takes milliseconds, more is 
 as there is anything to gain, and around the worst cells come sweeps of Newton's method on MetricLoss, for the mean,
 with every cell kept above a floor.
 
-A stage goes on as long as more than its ``gain`` in the mean of 1/q (of a sample of the cells) is to come, if gains go
-on as the last two did. What each stage is worth is measured by ``benchmarks/auto.py``; see docs/auto.md.
+A phase goes on as long as more than its ``gain`` in the mean of 1/q (of a sample of the cells) is to come, if gains go
+on as the last two did. What each phase is worth is measured by ``benchmarks/auto.py``; see docs/auto.md.
 
 With a target (``target_quality``, ``target_angle``) the cells that miss it are smoothed alone (methods/below.py), after
 Newton sweeps on Σq where they are many.
@@ -32,7 +32,7 @@ from gmsnet.methods.base import Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.optimize import Newton
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
-from gmsnet.parallel.threads import Share
+from gmsnet.parallel.executor import Executor
 
 SMALL = 5000  # free nodes
 SAMPLE = 32  # blocks of cells
@@ -40,7 +40,7 @@ ALWAYS = 10**9  # sweeps
 RELAXATION = 1.6  # of the Newton steps
 
 
-class Stage(NamedTuple):
+class Phase(NamedTuple):
     """name: for the record. create: its smoother. sweeps: how many, unless it has settled before.
 
     first: how many for the first time, if others. rounds: how often it is made at most. gain: what must be to come, in
@@ -69,69 +69,69 @@ def worst_first(more: int) -> WorstFirst:
     return WorstFirst(cycles, at_once=len(cycles))
 
 
-NEWTON = Stage("Newton on q", lambda: newton(means=1), 2, first=3, rounds=40, gain=0.006)
-WORST = Stage("worst first", lambda: worst_first(3), 1)
-MEAN = Stage("Newton on q, worst kept", newton, 1, rounds=10, gain=0.002)
+NEWTON = Phase("Newton on q", lambda: newton(means=1), 2, first=3, rounds=40, gain=0.006)
+WORST = Phase("worst first", lambda: worst_first(3), 1)
+MEAN = Phase("Newton on q, worst kept", newton, 1, rounds=10, gain=0.002)
 SHORT = WORST._replace(create=lambda: worst_first(0))
-LONG = Stage("Newton on q, to its end", lambda: newton(1.85, means=1), 4, first=4, rounds=20, gain=0.00005)
-ABOVE = Stage("MetricLoss, above 1/q = 0.4", lambda: Newton("metric", floor=0.4), 1, rounds=8, gain=0.0003)
-POLISH = Stage("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1, rounds=8, gain=0.0003)
+LONG = Phase("Newton on q, to its end", lambda: newton(1.85, means=1), 4, first=4, rounds=20, gain=0.00005)
+ABOVE = Phase("MetricLoss, above 1/q = 0.4", lambda: Newton("metric", floor=0.4), 1, rounds=8, gain=0.0003)
+POLISH = Phase("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1, rounds=8, gain=0.0003)
 
 LARGE_PLAN = (NEWTON._replace(looks=False), WORST._replace(looks=False), MEAN)
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 
 
 class Auto(Smoother):
-    """The stages one after the other. Without any: those for the size of the mesh."""
+    """The phases one after the other. Without any: those for the size of the mesh."""
 
     stops_when_idle = False
 
-    def __init__(self, stages: Sequence[Stage] = ()) -> None:
-        self.stages = stages
+    def __init__(self, phases: Sequence[Phase] = ()) -> None:
+        self.phases = phases
         self.at = -1
 
-    def _enter(self, stage: int, field: Field) -> None:
-        self.at, self.made, self.rounds, self.gained = stage, 0, 0, math.inf
-        if stage == len(self.stages):
+    def _enter(self, phase: int, field: Field) -> None:
+        self.at, self.made, self.rounds, self.gained = phase, 0, 0, math.inf
+        if phase == len(self.phases):
             self.converged = True
             return
-        self.smoother = self.stages[stage].create()
-        if self.stages[stage].rounds > 1 and not self.stages[stage].first:  # what those gain at first does not count
+        self.smoother = self.phases[phase].create()
+        if self.phases[phase].rounds > 1 and not self.phases[phase].first:  # what those gain at first does not count
             self.mean = mean_shape(field)
 
-    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if self.at < 0:
-            self.stages = self.stages or (SMALL_PLAN if len(field.topology.free) <= SMALL else LARGE_PLAN)
+            self.phases = self.phases or (SMALL_PLAN if len(field.topology.free) <= SMALL else LARGE_PLAN)
             self._enter(0, field)
-        stage = self.stages[self.at]
-        tally = self.smoother.sweep(field, share, test)
-        self.stage = stage.name
+        phase = self.phases[self.at]
+        tally = self.smoother.sweep(field, executor, test)
+        self.phase = phase.name
         self.made += 1
         self.looks = False
-        wanted = stage.first if stage.first and not self.rounds else stage.sweeps
+        wanted = phase.first if phase.first and not self.rounds else phase.sweeps
         if self.made == wanted or self.smoother.converged or not tally[MOVED]:
             self._end_round(field)
         return tally
 
     def _end_round(self, field: Field) -> None:
-        """Makes the stage once more where that pays, else goes on to the next one, or settles."""
-        stage = self.stages[self.at]
+        """Makes the phase once more where that pays, else goes on to the next one, or settles."""
+        phase = self.phases[self.at]
         self.rounds += 1
         self.made = 0
         goes_on = False
-        if self.rounds < stage.rounds:
+        if self.rounds < phase.rounds:
             mean = mean_shape(field)
-            if stage.first and self.rounds == 1:
+            if phase.first and self.rounds == 1:
                 goes_on = True
             else:
                 before, self.gained = self.gained, mean - self.mean
-                goes_on = to_come(before, self.gained) > stage.gain
+                goes_on = to_come(before, self.gained) > phase.gain
             self.mean = mean
         target_reached = self.smoother.target_reached
-        self.looks = self.rounds % stage.often == 0 if goes_on else stage.looks or target_reached
+        self.looks = self.rounds % phase.often == 0 if goes_on else phase.looks or target_reached
         if not goes_on:
-            self._enter(len(self.stages) if target_reached else self.at + 1, field)
+            self._enter(len(self.phases) if target_reached else self.at + 1, field)
 
 
 def mean_shape(field: Field) -> float:
@@ -158,12 +158,12 @@ def for_target(target: Target, share: float, *, rings: int) -> Auto:
     come before all.
     """
     plan = WIDE if rings > 1 else NEAR if target.angle is None else GENTLE
-    below = Stage("cells that miss the target", lambda: Below(target, plan, everywhere=False), 1)
-    stages = [NEWTON._replace(looks=False)] if share > MANY or rings > 2 else []
+    below = Phase("cells that miss the target", lambda: Below(target, plan, everywhere=False), 1)
+    phases = [NEWTON._replace(looks=False)] if share > MANY or rings > 2 else []
     if rings > 1:
         wide = below._replace(create=lambda: Below(target, plan, everywhere=True), looks=False)
-        stages += [wide, WORST._replace(looks=False)]
-    return Auto([*stages, below])
+        phases += [wide, WORST._replace(looks=False)]
+    return Auto([*phases, below])
 
 
 METHOD = Method(

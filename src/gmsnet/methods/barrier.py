@@ -23,7 +23,7 @@ from gmsnet.kernels.methods.barrier_star import Power
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Field, Method, StarSmoother, Tally
-from gmsnet.parallel.threads import Share
+from gmsnet.parallel.executor import Executor
 
 POWERS = {"q2": 2, "q": 1, "q4": 4}
 RELAXATION, RELAXED = 1.6, 8  # ω, and for how many sweeps
@@ -52,9 +52,9 @@ class Barrier(StarSmoother):
         stretch = STRETCH if self.sweeps < self.means else 0.0
         kernels.sweep(points, blocks, first, last, guard, self.power, relaxation, stretch, tally)
 
-    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
-        tally = super().sweep(field, share, test)
+        tally = super().sweep(field, executor, test)
         self.sweeps += 1
         return tally
 

@@ -24,7 +24,8 @@ from gmsnet.kernels.star.guard import (
     star_floors,
 )
 from gmsnet.methods.floor import Floor
-from gmsnet.parallel.threads import Share, serial
+from gmsnet.parallel.executor import Executor
+from gmsnet.topology.stars import Stars
 from gmsnet.topology.topology import Topology
 
 Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.star.stars)
@@ -41,10 +42,10 @@ class Field:
     floor: Floor = field(default_factory=Floor)
     constraint: Constraint | None = None
 
-    def guard(self, share: Share) -> Guard:
+    def guard(self, executor: Executor) -> Guard:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
         if self.level == WORST:
-            floor = self.floor.of(self.points, self.topology, self.precision, share)
+            floor = self.floor.of(self.points, self.topology, self.precision, executor)
             return MeshGuard(*self.precision, floor, self.constraint)
         guard = plain_guard(self.precision, self.constraint)
         if self.level == STAR:
@@ -60,21 +61,22 @@ class Smoother(ABC):
 
     settled: it has its own rule when to stop, and that has come true. reached: so has the target that it was made for.
     looks: the mesh is worth measuring after the last sweep. stops_when_idle: a sweep that moved nothing is the last.
-    stage: what of the method the last sweep was, "" for methods of one stage.
+    phase: what of the method the last sweep was, "" for methods of one phase.
     """
 
     converged = False
     target_reached = False
     looks = True
     stops_when_idle = True
-    stage = ""
+    phase = ""
 
     @abstractmethod
-    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """Visits the mesh once: about as many shifts as there are free nodes. Returns what happened to them.
 
-        share: runs kernels on ranges, on threads where that pays. test: measures the mesh as it stands, keeps it if it
-        is the best so far, and tells whether it is; for methods that look more often than after each sweep.
+        executor: runs kernels on ranges, on threads where that pays, and is told where a colour ends. test: measures
+        the mesh as it stands, keeps it if it is the best so far, and tells whether it is; for methods that look more
+        often than after each sweep.
         """
 
 
@@ -87,27 +89,35 @@ class StarSmoother(Smoother):
     ) -> None:
         """Visits the stars of the blocks first…last, all of one colour, once; without the GIL. Adds to the tally."""
 
-    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
-        stars, guard = field.topology.stars, field.guard(share)
+        stars, guard = field.topology.stars, field.guard(executor)
 
         def visit(first: int, last: int) -> Tally:
             counts = np.zeros(3, dtype=np.int64)
             self.visit(field.points, stars.blocks, first, last, guard, counts)
             return counts
 
-        if share is serial:  # colour after colour, too: in that order the blocks stand
-            tally = visit(0, int(stars.first[-1]))
-        else:
-            tally = np.zeros(3, dtype=np.int64)
-            for colour in range(stars.colours):
-                tally += sum(share(visit, int(stars.first[colour]), int(stars.first[colour + 1])))
+        tally = by_colour(executor, visit, stars, field.points)
         field.floor.swept(tally)
         return tally
 
 
+def by_colour(
+    executor: Executor, visit: Callable[[int, int], Tally], stars: Stars, points: NDArray[np.float64]
+) -> Tally:
+    """Visits the blocks of all stars, colour after colour, and adds up what happened to their shifts."""
+    if executor.sequential:  # colour after colour, too: in that order the blocks stand
+        return sum(executor.map(visit, 0, int(stars.first[-1])), np.zeros(3, dtype=np.int64))
+    tally = np.zeros(3, dtype=np.int64)
+    for colour in range(stars.colours):
+        tally += sum(executor.map(visit, int(stars.first[colour]), int(stars.first[colour + 1])))
+        executor.after_colour(colour, points)
+    return tally
+
+
 @dataclass(frozen=True)
-class Options:
+class MethodOptions:
     """What a user may tell a method.
 
     variant, objective: one of those that the method has, or "" where it has none. weights: a safetensors file instead
@@ -130,7 +140,7 @@ class Method:
     name: str
     summary: str
     source: str
-    create: Callable[[Options], Smoother]
+    create: Callable[[MethodOptions], Smoother]
     variants: tuple[str, ...] = ()
     objectives: tuple[str, ...] = ()
     weighted: bool = False

@@ -18,7 +18,7 @@ from gmsnet.kernels.methods import below as kernels
 from gmsnet.kernels.methods import ranking
 from gmsnet.measure.target import Target
 from gmsnet.methods.base import Field, Smoother, Tally
-from gmsnet.parallel.threads import Share
+from gmsnet.parallel.executor import Executor
 
 MANY = 0.25  # of the cells: where more miss the target, most of them cannot be had, and others would be lost for them
 SMALL = 1000  # cells: so few cost nothing
@@ -45,7 +45,7 @@ class Below(Smoother):
         self.limits = target.limits
         self.converged = self.target_reached = False
 
-    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother. The visits depend on each other, so that they are made on one thread."""
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
         simplices = topology.changeable
@@ -66,7 +66,7 @@ class Below(Smoother):
             seen = np.zeros(len(free), dtype=np.bool_)
             nodes = ranking.free_nodes(simplices.rows, rows, shape, np.inf, free, topology.memory, seen)
         left = kernels.rounds(
-            field.points, nodes, topology.links, free, topology.memory, field.guard(share), self.plan,
+            field.points, nodes, topology.links, free, topology.memory, field.guard(executor), self.plan,
             MOST * len(topology.free), self.least, self.limits, self.everywhere, tally,
         )  # fmt: skip
         self.target_reached = not len(left)

@@ -12,7 +12,7 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.star.block import DROPPED, TRUNCATED
 from gmsnet.kernels.star.guard import Precision, ratio_upper_bounds
-from gmsnet.parallel.threads import Share
+from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
 
 
@@ -47,36 +47,37 @@ class Floor:
         """Takes note of what happened to the shifts of a whole sweep."""
         self.unhindered += not (tally[TRUNCATED] or tally[DROPPED])
 
-    def of(self, points: NDArray[np.float64], topology: Topology, precision: Precision, share: Share) -> float:
+    def of(self, points: NDArray[np.float64], topology: Topology, precision: Precision, executor: Executor) -> float:
         """An upper bound of the minimum D/L of the triangles with a free node, as the points are now."""
         simplices = topology.changeable
         blocks = self.blocks
         if blocks is None or self.unhindered < self.looks >= self.enough:
             count, watched = -(-len(simplices.rows) // LANES), blocks
             blocks = np.arange(count, dtype=np.int32)
-            least = _least(points, simplices, blocks, precision, share)
+            least = _least(points, simplices, blocks, precision, executor)
             if watched is not None:
                 there = least[watched].min(initial=math.inf) == least.min(initial=math.inf)
                 self.enough = min(2 * self.enough, self.MOST_LOOKS) if there else self.LOOKS
             worst = max(self.FEWEST, count // self.SHARE)
             self._watch(blocks if worst >= count else np.sort(np.argpartition(least, worst)[:worst]).astype(np.int32))
         else:
-            least = _least(points, simplices, blocks, precision, share)
+            least = _least(points, simplices, blocks, precision, executor)
         self.looks += 1
-        return float(least.min(initial=math.inf))
+        return executor.minimum(float(least.min(initial=math.inf)))
 
     def _watch(self, blocks: NDArray[np.int32]) -> None:
         self.blocks, self.looks, self.unhindered = blocks, 0, 0
 
 
 def _least(
-    points: NDArray[np.float64], simplices: Simplices, blocks: NDArray[np.int32], precision: Precision, share: Share
-) -> NDArray[np.float64]:
+    points: NDArray[np.float64], simplices: Simplices, blocks: NDArray[np.int32], precision: Precision,
+    executor: Executor,
+) -> NDArray[np.float64]:  # fmt: skip
     """An upper bound of the minimum D/L in each of these blocks of simplices."""
     least = np.empty(len(blocks))
 
     def look(first: int, last: int) -> None:
         ratio_upper_bounds(points, simplices, blocks, precision.unit, precision.grain, first, last, least)
 
-    share(look, 0, len(blocks))
+    executor.map(look, 0, len(blocks))
     return least

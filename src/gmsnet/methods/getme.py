@@ -24,8 +24,8 @@ from gmsnet.kernels.methods import getme as kernels
 from gmsnet.kernels.methods import getme_simultaneous
 from gmsnet.kernels.methods.getme import Elements, Queue, Transformation
 from gmsnet.kernels.star.block import MOVED
-from gmsnet.methods.base import Field, Method, Options, Smoother, Tally
-from gmsnet.parallel.threads import Share
+from gmsnet.methods.base import Field, Method, MethodOptions, Smoother, Tally, by_colour
+from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
 
 PERIOD = 100  # steps between tests
@@ -54,7 +54,7 @@ class SequentialGetme(Smoother):
         self.without_gain = 0
         self.state: tuple[Elements, Queue] | None = None
 
-    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother. The steps depend on each other, so that they are made on one thread."""
         if self.state is None:
             elements = elements_of(field.topology)
@@ -64,7 +64,7 @@ class SequentialGetme(Smoother):
         period = max(PERIOD, nodes // PERIODS)
         left = max(1, round(nodes / period))
         while not self.converged and (left > 0 or tally[MOVED] == 0):
-            kernels.steps(field.points, elements, queue, self.transformation, field.guard(share), period, tally)
+            kernels.steps(field.points, elements, queue, self.transformation, field.guard(executor), period, tally)
             self.without_gain = 0 if test() else self.without_gain + 1
             self.converged = self.without_gain == PATIENCE
             left -= 1
@@ -77,9 +77,9 @@ class SimultaneousGetme(Smoother):
     def __init__(self, transformation: Transformation) -> None:
         self.transformation = transformation
 
-    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
-        stars, guard, tally = field.topology.stars, field.guard(share), np.zeros(3, dtype=np.int64)
+        stars, guard = field.topology.stars, field.guard(executor)
         points, blocks = field.points, stars.blocks
         shifts = np.empty((len(blocks.filled), 2 * LANES))
 
@@ -91,10 +91,8 @@ class SimultaneousGetme(Smoother):
             getme_simultaneous.carry_out(points, blocks, first, last, guard, shifts, counts)
             return counts
 
-        share(plan, 0, len(shifts))
-        for colour in range(stars.colours):
-            tally += sum(share(carry_out, int(stars.first[colour]), int(stars.first[colour + 1])))
-        return tally
+        executor.map(plan, 0, len(shifts))
+        return by_colour(executor, carry_out, stars, points)
 
 
 def elements_of(topology: Topology) -> Elements:
@@ -126,7 +124,7 @@ def queue_of(points: NDArray[np.float64], elements: Elements) -> Queue:
     return queue
 
 
-def create(options: Options) -> Smoother:
+def create(options: MethodOptions) -> Smoother:
     """The variant that the options name."""
     engine = SequentialGetme if options.variant.startswith("sequential") else SimultaneousGetme
     return engine(TRANSFORMATIONS[options.variant])

@@ -20,7 +20,7 @@ from gmsnet.kernels.methods import adam, newton
 from gmsnet.kernels.simplex import objectives
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import LARGEST, Guard
-from gmsnet.methods.base import Method, Options, StarSmoother, Tally
+from gmsnet.methods.base import Method, MethodOptions, StarSmoother, Tally
 
 
 class Adam(StarSmoother):
@@ -63,7 +63,7 @@ def step_sizes() -> NDArray[np.float64]:
     return adam.STEP_SIZE / np.sqrt(np.arange(1, adam.STEPS + 1))
 
 
-def create(options: Options) -> StarSmoother:
+def create(options: MethodOptions) -> StarSmoother:
     """The variant with the objective."""
     return Newton(options.objective) if options.variant == "newton" else Adam(options.objective)
 

@@ -15,7 +15,7 @@ from gmsnet.kernels.methods.bands import Bands, no_bands
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Field, Method, StarSmoother, Tally
-from gmsnet.parallel.threads import Share
+from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
 
 WEIGHT = 4.0
@@ -30,14 +30,14 @@ class Sized(StarSmoother):
         self.topology: Topology | None = None
         self.areas = np.empty(0)
 
-    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if field.topology is not self.topology:
             self.topology = field.topology
             blocks = field.topology.stars.blocks
             self.areas = np.empty(len(blocks.rings))
             kernels.targets(field.points, field.topology.near, blocks, self.areas)
-        return super().sweep(field, share, test)
+        return super().sweep(field, executor, test)
 
     def visit(
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally

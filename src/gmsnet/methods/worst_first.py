@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import ranking
 from gmsnet.kernels.methods import worst_first_cycles as kernels
-from gmsnet.methods.base import Field, Method, Options, Smoother, Tally
-from gmsnet.parallel.threads import Share
+from gmsnet.methods.base import Field, Method, MethodOptions, Smoother, Tally
+from gmsnet.parallel.executor import Executor
 
 
 class Cycle(NamedTuple):
@@ -58,12 +58,12 @@ class WorstFirst(Smoother):
         self.cells: NDArray[np.int32] | None = None
         self.next = 0
 
-    def sweep(self, field: Field, share: Share, test: Callable[[], bool]) -> Tally:
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother. The visits depend on each other, so that they are made on one thread."""
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
         simplices = topology.changeable
         if self.cells is None or self.next >= len(self.cycles):
-            self.cells = candidates(field, share)
+            self.cells = candidates(field, executor)
         late = self.next >= len(self.cycles)
         chosen = LAST if late else self.cycles[self.next : self.next + self.at_once]
         plan = [
@@ -71,14 +71,14 @@ class WorstFirst(Smoother):
         ]
         before, after = kernels.cycles(
             field.points, simplices, self.cells, topology.near_free, topology.memory, topology.links,
-            field.guard(share), np.array(plan), tally,
+            field.guard(executor), np.array(plan), tally,
         )  # fmt: skip
         self.next += len(chosen)
         self.converged = late and after < before + GAIN
         return tally
 
 
-def candidates(field: Field, share: Share) -> NDArray[np.int32]:
+def candidates(field: Field, executor: Executor) -> NDArray[np.int32]:
     """The worst cells, by their place among those that can change: at least the share CANDIDATES of them.
 
     The floor of the guard is told of the worst of these.
@@ -89,14 +89,14 @@ def candidates(field: Field, share: Share) -> NDArray[np.int32]:
     def look(first: int, last: int) -> None:
         ranking.shapes(field.points, simplices, first, last, shape)
 
-    share(look, 0, -(-len(shape) // LANES))
+    executor.map(look, 0, -(-len(shape) // LANES))
     wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * len(shape)))
     cells: NDArray[np.int32] = ranking.worst(shape, wanted)
     field.floor.watch(cells, shape[cells])
     return cells
 
 
-def create(options: Options) -> WorstFirst:
+def create(options: MethodOptions) -> WorstFirst:
     """There is nothing to choose."""
     return WorstFirst()
 

@@ -12,7 +12,8 @@ from gmsnet.paper.contenders import Contender, papers
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.store import Result
 from gmsnet.paper.units import Context, Unit
-from gmsnet.run.run import Run
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.run import Run, Start
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.topology import Topology
 
@@ -36,17 +37,19 @@ def record(context: Context, case: str) -> Result:
     topology = Topology.of(mesh)
 
     def run_of(contender: Contender, sweeps: int) -> dict[str, Any]:
-        run = Run(mesh, topology, contender.smoother(), 1, ASPECT, "valid")
-        start = run.best_score
-        seconds, qhat, mean_shape = [0.0], [start.qhat], [start.mean_shape]
-        began = time.process_time()
+        seconds, qhat, mean_shape = [0.0], list[float](), list[float]()
 
         def take_down(sweep: Sweep) -> None:
             seconds.append(time.process_time() - began)
             qhat.append(sweep.qhat)
             mean_shape.append(sweep.mean_shape)
 
-        run.to_the_end(sweeps, take_down)
+        options = SmoothOptions(max_sweeps=sweeps, callback=take_down, best_by=ASPECT, guard="valid")
+        run = Run(Start.of(mesh, topology), contender.smoother(), options)
+        qhat.append(run.best_score.qhat)
+        mean_shape.append(run.best_score.mean_shape)
+        began = time.process_time()
+        run.to_the_end()
         return {"seconds": seconds, "qhat": qhat, "mean_shape": mean_shape}
 
     records = {}

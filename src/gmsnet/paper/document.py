@@ -29,7 +29,7 @@ def collect(plan: Plan, store: Store, shown: Sequence[str]) -> dict[str, Any]:
         "machine": machine(),
         "versions": {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}},
         "seconds": {
-            stage.title: sum(store.seconds(unit.name) for unit in stage.units) for stage in parts.stages(plan, shown)
+            batch.title: sum(store.seconds(unit.name) for unit in batch.units) for batch in parts.batches(plan, shown)
         },
     }
     if "table1" in shown:

@@ -8,7 +8,7 @@ from gmsnet.paper import convergence, figures, properties, qualities, table3, ti
 from gmsnet.paper.contenders import beyond, papers
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.store import Store
-from gmsnet.paper.units import Stage, Unit, missing
+from gmsnet.paper.units import Batch, Unit, missing
 
 PARTS = ("table1", "table2", "table3", "figures")
 TIMED_PLAIN, TIMED, COURSES = "timing in plain Python", "timing compiled", "convergence"
@@ -26,10 +26,10 @@ NEEDS = {
     "table3": (TRAINING, THIRD),
     "figures": (COURSES, TRAINING, DRAWING),
 }
-SIDE_BY_SIDE = (TRAINING, PROPERTIES, QUALITY)  # none needs the result of another: one stage, long units first
+SIDE_BY_SIDE = (TRAINING, PROPERTIES, QUALITY)  # none needs the result of another: one batch, long units first
 
 
-def stages(plan: Plan, parts: Sequence[str]) -> list[Stage]:
+def batches(plan: Plan, parts: Sequence[str]) -> list[Batch]:
     """All that these parts need, timings first: they want the machine for themselves."""
     needed = {name for part in parts for name in NEEDS[part]}
     losses = ("cosine", "metric") if "figures" not in parts else tuple(trainings.TITLES)
@@ -43,13 +43,13 @@ def stages(plan: Plan, parts: Sequence[str]) -> list[Stage]:
         THIRD: table3.units(plan),
         DRAWING: figures.units(),
     }
-    made = [Stage(name, units[name], alone=True) for name in (TIMED_PLAIN, TIMED, COURSES) if name in needed]
+    made = [Batch(name, units[name], alone=True) for name in (TIMED_PLAIN, TIMED, COURSES) if name in needed]
     together: list[Unit] = [unit for name in SIDE_BY_SIDE if name in needed for unit in units[name]]
     if together:
-        made.append(Stage(" and ".join(name for name in SIDE_BY_SIDE if name in needed), together))
-    return made + [Stage(name, units[name]) for name in (THIRD, DRAWING) if name in needed]
+        made.append(Batch(" and ".join(name for name in SIDE_BY_SIDE if name in needed), together))
+    return made + [Batch(name, units[name]) for name in (THIRD, DRAWING) if name in needed]
 
 
 def complete(plan: Plan, store: Store) -> list[str]:
     """The parts of which everything is there."""
-    return [part for part in PARTS if not missing(stages(plan, [part]), store)]
+    return [part for part in PARTS if not missing(batches(plan, [part]), store)]

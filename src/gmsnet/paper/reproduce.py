@@ -46,8 +46,8 @@ def prepare(what: str, plan: Plan, folder: Path) -> Work:
     plot.check_target(f"{DOCUMENT}.png")
     store = Store(folder)
     store.open(plan.fingerprint())
-    stages = parts.stages(plan, parts.PARTS if what == "all" else (what,))
-    total, left = (sum(len(stage.units) for stage in those) for those in (stages, missing(stages, store)))
+    batches = parts.batches(plan, parts.PARTS if what == "all" else (what,))
+    total, left = (sum(len(batch.units) for batch in those) for those in (batches, missing(batches, store)))
     return Work(what, plan, store, total - left, total)
 
 
@@ -58,7 +58,7 @@ def reproduce(
 
     None if it was stopped; what is done is kept, and the same call goes on from there. See ``units.carry_out``.
     """
-    if not carry_out(parts.stages(work.plan, work.wanted), work.plan, work.store, on_unit, should_stop):
+    if not carry_out(parts.batches(work.plan, work.wanted), work.plan, work.store, on_unit, should_stop):
         return None
     document = collect(work.plan, work.store, parts.complete(work.plan, work.store))
     pictures = {each["file"]: (work.store.folder / each["file"]).read_bytes() for each in document.get("figures", [])}

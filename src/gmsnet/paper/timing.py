@@ -23,8 +23,9 @@ from gmsnet.paper.plain_getme import PlainGetme
 from gmsnet.paper.plan import Plan
 from gmsnet.paper.store import Result, Store
 from gmsnet.paper.units import Context, Unit
-from gmsnet.parallel.threads import workers
-from gmsnet.run.run import Run
+from gmsnet.parallel.threads import serial
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.run import Run, Start
 from gmsnet.topology.topology import Topology
 
 MOST_TESTS = 1000  # of a sweep
@@ -112,14 +113,13 @@ def time_compiled(context: Context, case: str) -> Result:
 def _sweeps(contender: Contender, mesh: Mesh, topology: Topology, count: int) -> list[float]:
     """Seconds per node of each of the first sweeps; an element method may visit nodes more than once in a sweep."""
     method = contender.smoother()
-    field = Run(mesh, topology, method, 1, ASPECT, "valid").field
+    field = Run(Start.of(mesh, topology), method, SmoothOptions(best_by=ASPECT, guard="valid")).field
     taken = []
-    with workers(1, 0) as share:
-        for _ in range(count):
-            gains = count_down(MOST_TESTS)
-            began = time.process_time()
-            moved, _, dropped = method.sweep(field, share, gains).tolist()
-            taken.append((time.process_time() - began) / max(len(topology.free), moved + dropped))
+    for _ in range(count):
+        gains = count_down(MOST_TESTS)
+        began = time.process_time()
+        moved, _, dropped = method.sweep(field, serial, gains).tolist()
+        taken.append((time.process_time() - began) / max(len(topology.free), moved + dropped))
     return taken
 
 

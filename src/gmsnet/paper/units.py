@@ -61,7 +61,7 @@ class Unit:
 
 
 @dataclass(frozen=True)
-class Stage:
+class Batch:
     """Units that may be done side by side, or, if ``alone``, one after another: because they are timed."""
 
     title: str
@@ -71,35 +71,35 @@ class Stage:
 
 @dataclass(frozen=True)
 class UnitsDone:
-    """How far a reproduction is: so many of all units are there; a unit of this stage was the last."""
+    """How far a reproduction is: so many of all units are there; a unit of this batch was the last."""
 
     done: int
     total: int
-    stage: str
+    batch: str
 
 
-def missing(stages: Sequence[Stage], store: Store) -> list[Stage]:
-    """The stages with those units whose results are not in the store."""
-    left = [Stage(s.title, [unit for unit in s.units if not store.holds(unit.name)], s.alone) for s in stages]
-    return [stage for stage in left if stage.units]
+def missing(batches: Sequence[Batch], store: Store) -> list[Batch]:
+    """The batches with those units whose results are not in the store."""
+    left = [Batch(s.title, [unit for unit in s.units if not store.holds(unit.name)], s.alone) for s in batches]
+    return [batch for batch in left if batch.units]
 
 
 def carry_out(
-    stages: Sequence[Stage],
+    batches: Sequence[Batch],
     plan: Plan,
     store: Store,
     on_unit: Callable[[UnitsDone], None],
     should_stop: Callable[[], bool],
 ) -> bool:
-    """Does what is missing, a stage after the other; tells whether all is there now.
+    """Does what is missing, a batch after the other; tells whether all is there now.
 
-    on_unit: called at the start of each stage and after each unit. should_stop: asked all the time; once it is true,
+    on_unit: called at the start of each batch and after each unit. should_stop: asked all the time; once it is true,
     units in work are given up (a training leaves its checkpoint), and all finished ones stay.
     Raises what a unit raises, and InputError where a process is killed; finished units stay then, too.
     """
-    total = sum(len(stage.units) for stage in stages)
-    left = missing(stages, store)
-    done = total - sum(len(stage.units) for stage in left)
+    total = sum(len(batch.units) for batch in batches)
+    left = missing(batches, store)
+    done = total - sum(len(batch.units) for batch in left)
     if not left:
         return True
     method = multiprocessing.get_context("spawn")  # a fork of a process with threads may hang
@@ -107,10 +107,10 @@ def carry_out(
     processes = min(available_threads(), MOST_PROCESSES)
     with ProcessPoolExecutor(processes, mp_context=method, initializer=_prepare, initargs=(stop,)) as pool:
         try:
-            for stage in left:
-                on_unit(UnitsDone(done, total, stage.title))
-                abreast = 1 if stage.alone else processes
-                waiting, running = list(stage.units), set[Future[bool]]()
+            for batch in left:
+                on_unit(UnitsDone(done, total, batch.title))
+                abreast = 1 if batch.alone else processes
+                waiting, running = list(batch.units), set[Future[bool]]()
                 while waiting or running:
                     if should_stop():
                         stop.set()
@@ -120,12 +120,12 @@ def carry_out(
                     finished, running = wait(running, timeout=LOOK, return_when=FIRST_COMPLETED)
                     for each in finished:
                         done += each.result()
-                        on_unit(UnitsDone(done, total, stage.title))
+                        on_unit(UnitsDone(done, total, batch.title))
                 if stop.is_set():
                     return False
         except BrokenProcessPool as error:
             raise InputError(
-                f"a process of the stage '{stage.title}' ended abruptly (is there too little memory?); "
+                f"a process of the batch '{batch.title}' ended abruptly (is there too little memory?); "
                 f"{store.folder} keeps what is done: the same command goes on with it"
             ) from error
         except BaseException:

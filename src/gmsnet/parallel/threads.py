@@ -4,56 +4,118 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.parallel.executor import Executor, Figure, Figures, Result
+
 FEWEST_BLOCKS = 64  # in a piece: a tenth of a millisecond of work, ten times what handing it to a thread takes
 
-Share = Callable[[Callable[[int, int], Any], int, int], list[Any]]
 One = TypeVar("One")
 Other = TypeVar("Other")
 
 
-def serial(work: Callable[[int, int], Any], first: int, last: int) -> list[Any]:
-    """All of the range at once, in this thread."""
-    return [work(first, last)]
+class Process:
+    """What executors of a single process have in common: the figures of the whole mesh are its own."""
+
+    def after_colour(self, colour: int, points: NDArray[np.float64]) -> None:
+        """See Executor. All threads see the same points."""
+
+    def minimum(self, value: Figure) -> Figure:
+        """See Executor."""
+        return value
+
+    def total(self, figures: Figures) -> Figures:
+        """See Executor."""
+        return figures
 
 
-@contextmanager
-def workers(threads: int, blocks: int) -> Iterator[Share]:
-    """Gives a function that calls another on the pieces of a range first…last, side by side where that pays.
+class Serial(Process):
+    """All of a range at once, in the calling thread."""
 
-    Threads take the next piece when they have done one, so that none waits long for another that was held up. What
-    the pieces return comes in their order. blocks: how many there are in all.
+    sequential = True
+
+    def map(self, work: Callable[[int, int], Result], first: int, last: int) -> list[Result]:
+        """See Executor."""
+        return [work(first, last)]
+
+    def for_blocks(self, blocks: int) -> Executor:
+        """See Executor."""
+        return self
+
+
+serial = Serial()
+
+
+class Threads(Process):
+    """Pieces of a range side by side, the calling thread among those that work.
+
+    Threads take the next piece when they have done one, so that none waits long for another that was held up. They are
+    started when there is first something for them to do, and stay until ``close``.
     """
-    if threads == 1 or blocks < 8 * FEWEST_BLOCKS:
-        yield serial
-        return
-    with ThreadPoolExecutor(threads - 1) as pool:
 
-        def share(work: Callable[[int, int], Any], first: int, last: int) -> list[Any]:
-            ends = pieces(first, last, threads)
-            found: list[Any] = [None] * (len(ends) - 1)
-            numbers = iter(range(len(found)))
+    sequential = False
 
-            def take() -> None:
-                for k in numbers:  # each number goes to one thread
-                    found[k] = work(ends[k], ends[k + 1])
+    def __init__(self, threads: int) -> None:
+        self.threads = threads
+        self._pool: ThreadPoolExecutor | None = None
 
-            others = [pool.submit(take) for _ in range(min(threads, len(found)) - 1)]
-            try:
-                take()  # the caller works too
-            except BaseException:
-                for _ in numbers:  # nobody begins another piece
-                    pass
-                raise
+    def map(self, work: Callable[[int, int], Result], first: int, last: int) -> list[Result]:
+        """See Executor."""
+        ends = pieces(first, last, self.threads)
+        found: list[Any] = [None] * (len(ends) - 1)
+        numbers = iter(range(len(found)))
+
+        def take() -> None:
+            for k in numbers:  # each number goes to one thread
+                found[k] = work(ends[k], ends[k + 1])
+
+        try:
+            others = self._submit(take, min(self.threads, len(found)) - 1)
+            take()
             for other in others:
                 if not other.cancel():  # one that has not begun by now has nothing left to do
                     other.result()
-            return found
+        except BaseException:
+            for _ in numbers:  # nobody begins another piece
+                pass
+            self.close()  # and those that were begun have ended before the caller looks at what they did
+            raise
+        return found
 
-        yield share
+    def for_blocks(self, blocks: int) -> Executor:
+        """See Executor."""
+        return serial if blocks < 8 * FEWEST_BLOCKS else self
+
+    def close(self) -> None:
+        """Waits until no thread works any more, and ends them."""
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            pool.shutdown()
+
+    def _submit(self, take: Callable[[], None], times: int) -> list[Future[None]]:
+        if not times:
+            return []
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self.threads - 1)
+        return [self._pool.submit(take) for _ in range(times)]
+
+
+@contextmanager
+def workers(threads: int) -> Iterator[Executor]:
+    """An executor of at most so many threads, which end with the context."""
+    if threads == 1:
+        yield serial
+        return
+    executor = Threads(threads)
+    try:
+        yield executor
+    finally:
+        executor.close()
 
 
 def pieces(first: int, last: int, threads: int) -> list[int]:

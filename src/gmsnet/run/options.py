@@ -1,8 +1,10 @@
-"""Whether the options of ``smooth`` can be used at all. What a mesh must be like is checked where meshes are made."""
+"""How a mesh is to be smoothed: all options in one object, checked when it is made."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,48 +12,96 @@ import numpy as np
 from gmsnet.errors import InputError
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.measure.report import ASPECT, SHAPE
-from gmsnet.preserve.protection import PRESERVE
+from gmsnet.measure.target import Target
+from gmsnet.methods import Method, MethodOptions, Smoother, chosen
+from gmsnet.parallel.threads import available_threads
+from gmsnet.preserve.protection import PRESERVE, method_for
+from gmsnet.run.sweep import Sweep
 
 
-def check_arguments(
-    *, max_sweeps: Any, threads: Any, target_quality: Any, target_angle: Any, seed: Any, callback: Any, weights: Any,
-    best_by: Any, guard: Any, preserve: Any, fix_layers: Any, untangle: Any,
-) -> None:  # fmt: skip
-    """Raises InputError, naming the option and what it must be, for the first one that cannot be used.
+@dataclass(frozen=True, kw_only=True)
+class SmoothOptions:
+    """The options of ``gmsnet.smooth``, whose documentation says what each means.
 
-    max_sweeps: a whole number of 0 or more. threads: None, or one of 1 or more. target_quality: None, or a number in
-    (0, 1]. target_angle: None, or a number in (0, 60]. seed: a whole number of 0 or more. callback: None or a function.
-    weights: None or the path of a file. best_by: SHAPE or ASPECT. guard: one of LEVELS. preserve: one of PRESERVE.
-    fix_layers, untangle: True or False. Whole numbers may be NumPy's; True and False are no numbers here.
+    Raises InputError for the first that cannot be used, with its name and what it must be: whole numbers may be
+    NumPy's, but True and False are no numbers. What can only be told with a mesh at hand is not checked here: whether a
+    file of weights can be read (``smoother``), and what depends on the mesh (``gmsnet.run.set_up``).
     """
-    if not _is_whole(max_sweeps, 0):
-        raise InputError(f"max_sweeps must be a whole number of 0 or more, got {max_sweeps!r}")
-    if threads is not None and not _is_whole(threads, 1):
-        raise InputError(f"threads must be a whole number of 1 or more, got {threads!r}")
-    if target_quality is not None and not _is_number(target_quality, 1.0):
-        raise InputError(f"target_quality is the minimum 1/q of a cell and must lie in (0, 1], got {target_quality!r}")
-    if target_angle is not None and not _is_number(target_angle, 60.0):
-        raise InputError(
-            f"target_angle is the minimum angle of a cell in degrees and must lie in (0, 60], got {target_angle!r}"
-        )
-    if not _is_whole(seed, 0):
-        raise InputError(f"seed must be a whole number of 0 or more, got {seed!r}")
-    if callback is not None and not callable(callback):
-        raise InputError(f"callback must be a function that takes a Sweep, got {callback!r}")
-    if weights is not None and not isinstance(weights, (str, os.PathLike)):
-        raise InputError(f"weights must be the path of a safetensors file, got {weights!r}")
-    for name, value, names in (
-        ("best_by", best_by, (SHAPE, ASPECT)), ("guard", guard, LEVELS), ("preserve", preserve, PRESERVE),
-    ):  # fmt: skip
-        if not isinstance(value, str) or value not in names:
-            raise InputError(f"{name} must be one of {', '.join(map(repr, names))}; got {value!r}")
-    for name, value in (("fix_layers", fix_layers), ("untangle", untangle)):
-        if not isinstance(value, (bool, np.bool_)):
-            raise InputError(f"{name} must be True or False, got {value!r}")
+
+    method: str = "auto"
+    variant: str | None = None
+    objective: str | None = None
+    max_sweeps: int = 100
+    threads: int | None = None
+    target_quality: float | None = None
+    target_angle: float | None = None
+    preserve: str = SHAPE
+    fix_layers: bool = False
+    untangle: bool = True
+    guard: str = "worst"
+    seed: int = 0
+    callback: Callable[[Sweep], bool | None] | None = None
+    weights: str | os.PathLike[str] | None = None
+    best_by: str = SHAPE
+
+    def __post_init__(self) -> None:
+        _check_whole("max_sweeps", self.max_sweeps, 0)
+        if self.threads is not None:
+            _check_whole("threads", self.threads, 1)
+        if self.target_quality is not None and not _is_number(self.target_quality, 1.0):
+            raise InputError(
+                f"target_quality is the minimum 1/q of a cell and must lie in (0, 1], got {self.target_quality!r}"
+            )
+        if self.target_angle is not None and not _is_number(self.target_angle, 60.0):
+            raise InputError(
+                "target_angle is the minimum angle of a cell in degrees and must lie in (0, 60], "
+                f"got {self.target_angle!r}"
+            )
+        _check_whole("seed", self.seed, 0)
+        if self.callback is not None and not callable(self.callback):
+            raise InputError(f"callback must be a function that takes a Sweep, got {self.callback!r}")
+        if self.weights is not None and not isinstance(self.weights, (str, os.PathLike)):
+            raise InputError(f"weights must be the path of a safetensors file, got {self.weights!r}")
+        _check_name("best_by", self.best_by, (SHAPE, ASPECT))
+        _check_name("guard", self.guard, LEVELS)
+        _check_name("preserve", self.preserve, PRESERVE)
+        _check_flag("fix_layers", self.fix_layers)
+        _check_flag("untangle", self.untangle)
+        self._method()
+
+    @property
+    def target(self) -> Target:
+        """What every cell is to reach; false where nothing is asked for."""
+        return Target(self.target_quality, self.target_angle)
+
+    @property
+    def thread_count(self) -> int:
+        """At most so many threads are used."""
+        return self.threads or available_threads()
+
+    def smoother(self) -> Smoother:
+        """The method, ready for one run. Raises InputError for weights that cannot be read."""
+        method, options = self._method()
+        return method.create(options)
+
+    def _method(self) -> tuple[Method, MethodOptions]:
+        name = method_for(self.method, self.variant, self.preserve, self.target)
+        return chosen(name, variant=self.variant, objective=self.objective, weights=self.weights, seed=self.seed)
 
 
-def _is_whole(value: Any, least: int) -> bool:
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and bool(value >= least)
+def _check_whole(name: str, value: Any, least: int) -> None:
+    if not (isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= least):
+        raise InputError(f"{name} must be a whole number of {least} or more, got {value!r}")
+
+
+def _check_name(name: str, value: Any, names: tuple[str, ...]) -> None:
+    if not isinstance(value, str) or value not in names:
+        raise InputError(f"{name} must be one of {', '.join(map(repr, names))}; got {value!r}")
+
+
+def _check_flag(name: str, value: Any) -> None:
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name} must be True or False, got {value!r}")
 
 
 def _is_number(value: Any, most: float) -> bool:

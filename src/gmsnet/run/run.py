@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import LEVELS, Precision
-from gmsnet.kernels.topology.write_back import put_back
-from gmsnet.measure.report import ASPECT, QualityReport, measure
-from gmsnet.measure.totals import Totals, totals_of
+from gmsnet.measure.totals import totals_of
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, Smoother, Tally
-from gmsnet.parallel.threads import Share, serial, workers
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.interrupts import interruptible
+from gmsnet.parallel.threads import serial
+from gmsnet.run.options import SmoothOptions
 from gmsnet.run.score import NONE, Score
 from gmsnet.run.stop import CALLBACK, INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.run.sweep import Sweep
@@ -31,81 +32,105 @@ PATIENCE = 10  # sweeps within which q̂ must rise by LEAST_GAIN, or a cell be u
 LEAST_GAIN = 1e-4
 
 
+class Start(NamedTuple):
+    """Where a run starts. points: (N, 2) in memory order, not changed. precision: of the mesh (``precision_of``).
+
+    score: of the points, where it is known. history: to go on with.
+    """
+
+    topology: Topology
+    points: Floats
+    precision: Precision
+    score: Score | None = None
+    history: Sequence[Sweep] = ()
+
+    @classmethod
+    def of(cls, mesh: Mesh, topology: Topology) -> Start:
+        """The mesh as it is."""
+        return cls(topology, near_points(mesh, topology), precision_of(mesh))
+
+
 class Run:
     """The state of one run: coordinates in memory order, the best so far, and the record.
 
-    points: to start from, in memory order (default: the mesh's own). history: to go on with. precision: of
-    the mesh, where it is known; score: of those points, where it is. missing: the corners (K, 3) of the triangles
-    that miss a target at given points; the run ends when there is none.
+    options: how many sweeps, what is called after them, the guard, and which mesh is the best. missing: the corners
+    (K, 3) of the triangles that miss a target at given points; the run ends when there is none. interruption: what
+    ended the sweeps, if they were interrupted.
     """
 
     def __init__(
-        self, mesh: Mesh, topology: Topology, smoother: Smoother, threads: int, best_by: str, guard: str,
-        points: Floats | None = None, history: list[Sweep] | None = None, precision: Precision | None = None,
-        score: Score | None = None, missing: Callable[[Floats], NDArray[np.int32]] | None = None,
+        self, start: Start, smoother: Smoother, options: SmoothOptions, executor: Executor = serial,
+        missing: Callable[[Floats], NDArray[np.int32]] | None = None,
     ) -> None:  # fmt: skip
-        self.topology, self.smoother, self.best_by = topology, smoother, best_by
-        start = near_points(mesh, topology) if points is None else points
-        self.field = Field(start.copy(), topology, precision or precision_of(mesh), LEVELS.index(guard))
-        self.threads, self.missing = threads, missing
+        self.topology, self.smoother, self.options, self.missing = start.topology, smoother, options, missing
+        self.executor = executor.for_blocks(len(start.topology.free) // LANES)
+        level = LEVELS.index(options.guard)
+        self.field = Field(start.points.copy(), start.topology, start.precision, level)
         self.fewest: list[int] = []  # cells that missed the target, up to each look
-        self.history: list[Sweep] = [] if history is None else history
+        self.history: list[Sweep] = [*start.history]
         self.sweeps = self.history[-1].index if self.history else 0
         self.first = len(self.history)
         self.tally: Tally = np.zeros(3, dtype=np.int64)  # since the last look
-        self.stages: dict[str, None] = {}  # since the last look, in their order
-        self.best, self.best_score = start, score or self._score()
+        self.phases: dict[str, None] = {}  # since the last look, in their order
+        self.best, self.best_score = start.points, start.score or self._score()
+        self.interruption: KeyboardInterrupt | None = None
 
-    def to_the_end(self, max_sweeps: int, callback: Callable[[Sweep], bool | None] | None = None) -> str:
-        """Sweeps until a stop rule says why to stop."""
+    def to_the_end(self, most: int | None = None) -> str:
+        """Sweeps until a stop rule says why to stop. most: sweeps, if fewer than the options allow."""
         if not len(self.topology.free):
             return NOTHING_TO_MOVE
         if self._reached():
             return TARGET_REACHED
         try:
-            with workers(self.threads, len(self.topology.free) // LANES) as share:
-                while self.sweeps < max_sweeps:
-                    moved = self._sweep(share)
-                    converged = self.smoother.converged or (self.smoother.stops_when_idle and not moved)
-                    if not (self.smoother.looks or converged or self.sweeps == max_sweeps):
-                        continue
-                    sweep = self._look(share, last=converged or self.sweeps == max_sweeps)
-                    if callback is not None and callback(sweep):
-                        return CALLBACK
-                    if self._reached():
-                        return TARGET_REACHED
-                    if converged or self.smoother.converged or self._stalled():
-                        return NO_PROGRESS
-        except KeyboardInterrupt:  # what was made since the last look counts, too: the guard allows each move by itself
-            with suppress(KeyboardInterrupt):
-                self._keep_if_best(self._score())
+            return self._until_stopped(self.options.max_sweeps if most is None else most)
+        except KeyboardInterrupt as interruption:
+            self.interruption = interruption
+            with suppress(KeyboardInterrupt), interruptible():  # one is enough
+                self._keep_if_best(self._score())  # each move since the last look is allowed by the guard itself
             return INTERRUPTED
+
+    @interruptible()
+    def _until_stopped(self, max_sweeps: int) -> str:
+        callback = self.options.callback
+        while self.sweeps < max_sweeps:
+            moved = self._sweep()
+            converged = self.smoother.converged or (self.smoother.stops_when_idle and not moved)
+            if not (self.smoother.looks or converged or self.sweeps == max_sweeps):
+                continue
+            sweep = self._look(last=converged or self.sweeps == max_sweeps)
+            if callback is not None and callback(sweep):
+                return CALLBACK
+            if self._reached():
+                return TARGET_REACHED
+            if converged or self.smoother.converged or self._stalled():
+                return NO_PROGRESS
         return MAX_SWEEPS
 
     def _reached(self) -> bool:
         return self.missing is not None and not self.best_score.missed
 
-    def _sweep(self, share: Share) -> int:
+    def _sweep(self) -> int:
         """One sweep; returns how many nodes moved."""
-        tally = self.smoother.sweep(self.field, share, lambda: self._keep_if_best(self._score(share)))
+        tally = self.smoother.sweep(self.field, self.executor, lambda: self._keep_if_best(self._score()))
+        tally = self.executor.total(tally)
         self.tally += tally
-        self.stages[self.smoother.stage] = None
+        self.phases[self.smoother.phase] = None
         self.sweeps += 1
         return int(tally[MOVED])
 
-    def _look(self, share: Share, *, last: bool) -> Sweep:
+    def _look(self, *, last: bool) -> Sweep:
         """Measures the mesh as it is now, keeps it if it is the best, and writes the record. last: nothing follows."""
-        score = self._score(share)
+        score = self._score()
         self._keep_if_best(score, last=last)
         moved, truncated, dropped = self.tally.tolist()
         self.tally[:] = 0
         sweep = Sweep(
-            self.sweeps, " + ".join(self.stages), moved, truncated, dropped, score.inverted, score.qhat,
+            self.sweeps, " + ".join(self.phases), moved, truncated, dropped, score.inverted, score.qhat,
             score.min_shape, score.mean_shape,
         )  # fmt: skip
         self.history.append(sweep)
         self.fewest.append(min([score.missed, *self.fewest[-1:]]))
-        self.stages.clear()
+        self.phases.clear()
         return sweep
 
     def _keep_if_best(self, score: Score, *, last: bool = False) -> bool:
@@ -115,10 +140,11 @@ class Run:
             self.best, self.best_score = points if last else points.copy(), score
         return better
 
-    def _score(self, share: Share = serial) -> Score:
+    def _score(self) -> Score:
         """The sums over all triangles of the coordinates as they are."""
-        totals = totals_of(self.field.points, self.topology.scored, share)
-        return Score.of(totals, self.best_by, self.missing(self.field.points) if self.missing else NONE)
+        points = self.field.points
+        totals = totals_of(points, self.topology.scored, self.executor)
+        return Score.of(totals, self.options.best_by, self.missing(points) if self.missing else NONE)
 
     def _stalled(self) -> bool:
         """Has nothing been gained for PATIENCE looks?"""
@@ -138,54 +164,6 @@ class Run:
 def precision_of(mesh: Mesh) -> Precision:
     """How exactly the coordinates of a mesh are known, in the units of ``planar_points``."""
     return Precision.of(single=mesh.single, exponent=mesh.exponent)
-
-
-def outcome(
-    mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
-    start: Floats | None = None, threads: int = 1, totals: Totals | None = None,
-) -> tuple[Floats, NDArray[np.bool_], QualityReport]:  # fmt: skip
-    """Points (N, dim), which of them moved, and their measures; those of the input if the quick sums misjudged them.
-
-    best: (N, 2) in memory order. All nodes that it does not move keep their very bits. rank: of two meshes that of the
-    lesser rank is the better. start: ``near_points`` of the mesh, totals: of ``best``, where they are known.
-    """
-    start = near_points(mesh, topology) if start is None else start
-    plane, factors = mesh.plane, _factors(mesh.exponent)
-    assert plane is not None
-    points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
-    count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)
-    if count:
-        points.flags.writeable = False  # so that the mesh need not copy them
-        whole = totals if topology.scored is topology.simplices else None
-        known = (best, threads, whole) if exact else (None, threads)
-        after = measure(mesh.with_points(points), topology, *known)
-        if rank(after) <= rank(before):
-            return points, moved, after
-        moved[:] = False
-    return mesh.points, moved, before
-
-
-def _factors(exponent: int) -> tuple[float, float]:
-    """Two normal powers of two by which to multiply one after the other for 2 to the power of the exponent.
-
-    The first one is 1 unless the exponent is too large or too small for a single float.
-    """
-    most = max(min(exponent, 1000), -1000)
-    return 2.0 ** (exponent - most), 2.0**most
-
-
-def rank_by(best_by: str) -> Callable[[QualityReport], Any]:
-    """Fewer inverted cells first, then the larger q̂, or the larger least and then mean 1/q if not all are triangles."""
-
-    def rank(report: QualityReport) -> tuple[float, ...]:
-        totals = report.totals
-        if totals is None:
-            return (report.inverted,)
-        if math.isnan(totals.qhat):
-            return report.inverted, -totals.shape_min, -totals.shape_mean
-        return report.inverted, -(totals.qhat_aspect if best_by == ASPECT else totals.qhat)
-
-    return rank
 
 
 def merit(sweep: Sweep) -> float:

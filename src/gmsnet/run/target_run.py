@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,16 +12,16 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.methods.below import missed
 from gmsnet.kernels.topology.patch import around
-from gmsnet.measure.report import QualityReport
 from gmsnet.measure.target import Target
 from gmsnet.measure.totals import totals_of
-from gmsnet.mesh.mesh import Mesh
-from gmsnet.methods import Smoother
-from gmsnet.methods.auto import for_target
-from gmsnet.run.run import Run, precision_of
+from gmsnet.methods.auto import Auto, for_target
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.interrupts import interruptible
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.run import Run, Start
 from gmsnet.run.score import Score
-from gmsnet.run.stop import INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
-from gmsnet.run.sweep import Sweep
+from gmsnet.run.state import State
+from gmsnet.run.stop import MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
@@ -34,64 +35,77 @@ FEW = 0.02  # of the cells that missed it at first: for so few that are left, th
 FEWER, IDLE = 0.9, 2  # a round that leaves more of the cells below the target is idle; so many in a row are the last
 
 
-def reach_target(
-    mesh: Mesh, topology: Topology, create: Callable[[], Smoother] | None, target: Target, points: Floats, *,
-    threads: int, best_by: str, guard: str, max_sweeps: int, callback: Callable[[Sweep], bool | None] | None,
-    report: QualityReport | None = None, shapes: NDArray[np.float32] | None = None,
-) -> tuple[Floats, str, list[Sweep]]:  # fmt: skip
+def reach_target(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Smooths patches around the cells that miss the target until none does, or nothing is gained any more.
 
-    create: makes a method ready for a run on one set of patches; None for ``methods.auto``, which has a plan for each.
-    points: (N, 2) in memory order, not changed. report: the measures of these points, if they are known; shapes: 1/q of
-    the triangles in ``topology.near``, if it is. Returns the new points, why it ended, and the record. A patch's result
-    is taken if fewer of its cells are inverted, or as many and fewer miss the target, or as many and the worst of them
-    is better.
+    ``auto`` has a plan for each set of patches; another method is made anew for each. A patch's result is taken if
+    fewer of its cells are inverted, or as many and fewer miss the target, or as many and the worst of them is better.
     """
-    history: list[Sweep] = []
-    rows = rows_missing(points, topology, target, shapes)
-    corners = topology.near.take(rows, axis=0)
-    clear = report is None or target.clearly_missed(points, topology.simplices.take(rows))
-    if report is not None and not clear:
-        corners = topology.places[topology.triangles[target.missed_in(report)]]
+    try:
+        with interruptible():
+            for reached in _rounds(state, options, executor):
+                state = reached
+                if state.stop_reason:
+                    break
+    except KeyboardInterrupt as interruption:  # between rounds: in a round the run has caught it
+        return state.interrupted(interruption)
+    return state
+
+
+def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterator[State]:
+    """The state after each set of patches; the last one has a reason to stop."""
+    target, topology, own_plan = options.target, state.topology, isinstance(state.smoother, Auto)
+    corners, clear = cells_missing(state, target)
     if not len(corners):
-        return points, TARGET_REACHED, history
+        yield state.ended(TARGET_REACHED)
+        return
     changeable = topology.near_free.take(corners).any(axis=1)
     hopeless = not changeable.all()  # cells that miss it and cannot change
     corners = corners[changeable]
-    idle, at_first, precision = 0, len(corners), precision_of(mesh)
-    positive = report is not None and report.signs is None
-    try:
-        for rings in RINGS if create else NARROW:
-            if not len(corners):
-                return points, NO_PROGRESS if history else NOTHING_TO_MOVE, history
-            active = around(corners, rings, topology.near_free, topology.near_start, topology.near_ring)
-            if create is None and rings > 1 and too_large(rings, active, len(corners) / at_first, topology):
-                break
-            patch = topology.restricted(active)
-            share = len(corners) / len(patch.near)
-            smoother = create() if create else for_target(target, share, rings=rings)
-            missing = partial(corners_missing, topology=patch, target=target)
-            measure = partial(totals_of, points, patch.scored)
-            before = Score(measure, best_by, corners if clear else missing(points), positive)
-            run = Run(
-                mesh, patch, smoother, threads, best_by, guard, points, history, precision, before, missing
-            )  # fmt: skip
-            reason = run.to_the_end(max_sweeps, callback)
-            after = run.best_score
-            if after.closer_to_target(before):
-                points, corners, clear = run.best, after.missing, True
-            if not after.missed:
-                return points, NO_PROGRESS if hopeless else TARGET_REACHED, history
-            if reason not in (NO_PROGRESS, TARGET_REACHED):  # stopped from outside, or at the most sweeps
-                return points, reason, history
-            if run.sweeps >= max_sweeps:
-                return points, MAX_SWEEPS, history
-            idle = idle + 1 if after.missed > FEWER * before.missed else 0
-            if idle == IDLE:
-                break
-    except KeyboardInterrupt:  # in a round itself the run has caught it
-        return points, INTERRUPTED, history
-    return points, NO_PROGRESS, history
+    idle, at_first, precision = 0, len(corners), state.precision
+    positive = state.before.signs is None
+    for rings in NARROW if own_plan else RINGS:
+        if not len(corners):
+            yield state.ended(NO_PROGRESS if state.history else NOTHING_TO_MOVE)
+            return
+        active = around(corners, rings, topology.near_free, topology.near_start, topology.near_ring)
+        if own_plan and rings > 1 and too_large(rings, active, len(corners) / at_first, topology):
+            break
+        patch = topology.restricted(active)
+        fraction = len(corners) / len(patch.near)
+        smoother = for_target(target, fraction, rings=rings) if own_plan else options.smoother()
+        missing = partial(corners_missing, topology=patch, target=target)
+        measure = partial(totals_of, state.points, patch.scored)
+        before = Score(measure, options.best_by, corners if clear else missing(state.points), positive)
+        run = Run(Start(patch, state.points, precision, before, state.history), smoother, options, executor, missing)
+        reason = run.to_the_end()
+        after = run.best_score
+        state = replace(state, history=tuple(run.history), totals=None)
+        if after.closer_to_target(before):
+            state, corners, clear = replace(state, points=run.best), after.missing, True
+        if run.interruption is not None:
+            state = state.interrupted(run.interruption)
+        elif not after.missed:
+            state = state.ended(NO_PROGRESS if hopeless else TARGET_REACHED)
+        elif reason not in (NO_PROGRESS, TARGET_REACHED):  # stopped by the callback, or at the most sweeps
+            state = state.ended(reason)
+        elif run.sweeps >= options.max_sweeps:
+            state = state.ended(MAX_SWEEPS)
+        yield state
+        idle = idle + 1 if after.missed > FEWER * before.missed else 0
+        if idle == IDLE:
+            break
+    yield state.ended(NO_PROGRESS)
+
+
+def cells_missing(state: State, target: Target) -> tuple[NDArray[np.int32], bool]:
+    """The corners (K, 3) of the cells that miss the target, and whether all of them do however they are measured."""
+    topology, points, before = state.topology, state.points, state.before
+    rows = rows_missing(points, topology, target, state.shapes if points is state.start else None)
+    corners = topology.near.take(rows, axis=0)
+    if before.inverted or target.clearly_missed(points, topology.simplices.take(rows)):
+        return corners, True
+    return topology.places[topology.triangles[target.missed_in(before)]], False
 
 
 def too_large(rings: int, active: Flags, left: float, topology: Topology) -> bool:

@@ -1,18 +1,21 @@
-"""Untangling as a part of smoothing: what was done in words, and which cells stay inverted and why."""
+"""Untangling as the first stages of smoothing: what was done in words, and which cells stay inverted and why."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.star.guard import Precision
 from gmsnet.measure.report import QualityReport
+from gmsnet.parallel.executor import Executor
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.state import State
 from gmsnet.topology.topology import Topology
 
-Floats = NDArray[np.float64]
-Reasons = dict[tuple[int, ...], str]
+Reasons = Mapping[tuple[int, ...], str]
 
 
 class StillInvertedCell(NamedTuple):
@@ -22,23 +25,30 @@ class StillInvertedCell(NamedTuple):
     reason: str
 
 
-def mended(points: Floats, topology: Topology, precision: Precision) -> tuple[Floats, str, Reasons]:
-    """Points (N, 2) in memory order with fewer inverted cells, one sentence on it, and why others stay as they are.
+def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """Moves the free nodes so that fewer cells are inverted."""
+    return _untangled(state) if options.untangle and state.before.inverted else state
 
-    The reasons are kept by the nodes of the cells, ascending.
-    """
+
+def untangle_protected(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """Lets go of protected nodes beside cells that could not be untangled, and tries once more."""
+    freed = None
+    if state.reasons:
+        freed = state.protection.released(beside(state.reasons, state.topology))
+    return state if freed is None else _untangled(replace(state, protection=freed))
+
+
+def _untangled(state: State) -> State:
     from gmsnet.untangle import untangle  # what it needs of SciPy takes 0.15 s more to import
 
-    done = untangle(points, topology, precision)
-    stages = ", ".join(f"{stage.name} ({stage.sweeps})" for stage in done.stages) or "nothing to try"
+    topology = state.topology
+    done = untangle(state.points, topology, state.precision)
+    steps = ", ".join(f"{step.name} ({step.sweeps})" for step in done.steps) or "nothing to try"
     left = f"{done.after:,} of {done.before:,} inverted cells are left" if done.after else f"all {done.before:,} mended"
-    note = f"untangling: {left}; {stages}{f'; {done.why}' if done.why else ''}"
+    note = f"untangling: {left}; {steps}{f'; {done.why}' if done.why else ''}"
     corners = np.sort(topology.memory[topology.near[[cell.triangle for cell in done.unmended]].reshape(-1, 3)], axis=1)
-    return (
-        done.points,
-        note,
-        {tuple(nodes): cell.reason for nodes, cell in zip(corners.tolist(), done.unmended, strict=True)},
-    )
+    reasons = {tuple(nodes): cell.reason for nodes, cell in zip(corners.tolist(), done.unmended, strict=True)}
+    return replace(state, points=done.points, totals=None, untangling=(*state.untangling, note), reasons=reasons)
 
 
 def beside(reasons: Reasons, topology: Topology) -> NDArray[np.bool_]:

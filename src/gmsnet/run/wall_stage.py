@@ -1,44 +1,35 @@
-"""The last stage of a run: near walls that a mesh is refined towards, shapes get better within bands of the areas."""
+"""The last stage: near walls that a mesh is refined towards, shapes get better within bands of the areas."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.sized import banded
+from gmsnet.parallel.executor import Executor
+from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run
-from gmsnet.run.stop import MAX_SWEEPS, NO_PROGRESS
-from gmsnet.run.sweep import Sweep
-from gmsnet.topology.topology import Topology, near_points
-
-Floats = NDArray[np.float64]
+from gmsnet.run.state import State
+from gmsnet.run.stop import MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE
 
 SWEEPS = 20  # at most
-STAGE = "near walls, areas kept"
+PHASE = "near walls, areas kept"
 ELSEWHERE = "not near a wall"
 
 
-def improve_near_walls(
-    mesh: Mesh, topology: Topology, kept: NDArray[np.bool_], points: Floats, history: list[Sweep], *,
-    threads: int, best_by: str, guard: str, max_sweeps: int = 1000,
-    callback: Callable[[Sweep], bool | None] | None = None,
-) -> tuple[Floats, str, list[Sweep]]:  # fmt: skip
-    """Moves the free nodes among ``kept`` alone; each cell whose corners all are keeps its area within a tenth.
+def improve_near_walls(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """Moves the nodes that were held near walls, where the sweeps have ended of themselves.
 
-    topology: of the mesh, in which the nodes near walls are not held on that account. kept: (N,) bool by id, from
-    ``walls.near_walls``. points: (N, 2) in memory order, where other stages have left the mesh, with the kept nodes
-    where they are in ``mesh``; not changed. history: to go on with. max_sweeps: with those of the history.
-
-    Returns the new points, why it ended, and the record.
+    Other nodes stay. Each cell whose corners all were held keeps its area in the input within a tenth.
     """
-    zone = topology.holding(~kept, ELSEWHERE)
-    smoother = banded(near_points(mesh, topology), kept[topology.memory])
-    smoother.stage = STAGE
-    run = Run(mesh, zone, smoother, threads, best_by, guard, points=points, history=history)
-    stop_reason = run.to_the_end(min(run.sweeps + SWEEPS, max_sweeps), callback)
-    if stop_reason == MAX_SWEEPS and run.sweeps < max_sweeps:
+    kept = state.protection.kept
+    if kept is None or options.target or state.stop_reason not in (NO_PROGRESS, NOTHING_TO_MOVE):
+        return state
+    state = replace(state, released=True, totals=None)
+    zone = state.topology.holding(~kept, ELSEWHERE)
+    smoother = banded(state.start, kept[zone.memory])
+    smoother.phase = PHASE
+    run = Run(state.run_start(options.best_by)._replace(topology=zone), smoother, options, executor)
+    stop_reason = run.to_the_end(min(run.sweeps + SWEEPS, options.max_sweeps))
+    if stop_reason == MAX_SWEEPS and run.sweeps < options.max_sweeps:
         stop_reason = NO_PROGRESS  # of the stage's own sweeps
-    return run.best, stop_reason, run.history
+    return replace(state, points=run.best, history=tuple(run.history)).ended(stop_reason, run.interruption)

@@ -10,11 +10,11 @@ from gmsnet.untangle.guarded import what_is_left
 from gmsnet.untangle.newton import polish
 from gmsnet.untangle.patch import Floats
 from gmsnet.untangle.reasons import freeze, reasons
-from gmsnet.untangle.result import ALL, NOTHING, PART, Stage, StillInverted, Untangled
+from gmsnet.untangle.result import ALL, NOTHING, PART, StillInverted, Untangled, UntanglingStep
 from gmsnet.untangle.state import UntanglingState
 from gmsnet.untangle.transaction import moved, restore, take
 
-__all__ = ["ALL", "NOTHING", "PART", "Stage", "StillInverted", "Untangled", "untangle"]
+__all__ = ["ALL", "NOTHING", "PART", "StillInverted", "Untangled", "UntanglingStep", "untangle"]
 
 
 ROUNDS = 2  # after the first, nodes of cells that cannot be untangled stand still, for the sake of those beside them
@@ -35,30 +35,30 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     before = int(tangle.was_bad.sum())
     if not before:
         return Untangled(tangle.points, 0, 0, ALL, "", (), ())
-    stages, whys = list[Stage](), list[str]()
+    steps, whys = list[UntanglingStep](), list[str]()
     for _ in range(ROUNDS):
-        stages += escalate(tangle)
+        steps += escalate(tangle)
         whys.append(take(tangle))
         tangle.frozen[:] = False
         if not tangle.bad_nodes().any():
             break
-        stages.append(what_is_left(tangle))
+        steps.append(what_is_left(tangle))
         if not freeze(tangle):
             break
     why = next(filter(None, whys), "")
     taken = NOTHING if not moved(tangle).any() else PART if why else ALL
     if taken != NOTHING:
-        stages += restore(tangle), polish(tangle)
+        steps += restore(tangle), polish(tangle)
     after = 0
     if tangle.left:  # else all are certified that have moved or were not positive
         after = int((exact_signs(tangle.points, topology.near, topology.near_orientation) <= 0).sum())
-    sweeps = sum(stage.sweeps for stage in stages)
+    sweeps = sum(step.sweeps for step in steps)
     return Untangled(
         tangle.points,
         before,
         after,
         taken,
         why,
-        tuple(stage for stage in stages if stage.nodes),
+        tuple(step for step in steps if step.nodes),
         reasons(topology, tangle.points, tangle.bad, sweeps),
     )

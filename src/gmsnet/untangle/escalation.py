@@ -12,7 +12,7 @@ from gmsnet.untangle.lbfgs import whole
 from gmsnet.untangle.newton import keep_gains, newton
 from gmsnet.untangle.patch import Patch, in_order
 from gmsnet.untangle.reasons import freeze_hopeless
-from gmsnet.untangle.result import Stage
+from gmsnet.untangle.result import UntanglingStep
 from gmsnet.untangle.state import UntanglingState
 
 LAPLACIAN_SWEEPS = 8
@@ -24,8 +24,8 @@ FEW = 0.25  # harmonic places are a better start if they leave no more than this
 PATIENCE, LAST_PATIENCE = 3, 8  # of L-BFGS, and where the patch cannot grow any more
 
 
-def escalate(tangle: UntanglingState) -> Iterator[Stage]:
-    """Untangles; yields what each stage has done, and ends when nothing is left or nothing is left to try."""
+def escalate(tangle: UntanglingState) -> Iterator[UntanglingStep]:
+    """Untangles; yields what each step has done, and ends when nothing is left or nothing is left to try."""
     if not tangle.left:
         return
     yield worst_nodes(tangle)
@@ -54,7 +54,7 @@ def escalate(tangle: UntanglingState) -> Iterator[Stage]:
         keep_gains(tangle, points, bad)
 
 
-def bad_stars(tangle: UntanglingState) -> Stage:
+def bad_stars(tangle: UntanglingState) -> UntanglingStep:
     """Laplacian sweeps over the stars that have a bad cell at the time."""
     chosen = tangle.bad_nodes()
     visited = chosen.copy()
@@ -65,15 +65,15 @@ def bad_stars(tangle: UntanglingState) -> Stage:
         visited |= chosen
         sweeps += 1
     tangle.look()
-    return Stage("Laplacian, bad stars", int(visited.sum()), sweeps, tangle.left)
+    return UntanglingStep("Laplacian, bad stars", int(visited.sum()), sweeps, tangle.left)
 
 
-def mend(tangle: UntanglingState, patch: Patch, where: str, patience: int) -> Iterator[Stage]:
+def mend(tangle: UntanglingState, patch: Patch, where: str, patience: int) -> Iterator[UntanglingStep]:
     """The barrier on a patch: Newton sweeps; from harmonic places if these are better; L-BFGS on what is left."""
     points = tangle.points[patch.every]
     open_, sweeps = newton(tangle, patch, points)
     tangle.put(points, patch)
-    yield Stage(f"barrier, Newton, {where}", patch.count, sweeps, tangle.look())
+    yield UntanglingStep(f"barrier, Newton, {where}", patch.count, sweeps, tangle.look())
     if not open_.any():
         return
     hard = patch.only(tangle.topology, open_)
@@ -82,7 +82,7 @@ def mend(tangle: UntanglingState, patch: Patch, where: str, patience: int) -> It
     if tangle.uncertified(start, hard) <= FEW * tangle.uncertified(points, hard):
         open_, sweeps = newton(tangle, hard, start)
         tangle.put(start, hard)
-        yield Stage(f"harmonic and barrier, Newton, {where}", hard.count, sweeps, tangle.look())
+        yield UntanglingStep(f"harmonic and barrier, Newton, {where}", hard.count, sweeps, tangle.look())
         if not open_.any():
             return
     else:
@@ -91,4 +91,4 @@ def mend(tangle: UntanglingState, patch: Patch, where: str, patience: int) -> It
     for piece in hard.pieces(tangle.topology, open_):
         moved += piece.count
         iterations += whole(tangle, piece, patience)
-    yield Stage(f"barrier, L-BFGS, {where}", moved, iterations, tangle.look())
+    yield UntanglingStep(f"barrier, L-BFGS, {where}", moved, iterations, tangle.look())

@@ -11,27 +11,27 @@ import numpy as np
 from gmsnet.kernels.untangle import barrier
 from gmsnet.untangle.newton import AVERAGING, closing, keep_gains, sweep
 from gmsnet.untangle.patch import Ints, Patch, in_order
-from gmsnet.untangle.result import Stage
+from gmsnet.untangle.result import UntanglingStep
 from gmsnet.untangle.state import UntanglingState
 
 FIRST_SWEEPS, FEW_NODES = 3, 0.1  # only where no more than this share of the free nodes has bad cells
 LAST_SWEEPS, RINGS = 30, 2
 
 
-def worst_nodes(tangle: UntanglingState) -> Stage:
+def worst_nodes(tangle: UntanglingState) -> UntanglingStep:
     """The nodes with bad cells, the worst first, each only if its star is still bad when its turn comes."""
     nodes = tangle.worst_first(in_order(tangle.topology, tangle.bad_nodes()))
     if len(nodes) > FEW_NODES * len(tangle.topology.free):
-        return Stage("barrier, guarded, worst first", 0, 0, tangle.left)
+        return UntanglingStep("barrier, guarded, worst first", 0, 0, tangle.left)
     return guarded(tangle, nodes, FIRST_SWEEPS, barrier.MENDING, "barrier, guarded, worst first")
 
 
-def what_is_left(tangle: UntanglingState) -> Stage:
+def what_is_left(tangle: UntanglingState) -> UntanglingStep:
     """All nodes around bad cells."""
     return guarded(tangle, tangle.around(RINGS).nodes, LAST_SWEEPS, barrier.GUARDED, "barrier, guarded")
 
 
-def guarded(tangle: UntanglingState, nodes: Ints, most: int, mode: int, name: str) -> Stage:
+def guarded(tangle: UntanglingState, nodes: Ints, most: int, mode: int, name: str) -> UntanglingStep:
     """At most so many sweeps over some nodes; pieces in which no cell is untangled by that go back."""
     patch = Patch.of(tangle.topology, nodes)
     points = tangle.points[patch.every]
@@ -47,4 +47,4 @@ def guarded(tangle: UntanglingState, nodes: Ints, most: int, mode: int, name: st
     tangle.put(points, patch)
     tangle.look()
     keep_gains(tangle, before, bad)
-    return Stage(name, patch.count, sweeps, tangle.left)
+    return UntanglingStep(name, patch.count, sweeps, tangle.left)

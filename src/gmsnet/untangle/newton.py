@@ -10,7 +10,7 @@ from gmsnet.kernels.simplex.mean_ratio2 import TWO_SQRT3
 from gmsnet.kernels.untangle import barrier
 from gmsnet.kernels.untangle import untangling as kernels
 from gmsnet.untangle.patch import Flags, Floats, Patch, free_nodes_of, in_order
-from gmsnet.untangle.result import Stage
+from gmsnet.untangle.result import UntanglingStep
 from gmsnet.untangle.state import UntanglingState
 
 SWEEPS = 12
@@ -62,7 +62,7 @@ def closing(worst: Floats) -> Floats:
     return np.sqrt(LEAST_EPSILON**2 + (CLOSING * np.minimum(worst, 0.0)) ** 2)
 
 
-def polish(tangle: UntanglingState) -> Stage:
+def polish(tangle: UntanglingState) -> UntanglingStep:
     """A few Newton sweeps on the stars of slivers that untangling has left; certified stars stay so."""
     slivers, topology = np.empty(len(tangle.bad), dtype=bool), tangle.topology
     kernels.find_slivers(
@@ -75,7 +75,7 @@ def polish(tangle: UntanglingState) -> Stage:
     for _ in range(POLISH):
         sweep(tangle, patch, points, scale, epsilon, barrier.CERTIFIED)
     tangle.put(points, patch)
-    return Stage("barrier, slivers", patch.count, POLISH, tangle.left)  # no cell changes its sign by that
+    return UntanglingStep("barrier, slivers", patch.count, POLISH, tangle.left)  # no cell changes its sign by that
 
 
 def keep_gains(tangle: UntanglingState, before: Floats, bad: Flags) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 ALL, PART, NOTHING = "all", "part", "nothing"
 
 
-class Stage(NamedTuple):
+class UntanglingStep(NamedTuple):
     """What was done: its name, how many nodes it moved about, sweeps (or iterations), cells then left to mend."""
 
     name: str
@@ -32,7 +32,7 @@ class StillInverted(NamedTuple):
 class Untangled:
     """points: (N, 2) in memory order. before, after: how many cells have an area of zero or less (exact signs).
 
-    taken: ALL, PART or NOTHING of what was tried; why: if not all, what stood against it, else "". stages: what was
+    taken: ALL, PART or NOTHING of what was tried; why: if not all, what stood against it, else "". steps: what was
     done. unmended: the cells that are still inverted, or positive within rounding only, ascending.
     """
 
@@ -41,10 +41,10 @@ class Untangled:
     after: int
     taken: str
     why: str
-    stages: tuple[Stage, ...]
+    steps: tuple[UntanglingStep, ...]
     unmended: tuple[StillInverted, ...]
 
     @property
     def sweeps(self) -> int:
-        """Sweeps and iterations of all stages."""
-        return sum(stage.sweeps for stage in self.stages)
+        """Sweeps and iterations of all steps."""
+        return sum(step.sweeps for step in self.steps)

@@ -14,7 +14,7 @@ from gmsnet.kernels.simplex.mean_ratio2 import TWO_SQRT3
 from gmsnet.kernels.untangle import untangling as kernels
 from gmsnet.untangle.newton import keep_gains
 from gmsnet.untangle.patch import Flags, free_nodes_of, in_order
-from gmsnet.untangle.result import Stage
+from gmsnet.untangle.result import UntanglingStep
 from gmsnet.untangle.state import UntanglingState
 
 BACK_SWEEPS, FINE = 20, 0.1  # a cell between nodes that went back and others may have this 1/q
@@ -62,7 +62,7 @@ def put_back(tangle: UntanglingState, nodes: Flags) -> None:
     tangle.points[nodes] = tangle.before[nodes]
 
 
-def restore(tangle: UntanglingState) -> Stage:
+def restore(tangle: UntanglingState) -> UntanglingStep:
     """Nodes that need not be elsewhere go back to their very bits: what was made thin on purpose stays as it was."""
     topology, precision = tangle.topology, tangle.precision
     nodes = in_order(topology, moved(tangle))
@@ -74,4 +74,4 @@ def restore(tangle: UntanglingState) -> Stage:
             precision.unit, precision.grain,
         ):  # fmt: skip
             break
-    return Stage("back where possible", len(nodes), sweeps, tangle.left)
+    return UntanglingStep("back where possible", len(nodes), sweeps, tangle.left)

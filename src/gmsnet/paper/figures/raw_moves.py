@@ -23,7 +23,7 @@ EPOCHS = (1, 10)
 
 
 @dataclass(frozen=True)
-class Stage:
+class Snapshot:
     """The network at some point of its training."""
 
     title: str
@@ -31,31 +31,31 @@ class Stage:
 
 
 def draw(context: Context) -> Drawn:
-    """A training mesh and a test mesh, raw and truncated, at each stage; counts over all meshes of each kind."""
+    """A training mesh and a test mesh, raw and truncated, at each snapshot; counts over all meshes of each kind."""
     meshes = data.meshes(0)
     first, second, _ = data.SPLIT
     kinds = {"training": meshes[:first], "test": meshes[first + second :]}
-    stages = [Stage(f"after {n} epoch{'s' * (n > 1)}", _after(n, context.plan.seed)) for n in EPOCHS]
-    stages.append(Stage("after the full training", GMSNet.from_tensors(weights.load().tensors)))
+    snapshots = [Snapshot(f"after {n} epoch{'s' * (n > 1)}", _after(n, context.plan.seed)) for n in EPOCHS]
+    snapshots.append(Snapshot("after the full training", GMSNet.from_tensors(weights.load().tensors)))
     figure = plot.new_figure(12.0, 16.5)
-    axes = figure.subplots(4, len(stages))
+    axes = figure.subplots(4, len(snapshots))
     facts: dict[str, Any] = {}
     for row, (kind, those) in enumerate(kinds.items()):
         mesh = min(those, key=lambda each: len(each.points))
         topology = Topology.of(mesh)
-        for column, stage in enumerate(stages):
+        for column, snapshot in enumerate(snapshots):
             context.go_on()
             for below, truncate in enumerate((False, True)):
-                moved = raw.sweep(stage.net, mesh, truncate=truncate, topology=topology)
+                moved = raw.sweep(snapshot.net, mesh, truncate=truncate, topology=topology)
                 view = plot.View.of(moved.mesh, topology=topology)
                 where = axes[2 * row + below, column]
                 mappable = plot.draw(where, view)
                 how = "truncated" if truncate else "raw"
                 cells = f"{view.report.inverted:,} of {len(view.corners):,} cells inverted"
-                where.set_title(f"{kind} mesh {stage.title}, {how}:\n{cells}", fontsize=9)
-            facts.setdefault(kind, {})[stage.title] = _count(stage.net, those)
+                where.set_title(f"{kind} mesh {snapshot.title}, {how}:\n{cells}", fontsize=9)
+            facts.setdefault(kind, {})[snapshot.title] = _count(snapshot.net, those)
     plot.add_colour_bar(figure, mappable, axes.ravel(), shrink=0.5)
-    counts = "; ".join(_sentence(kind, facts[kind], stages) for kind in kinds)
+    counts = "; ".join(_sentence(kind, facts[kind], snapshots) for kind in kinds)
     caption = (
         "One sweep of GMSNet over a mesh of the training set and one of the test set, with raw shifts and with "
         "truncated ones, after 1 and 10 epochs and after the full training; inverted cells are red. Shifts that "
@@ -80,9 +80,9 @@ def _count(net: GMSNet, meshes: Sequence[Mesh]) -> dict[str, int]:
     return total
 
 
-def _sentence(kind: str, facts: dict[str, dict[str, int]], stages: Sequence[Stage]) -> str:
-    parts = [f"{facts[s.title]['inverting']:,} {s.title}" for s in stages]
-    return f"of {facts[stages[0].title]['visits']:,} on the {kind} meshes {', '.join(parts)}"
+def _sentence(kind: str, facts: dict[str, dict[str, int]], snapshots: Sequence[Snapshot]) -> str:
+    parts = [f"{facts[s.title]['inverting']:,} {s.title}" for s in snapshots]
+    return f"of {facts[snapshots[0].title]['visits']:,} on the {kind} meshes {', '.join(parts)}"
 
 
 def _after(epochs: int, seed: int) -> GMSNet:

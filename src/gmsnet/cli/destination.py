@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Target:
+class Destination:
     """path: of the output. format: its name in the table, None where the input's is kept.
 
     aside: the output is the standard output, so what is said goes to standard error.
@@ -30,7 +30,7 @@ class Target:
     aside: bool = False
 
 
-def target_of(source: str, output: str | None, in_place: bool, format: str | None) -> Target:
+def destination_of(source: str, output: str | None, in_place: bool, format: str | None) -> Destination:
     """The output of ``smooth``. Raises InputError where it is missing, is the input, or cannot be written."""
     if in_place:
         if output is not None:
@@ -40,7 +40,7 @@ def target_of(source: str, output: str | None, in_place: bool, format: str | Non
         if not os.path.isfile(source):
             raise InputError(f"{source}: only a file can be smoothed in place")
         check_writable(source)
-        return Target(source, None, is_standard_output(source))
+        return Destination(source, None, is_standard_output(source))
     if output is None:
         raise InputError("the output is missing: give IN and OUT, or --in-place to overwrite the input")
     if format is not None:
@@ -49,7 +49,7 @@ def target_of(source: str, output: str | None, in_place: bool, format: str | Non
     if output in STANDARD_OUTPUT:
         standard_output()  # raises where it is closed
     if output in STANDARD_OUTPUT or is_special(output):
-        return Target(output, format, aside)
+        return Destination(output, format, aside)
     refuse_folder(output)
     key = format or format_of_suffix(output, os.path.splitext(output)[1], "--output-format", reading=False)
     for read, written in itertools.product(_files(source), _files(output, key)):
@@ -57,15 +57,15 @@ def target_of(source: str, output: str | None, in_place: bool, format: str | Non
             raise InputError(f"{written} is the input {read} itself: name another output, or use --in-place")
     for written in files_of(output, FORMATS[key]):
         check_writable(written)
-    return Target(output, key, aside)
+    return Destination(output, key, aside)
 
 
-def check_picture(plot: str, source: str, target: Target | None = None) -> None:
+def check_picture(plot: str, source: str, destination: Destination | None = None) -> None:
     """InputError where a picture cannot be written to this path, or would overwrite a mesh that is read or written."""
     from gmsnet.plot import check_target
 
     check_target(plot)
-    meshes = [*_files(source), *(_files(target.path, target.format) if target else ())]
+    meshes = [*_files(source), *(_files(destination.path, destination.format) if destination else ())]
     if any(_is_same(plot, path) for path in meshes):
         raise InputError(f"{plot}: the picture would overwrite the mesh: give it another name")
     check_writable(plot)

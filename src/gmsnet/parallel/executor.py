@@ -1,0 +1,57 @@
+"""Who carries out the work on a mesh: one thread, several, or (so that nothing stands against it) several processes.
+
+A sweep gives an executor ranges of blocks, tells it where a colour ends, and asks it for figures of the whole mesh. An
+executor of processes works on the blocks of its own part of the mesh, sends its neighbours the places of nodes that
+have moved after each colour, and forms the figures with the other processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Result = TypeVar("Result")
+Figure = TypeVar("Figure", float, NDArray[np.float64])
+Figures = TypeVar("Figures", bound=NDArray[Any])
+
+
+class Executor(Protocol):
+    """See the module. Every process of an executor calls the same functions in the same order."""
+
+    @property
+    def sequential(self) -> bool:
+        """``map`` works a range off from its first to its last, and nothing is to be done after a colour.
+
+        The colours of a sweep may then be given as one range.
+        """
+        ...
+
+    def map(self, work: Callable[[int, int], Result], first: int, last: int) -> list[Result]:
+        """What ``work`` returns for the pieces of a range first…last, in the order of the pieces; at least one.
+
+        What a piece raises is raised here, when no other piece is worked on any more.
+        """
+        ...
+
+    def after_colour(self, colour: int, points: NDArray[np.float64]) -> None:
+        """All nodes of a colour are where they will be; points: (N, 2) of all nodes, in memory order."""
+        ...
+
+    def minimum(self, value: Figure) -> Figure:
+        """The least of what all processes give; of an array, for each of its places."""
+        ...
+
+    def total(self, figures: Figures) -> Figures:
+        """The sums of what all processes give, for each place of an array.
+
+        The sums must be exact, so that they have the same bits in any order: whole numbers, or numbers on the grid of
+        ``kernels.simplex.measures.grids``.
+        """
+        ...
+
+    def for_blocks(self, blocks: int) -> Executor:
+        """The executor for a mesh of so many blocks: one that is sequential where sharing them out does not pay."""
+        ...

@@ -1,0 +1,111 @@
+"""What a call of ``smooth`` ends with: the best mesh as it is written, its measures, and what there is to say."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.topology.write_back import put_back
+from gmsnet.measure.report import ASPECT, QualityReport, measure
+from gmsnet.measure.totals import Totals
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
+from gmsnet.preserve.protection import WALL, wall_note
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.result import SmoothResult
+from gmsnet.run.state import Ending, State
+from gmsnet.run.untangle_stage import still_inverted
+from gmsnet.topology.topology import Topology, near_points
+
+Floats = NDArray[np.float64]
+
+
+def write_back(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """The last stage: the best points in the order of the input, and their measures."""
+    rank = options.target.rank if options.target else rank_by(options.best_by)
+    ending = outcome(state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals)
+    nothing = np.empty((0, 2))
+    return replace(state, start=nothing, points=nothing, shapes=np.empty(0, dtype=np.float32), ending=ending)
+
+
+def result_of(state: State, began: float) -> SmoothResult:
+    """What the caller gets. began: when the call did, by ``time.perf_counter``."""
+    assert state.ending is not None
+    (points, moved, after), topology = state.ending, state.topology
+    return SmoothResult(
+        mesh=state.restore(points),
+        points=points.copy(),
+        before=state.before,
+        after=after,
+        sweeps=state.history[-1].index if state.history else 0,
+        stop_reason=state.stop_reason,
+        moved=moved,
+        held=topology.held,
+        history=list(state.history),
+        notes=_notes(state),
+        unmended=still_inverted(after, topology, state.reasons),
+        topology=topology,
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _notes(state: State) -> list[str]:
+    protection, near_walls = state.protection, []
+    if protection.kept is not None:
+        near_walls.append(wall_note(len(protection.topology.held.get(WALL, ())), moved=state.released))
+    return [*protection.notes, *near_walls, *state.untangling, *state.remarks]
+
+
+def outcome(
+    mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
+    start: Floats | None = None, executor: Executor = serial, totals: Totals | None = None,
+) -> Ending:  # fmt: skip
+    """The best mesh as it is in the input's order; that of the input if the quick sums misjudged it.
+
+    best: (N, 2) in memory order. All nodes that it does not move keep their very bits. rank: of two meshes that of the
+    lesser rank is the better. start: ``near_points`` of the mesh, totals: of ``best``, where they are known.
+    """
+    start = near_points(mesh, topology) if start is None else start
+    plane, factors = mesh.plane, _factors(mesh.exponent)
+    assert plane is not None
+    points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
+    count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)
+    if count:
+        points.flags.writeable = False  # so that the mesh need not copy them
+        whole = totals if topology.scored is topology.simplices else None
+        known = (best, executor, whole) if exact else (None, executor)
+        after = measure(mesh.with_points(points), topology, *known)
+        if rank(after) <= rank(before):
+            return Ending(points, moved, after)
+        moved[:] = False
+    return Ending(mesh.points, moved, before)
+
+
+def _factors(exponent: int) -> tuple[float, float]:
+    """Two normal powers of two by which to multiply one after the other for 2 to the power of the exponent.
+
+    The first one is 1 unless the exponent is too large or too small for a single float.
+    """
+    most = max(min(exponent, 1000), -1000)
+    return 2.0 ** (exponent - most), 2.0**most
+
+
+def rank_by(best_by: str) -> Callable[[QualityReport], Any]:
+    """Fewer inverted cells first, then the larger q̂, or the larger least and then mean 1/q if not all are triangles."""
+
+    def rank(report: QualityReport) -> tuple[float, ...]:
+        totals = report.totals
+        if totals is None:
+            return (report.inverted,)
+        if math.isnan(totals.qhat):
+            return report.inverted, -totals.shape_min, -totals.shape_mean
+        return report.inverted, -(totals.qhat_aspect if best_by == ASPECT else totals.qhat)
+
+    return rank

@@ -1,0 +1,94 @@
+"""The first state of a mesh that is to be smoothed: connectivity, measures, and what is protected."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import InputError
+from gmsnet.kernels.topology.connectivity import CHOSEN
+from gmsnet.measure.report import QualityReport, measure
+from gmsnet.measure.target import Target
+from gmsnet.mesh.adapters import to_mesh
+from gmsnet.mesh.mesh import Mesh, unknown_cells, unmeasured
+from gmsnet.mesh.selection import fixed_mask
+from gmsnet.methods import Smoother, StarSmoother
+from gmsnet.methods.auto import Auto
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.memory import refuse_unless_free
+from gmsnet.parallel.threads import side_by_side
+from gmsnet.preserve.protection import Protection, protected
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.state import State
+from gmsnet.topology.held import REASONS
+from gmsnet.topology.topology import Topology
+
+Floats = NDArray[np.float64]
+
+MANY = 20_000  # nodes: for the set-up of fewer a second thread is not worth starting
+BYTES_PER_NODE = 400  # that a call takes at most on a mesh of triangles, copies of them included; ``auto`` takes 250
+
+
+def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOptions, executor: Executor) -> State:
+    """The state before the first stage. mesh, fixed: see ``gmsnet.smooth``.
+
+    Raises InputError for a mesh that cannot be smoothed or does not fit into memory, and for nodes that it has not.
+    """
+    target = options.target
+    given, restore = to_mesh(mesh)
+    check_mesh(given, target)
+    remarks = []
+    refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
+    threads = options.thread_count if len(given.points) >= MANY else 1
+    asked = fixed_mask(given, fixed)
+    topology, start = Topology.and_points(given, asked, threads)
+    if asked.any() and REASONS[CHOSEN] not in topology.held:
+        count = np.count_nonzero(asked)
+        named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
+        where = " by the point data 'fixed' of the mesh" if fixed is None else ""
+        remarks.append(f"fixed: {named}{where}, and held for other reasons anyway")
+    if unknown := unknown_cells(given):
+        remarks.append(f"the nodes of {unknown} are held: gmsnet does not know this type of cells")
+    if target and (others := unmeasured(given)):
+        remarks.append(f"the target is asked of triangles alone, not of {others}")
+    given = given.without_cells()  # whatever was copied of them is given back
+    shapes = np.empty(len(topology.near) if target else 0, dtype=np.float32)
+
+    def looked_at(near: Floats) -> tuple[QualityReport, Protection]:
+        before = measure(given, topology, near, executor.for_blocks(0), shapes=shapes)
+        return before, protected(given, topology, options.preserve, options.fix_layers, near)
+
+    if threads == 1 or target or not isinstance(smoother, Auto | StarSmoother):
+        before, protection = looked_at(start)
+    else:  # most often nothing is protected, and these are the stars that are smoothed
+        (before, protection), _ = side_by_side(threads, partial(looked_at, start), lambda: topology.stars)
+    return State(
+        given, restore, smoother, before, protection, start, start, shapes, tuple(remarks), totals=before.totals
+    )
+
+
+def check_mesh(mesh: Mesh, target: Target) -> None:
+    """InputError for volume meshes and curved surfaces, which cannot be smoothed yet, and targets of no triangle."""
+    others = unmeasured(mesh) if target else ""
+    if others and not any(len(block.nodes) for block in mesh.cells if block.triangular):
+        raise InputError(f"a target is asked of triangles, and this mesh has none: {others} cannot be measured so far")
+    volumes = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
+    if mesh.plane is None and volumes:
+        raise InputError(
+            f"this is a volume mesh ({', '.join(volumes)}): only planar triangle meshes can be smoothed so far"
+        )
+    if mesh.plane is None and (unknown := unknown_cells(mesh)):
+        raise InputError(
+            f"the mesh varies in x, y and z and has cells of a type that gmsnet does not know ({unknown}): "
+            "only planar triangle meshes can be smoothed so far"
+        )
+    if mesh.plane is None:
+        extent = np.ptp(mesh.points, axis=0)
+        raise InputError(
+            "this is a curved surface (x, y and z all vary, by "
+            + ", ".join(f"{e:.3g}" for e in extent)
+            + "): only meshes in a plane of constant x, y or z can be smoothed so far"
+        )

@@ -1,0 +1,92 @@
+"""A mesh on its way through the stages of ``smooth``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.star.guard import Precision
+from gmsnet.measure.report import QualityReport
+from gmsnet.measure.totals import Totals
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.methods import Smoother
+from gmsnet.preserve.protection import Protection
+from gmsnet.run.run import Start, precision_of
+from gmsnet.run.score import Score
+from gmsnet.run.stop import INTERRUPTED
+from gmsnet.run.sweep import Sweep
+from gmsnet.topology.topology import Topology
+
+Floats = NDArray[np.float64]
+
+
+class Ending(NamedTuple):
+    """What is left of a mesh after the stages. points: (N, dim) by id. moved: (N,) bool. after: the measures."""
+
+    points: Floats
+    moved: NDArray[np.bool_]
+    after: QualityReport
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Each stage makes a new one. Nothing in it is changed in place.
+
+    mesh: the input, without its cells. restore: what makes a mesh of the type that came in of points (N, dim).
+    smoother: the method, ready for one run. before: the measures of the input. protection: what of it is protected.
+    start: (N, 2) the nodes of the input, points: those of the best mesh so far, both in memory order (``near_points``).
+    shapes: (T,) 1/q of the input's triangles in ``topology.near``; none without a target. remarks: what there is to say
+    about the input. totals: of the points, where they are known. untangling: what was done about inverted cells,
+    reasons: why some are left, by the nodes of each, ascending. history: one Sweep for each look. stop_reason: one of
+    ``run.stop``, "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
+    interruption: what ends the smoothing before its end. ending: once the mesh is written back to the order of the
+    input; start, points and shapes are then empty, lest the result needs more memory than the stages.
+    """
+
+    mesh: Mesh
+    restore: Callable[[Floats], Any]
+    smoother: Smoother
+    before: QualityReport
+    protection: Protection
+    start: Floats
+    points: Floats
+    shapes: NDArray[np.float32]
+    remarks: tuple[str, ...] = ()
+    totals: Totals | None = None
+    untangling: tuple[str, ...] = ()
+    reasons: Mapping[tuple[int, ...], str] = field(default_factory=dict)
+    history: tuple[Sweep, ...] = ()
+    stop_reason: str = ""
+    released: bool = False
+    interruption: KeyboardInterrupt | None = None
+    ending: Ending | None = None
+
+    @property
+    def topology(self) -> Topology:
+        """With the nodes that are held now."""
+        return self.protection.outer if self.released else self.protection.topology
+
+    @property
+    def precision(self) -> Precision:
+        """How exactly coordinates are known."""
+        return precision_of(self.mesh)
+
+    def run_start(self, best_by: str) -> Start:
+        """Where a run over the whole mesh starts."""
+        known = self.totals is not None and self.topology.scored is self.topology.simplices
+        score = Score.of(self.totals, best_by) if known else None
+        return Start(self.topology, self.points, self.precision, score, self.history)
+
+    def ended(self, stop_reason: str, interruption: KeyboardInterrupt | None = None) -> State:
+        """The same, and why the sweeps ended."""
+        return replace(self, stop_reason=stop_reason, interruption=interruption)
+
+    def interrupted(self, interruption: KeyboardInterrupt) -> State:
+        """The same, interrupted. Raises the second interruption: who asks twice does not want to wait."""
+        if self.interruption is not None:
+            raise interruption
+        return self.ended(INTERRUPTED, interruption)
