@@ -114,7 +114,8 @@ def elements_of(topology: Topology) -> Elements:
     if simplices.cells is not None:
         corners = _cells_of(simplices._replace(rows=corners))
     there = corners >= 0
-    corners, there = (each[(free[corners] & there).any(axis=1)] for each in (corners, there))
+    corners = corners[(free[corners] & there).any(axis=1)]
+    there = corners >= 0
     sides = there.sum(axis=1)
     first = np.where(there, corners, len(free)).argmin(axis=1)
     turned = (first[:, None] + np.arange(corners.shape[1])) % sides[:, None]
@@ -135,7 +136,8 @@ def _cells_of(simplices: Simplices) -> NDArray[np.int32]:
     Of a quad at least two simplices are there; each has another node than the one before it.
     """
     rows, cells, shapes = simplices.rows, simplices.cells, simplices.shapes
-    assert cells is not None and shapes is not None
+    assert cells is not None
+    assert shapes is not None
     one = np.flatnonzero(np.diff(cells, prepend=-1))
     corners = np.full((len(one), 4), -1, dtype=np.int32)
     corners[:, :3] = rows[one]

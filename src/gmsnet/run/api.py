@@ -21,6 +21,7 @@ from gmsnet.mesh.mesh import Mesh, unknown_cells, unmeasured
 from gmsnet.mesh.selection import fixed_mask
 from gmsnet.methods import Smoother, StarSmoother, smoother
 from gmsnet.methods.auto import Auto
+from gmsnet.methods.cells import check_cells
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import available_threads, side_by_side
 from gmsnet.preserve.protection import WALL, Protection, method_for, protected, wall_note
@@ -95,6 +96,7 @@ def smooth(
     target, chosen = Target(target_quality, target_angle), create()
     given, restore = to_mesh(mesh)
     check_mesh(given, target)
+    check_cells(given, method, objective)
     others, unknown = unmeasured(given) if target else "", unknown_cells(given)
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     threads = threads or available_threads()

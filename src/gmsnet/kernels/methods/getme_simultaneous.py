@@ -1,8 +1,8 @@
 """GETMe for all elements at once: every node goes to a mean of its places in the transformed cells around it.
 
 Vartziotis, Wipper: The GETMe Mesh Smoothing Framework (2018), section 6.1.2. The transformations are those of
-kernels.methods.getme_elements; the mean has the weights (1 − 1/q)^η. All shifts are planned before anything moves; the guard
-then makes them colour by colour. (The book puts nodes back until no element is invalid.)
+kernels.methods.getme_elements; the mean has the weights (1 − 1/q)^η. All shifts are planned before anything moves; the
+guard then makes them colour by colour. (The book puts nodes back until no element is invalid.)
 """
 
 from __future__ import annotations
