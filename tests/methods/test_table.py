@@ -74,7 +74,9 @@ def test_methods_for_triangles_refuse_quads_and_name_those_that_move_them(name):
     assert METHODS[name].moves("triangle")
     assert METHODS[name].moves("quad") == (name not in TRIANGLES_ONLY)
     if name in TRIANGLES_ONLY:
-        with pytest.raises(InputError, match=f"^{name} moves triangles alone, and this mesh has 4 quads: choose auto, "):
+        with pytest.raises(
+            InputError, match=f"^{name} moves triangles alone, and this mesh has 4 quads: choose auto, "
+        ):
             gmsnet.smooth(QUADS, name)
 
 
