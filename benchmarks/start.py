@@ -101,8 +101,8 @@ def degrees() -> None:
         def visit(local, n, power, sums, step, times):
             n = n if degree == 0 else degree
             for _ in range(times):
-                derive(local, n, power, sums)
-                judge(local, n, power, step, 0.01, sums)
+                derive(local, n, None, power, sums)
+                judge(local, n, None, power, step, 0.01, sums)
 
         return numba.njit(**OPTIONS)(visit)
 

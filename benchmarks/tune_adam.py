@@ -50,12 +50,12 @@ NONE, MANY = np.zeros(1), 0.05 * (1.0 - np.arange(1000) / 1000)
 @numba.njit
 def least_values(points, blocks, objective, sizes, out):
     """The least objective that so many steps find for each lane of each block."""
-    x, ring, work, _ = stars.room(blocks.most)
+    workspace = stars.workspace_for(blocks.most)
     local, shift = np.empty(2 * blocks.most * LANES), np.empty(2 * LANES)
     state, sums = np.empty(adam.STATE * LANES), np.empty(OUT * LANES)
     for block in range(len(blocks.filled)):
-        n = stars.fetch(points, blocks, block, x, ring, work, local)
-        adam.descend(objective, local, n, sizes, state, sums, shift)
+        n = stars.fetch(points, blocks, block, workspace, local)
+        adam.descend(objective, local, n, None, sizes, state, sums, shift)
         out[block * LANES : (block + 1) * LANES] = state[adam.BEST * LANES : (adam.BEST + 1) * LANES]
 
 

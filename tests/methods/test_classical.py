@@ -25,22 +25,22 @@ def plain_mean(local, n, shift):
     star = np.zeros((n + 1, LANES, 2))
     star[1:] = local.reshape(n, 2, LANES).swapaxes(1, 2)
     pairs = np.empty(2 * LANES)
-    laplacian_plain.aim(star.ravel(), n, False, pairs, np.empty(block.FLOORS * LANES))
+    laplacian_plain.aim(star.ravel(), n, None, False, pairs, np.empty(block.FLOORS * LANES))
     shift[:] = pairs.reshape(LANES, 2).T.ravel()
 
 
 TWINS = {  # method and variant → (compiled proposal, plain one)
     ("laplacian", "smart"): (
-        lambda local, n, shift: laplacian.propose(local, n, laplacian.SMART, 0.0, ROW, shift),
+        lambda local, n, shift: laplacian.propose(local, n, None, laplacian.SMART, 0.0, ROW, shift),
         plain.smart_laplacian,
     ),
     ("laplacian", "plain"): (plain_mean, plain.laplacian),
     ("laplacian", "inverse-length"): (
-        lambda local, n, shift: laplacian.propose(local, n, laplacian.INVERSE_LENGTH, 0.0, ROW, shift),
+        lambda local, n, shift: laplacian.propose(local, n, None, laplacian.INVERSE_LENGTH, 0.0, ROW, shift),
         plain.inverse_length_laplacian,
     ),
     ("laplacian", "area"): (
-        lambda local, n, shift: laplacian.propose(local, n, laplacian.AREA, 0.0, ROW, shift),
+        lambda local, n, shift: laplacian.propose(local, n, None, laplacian.AREA, 0.0, ROW, shift),
         plain.area_laplacian,
     ),
     ("angle", None): (angle.propose, plain.angle),

@@ -26,9 +26,9 @@ class Looks:
         self.topology, self.floor, self.blocks = Topology.of(mesh), Floor(), []
         self.points, original = near_points(mesh, self.topology), module.ratio_upper_bounds
 
-        def counted(points, triangles, orientation, blocks, *others):
+        def counted(points, simplices, blocks, *others):
             self.blocks.append(len(blocks))
-            original(points, triangles, orientation, blocks, *others)
+            original(points, simplices, blocks, *others)
 
         monkeypatch.setattr(module, "ratio_upper_bounds", counted)
 
@@ -56,7 +56,7 @@ def worst(points, triangles, orientation):
 
 
 def test_it_is_never_below_the_worst_cell_and_next_to_it_after_a_look_at_all(looks):
-    triangles, orientation = looks.topology.changeable
+    triangles, orientation, *_ = looks.topology.changeable
     random = np.random.default_rng(0)
     for number in range(5):
         found, least = looks.look(HELD_BACK), worst(looks.points, triangles, orientation)
@@ -68,7 +68,7 @@ def test_it_is_never_below_the_worst_cell_and_next_to_it_after_a_look_at_all(loo
 
 
 def test_all_are_looked_at_again_only_where_stars_were_held_back(looks):
-    count = math.ceil(len(looks.topology.changeable[0]) / module.LANES)
+    count = math.ceil(len(looks.topology.changeable.rows) / module.LANES)
     for tally in [ALL_MOVED] * 6:
         looks.look(tally)
     few = looks.blocks[1]
@@ -98,7 +98,7 @@ def test_the_longer_the_worst_stays_where_it_is_looked_for_the_rarer_are_looks_a
 def test_a_worst_cell_that_was_overlooked_makes_looks_at_all_as_frequent_as_at_first(looks):
     for _ in range(20):
         looks.look(HELD_BACK)
-    triangles, _ = looks.topology.changeable
+    triangles = looks.topology.changeable.rows
     elsewhere = np.setdiff1d(np.arange(len(triangles) // module.LANES), looks.floor.blocks)
     free = looks.topology.near_free[triangles]
     cell = next(t for t in elsewhere * module.LANES if free[t].any())
@@ -117,7 +117,7 @@ def test_a_method_that_does_not_tell_what_a_sweep_did_counts_as_held_back(looks)
 
 
 def test_the_worst_cells_that_a_method_names_are_looked_at_from_then_on(looks):
-    triangles, _ = looks.topology.changeable
+    triangles = looks.topology.changeable.rows
     cells = np.array([0, 1, 64, 640, len(triangles) - 1], dtype=np.int32)
     looks.floor.watch(cells, np.linspace(0.1, 0.5, len(cells)))
     looks.look(ALL_MOVED)

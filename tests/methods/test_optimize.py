@@ -28,14 +28,14 @@ def adam_shifts(name, stars, sizes=None):
     sizes = step_sizes() if sizes is None else sizes
 
     def propose(local, n, shift):
-        adam.propose(NAMES.index(name), local, n, sizes, STATE, SUMS, shift, OTHER)
+        adam.propose(NAMES.index(name), local, n, None, sizes, STATE, SUMS, shift, OTHER)
 
     return proposed(stars, propose)
 
 
 def newton_shifts(name, stars):
     def propose(local, n, shift):
-        newton.propose(NAMES.index(name), local, n, SEARCH, SUMS, HESSIAN, shift, OTHER)
+        newton.propose(NAMES.index(name), local, n, None, SEARCH, SUMS, HESSIAN, shift, OTHER)
 
     return proposed(stars, propose)
 

@@ -10,29 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 from support import naive
+from support.choices import CHOICES, TURN_MATTERS, name_of
 
 import gmsnet
-from gmsnet import METHODS, CellBlock, Mesh
+from gmsnet import CellBlock, Mesh
 from gmsnet.generate import disturb
 from gmsnet.parallel import threads as workers
 from gmsnet.topology.topology import Topology
 
-
-def name_of(method):
-    return "-".join(method.values())
-
-
-CHOICES = [
-    {"method": name, **({"variant": variant} if variant else {}), **({"objective": objective} if objective else {})}
-    for name, method in METHODS.items()
-    for variant in method.variants or [""]
-    for objective in method.objectives or [""]
-]
 every_method = pytest.mark.parametrize("method", CHOICES, ids=list(map(name_of, CHOICES)))
-
-# How the names of the methods begin whose result depends on how the mesh lies to the axes: the paper's networks scale a
-# star by the sides of a bounding box and read plain coordinates; Adam scales each component of a gradient by itself.
-TURN_MATTERS = ("gmsnet-", "nn", "optimize-adam")
 
 # What is less than a gain of 0.1 in q-hat and a mean 1/q of 0.85 on a random square in twenty sweeps.
 LESSER_GAINS = {

@@ -9,7 +9,7 @@ import gmsnet
 from gmsnet.generate import disturb
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import sized
-from gmsnet.methods.sized import BAND, WEIGHT, Sized, banded
+from gmsnet.methods.sized import BAND, WEIGHT, Sized, banded, room_for
 from gmsnet.paper.cases import CASES
 from gmsnet.topology.topology import Topology, planar_points
 
@@ -45,7 +45,7 @@ def test_derivatives(n):
 
     def at(x, y):
         state[: 2 * LANES] = np.repeat([x, y], LANES)
-        sized.derive(local, n, wanted, WEIGHT, state)
+        sized.derive(local, n, None, wanted, WEIGHT, state)
         rows = state.reshape(-1, LANES)[:, inside]
         return rows[sized.VALUE].copy(), rows[sized.GX : sized.LEAST].copy()
 
@@ -77,13 +77,13 @@ def test_a_visit_never_makes_the_objective_larger(n):
     rng = np.random.default_rng(n)
     local, wanted = stars(rng, n)
     state = np.zeros(sized.STATE * LANES)
-    sized.derive(local, n, wanted, WEIGHT, state)
+    sized.derive(local, n, None, wanted, WEIGHT, state)
     before, least = (state.reshape(-1, LANES)[row].copy() for row in (sized.VALUE, sized.LEAST))
-    sized.descend(local, n, wanted, WEIGHT, state)
+    sized.descend(local, n, None, wanted, WEIGHT, state)
     place = state[: 2 * LANES].copy()
     state[:] = 0.0
     state[: 2 * LANES] = place
-    sized.derive(local, n, wanted, WEIGHT, state)
+    sized.derive(local, n, None, wanted, WEIGHT, state)
     after = state.reshape(-1, LANES)[sized.VALUE]
     inside = least > 0.0
     assert inside.any()
@@ -95,9 +95,10 @@ def wanted_areas(mesh):
     """D of the triangles of all stars, and what it is to be."""
     topology = Topology.of(mesh)
     blocks = topology.stars.blocks
-    areas = np.empty(len(blocks.rings))
+    room = room_for(blocks)
     points = planar_points(mesh)[topology.memory]
-    sized.targets(points, topology.near, blocks, areas)
+    sized.targets(points, topology.near, blocks, room)
+    areas = room.double
     corners = np.empty((len(areas), 3), dtype=int)
     for block in range(len(blocks.degree)):
         n, offset = blocks.degree[block], blocks.offset[block]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import gmsnet
+from gmsnet import CellBlock, Mesh
 from gmsnet.errors import InputError
 from gmsnet.methods import METHODS, method_named, smoother
 
@@ -58,3 +60,35 @@ def test_names_in_other_letters_are_known():
     for name in METHODS:
         with pytest.raises(InputError, match=f"did you mean .*{name}"):
             method_named(name.upper())
+
+
+QUADS = Mesh(
+    np.array([[x, y] for x in range(3) for y in range(3)], dtype=float),
+    (CellBlock("quad", np.array([[k, k + 3, k + 4, k + 1] for k in (0, 1, 3, 4)]), np.zeros(4, dtype=int)),),
+)
+TRIANGLES_ONLY = {"angle", "cvt", "cpt", "nn", "gmsnet", "gmsnet2"}
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_methods_for_triangles_refuse_quads_and_name_those_that_move_them(name):
+    assert METHODS[name].moves("triangle")
+    assert METHODS[name].moves("quad") == (name not in TRIANGLES_ONLY)
+    if name in TRIANGLES_ONLY:
+        with pytest.raises(
+            InputError, match=f"^{name} moves triangles alone, and this mesh has 4 quads: choose auto, "
+        ):
+            gmsnet.smooth(QUADS, name)
+
+
+@pytest.mark.parametrize("objective", ["cosine", "min-max-angle"])
+def test_objectives_of_angles_refuse_quads(objective):
+    method = METHODS["optimize"]
+    assert [each for each in method.objectives if not method.moves("quad", each)] == ["cosine", "min-max-angle"]
+    with pytest.raises(InputError, match=rf"^the objective {objective} of optimize .* 4 quads: .* metric, q, q2, or"):
+        gmsnet.smooth(QUADS, "optimize", objective=objective)
+
+
+def test_a_single_quad_is_named_as_one():
+    one = Mesh(QUADS.points[[0, 3, 4, 1]], (CellBlock("quad", np.array([[0, 1, 2, 3]]), np.zeros(1, dtype=int)),))
+    with pytest.raises(InputError, match="this mesh has 1 quad: "):
+        gmsnet.smooth(one, "cvt")

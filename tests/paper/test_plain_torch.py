@@ -52,7 +52,7 @@ def compiled_adam(stars):
     state, out, other = np.empty(adam.STATE * LANES), np.empty(OUT * LANES), np.empty(2 * LANES)
 
     def propose(local, n, shift):
-        adam.propose(METRIC, local, n, step_sizes(), state, out, shift, other)
+        adam.propose(METRIC, local, n, None, step_sizes(), state, out, shift, other)
 
     return proposed(stars, propose) / [[size(*s)] for s in stars]
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.methods import angle as kernels
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import Method, StarSmoother, Tally
+from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
 
 
 class AngleBased(StarSmoother):
@@ -26,4 +26,5 @@ METHOD = Method(
     summary="to the mean of the places where the node would halve the angles at its neighbours",
     source="Zhou, Shimada: An angle-based approach to two-dimensional mesh smoothing (2000)",
     create=lambda options: AngleBased(),
+    cells=TRIANGLES,
 )

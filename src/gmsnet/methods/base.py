@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -28,6 +28,8 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.topology.stars import Stars
 from gmsnet.topology.topology import Topology
 
+CELLS = ("triangle", "quad")  # the kinds of cells whose nodes may move
+TRIANGLES = ("triangle",)
 Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.star.stars)
 
 
@@ -134,8 +136,9 @@ class MethodOptions:
 class Method:
     """A row of the table of methods.
 
-    variants, objectives: the names that may be chosen from, the default first. weighted: it takes weights. slides: it
-    can let nodes slide along curves.
+    variants, objectives: the names that may be chosen from, the default first. weighted: it takes weights. cells: the
+    kinds of cells whose nodes it moves; limits: of objectives with which it moves fewer kinds, those. slides:
+    it can let nodes slide along curves.
     """
 
     name: str
@@ -146,3 +149,10 @@ class Method:
     objectives: tuple[str, ...] = ()
     weighted: bool = False
     slides: bool = False
+    cells: tuple[str, ...] = CELLS
+    limits: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
+
+    def moves(self, kind: str, objective: str | None = None) -> bool:
+        """Does it move the nodes of cells of this kind, with this objective (None: the default one)?"""
+        chosen = objective or (self.objectives[0] if self.objectives else "")
+        return kind in self.limits.get(chosen, self.cells)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.methods import cvt as kernels
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import Method, StarSmoother, Tally
+from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
 
 
 class Centroids(StarSmoother):
@@ -30,4 +30,5 @@ METHOD = Method(
     summary="to the centroid of the star: the mean of the triangles' centroids, weighted by their areas",
     source="Chen, Holst: Efficient mesh optimization schemes based on optimal Delaunay triangulations (2011)",
     create=lambda options: Centroids(),
+    cells=TRIANGLES,
 )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.methods import cvt as kernels
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import Method, StarSmoother, Tally
+from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
 
 
 class Circumcentres(StarSmoother):
@@ -30,4 +30,5 @@ METHOD = Method(
     summary="to the mean of the circumcentres of the triangles, weighted by their areas (also called ODT)",
     source="Chen: Mesh smoothing schemes based on optimal Delaunay triangulations (2004)",
     create=lambda options: Circumcentres(),
+    cells=TRIANGLES,
 )

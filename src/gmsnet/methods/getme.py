@@ -1,4 +1,4 @@
-"""GETMe, the geometric element transformation method. The formulas stand in kernels/methods/getme.py.
+"""GETMe, the geometric element transformation method. The formulas stand in kernels/methods/getme_elements.py.
 
 The paper runs the sequential variant with θ = π/3, λ = 0, ρ = 1. The book's setting for triangles is θ = π/4, λ = ½;
 with ρ = 0.01 in the sequential variant, where the worst elements' neighbours are easily broken, and with ρ = 1 and
@@ -6,6 +6,9 @@ with ρ = 0.01 in the sequential variant, where the worst elements' neighbours a
 squares). The simultaneous variant with the paper's θ and λ is not in the paper: η = 2 was chosen for it among 0 to 3,
 which raises q̂ by 0.05 to 0.1 over η = 0 and costs 0.01 of the mean 1/q; with the book's θ and λ, which transform more
 at once, η = 2 lowers q̂.
+
+Quads have a θ and a λ of their own in all variants: π/4 and ½. The paper knows triangles alone, and with its setting no
+quad becomes a square.
 
 The book lowers the penalty of an element that was transformed. What the paper's rows would be had it been raised is
 measured by ``benchmarks/getme_penalties.py``.
@@ -22,7 +25,9 @@ from numpy.typing import NDArray
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import getme as kernels
 from gmsnet.kernels.methods import getme_simultaneous
-from gmsnet.kernels.methods.getme import Elements, Queue, Transformation
+from gmsnet.kernels.methods.getme import Queue
+from gmsnet.kernels.methods.getme_elements import Elements, Transformation
+from gmsnet.kernels.simplex.mean_ratio2 import SQUARE, Simplices
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.methods.base import Field, Method, MethodOptions, Smoother, Tally, by_colour
 from gmsnet.parallel.executor import Executor
@@ -96,22 +101,49 @@ class SimultaneousGetme(Smoother):
 
 
 def elements_of(topology: Topology) -> Elements:
-    """The triangles that have a free node, in an order that does not depend on how they stand in the file.
+    """The cells that have a free node, in an order that does not depend on how they stand in the file.
 
     Each starts with its lowest place in memory and goes counter-clockwise; they are sorted by their places.
     """
-    free = topology.near_free
-    chosen = free[topology.near].any(axis=1)
-    corners = topology.near[chosen]
-    backwards = topology.near_orientation[chosen] < 0
+    free, simplices = topology.near_free, topology.simplices
+    corners = simplices.rows.copy()
+    backwards = simplices.orientation < 0
     corners[backwards] = corners[backwards, ::-1]
-    first = corners.argmin(axis=1)
-    corners = np.take_along_axis(corners, (first[:, None] + np.arange(3)) % 3, axis=1)
+    if simplices.cells is not None:
+        corners = _cells_of(simplices._replace(rows=corners))
+    there = corners >= 0
+    corners = corners[(free[corners] & there).any(axis=1)]
+    there = corners >= 0
+    sides = there.sum(axis=1)
+    first = np.where(there, corners, len(free)).argmin(axis=1)
+    turned = (first[:, None] + np.arange(corners.shape[1])) % sides[:, None]
+    corners = np.where(there, np.take_along_axis(corners, turned, axis=1), -1)
     corners = np.ascontiguousarray(corners[np.lexsort(corners.T[::-1])], dtype=np.int32)
+    of_corner = corners.ravel()
     start = np.zeros(len(free) + 1, dtype=np.int32)
-    np.cumsum(np.bincount(corners.ravel(), minlength=len(free)), out=start[1:])
-    around = (np.argsort(corners.ravel(), kind="stable") // 3).astype(np.int32)
-    return Elements(corners, free, start, around)
+    np.cumsum(np.bincount(of_corner[of_corner >= 0], minlength=len(free)), out=start[1:])
+    order = np.argsort(of_corner, kind="stable")[np.count_nonzero(of_corner < 0) :]
+    around = (order // corners.shape[1]).astype(np.int32)
+    quad = None if simplices.cells is None else corners[:, 3] >= 0
+    return Elements(corners, free, start, around, quad)
+
+
+def _cells_of(simplices: Simplices) -> NDArray[np.int32]:
+    """(C, 4) the corners of the cells that corner simplices belong to, counter-clockwise; −1 where there is no fourth.
+
+    Of a quad at least two simplices are there; each has another node than the one before it.
+    """
+    rows, cells, shapes = simplices.rows, simplices.cells, simplices.shapes
+    assert cells is not None
+    assert shapes is not None
+    one = np.flatnonzero(np.diff(cells, prepend=-1))
+    corners = np.full((len(one), 4), -1, dtype=np.int32)
+    corners[:, :3] = rows[one]
+    quad = np.flatnonzero(shapes[one] == SQUARE)
+    own, others = rows[one[quad]], rows[one[quad] + 1]
+    new = (others[:, :, None] != own[:, None, :]).all(axis=2)
+    corners[quad, 2], corners[quad, 3] = others[new], own[:, 2]
+    return corners
 
 
 def queue_of(points: NDArray[np.float64], elements: Elements) -> Queue:

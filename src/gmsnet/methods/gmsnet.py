@@ -11,7 +11,7 @@ from gmsnet import weights
 from gmsnet.kernels.methods import gmsnet as kernels
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import Method, StarSmoother, Tally
+from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
 
 
 class GmsNet(StarSmoother):
@@ -56,4 +56,5 @@ METHOD = Method(
     create=lambda options: GmsNet(weights.load(options.weights, variant=options.variant)),
     variants=tuple(weights.SHIPPED["gmsnet"]),
     weighted=True,
+    cells=TRIANGLES,
 )

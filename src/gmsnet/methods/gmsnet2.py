@@ -10,7 +10,7 @@ from gmsnet import weights
 from gmsnet.kernels.methods import gmsnet2 as kernels
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import Method, StarSmoother, Tally
+from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
 
 ACTIVATIONS = {"silu": kernels.SILU, "relu": kernels.RELU}
 
@@ -55,4 +55,5 @@ METHOD = Method(
     create=lambda options: GmsNet2(weights.load(options.weights, model="gmsnet2", variant=options.variant)),
     variants=tuple(weights.SHIPPED["gmsnet2"]),
     weighted=True,
+    cells=TRIANGLES,
 )

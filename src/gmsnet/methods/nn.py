@@ -17,7 +17,7 @@ from gmsnet import weights
 from gmsnet.kernels.methods import nn as kernels
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import Method, StarSmoother, Tally
+from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
 from gmsnet.weights.shapes import NN_HIDDEN
 
 
@@ -58,4 +58,5 @@ METHOD = Method(
     create=lambda options: NNSmoothing(weights.load(options.weights, model="nn", variant=options.variant)),
     variants=tuple(weights.SHIPPED["nn"]),
     weighted=True,
+    cells=TRIANGLES,
 )

@@ -2,7 +2,7 @@
 
 - adam: at most 20 Adam steps from where the node is, of MetricLoss by default: the paper's OptimSmoothing, with a step
   size tuned in its favour. kernels/methods/adam.py
-- newton: safeguarded Newton steps, to the end; bounded objectives may not make a triangle smaller than a tenth of its
+- newton: safeguarded Newton steps, to the end; bounded objectives may not make a simplex smaller than a tenth of its
   star's mean. kernels/methods/newton.py
 
 The objectives stand in kernels/simplex/objectives.py. ``q`` and ``q2`` are barriers, and good for the worst cell; the
@@ -20,7 +20,7 @@ from gmsnet.kernels.methods import adam, newton
 from gmsnet.kernels.simplex import objectives
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import LARGEST, Guard
-from gmsnet.methods.base import Method, MethodOptions, StarSmoother, Tally
+from gmsnet.methods.base import TRIANGLES, Method, MethodOptions, StarSmoother, Tally
 
 
 class Adam(StarSmoother):
@@ -76,4 +76,5 @@ METHOD = Method(
     variants=("adam", "newton"),
     objectives=objectives.NAMES,
     slides=True,
+    limits=dict.fromkeys(objectives.OF_ANGLES, TRIANGLES),
 )

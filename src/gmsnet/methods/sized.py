@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import sized as kernels
 from gmsnet.kernels.methods.bands import Bands, no_bands
 from gmsnet.kernels.star.block import Blocks
@@ -28,22 +29,32 @@ class Sized(StarSmoother):
     def __init__(self, weight: float = WEIGHT, bands: Bands | None = None) -> None:
         self.weight, self.bands = weight, bands or no_bands()
         self.topology: Topology | None = None
-        self.areas = np.empty(0)
+        self.wanted = kernels.Wanted(np.empty(0, dtype=np.int64), np.empty(0))
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if field.topology is not self.topology:
             self.topology = field.topology
             blocks = field.topology.stars.blocks
-            self.areas = np.empty(len(blocks.rings))
-            kernels.targets(field.points, field.topology.near, blocks, self.areas)
+            self.wanted = room_for(blocks)
+            kernels.targets(field.points, field.topology.near, blocks, self.wanted)
         return super().sweep(field, executor, test)
 
     def visit(
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, self.areas, self.weight, self.bands, first, last, guard, tally)
+        kernels.sweep(points, blocks, self.wanted, self.weight, self.bands, first, last, guard, tally)
+
+
+def room_for(blocks: Blocks) -> kernels.Wanted:
+    """For the targets of all simplices of the stars."""
+    count = blocks.degree
+    if blocks.patterns is not None and blocks.pattern is not None:
+        count = np.diff(blocks.patterns.first)[blocks.pattern]
+    first = np.zeros(len(count) + 1, dtype=np.int64)
+    np.cumsum(LANES * count.astype(np.int64), out=first[1:])
+    return kernels.Wanted(first[:-1], np.empty(first[-1]))
 
 
 def banded(start: NDArray[np.float64], kept: NDArray[np.bool_]) -> Sized:

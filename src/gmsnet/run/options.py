@@ -98,6 +98,11 @@ class SmoothOptions:
         """May nodes of curves move along them?"""
         return self.slide is not None and self.slide is not False
 
+    @property
+    def method_name(self) -> str:
+        """The method that is used: another one than ``method`` where sizes are to be kept."""
+        return self._method()[0].name
+
     def _method(self) -> tuple[Method, MethodOptions]:
         name = method_for(self.method, self.variant, self.preserve, self.target)
         return chosen(name, variant=self.variant, objective=self.objective, weights=self.weights, seed=self.seed)

@@ -18,6 +18,7 @@ from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured
 from gmsnet.mesh.selection import fixed_mask
 from gmsnet.methods import Smoother, StarSmoother
 from gmsnet.methods.auto import Auto
+from gmsnet.methods.cells import check_cells
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
@@ -41,6 +42,7 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
     target = options.target
     given, restore = to_mesh(mesh)
     check_mesh(given, target)
+    check_cells(given, options.method_name, options.objective)
     remarks = []
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     threads = options.thread_count if len(given.points) >= MANY else 1

@@ -116,9 +116,9 @@ def test_derivatives_and_step(p, degree):
     power, sums, shift = Power.of(p), np.zeros(kernels.SUMS * LANES), np.empty(2 * LANES)
     for place, ring in stars_of(rng, degree, 4):
         local = local_of(ring, place, float)
-        kernels.derive(local, degree, power, sums)
+        kernels.derive(local, degree, None, power, sums)
         kernels.propose(sums, 1.0, power.ratio, shift)
-        kernels.judge(local, degree, power, shift, 0.1, sums)
+        kernels.judge(local, degree, None, power, shift, 0.1, sums)
         rows = sums.reshape(kernels.SUMS, LANES)
         assert (rows == rows[:, :1]).all()  # all lanes hold the same star
         f, g, h = at(p, ring, place)
@@ -137,7 +137,7 @@ def test_derivatives_and_step(p, degree):
         if least > 0:
             assert rows[kernels.AFTER, 0] == pytest.approx(value(p, ring, there), rel=1e-10)
         pairs = np.vstack([place, ring]).repeat(LANES, axis=0).ravel()
-        found = barrier_star.derivatives(*place, pairs, degree, 3, power)
+        found = barrier_star.derivatives(*place, pairs, degree, None, 3, power)
         np.testing.assert_allclose(found[0], f, rtol=1e-12)
         np.testing.assert_allclose([found[3], found[4], found[5]], h[[0, 0, 1], [0, 1, 1]], rtol=1e-10, atol=1e-9)
 

@@ -39,7 +39,7 @@ def test_a_cell_misses_a_target_as_its_definition_says(a, b, c, quality, angle):
         return
     expected = shape < quality or (angle > 0.0 and (doubled <= 0.0 or least < angle))
     px, py, qx, qy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
-    assert missing.missing(px, py, qx, qy, quality, math.tan(math.radians(angle))) == expected
+    assert missing.missing(px, py, qx, qy, quality, math.tan(math.radians(angle)), None) == expected
 
 
 @pytest.mark.parametrize("target", [Target(0.4), Target(angle=25.0), Target(0.5, 20.0)])
@@ -48,7 +48,7 @@ def test_rows_and_nodes_against_a_slow_twin(target):
     topology = Topology.of(mesh)
     points, near, may_move = near_points(mesh, topology), topology.near, topology.near_free
     report = gmsnet.quality(mesh)
-    rows = below.missed(points, near, topology.near_orientation, *target.limits)
+    rows = below.missed(points, topology.simplices, *target.limits)
     expected = np.flatnonzero(target.missed(report.shape, report.min_angle))
     assert sorted(sorted(topology.memory[near[t]].tolist()) for t in rows) == sorted(
         sorted(topology.triangles[t].tolist()) for t in expected
@@ -61,8 +61,7 @@ def test_rows_and_nodes_against_a_slow_twin(target):
     chosen, tried = free[: len(free) // 2], np.zeros(len(points), dtype=bool)
     tried[chosen[::3]] = True
     around = {t for t in rows.tolist() if tried[near[t]].any()}
-    rings = topology.near_start, topology.near_ring
-    found = below.still_missing(points, chosen, *rings, may_move, *target.limits, tried, seen)
+    found = below.still_missing(points, chosen, topology.links, may_move, *target.limits, tried, seen)
     assert len(set(found.tolist())) == len(found)
     assert set(found.tolist()) == {i for t in around for i in near[t].tolist() if may_move[i]}
     assert not seen.any()
@@ -72,19 +71,18 @@ def test_rows_and_nodes_against_a_slow_twin(target):
 def test_rounds_end_where_nothing_is_missed_or_too_much_was_done():
     mesh = gmsnet.random_mesh(500, seed=3)
     topology, target = Topology.of(mesh), Target(0.3)
-    near, turn, may_move = topology.near, topology.near_orientation, topology.near_free
-    rings, ids = (topology.near_start, topology.near_ring), topology.memory
+    near, may_move, ids = topology.near, topology.near_free, topology.memory
 
     def made(plan, most, everywhere=False):
         points, tally = near_points(mesh, topology), np.zeros(3, dtype=np.int64)
-        rows = below.missed(points, near, turn, *target.limits)
+        rows = below.missed(points, topology.simplices, *target.limits)
         shape, seen = np.zeros(len(rows)), np.zeros(len(points), dtype=bool)
         nodes = ranking.free_nodes(near, rows, shape, 0.0, may_move, ids, seen)
         guard, scale, limits = plain_guard(Precision()), target.shape, target.limits
         left = below.rounds(
-            points, nodes, *rings, may_move, ids, guard, np.array(plan), most, scale, limits, everywhere, tally
+            points, nodes, topology.links, may_move, ids, guard, np.array(plan), most, scale, limits, everywhere, tally
         )
-        rows = below.missed(points, near, turn, *target.limits)
+        rows = below.missed(points, topology.simplices, *target.limits)
         assert set(left.tolist()) == {i for i in near[rows].ravel().tolist() if may_move[i]}
         return points.tobytes(), tally.tolist(), len(nodes), len(left)
 
@@ -104,7 +102,7 @@ def test_rounds_end_where_nothing_is_missed_or_too_much_was_done():
 def test_a_star_misses_a_target_if_one_of_its_triangles_does(corners, centre, quality, tangent):
     ring, (x, y) = np.array(corners).ravel(), centre
     expected = any(
-        missing.missing(a[0] - x, a[1] - y, b[0] - x, b[1] - y, quality, tangent)
+        missing.missing(a[0] - x, a[1] - y, b[0] - x, b[1] - y, quality, tangent, None)
         for a, b in zip([corners[-1], *corners[:-1]], corners, strict=True)
     )
-    assert missing.any_missing(ring, len(corners), x, y, quality, tangent) == expected
+    assert missing.any_missing(ring, len(corners), None, x, y, quality, tangent) == expected

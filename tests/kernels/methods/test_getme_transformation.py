@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gmsnet.kernels.methods import getme as kernels
+from gmsnet.kernels.methods import getme_elements as kernels
 from gmsnet.paper import plain_getme
 
 ANGLES = {"paper": (math.pi / 3, 0.0), "book": (math.pi / 4, 0.5)}  # θ, λ

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import gmsnet
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import ranking
+from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.topology.topology import Topology, planar_points
 
 
@@ -18,10 +19,11 @@ def test_shapes_are_those_of_the_report():
     report, topology = gmsnet.quality(mesh), Topology.of(mesh)
     points, count = planar_points(mesh), len(topology.triangles)
     shape, some = np.empty(count), np.empty(3)
-    ranking.shapes(points, topology.triangles, topology.orientation, 0, -(-count // LANES), shape)
+    simplices = Simplices(topology.triangles, topology.orientation)
+    ranking.shapes(points, simplices, 0, -(-count // LANES), shape)
     np.testing.assert_allclose(shape, report.shape, rtol=1e-12)
     cells = np.array([5, 0, count - 1], dtype=np.int32)
-    ranking.shapes_of(points, topology.triangles, topology.orientation, cells, some)
+    ranking.shapes_of(points, simplices, cells, some)
     np.testing.assert_allclose(some, report.shape[cells], rtol=1e-12)
 
 

@@ -18,6 +18,7 @@ from gmsnet.kernels.methods import worst_first_cycles as cycles
 from gmsnet.kernels.star import block, truncation
 from gmsnet.kernels.star import stars as kernels_stars
 from gmsnet.kernels.star.guard import STAR, VALID, WORST, MeshGuard, StarGuard, plain_guard
+from gmsnet.kernels.star.pattern import Stars
 
 DOUBLINGS = (3, 4, 6)
 every_power = pytest.mark.parametrize("doublings", DOUBLINGS)
@@ -45,14 +46,14 @@ def test_value_and_step(doublings, degree):
         place, ring = valid_star(rng, degree)
         most = largest(ring, place)
         inverse = 1 / (math.sqrt(3) * most)
-        value, dx, dy, least = kernels.newton(ring.ravel(), degree, *place, inverse, doublings)
+        value, dx, dy, least = kernels.newton(ring.ravel(), degree, None, *place, inverse, doublings)
         f, g, h = naive_objectives.derivatives_at(f"q{p}", ring, place)
         f, g, h = (degree * (x / most**p) for x in (f, g, h))
         newton = -np.linalg.solve(h, g)
         longer = 1 / max(1 - (1 + 1 / p) * (-g @ newton) / f, 1 / kernels.MOST)
-        assert kernels.largest(ring.ravel(), degree, *place) == pytest.approx(1 / inverse, rel=1e-12)
+        assert kernels.largest(ring.ravel(), degree, None, *place) == pytest.approx(1 / inverse, rel=1e-12)
         assert value == pytest.approx(f, rel=1e-10)
-        assert kernels.value_at(ring.ravel(), degree, *place, inverse, doublings) == pytest.approx(f, rel=1e-10)
+        assert kernels.value_at(ring.ravel(), degree, None, *place, inverse, doublings) == pytest.approx(f, rel=1e-10)
         assert least == pytest.approx(naive_objectives.least_area(ring, place), rel=1e-12)
         np.testing.assert_allclose([dx, dy], longer * newton, rtol=1e-5, atol=1e-12)
 
@@ -67,8 +68,8 @@ def test_the_objective_never_rises(doublings, seed, degree):
         return
     inverse = 1 / (math.sqrt(3) * largest(ring, place))
     for _ in range(3):
-        there = np.array(kernels.descend(ring.ravel(), degree, *place, inverse, doublings))
-        before, after = (kernels.value_at(ring.ravel(), degree, *x, inverse, doublings) for x in (place, there))
+        there = np.array(kernels.descend(ring.ravel(), degree, None, *place, inverse, doublings))
+        before, after = (kernels.value_at(ring.ravel(), degree, None, *x, inverse, doublings) for x in (place, there))
         assert after <= before * (1 + 1e-12)
         assert naive_objectives.least_area(ring, there) > 0
         place = there
@@ -78,8 +79,8 @@ def test_the_objective_never_rises(doublings, seed, degree):
 def test_the_scale_does_not_matter(scale):
     """Powers that under- or overflow with the scale that is given are taken with the star's own."""
     place, ring = valid_star(np.random.default_rng(4), 6)
-    one = kernels.descend(ring.ravel(), 6, *place, 1 / (math.sqrt(3) * largest(ring, place)), 6)
-    np.testing.assert_allclose(kernels.descend(ring.ravel(), 6, *place, scale, 6), one, rtol=0, atol=1e-9)
+    one = kernels.descend(ring.ravel(), 6, None, *place, 1 / (math.sqrt(3) * largest(ring, place)), 6)
+    np.testing.assert_allclose(kernels.descend(ring.ravel(), 6, None, *place, scale, 6), one, rtol=0, atol=1e-9)
 
 
 def test_high_powers_find_the_best_worst_triangle():
@@ -87,7 +88,7 @@ def test_high_powers_find_the_best_worst_triangle():
     for _ in range(10):
         place, ring = valid_star(rng, 5)
         for doublings in (3, 4, 5, 6, 7, 8, 8, 8):
-            place = np.array(kernels.descend(ring.ravel(), 5, *place, 1 / largest(ring, place), doublings))
+            place = np.array(kernels.descend(ring.ravel(), 5, None, *place, 1 / largest(ring, place), doublings))
         around = place + 0.01 * rng.normal(size=(2000, 2))
         assert largest(ring, place) < 1.02 * min(largest(ring, other) for other in around)
 
@@ -95,7 +96,7 @@ def test_high_powers_find_the_best_worst_triangle():
 def test_a_tangled_star_goes_to_the_mean():
     angles = 2 * np.pi * np.arange(5) / 5
     ring = np.column_stack([np.cos(angles), np.sin(angles)])
-    np.testing.assert_allclose(kernels.descend(ring.ravel(), 5, 2.0, 0.0, 1.0, 5), [0, 0], atol=1e-12)
+    np.testing.assert_allclose(kernels.descend(ring.ravel(), 5, None, 2.0, 0.0, 1.0, 5), [0, 0], atol=1e-12)
 
 
 @pytest.mark.parametrize("level", [VALID, WORST, STAR])
@@ -128,8 +129,8 @@ def test_the_guard_is_that_of_blocks(level, single):
         around = blocks.rings.reshape(degree, LANES).T.ravel().copy()
         room, counts = np.empty(3 * degree + 1), np.zeros(2, dtype=int)
         for i in range(LANES):
-            n = kernels.gather(points, i, start, around, guard, room)
-            tx, ty, halvings = kernels.way_there(room, n, *points[i], *targets[i], unit, 0.0, single)
+            n, _ = kernels.gather(points, i, Stars(start, around), guard, room)
+            tx, ty, halvings = kernels.way_there(room, n, None, *points[i], *targets[i], unit, 0.0, single)
             # In blocks fewer halvings are made where floors refuse a shift.
             given_up = halvings == kernels.HALVINGS or (
                 halvings >= truncation.FEW_HALVINGS and (one[i] == points[i]).all()
@@ -151,7 +152,7 @@ def test_the_order_within_a_colour_does_not_matter():
     for order in (np.arange(40), np.random.default_rng(7).permutation(40)):
         now, awake = points.copy(), np.zeros(len(points), dtype=np.bool_)
         cycles.visit(
-            now, order.astype(np.int32), start, around, plain_guard(), 4, 5, 1.0, None, awake, None,
+            now, order.astype(np.int32), Stars(start, around), plain_guard(), 4, 5, 1.0, None, awake, None,
             np.zeros(3, dtype=np.int64),
         )  # fmt: skip
         assert not awake.any()

@@ -25,8 +25,8 @@ def evaluate(name, ring, places):
     out, other = np.empty(objectives.OUT * LANES), np.empty(objectives.OUT * LANES)
     hessian = np.empty(3 * LANES)
     code = objectives.NAMES.index(name)
-    objectives.evaluate(code, local, len(ring), at, out, hessian)
-    objectives.evaluate(code, local, len(ring), at, other, None)
+    objectives.evaluate(code, local, len(ring), None, at, out, hessian)
+    objectives.evaluate(code, local, len(ring), None, at, other, None)
     np.testing.assert_array_equal(out, other)  # whether or not a Hessian is wanted
     value, gx, gy, least = out.reshape(4, LANES)
     xx, xy, yy = hessian.reshape(3, LANES)
@@ -76,7 +76,8 @@ def one(name, a, b):
         objectives.cosines,
         objectives.largest_angle,
     )
-    found = functions[objectives.NAMES.index(name)](*map(float, a), *map(float, b))
+    spokes = *map(float, a), *map(float, b)
+    found = functions[objectives.NAMES.index(name)](*spokes, *(() if name in objectives.OF_ANGLES else (None,)))
     return found[0], found[1:]
 
 

@@ -24,6 +24,7 @@ from gmsnet.kernels.jit.compile import LANES, kernel, part
 from gmsnet.kernels.simplex import objectives
 from gmsnet.kernels.simplex.objectives import GRADIENT, LEAST, METRIC, OUT
 from gmsnet.kernels.star import stars
+from gmsnet.kernels.star.pattern import pattern_at
 
 BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8
 STEPS = 20
@@ -34,7 +35,7 @@ STATE = 11
 
 
 @part
-def descend(objective, local, n, sizes, state, out, shift):
+def descend(objective, local, n, pattern, sizes, state, out, shift):
     """Shifts (2·LANES, over the star's size) to the best places that len(sizes) steps of these sizes visit.
 
     Work: state (STATE rows of LANES; row TANGLED: 1 where the star was tangled at the start, else 0), out (OUT rows).
@@ -45,7 +46,7 @@ def descend(objective, local, n, sizes, state, out, shift):
         state[FACTOR * LANES + lane] = 1.0
     first, second = 1.0, 1.0
     for step in range(len(sizes)):
-        objectives.evaluate(objective, local, n, state, out, None)
+        objectives.evaluate(objective, local, n, pattern, state, out, None)
         if step == 0:
             for lane in range(LANES):
                 state[TANGLED * LANES + lane] = 0.0 if out[LEAST * LANES + lane] > 0.0 else 1.0
@@ -53,7 +54,7 @@ def descend(objective, local, n, sizes, state, out, shift):
         first *= BETA_1
         second *= BETA_2
         advance(sizes[step] / (1.0 - first), 1.0 / (1.0 - second), out, state)
-    objectives.evaluate(objective, local, n, state, out, None)
+    objectives.evaluate(objective, local, n, pattern, state, out, None)
     keep_best(out, state)
     shift[:] = state[BEST_X * LANES : (BEST_Y + 1) * LANES]
 
@@ -95,11 +96,11 @@ def advance(size, correction, out, state):
 
 
 @part
-def propose(objective, local, n, sizes, state, out, shift, other):
+def propose(objective, local, n, pattern, sizes, state, out, shift, other):
     """As ``descend``, tangled stars by ``metric``. Work: as there, and other (2·LANES)."""
-    descend(objective, local, n, sizes, state, out, shift)
+    descend(objective, local, n, pattern, sizes, state, out, shift)
     if objective != METRIC and state[TANGLED * LANES :].max() > 0.0:
-        descend(METRIC, local, n, sizes, state, out, other)
+        descend(METRIC, local, n, pattern, sizes, state, out, other)
         objectives.choose(state[TANGLED * LANES :], other, shift)
 
 
@@ -112,7 +113,8 @@ def sweep(points, blocks, first, last, guard, objective, sizes, tally):
     state, out = np.empty(STATE * LANES), np.empty(OUT * LANES)
     for block in range(first, last):
         n = stars.fetch(points, blocks, block, workspace, local)
-        propose(objective, local, n, sizes, state, out, shift, other)
+        pattern = pattern_at(blocks.patterns, blocks.pattern, block)
+        propose(objective, local, n, pattern, sizes, state, out, shift, other)
         stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
         tally[k] += workspace.counts[k]

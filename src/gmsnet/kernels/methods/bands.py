@@ -1,8 +1,9 @@
 """Areas that are kept within a band around those of the input: shifts are shortened so that no cell leaves it.
 
-Of a triangle (p, r_{i−1}, r_i) with the ring fixed, D is an affine function of the free node's place p. So the places
-where D lies in a band form a strip, and those where all triangles of a star do form a convex polygon. A shift that ends
-outside ends where it leaves the polygon instead; what is halved after that remains inside.
+Of a corner simplex (p, r_i, r_j) with what is around it fixed, D is an affine function of the free node's place p. So
+the places where D lies in a band form a strip, and those where all simplices of a star do form a convex polygon. A
+shift that ends outside ends where it leaves the polygon instead; what is halved after that remains inside. Twice the
+area of a quad is the sum of the D at two opposite corners: it stays in the band with them.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES, part
+from gmsnet.kernels.star.pattern import count_of, other_of, pair_of, pattern_at
 
 
 class Bands(NamedTuple):
-    """Which triangles keep their areas: those whose three corners are ``kept``, if they were positive.
+    """Which cells keep their areas: those whose corners are all ``kept``, each corner simplex that was positive.
 
     start: (N, 2) the points of the input, in memory order. kept: (N,) bool; both empty where there are none. width:
     the band is [1 − width, 1 + width] times D of the input.
@@ -28,7 +30,7 @@ class Bands(NamedTuple):
 
 
 def no_bands() -> Bands:
-    """No triangle has one."""
+    """No cell has one."""
     return Bands(np.empty((0, 2)), np.empty(0, dtype=np.bool_), 0.0)
 
 
@@ -38,15 +40,17 @@ def shorten(bands, blocks, block, star, sizes, shift):
 
     star: as ``block.gather`` leaves it; sizes: (LANES,).
     """
-    n, offset = blocks.degree[block], blocks.offset[block]
+    n, offset, pattern = blocks.degree[block], blocks.offset[block], pattern_at(blocks.patterns, blocks.pattern, block)
     for lane in range(LANES):
         c = blocks.centre[block * LANES + lane]
         if not bands.kept[c]:
             continue
         size, share = sizes[lane], 1.0
         dx, dy = size * shift[lane], size * shift[LANES + lane]
-        for j in range(n):
-            i = n - 1 if j == 0 else j - 1
+        for k in range(count_of(pattern, n)):
+            i, j = pair_of(pattern, n, k)
+            if not bands.kept[blocks.rings[offset + other_of(pattern, k, i) * LANES + lane]]:
+                continue
             a, b = blocks.rings[offset + i * LANES + lane], blocks.rings[offset + j * LANES + lane]
             x, y, p, q = star[2 * lane], star[2 * lane + 1], 2 * ((i + 1) * LANES + lane), 2 * ((j + 1) * LANES + lane)
             px, py, qx, qy = star[p] - x, star[p + 1] - y, star[q] - x, star[q + 1] - y
@@ -57,9 +61,9 @@ def shorten(bands, blocks, block, star, sizes, shift):
 
 @part
 def share_inside(bands, c, a, b, px, py, qx, qy, dx, dy):
-    """How much of the shift (dx, dy) of node c keeps the triangle c, a, b (counter-clockwise) in its band, 0 to 1.
+    """How much of the shift (dx, dy) of node c keeps the simplex c, a, b (counter-clockwise) in its band, 0 to 1.
 
-    p, q: the nodes a and b minus c, as they are now. A triangle that has left its band, by rounding, may go back but
+    p, q: the nodes a and b minus c, as they are now. One that has left its band, by rounding, may go back but
     no further away. A shift that is not finite is none of this function's business.
     """
     if not (bands.kept[a] and bands.kept[b] and bands.kept[c]):

@@ -4,7 +4,7 @@ With the gradient g and the eigenvalues λ and eigenvectors u of the Hessian,
 
     d = −Σ u (u·g)/max(|λ|, ε·max|λ|, δ),
 
-at most half the star's radius (the root mean square of its spokes) long, halved until the objective falls by at least
+at most half the star's radius (the root mean square of its edges) long, halved until the objective falls by at least
 1e-4 of what the slope promises (Armijo) and the star, if it was valid at the start, still is. So the objective never
 rises. A bounded objective would flatten a triangle for the good of the others; it may not make any smaller than a tenth
 of the star's mean. A lane has come to its end after 20 steps, when a step is below 1e-9 of the radius, or when ten
@@ -25,6 +25,7 @@ from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.simplex import objectives
 from gmsnet.kernels.simplex.objectives import GRADIENT, LEAST, METRIC, OUT, Q2, VALUE, Q
 from gmsnet.kernels.star import stars
+from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at
 
 STEPS, TRIALS = 20, 100  # at most so many steps and, halvings included, evaluations
 ARMIJO = 1e-4
@@ -53,15 +54,15 @@ def newton_step(gx, gy, xx, xy, yy):
 
 
 @part
-def descend(objective, local, n, state, out, hessian, shift):
+def descend(objective, local, n, pattern, state, out, hessian, shift):
     """Shifts (2·LANES, over the star's size) to where the steps end.
 
     Work: state (STATE rows of LANES; row TANGLED: 1 where the star was tangled at the start, else 0), out (OUT rows),
     hessian (3 rows).
     """
-    begin(local, n, 0.0 if objective in (Q, Q2) else MARGIN, state)
+    begin(local, n, pattern, 0.0 if objective in (Q, Q2) else MARGIN, state)
     for trial in range(TRIALS):
-        objectives.evaluate(objective, local, n, state, out, hessian)
+        objectives.evaluate(objective, local, n, pattern, state, out, hessian)
         if trial == 0:
             for lane in range(LANES):
                 least = out[LEAST * LANES + lane]
@@ -74,19 +75,23 @@ def descend(objective, local, n, state, out, hessian, shift):
 
 
 @part
-def begin(local, n, margin, state):
+def begin(local, n, pattern, margin, state):
     """All lanes at the origin, their radii, and the minimum D that they may come to."""
     state[:] = 0.0
     for j in range(n):
-        i = n - 1 if j == 0 else j - 1
+        weight = neighbour_weight(pattern, j)
+        for lane in range(LANES):
+            qx, qy = local[2 * j * LANES + lane], local[(2 * j + 1) * LANES + lane]
+            state[RADIUS * LANES + lane] += weight * (qx * qx + qy * qy)
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
         for lane in range(LANES):
             px, py = local[2 * i * LANES + lane], local[(2 * i + 1) * LANES + lane]
             qx, qy = local[2 * j * LANES + lane], local[(2 * j + 1) * LANES + lane]
-            state[RADIUS * LANES + lane] += qx * qx + qy * qy
             state[LOWEST * LANES + lane] += px * qy - py * qx
     for lane in range(LANES):
-        state[RADIUS * LANES + lane] = math.sqrt(state[RADIUS * LANES + lane] / n)
-        state[LOWEST * LANES + lane] *= margin / n
+        state[RADIUS * LANES + lane] = math.sqrt(state[RADIUS * LANES + lane] / neighbours(pattern, n))
+        state[LOWEST * LANES + lane] *= margin / count_of(pattern, n)
         state[BEST * LANES + lane] = np.inf
         state[ALIVE * LANES + lane] = 1.0
 
@@ -128,12 +133,12 @@ def judge(out, hessian, state):
 
 
 @part
-def propose(objective, local, n, state, out, hessian, shift, other):
+def propose(objective, local, n, pattern, state, out, hessian, shift, other):
     """As ``descend``, tangled stars by ``metric``. Work: as there, and other (2·LANES)."""
-    descend(objective, local, n, state, out, hessian, shift)
+    descend(objective, local, n, pattern, state, out, hessian, shift)
     tangled = state[TANGLED * LANES : (TANGLED + 1) * LANES]
     if objective != METRIC and tangled.max() > 0.0:
-        descend(METRIC, local, n, state, out, hessian, other)
+        descend(METRIC, local, n, pattern, state, out, hessian, other)
         objectives.choose(tangled, other, shift)
 
 
@@ -146,7 +151,8 @@ def sweep(points, blocks, first, last, guard, objective, tally):
     state, out, hessian = np.empty(STATE * LANES), np.empty(OUT * LANES), np.empty(3 * LANES)
     for block in range(first, last):
         n = stars.fetch(points, blocks, block, workspace, local)
-        propose(objective, local, n, state, out, hessian, shift, other)
+        pattern = pattern_at(blocks.patterns, blocks.pattern, block)
+        propose(objective, local, n, pattern, state, out, hessian, shift, other)
         stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
         tally[k] += workspace.counts[k]

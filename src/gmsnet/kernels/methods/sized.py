@@ -1,6 +1,6 @@
 """Newton steps on shape and size together, for a block of stars in float64.
 
-Each triangle of a star costs, with D twice its area and D₀ what that is to be,
+Each corner simplex of a star costs, with D twice its area and D₀ what that is to be,
 
     q² + (γ/2)(D/D₀ + D₀/D),
 
@@ -12,22 +12,26 @@ a linear function (kernels.simplex.objectives), D is linear, of the gradient w, 
 Near a sliver q² rules, and the step is Newton's of F^(−1/2), as in kernels.methods.barrier. It is halved until F
 falls. A star that is tangled goes to the mean of its ring.
 
-What a triangle's area is to be: its own as the run begins, but not further than a factor of exp(REACH) from the mean of
+What a simplex's area is to be: its own as the run begins, but not further than a factor of exp(REACH) from the mean of
 the areas around it; and where those lie far apart, so that they are nobody's intent, it is that mean. So a graded mesh
-keeps its areas, and slivers get those of their neighbours.
+keeps its areas, and slivers get those of their neighbours. Of a quad the simplices at its four corners count, each with
+its own D₀: those at two opposite corners make up its area, so that it keeps that with them.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.methods import bands
-from gmsnet.kernels.simplex.objectives import aspect_squared
+from gmsnet.kernels.simplex.objectives import aspect_squared, squares
 from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.block import SIZE
+from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at, weights_of
 
 REACH = 0.25
 CALM, ROUGH = 0.25, 0.5  # how far areas around a node lie from their mean, in logarithms
@@ -42,9 +46,16 @@ X, Y, DX, DY, SHARE, VALUE, AFTER, GX, GY, XX, XY, YY, LEAST, OPEN = range(14)
 STATE = 14
 
 
+class Wanted(NamedTuple):
+    """D₀ of each simplex of the stars in blocks, [simplex][lane], those of a block from double[first[block]] on."""
+
+    first: NDArray[np.int64]
+    double: NDArray[np.float64]
+
+
 @kernel
-def targets(points, triangles, blocks, areas):
-    """D₀ of each triangle of the stars, [ring node][lane] at the places in ``Blocks.rings``, of the triangle before."""
+def targets(points, triangles, blocks, wanted):
+    """Writes the D₀ of all stars. triangles: (T, 3) the nodes of all corner simplices."""
     nodes = len(points)
     mean, rough, number = np.zeros(nodes), np.zeros(nodes), np.zeros(nodes)
     for t in range(len(triangles)):
@@ -62,17 +73,18 @@ def targets(points, triangles, blocks, areas):
             i = triangles[t, c]
             rough[i] += min(abs(size - mean[i]), ROUGH) / number[i]
     for block in range(len(blocks.degree)):
-        n, offset = blocks.degree[block], blocks.offset[block]
-        for j in range(n):
-            before = n - 1 if j == 0 else j - 1
+        n, offset, low = blocks.degree[block], blocks.offset[block], wanted.first[block]
+        pattern = pattern_at(blocks.patterns, blocks.pattern, block)
+        for k in range(count_of(pattern, n)):
+            i, j = pair_of(pattern, n, k)
             for lane in range(LANES):
                 c = blocks.centre[block * LANES + lane]
-                a, b = blocks.rings[offset + before * LANES + lane], blocks.rings[offset + j * LANES + lane]
+                a, b = blocks.rings[offset + i * LANES + lane], blocks.rings[offset + j * LANES + lane]
                 around = (mean[a] + mean[b] + mean[c]) / 3.0
                 uneven = (rough[a] + rough[b] + rough[c]) / 3.0
                 reach = REACH * min(max((ROUGH - uneven) / (ROUGH - CALM), 0.0), 1.0)
                 own = math.log(max(double(points, c, a, b), TINY))
-                areas[offset + j * LANES + lane] = math.exp(min(max(own, around - reach), around + reach))
+                wanted.double[low + k * LANES + lane] = math.exp(min(max(own, around - reach), around + reach))
 
 
 @inlined
@@ -84,20 +96,21 @@ def double(points, i, j, k):
 
 
 @part
-def derive(local, n, wanted, weight, state):
+def derive(local, n, pattern, wanted, weight, state):
     """The objective with its derivatives, and the minimum D, where the nodes are. wanted: D₀ over the size squared."""
     state[VALUE * LANES : (VALUE + 1) * LANES] = 0.0
     state[GX * LANES : LEAST * LANES] = 0.0
     state[LEAST * LANES : (LEAST + 1) * LANES] = np.inf
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        weights = weights_of(pattern, k, np.float64)
         r = local[2 * i * LANES : 2 * (i + 1) * LANES]
         s = local[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
             x, y = state[X * LANES + lane], state[Y * LANES + lane]
             ax, ay, bx, by = r[lane] - x, r[LANES + lane] - y, s[lane] - x, s[LANES + lane] - y
-            value, gx, gy, xx, xy, yy = aspect_squared(ax, ay, bx, by)
-            d, goal = ax * by - ay * bx, wanted[j * LANES + lane]
+            value, gx, gy, xx, xy, yy = aspect_squared(ax, ay, bx, by, weights)
+            d, goal = ax * by - ay * bx, wanted[k * LANES + lane]
             wx, wy = ay - by, bx - ax
             inverse = 1.0 / d if d > 0.0 else 0.0
             part = goal * inverse
@@ -113,11 +126,12 @@ def derive(local, n, wanted, weight, state):
 
 
 @part
-def judge(local, n, wanted, weight, state):
+def judge(local, n, pattern, wanted, weight, state):
     """The objective with the share SHARE of the step taken: row AFTER, infinite where a D is not positive."""
     state[AFTER * LANES : (AFTER + 1) * LANES] = 0.0
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        weights = weights_of(pattern, k, np.float64)
         r = local[2 * i * LANES : 2 * (i + 1) * LANES]
         s = local[2 * j * LANES : 2 * (j + 1) * LANES]
         for lane in range(LANES):
@@ -125,8 +139,8 @@ def judge(local, n, wanted, weight, state):
             x = state[X * LANES + lane] + share * state[DX * LANES + lane]
             y = state[Y * LANES + lane] + share * state[DY * LANES + lane]
             ax, ay, bx, by = r[lane] - x, r[LANES + lane] - y, s[lane] - x, s[LANES + lane] - y
-            d, goal = ax * by - ay * bx, wanted[j * LANES + lane]
-            q = (ax * ax + ay * ay + bx * bx + by * by - ax * bx - ay * by) / d
+            d, goal = ax * by - ay * bx, wanted[k * LANES + lane]
+            q = squares(ax, ay, bx, by, weights) / d
             value = q * q / 3.0 + 0.5 * weight * (d / goal + goal / d)
             state[AFTER * LANES + lane] += value if d > 0.0 else np.inf
 
@@ -149,14 +163,14 @@ def steps(state):
 
 
 @part
-def descend(local, n, wanted, weight, state):
+def descend(local, n, pattern, wanted, weight, state):
     """Takes up to STEPS steps from the origin; rows X and Y say where they lead."""
     state[:] = 0.0
     for _ in range(STEPS):
-        derive(local, n, wanted, weight, state)
+        derive(local, n, pattern, wanted, weight, state)
         steps(state)
         for _ in range(HALVINGS):
-            judge(local, n, wanted, weight, state)
+            judge(local, n, pattern, wanted, weight, state)
             for lane in range(LANES):
                 falls = state[AFTER * LANES + lane] < state[VALUE * LANES + lane]
                 state[OPEN * LANES + lane] = 0.0 if falls else state[OPEN * LANES + lane]
@@ -173,31 +187,39 @@ def descend(local, n, wanted, weight, state):
             break
 
 
+@part
+def take(local, n, pattern, state, shift):
+    """The shifts (2·LANES): to where the steps have led, or, in tangled stars, to the mean of the neighbours."""
+    for lane in range(LANES):
+        tangled = not state[LEAST * LANES + lane] > 0.0
+        shift[lane] = 0.0 if tangled else state[X * LANES + lane]
+        shift[LANES + lane] = 0.0 if tangled else state[Y * LANES + lane]
+        if tangled:
+            for j in range(n):
+                share, of_all = neighbour_weight(pattern, j), neighbours(pattern, n)
+                shift[lane] += share * local[2 * j * LANES + lane] / of_all
+                shift[LANES + lane] += share * local[(2 * j + 1) * LANES + lane] / of_all
+
+
 @kernel
-def sweep(points, blocks, areas, weight, kept, first, last, guard, tally):
+def sweep(points, blocks, wanted, weight, kept, first, last, guard, tally):
     """Visits the blocks first…last (of one colour) once. tally: (3,), added to.
 
-    areas: as ``targets`` leaves them. kept: bands.Bands that no shift leaves.
+    wanted: as ``targets`` leaves it. kept: bands.Bands that no shift leaves.
     """
     workspace = stars.workspace_for(blocks.most)
-    local, wanted = np.empty(2 * blocks.most * LANES), np.empty(blocks.most * LANES)
+    local, goals = np.empty(2 * blocks.most * LANES), np.empty(blocks.most * LANES)
     state, shift = np.empty(STATE * LANES), np.empty(2 * LANES)
     for block in range(first, last):
         n = stars.fetch(points, blocks, block, workspace, local)
-        offset, sizes = blocks.offset[block], workspace.work[SIZE * LANES : (SIZE + 1) * LANES]
-        for j in range(n):
+        pattern = pattern_at(blocks.patterns, blocks.pattern, block)
+        low, sizes = wanted.first[block], workspace.work[SIZE * LANES : (SIZE + 1) * LANES]
+        for k in range(count_of(pattern, n)):
             for lane in range(LANES):
                 size = sizes[lane]
-                wanted[j * LANES + lane] = areas[offset + j * LANES + lane] / (size * size)
-        descend(local, n, wanted, weight, state)
-        for lane in range(LANES):
-            tangled = not state[LEAST * LANES + lane] > 0.0
-            shift[lane] = 0.0 if tangled else state[X * LANES + lane]
-            shift[LANES + lane] = 0.0 if tangled else state[Y * LANES + lane]
-            if tangled:
-                for j in range(n):
-                    shift[lane] += local[2 * j * LANES + lane] / n
-                    shift[LANES + lane] += local[(2 * j + 1) * LANES + lane] / n
+                goals[k * LANES + lane] = wanted.double[low + k * LANES + lane] / (size * size)
+        descend(local, n, pattern, goals, weight, state)
+        take(local, n, pattern, state, shift)
         if len(kept.kept):
             bands.shorten(kept, blocks, block, workspace.star, sizes, shift)
         stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)

@@ -1,16 +1,19 @@
-"""What a free node's place is worth: five objectives over the n triangles of its star, with two derivatives.
+"""What a free node's place is worth: five objectives over the corner simplices of its star, with two derivatives.
 
-Each is the mean over the triangles (p, r_{i−1}, r_i) of a number that depends on the free node p alone; the ring stays.
-With the spokes a = r_{i−1} − p and b = r_i − p, the rim e = b − a, and the doubled area D = a × b, of which w = ∇D =
-(a_y − b_y, b_x − a_x) does not depend on p:
+Each is the mean over the simplices (p, r_i, r_j) of a number that depends on the free node p alone; what is around it
+stays. With the spokes a = r_i − p and b = r_j − p, the rim e = b − a, and the doubled area D = a × b, of which w = ∇D =
+(a_y − b_y, b_x − a_x) does not depend on p; with L = w_a |a|² + w_b |b|² + w_o |e|², N = L/2, the weights those of
+kernels.simplex.mean_ratio2, P = w_a a + w_b b = −∇N and ω = w_a + w_b:
 
-    metric          1 − s,  s = 1/q = 2√3 D/L,  L = l² + m² + n² = 2(|a|² + |b|² − a·b)      (the paper's equation 10)
-                    ∇s = (2√3 w + 2s(a + b))/L,   ∇²s = (2 ∇s (a + b)ᵀ + 2 (a + b) ∇sᵀ − 4s I)/L
-    q               κ(|a|² + |b|² − a·b)/D,  κ = 1/√3
-                    ∇q = −(κ(a + b) + q w)/D,     ∇²q = (2κ I − w ∇qᵀ − ∇q wᵀ)/D
+    metric          1 − s,  s = 1/q = 2√3 D/L      (the paper's equation 10; of triangles L = l² + m² + n²)
+                    ∇s = (2√3 w + 2s P)/L,        ∇²s = (2 ∇s Pᵀ + 2 P ∇sᵀ − 2ωs I)/L
+    q               κN/D,  κ = 1/√3
+                    ∇q = −(κP + q w)/D,           ∇²q = (κω I − w ∇qᵀ − ∇q wᵀ)/D
     q2              q²:  2q ∇q,  2q ∇²q + 2 ∇q ∇qᵀ
-    cosine          ⅓ Σ (cos θ − ½)² over the three angles
-    min-max-angle   the largest of the three angles, in radians
+    cosine          ⅓ Σ (cos θ − ½)² over the three angles of a triangle
+    min-max-angle   the largest of the three angles of a triangle, in radians
+
+The last two are for stars of triangles alone (fans): of what a square corner is to have they know nothing.
 
 The angles, counter-clockwise, are φ_b − φ_a at the free node, φ_a + π − φ_e at r_{i−1} and φ_e − φ_b at r_i, φ the
 direction of an edge. The rim stays, so their derivatives are made of
@@ -30,11 +33,13 @@ import math
 import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, inlined, part
+from gmsnet.kernels.simplex.mean_ratio2 import TWO_SQRT3, half_lengths, pull, roundness
 from gmsnet.kernels.simplex.measures import angle
+from gmsnet.kernels.star.pattern import count_of, pair_of, weights_of
 
 NAMES = ("metric", "q", "q2", "cosine", "min-max-angle")
 METRIC, Q, Q2, COSINE, LARGEST_ANGLE = range(5)
-TWO_SQRT3 = 2.0 * math.sqrt(3.0)
+OF_ANGLES = ("cosine", "min-max-angle")  # for triangles alone
 KAPPA = 1.0 / math.sqrt(3.0)
 THIRD = 1.0 / 3.0
 SMALL = 1e-30  # a squared length that is none, in stars of size 1
@@ -44,39 +49,49 @@ OUT = 4
 
 
 @inlined
-def metric(ax, ay, bx, by):
-    """1 − 1/q of the triangle (0, a, b): value, gradient x y, Hessian xx xy yy."""
-    sx, sy = ax + bx, ay + by
-    inverse = 1.0 / max(2.0 * (ax * ax + ay * ay + bx * bx + by * by - ax * bx - ay * by), SMALL)
+def squares(ax, ay, bx, by, weights):
+    """N = L/2; that of a triangle in the order of operations on which results have rested from the start."""
+    if weights is None:
+        return ax * ax + ay * ay + bx * bx + by * by - ax * bx - ay * by
+    return half_lengths(ax, ay, bx, by, weights)
+
+
+@inlined
+def metric(ax, ay, bx, by, weights):
+    """1 − 1/q of the simplex (0, a, b): value, gradient x y, Hessian xx xy yy."""
+    sx, sy = pull(ax, bx, weights), pull(ay, by, weights)
+    inverse = 1.0 / max(2.0 * squares(ax, ay, bx, by, weights), SMALL)
     s = TWO_SQRT3 * (ax * by - ay * bx) * inverse
     gx = (TWO_SQRT3 * (ay - by) + 2.0 * s * sx) * inverse
     gy = (TWO_SQRT3 * (bx - ax) + 2.0 * s * sy) * inverse
-    xx = (4.0 * gx * sx - 4.0 * s) * inverse
+    even = 4.0 * roundness(s, weights)
+    xx = (4.0 * gx * sx - even) * inverse
     xy = 2.0 * (gx * sy + gy * sx) * inverse
-    yy = (4.0 * gy * sy - 4.0 * s) * inverse
+    yy = (4.0 * gy * sy - even) * inverse
     return 1.0 - s, -gx, -gy, -xx, -xy, -yy
 
 
 @inlined
-def aspect(ax, ay, bx, by):
-    """q of the triangle (0, a, b), as ``metric``."""
+def aspect(ax, ay, bx, by, weights):
+    """q of the simplex (0, a, b), as ``metric``."""
     d = ax * by - ay * bx
     inside = d > 0.0
     inverse = 1.0 / d if inside else 0.0
     wx, wy = ay - by, bx - ax
-    q = KAPPA * (ax * ax + ay * ay + bx * bx + by * by - ax * bx - ay * by) * inverse
-    gx = -(KAPPA * (ax + bx) + q * wx) * inverse
-    gy = -(KAPPA * (ay + by) + q * wy) * inverse
-    xx = 2.0 * (KAPPA - wx * gx) * inverse
+    q = KAPPA * squares(ax, ay, bx, by, weights) * inverse
+    gx = -(KAPPA * pull(ax, bx, weights) + q * wx) * inverse
+    gy = -(KAPPA * pull(ay, by, weights) + q * wy) * inverse
+    even = roundness(KAPPA, weights)
+    xx = 2.0 * (even - wx * gx) * inverse
     xy = -(wx * gy + wy * gx) * inverse
-    yy = 2.0 * (KAPPA - wy * gy) * inverse
+    yy = 2.0 * (even - wy * gy) * inverse
     return q if inside else np.inf, gx, gy, xx, xy, yy
 
 
 @inlined
-def aspect_squared(ax, ay, bx, by):
-    """q² of the triangle (0, a, b), as ``metric``."""
-    q, gx, gy, xx, xy, yy = aspect(ax, ay, bx, by)
+def aspect_squared(ax, ay, bx, by, weights):
+    """q² of the simplex (0, a, b), as ``metric``."""
+    q, gx, gy, xx, xy, yy = aspect(ax, ay, bx, by, weights)
     twice = 2.0 * q if q < np.inf else 0.0
     return (
         q * q,
@@ -147,36 +162,39 @@ def largest_angle(ax, ay, bx, by):
 
 
 @part
-def evaluate(objective, local, n, at, out, hessian):
+def evaluate(objective, local, n, pattern, at, out, hessian):
     """The objective of a block of stars with their free nodes at ``at`` (2·LANES), in the frame of ``local``.
 
     out: OUT rows of LANES, see the names above. hessian: three rows (xx, xy, yy), or None if it is not wanted (which
-    is known when it is compiled, so that nothing of it is computed then).
+    is known when it is compiled, so that nothing of it is computed then). COSINE, LARGEST_ANGLE: of fans alone.
     """
     out[: LEAST * LANES] = 0.0
     out[LEAST * LANES :] = np.inf
     if hessian is not None:
         hessian[:] = 0.0
-    for j in range(n):
-        i = n - 1 if j == 0 else j - 1
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        weights = weights_of(pattern, k, np.float64)
         p = local[2 * i * LANES : 2 * (i + 1) * LANES]
         q = local[2 * j * LANES : 2 * (j + 1) * LANES]
         if objective == METRIC:
             for lane in range(LANES):
-                add(lane, at, p, q, metric(*spokes(lane, at, p, q)), out, hessian)
+                add(lane, at, p, q, metric(*spokes(lane, at, p, q), weights), out, hessian)
         elif objective == Q:
             for lane in range(LANES):
-                add(lane, at, p, q, aspect(*spokes(lane, at, p, q)), out, hessian)
+                add(lane, at, p, q, aspect(*spokes(lane, at, p, q), weights), out, hessian)
         elif objective == Q2:
             for lane in range(LANES):
-                add(lane, at, p, q, aspect_squared(*spokes(lane, at, p, q)), out, hessian)
+                add(lane, at, p, q, aspect_squared(*spokes(lane, at, p, q), weights), out, hessian)
+        elif pattern is not None:
+            out[:] = np.nan  # angles of triangles say nothing of a quad: methods refuse those (methods/base.py)
         elif objective == COSINE:
             for lane in range(LANES):
                 add(lane, at, p, q, cosines(*spokes(lane, at, p, q)), out, hessian)
         else:
             for lane in range(LANES):
                 add(lane, at, p, q, largest_angle(*spokes(lane, at, p, q)), out, hessian)
-    inverse = 1.0 / n
+    inverse = 1.0 / count_of(pattern, n)
     for k in range(LEAST * LANES):
         out[k] *= inverse
     if hessian is not None:
