@@ -113,7 +113,7 @@ def smooth(
     else:  # most often nothing is protected, and these are the stars that are smoothed
         (before, protection), _ = side_by_side(apart, partial(looked_at, start), lambda: topology.stars)
     given_points = start
-    reasons: dict[tuple[int, ...], str] = {}
+    reasons: dict[int, str] = {}
     untangling: list[str] = []
     if untangle and before.inverted:
         start, note, reasons = mended(start, protection.topology, precision_of(given))
@@ -178,7 +178,7 @@ def smooth(
         held=topology.held,
         history=history,
         notes=notes,
-        unmended=still_inverted(after, topology, reasons),
+        unmended=still_inverted(after, reasons),
         topology=topology,
         seconds=time.perf_counter() - began,
     )
