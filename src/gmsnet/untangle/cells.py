@@ -28,8 +28,7 @@ def whole_cells(topology: Topology, rows: Flags) -> Flags:
         return rows
     chosen = np.zeros(int(cells.max(initial=-1)) + 1, dtype=bool)
     chosen[cells[rows]] = True
-    marked: Flags = chosen[cells]
-    return marked
+    return np.take(chosen, cells)
 
 
 def first_rows(topology: Topology, rows: Flags) -> Rows:
@@ -37,7 +36,7 @@ def first_rows(topology: Topology, rows: Flags) -> Rows:
     chosen = np.flatnonzero(rows)
     if topology.near_cells is None:
         return chosen
-    return chosen[np.diff(topology.near_cells[chosen], prepend=-1) != 0]
+    return np.compress(np.diff(topology.near_cells[chosen], prepend=-1) != 0, chosen)
 
 
 def corners_of(topology: Topology, first: Rows) -> Corners:
@@ -45,8 +44,8 @@ def corners_of(topology: Topology, first: Rows) -> Corners:
     cells = topology.near_cells
     if cells is None:
         return Corners(topology.near[first], np.full(len(first), 3))
-    last = np.minimum(first + 3, len(cells) - 1)
-    quad = cells[last] == cells[first]
+    next_row = np.minimum(first + 1, len(cells) - 1)
+    quad = (next_row > first) & (cells[next_row] == cells[first])
     nodes = np.column_stack([topology.near[first], topology.near[first, 2]])
     nodes[quad] = topology.near[first[quad, None] + np.arange(4), 0]
     return Corners(nodes, np.where(quad, 4, 3))
