@@ -58,3 +58,29 @@ def untangled(mesh, topology=None):
     """The result, with points, topology and precision."""
     points, topology, precision = prepared(mesh, topology)
     return untangle(points, topology, precision), points, topology, precision
+
+
+def quad_grid(n, triangles=0.0, seed=0):
+    """(n + 1)² nodes of the unit square; this share of its cells, chosen at random, is two triangles, the rest quads.
+
+    Half of the cells are wound clockwise.
+    """
+    rng = np.random.default_rng(seed)
+    i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
+    a = (i[:-1, :-1] * (n + 1) + j[:-1, :-1]).ravel()
+    quads = np.column_stack([a, a + n + 1, a + n + 2, a + 1])
+    split = rng.random(len(quads)) < triangles
+    halves = np.concatenate([quads[split][:, [0, 1, 2]], quads[split][:, [0, 2, 3]]])
+    blocks = []
+    for kind, cells in (("quad", quads[~split]), ("triangle", halves)):
+        turned = rng.random(len(cells)) < 0.5
+        cells[turned] = cells[turned, ::-1]
+        blocks.append(CellBlock(kind, cells, np.zeros(len(cells), int)))
+    return Mesh(np.column_stack([i.ravel(), j.ravel()]) / n, tuple(block for block in blocks if len(block.nodes)))
+
+
+def thrown(mesh, nodes, length, seed=0):
+    """Each of the nodes is thrown this far, in a random direction."""
+    angle = 2 * np.pi * np.random.default_rng(seed).random(len(nodes))
+    shift = length * np.column_stack([np.cos(angle), np.sin(angle)])
+    return moved(mesh, nodes, mesh.points[nodes, :2] + shift)

@@ -45,7 +45,7 @@ def test_a_patch_is_what_it_says(seed, part):
     assert patch.nodes.tolist() == chosen.tolist()
     assert len(set(patch.every.tolist())) == len(patch.every)
     for k, v in enumerate(chosen):
-        ring = patch.every[patch.ring[patch.start[k] : patch.start[k + 1]]]
+        ring = patch.every[patch.stars.around[patch.stars.start[k] : patch.stars.start[k + 1]]]
         assert ring.tolist() == topology.near_ring[topology.near_start[v] : topology.near_start[v + 1]].tolist()
     touching = np.isin(topology.near, chosen).any(axis=1)
     expected = {frozenset(row) for row in topology.near[touching].tolist()}
@@ -79,7 +79,10 @@ def test_harmonic_places_are_the_means_of_their_rings_and_valid_in_a_convex_rim(
     points, topology, precision = prepared(thrown(1, amount=40.0))
     patch = Patch.of(topology, in_order(topology, topology.near_colours >= 0))
     new = harmonic(points[patch.every], patch)
-    means = [new[patch.ring[patch.start[k] : patch.start[k + 1]]].mean(axis=0) for k in range(patch.count)]
+    means = [
+        new[patch.stars.around[patch.stars.start[k] : patch.stars.start[k + 1]]].mean(axis=0)
+        for k in range(patch.count)
+    ]
     np.testing.assert_allclose(new[: patch.count], means, rtol=0, atol=1e-12)
     assert (new[patch.count :] == points[patch.every[patch.count :]]).all()
     assert kernels.uncertified(new, patch.cells, precision.unit, precision.grain) == 0

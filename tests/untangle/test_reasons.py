@@ -15,7 +15,7 @@ def test_a_cell_whose_nodes_are_all_held():
     result, _, topology, _ = untangled(moved(grid(4), [4], [[0.3, 0.7]]))
     assert [row.reason for row in result.unmended] == [HELD]
     assert result.after == 1
-    assert (topology.near_colours[topology.near[result.unmended[0].triangle]] < 0).all()
+    assert (topology.near_colours[topology.near[result.unmended[0].row]] < 0).all()
     assert result.unmended[0].place == pytest.approx(((0.3 + 0.0 + 0.25) / 6, (0.7 + 0.75 + 1.0) / 6))  # over 2
 
 
@@ -33,12 +33,12 @@ def test_a_boundary_that_crosses_itself():
 def test_a_ring_that_no_place_sees_all_of():
     angle = np.pi / 3 * np.arange(6)
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
-    assert kernel_depth(ring) == pytest.approx(np.sqrt(0.75) / 2)
+    assert kernel_depth(ring, np.roll(ring, -1, axis=0)) == pytest.approx(np.sqrt(0.75) / 2)
     # A Z: each of its arms looks past the other.
     ring = np.array([[0, 0], [4, 0], [4, 3], [3, 3], [3, 1], [0, 1]], float)
-    assert kernel_depth(ring) > 0
+    assert kernel_depth(ring, np.roll(ring, -1, axis=0)) > 0
     ring = np.array([[0, 0], [4, 0], [4, 1], [1, 1], [1, 2], [4, 2], [4, 3], [0, 3]], float)  # a C
-    assert kernel_depth(ring) < 0
+    assert kernel_depth(ring, np.roll(ring, -1, axis=0)) < 0
     points = np.vstack([[2.0, 0.5], ring])
     result, before, _, _ = untangled(mesh_of(points, [(0, 1 + i, 1 + (i + 1) % 8) for i in range(8)]))
     assert (result.points == before).all()
@@ -47,8 +47,9 @@ def test_a_ring_that_no_place_sees_all_of():
 
 
 def test_depth_is_zero_for_an_edge_of_no_length_and_for_a_point():
-    assert kernel_depth(np.array([[0, 0], [1, 0], [1, 0], [0, 1]], float)) == 0
-    assert kernel_depth(np.zeros((4, 2))) == 0
+    ring = np.array([[0, 0], [1, 0], [1, 0], [0, 1]], float)
+    assert kernel_depth(ring, np.roll(ring, -1, axis=0)) == 0
+    assert kernel_depth(np.zeros((4, 2)), np.zeros((4, 2))) == 0
 
 
 def test_all_held():

@@ -42,7 +42,7 @@ def check(result, points, topology):
     if (result.points != points).any():
         assert result.after < result.before
     assert (result.taken == NOTHING) == (result.before > 0 and (result.points == points).all())
-    assert set(np.flatnonzero(still)) <= {row.triangle for row in result.unmended}
+    assert set(np.flatnonzero(still)) <= {row.row for row in result.unmended}
     assert all(row.reason and np.isfinite(row.place).all() for row in result.unmended)
 
 

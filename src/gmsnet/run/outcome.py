@@ -50,7 +50,7 @@ def result_of(state: State, began: float) -> SmoothResult:
         held=topology.held,
         history=list(state.history),
         notes=_notes(state),
-        unmended=still_inverted(after, topology, state.reasons),
+        unmended=still_inverted(after, state.reasons),
         topology=topology,
         seconds=time.perf_counter() - began,
     )

@@ -16,7 +16,7 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.topology.topology import Topology
 
-Reasons = Mapping[tuple[int, ...], str]
+Reasons = Mapping[int, str]  # by the index of each cell among all cells of the mesh
 
 
 class StillInvertedCell(NamedTuple):
@@ -49,22 +49,24 @@ def _untangled(state: State) -> State:
     steps = ", ".join(f"{step.name} ({step.sweeps})" for step in done.steps) or "nothing to try"
     left = f"{done.after:,} of {done.before:,} inverted cells are left" if done.after else f"all {done.before:,} mended"
     note = f"untangling: {left}; {steps}{f'; {done.why}' if done.why else ''}"
-    corners = np.sort(topology.memory[topology.near[[cell.triangle for cell in done.unmended]].reshape(-1, 3)], axis=1)
-    reasons = {tuple(nodes): cell.reason for nodes, cell in zip(corners.tolist(), done.unmended, strict=True)}
+    cells = topology.cells_of(np.array([cell.row for cell in done.unmended], dtype=np.intp)).tolist()
+    reasons = {index: cell.reason for index, cell in zip(cells, done.unmended, strict=True)}
     return replace(state, points=done.points, totals=None, untangling=(*state.untangling, note), reasons=reasons)
 
 
 def beside(reasons: Reasons, topology: Topology) -> NDArray[np.bool_]:
     """(N,) bool by id: the nodes of the cells that have a reason, and their neighbours."""
     chosen = np.zeros(len(topology.memory), dtype=bool)
-    chosen[[node for nodes in reasons for node in nodes]] = True
-    chosen[topology.triangles[chosen[topology.triangles].any(axis=1)]] = True
-    return chosen
+    cells = np.array(list(reasons), dtype=np.int64)
+    for corners, index in ((topology.triangles, topology.cell), (topology.quads, topology.quad_cell)):
+        chosen[corners[np.isin(index, cells)]] = True
+    around = chosen.copy()
+    for corners in (topology.triangles, topology.quads):
+        around[corners[chosen[corners].any(axis=1)]] = True
+    return around
 
 
-def still_inverted(after: QualityReport, topology: Topology, reasons: Reasons) -> list[StillInvertedCell]:
-    """The cells of zero or negative area that have a reason for it."""
-    rows = np.flatnonzero(~after.valid) if reasons else np.empty(0, dtype=int)
-    nodes = map(tuple, np.sort(topology.triangles[rows], axis=1).tolist())
-    cells = after.cell[rows].tolist()
-    return [StillInvertedCell(cell, reasons[key]) for cell, key in zip(cells, nodes, strict=True) if key in reasons]
+def still_inverted(after: QualityReport, reasons: Reasons) -> list[StillInvertedCell]:
+    """The cells with a corner of zero or negative area that have a reason for it."""
+    cells = after.cell[~after.valid].tolist() if reasons else []
+    return [StillInvertedCell(cell, reasons[cell]) for cell in cells if cell in reasons]

@@ -44,7 +44,8 @@ class Topology:
     memory: (N,) node ids in memory order. In that order, by places in memory: near (T, 3) and near_orientation (T,),
     the triangles; rings, each from its smallest id on, and their CSR start (N + 1); near_free (N,), which nodes may
     move. colouring: of all nodes that were free at first, in the order of the ids, so that colours follow from the
-    connectivity alone.
+    connectivity alone. face_cell: (F,) the index among all cells of the mesh of each face in file order; near_origin:
+    the place there of each triangle of ``near``, of each face if not all cells are triangles (``cells_of``).
     """
 
     plane: tuple[int, int] | None
@@ -67,6 +68,8 @@ class Topology:
     quads: Ints = field(default_factory=lambda: np.empty((0, 4), dtype=np.int32))
     quad_cell: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     quad_orientation: NDArray[np.int8] = field(default_factory=lambda: np.empty(0, dtype=np.int8))
+    face_cell: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    near_origin: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int32))
 
     @classmethod
     def of(cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1, sliding: Flags | None = None) -> Topology:
@@ -115,11 +118,16 @@ class Topology:
             near_ring=ring[: start[-1]],
             near_free=marks == 0,
             colouring=Colouring(places, start, ring),
+            face_cell=written.cell,
+            near_origin=faces.origin[whole],
         )
         if near_sliding.any() or any(block.kind == "quad" and len(block.nodes) for block in mesh.cells):
             topology = topology.linked(Links.of(faces, near_orientation, start, topology.near_ring, near_sliding))
             four, quads = written.with_corners(4)
-            topology = replace(topology, quads=quads, quad_cell=written.cell[four], quad_orientation=orientation[four])
+            topology = replace(
+                topology, quads=quads, quad_cell=written.cell[four], quad_orientation=orientation[four],
+                near_origin=faces.origin,
+            )  # fmt: skip
         return topology, planar
 
     def linked(self, links: Links) -> Topology:
@@ -151,7 +159,7 @@ class Topology:
     def restricted(self, active: Flags) -> Topology:
         """The same with the active nodes (N,) by places in memory alone free, and only the triangles around them.
 
-        For a while: ``held`` does not tell of the others.
+        For a while: ``held`` does not tell of the others, nor ``cells_of`` of which cells the rows are.
         """
         nodes = np.flatnonzero(active)
         if self.patterns is None:
@@ -242,6 +250,13 @@ class Topology:
     def simplices(self) -> Simplices:
         """The corner simplices of all cells whose nodes may move, in memory order."""
         return Simplices(self.near, self.near_orientation, self.near_shapes, self.near_cells)
+
+    def cells_of(self, rows: NDArray[np.intp]) -> NDArray[np.int64]:
+        """The index among all cells of the mesh of the cell of each of some rows of ``near``."""
+        chosen: NDArray[np.int64] = self.face_cell[
+            self.near_origin[rows if self.near_cells is None else self.near_cells[rows]]
+        ]
+        return chosen
 
     @cached_property
     def scored(self) -> Simplices:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.measure.signs import exact_signs
 from gmsnet.topology.topology import Topology
+from gmsnet.untangle.cells import first_rows, whole_cells
 from gmsnet.untangle.escalation import escalate
 from gmsnet.untangle.guarded import what_is_left
 from gmsnet.untangle.newton import polish
@@ -26,13 +27,14 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     points: (N, 2) float64 by places in memory (``planar_points(mesh)[topology.memory]``); not changed. topology: of the
     mesh. precision: how exactly coordinates are known once they are written (kernels.star.guard).
 
-    A cell counts as untangled once it is certified: positive as it will be written. No cell that was positive is not so
+    A cell is inverted if one of its corners is not positive. It counts as untangled once it is certified: all its
+    corners are positive as they will be written. No cell that was positive is not so
     afterwards, and none that stays inverted is worse (in 1/q) than the worst with a free node was. The result follows
     from the arguments alone.
     """
     topology = topology.with_rings_of_free_nodes()
     tangle = UntanglingState(points, topology, precision)
-    before = int(tangle.was_bad.sum())
+    before = len(first_rows(topology, tangle.was_bad))
     if not before:
         return Untangled(tangle.points, 0, 0, ALL, "", (), ())
     steps, whys = list[UntanglingStep](), list[str]()
@@ -51,7 +53,8 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
         steps += restore(tangle), polish(tangle)
     after = 0
     if tangle.left:  # else all are certified that have moved or were not positive
-        after = int((exact_signs(tangle.points, topology.near, topology.near_orientation) <= 0).sum())
+        inverted = exact_signs(tangle.points, topology.near, topology.near_orientation) <= 0
+        after = len(first_rows(topology, whole_cells(topology, inverted)))
     sweeps = sum(step.sweeps for step in steps)
     return Untangled(
         tangle.points,

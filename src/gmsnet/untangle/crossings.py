@@ -8,6 +8,7 @@ import numpy as np
 import scipy.spatial
 from numpy.typing import NDArray
 
+from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL
 from gmsnet.measure.signs import exact_signs
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.patch import Floats, Ints
@@ -77,12 +78,14 @@ def by_size(low: Floats, high: Floats) -> Iterator[tuple[NDArray[np.intp], Float
 
 
 def held_edges(topology: Topology) -> tuple[Ints, Ints]:
-    """The edges of triangles whose two nodes are held (e, 2), by places in memory: those of one triangle, and all."""
-    near = topology.near
-    edges = np.concatenate([near[:, [0, 1]], near[:, [1, 2]], near[:, [2, 0]]])
+    """The edges of cells whose two nodes are held (e, 2), by places in memory: those of one cell, and all."""
+    near, whole = topology.near, topology.near
+    if topology.near_shapes is not None:  # of a quad, whose corners are all there, each gives the edge that follows it
+        whole = near[topology.near_shapes == EQUILATERAL]
+    edges = np.concatenate([near[:, [0, 1]], whole[:, [1, 2]], whole[:, [2, 0]]])
     edges = np.sort(edges[~topology.near_free[edges].any(axis=1)], axis=1)
-    every, triangles = np.unique(edges, axis=0, return_counts=True)
-    return every[triangles == 1], every
+    every, cells = np.unique(edges, axis=0, return_counts=True)
+    return every[cells == 1], every
 
 
 def crossings(points: Floats, pairs: Ints) -> Floats:

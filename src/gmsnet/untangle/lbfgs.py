@@ -58,7 +58,7 @@ def minimise(points: Floats, patch: Patch, scale: Floats, epsilon: float, iterat
 
     def evaluate(unknowns: Floats) -> tuple[float, Floats]:
         points[:count] = start + size * unknowns.reshape(-1, 2)
-        value = barrier.energy(points, patch.cells, scale, epsilon, gradient)
+        value = barrier.energy(points, patch.cells, patch.weights, scale, epsilon, gradient)
         return value, (gradient[:count] * size).ravel()
 
     result = scipy.optimize.minimize(

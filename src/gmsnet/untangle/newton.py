@@ -8,7 +8,8 @@ import numpy as np
 
 from gmsnet.kernels.simplex.mean_ratio2 import TWO_SQRT3
 from gmsnet.kernels.untangle import barrier
-from gmsnet.kernels.untangle import untangling as kernels
+from gmsnet.kernels.untangle import cells as kernels
+from gmsnet.untangle.cells import most_of_cells
 from gmsnet.untangle.patch import Flags, Floats, Patch, free_nodes_of, in_order
 from gmsnet.untangle.result import UntanglingStep
 from gmsnet.untangle.state import UntanglingState
@@ -52,7 +53,7 @@ def sweep(
     precision, nodes = tangle.precision, np.arange(patch.count, dtype=np.int32)
     single = mode != barrier.FREELY and precision.single
     moved: int = barrier.sweep(
-        points, nodes, patch.start, patch.ring, scale, epsilon, mode, precision.unit, precision.grain, single, floor
+        points, nodes, patch.stars, scale, epsilon, mode, precision.unit, precision.grain, single, floor
     )
     return moved
 
@@ -65,9 +66,7 @@ def closing(worst: Floats) -> Floats:
 def polish(tangle: UntanglingState) -> UntanglingStep:
     """A few Newton sweeps on the stars of slivers that untangling has left; certified stars stay so."""
     slivers, topology = np.empty(len(tangle.bad), dtype=bool), tangle.topology
-    kernels.find_slivers(
-        tangle.points, tangle.before, topology.near, topology.near_orientation, SLIVER / TWO_SQRT3, slivers
-    )  # fmt: skip
+    kernels.find_slivers(tangle.points, tangle.before, topology.simplices, SLIVER / TWO_SQRT3, slivers)
     patch = Patch.of(topology, in_order(topology, free_nodes_of(topology, slivers)))
     points = tangle.points[patch.every]
     scale = barrier.local_area(points, patch.cells, AVERAGING)
@@ -85,7 +84,8 @@ def keep_gains(tangle: UntanglingState, before: Floats, bad: Flags) -> None:
     piece = np.full(len(tangle.points), -1, dtype=np.int32)
     piece[patch.nodes] = patch.part
     rows = np.flatnonzero(bad | tangle.bad)
-    of_cell = piece[topology.near[rows]].max(axis=1, initial=-1)  # no cell has moved nodes of two
+    rows, of_cell = most_of_cells(topology, rows, piece[topology.near[rows]].max(axis=1, initial=-1))
+    # No cell has moved nodes of two.
     rows, of_cell = rows[of_cell >= 0], of_cell[of_cell >= 0]
     was, now = (np.bincount(of_cell[flags[rows]], minlength=patch.parts) for flags in (bad, tangle.bad))
     useless = patch.nodes[(now >= was)[patch.part]]

@@ -1,4 +1,4 @@
-"""A patch: free nodes that are moved together, with their rings and cells in numbers of their own."""
+"""A patch: free nodes that are moved together, with their stars in numbers of their own."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
+from gmsnet.kernels.star.pattern import Stars
 from gmsnet.kernels.untangle import untangling as kernels
 from gmsnet.topology.topology import Topology
 
@@ -21,16 +22,17 @@ Flags = NDArray[np.bool_]
 class Patch:
     """count: how many nodes are moved. every: (m,) places in memory of all its nodes, the moved ones first.
 
-    start, ring: the rings of the moved nodes, CSR in numbers of the patch. cells: (c, 3), counter-clockwise, all that
-    have a moved node, each with one in front. part: (count,) which piece of the patch a moved node belongs to; no cell
-    has moved nodes of two. parts: how many pieces there are.
+    stars: of the moved nodes, in numbers of the patch. cells: (c, 3), the corner simplices, counter-clockwise, that
+    have a moved node, each with one in front. weights: (c, 3) their weights as seen from that one
+    (kernels.simplex.mean_ratio2), None where all are equilateral. part: (count,) which piece of the patch a moved node
+    belongs to; no cell has moved nodes of two. parts: how many pieces there are.
     """
 
     count: int
     every: Ints
-    start: Ints
-    ring: Ints
+    stars: Stars
     cells: Ints
+    weights: Floats | None
     part: Ints
     parts: int
 
@@ -38,7 +40,11 @@ class Patch:
     def of(cls, topology: Topology, nodes: Ints) -> Patch:
         """The patch of free nodes (places in memory), in their order."""
         number = np.full(len(topology.memory), -1, dtype=np.int32)
-        every, start, ring, cells = kernels.cut(nodes, topology.near_start, topology.near_ring, number)
+        table, pattern, patterns = None, None, topology.patterns
+        if patterns is not None and topology.near_pattern is not None:
+            pattern = topology.near_pattern[nodes]
+            table = np.empty((int(np.diff(patterns.first)[pattern].sum()), 3))
+        every, start, ring, cells = kernels.cut(nodes, topology.links, number, table)
         count = len(nodes)
         row = np.repeat(np.arange(count), np.diff(start))
         joined = ring < count
@@ -46,7 +52,8 @@ class Patch:
             (np.ones(int(joined.sum()), dtype=np.int8), (row[joined], ring[joined])), shape=(count, count)
         )
         parts, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
-        return cls(count, every, start, ring, cells, part.astype(np.int32), int(parts))
+        stars, weights = Stars(start, ring, pattern, patterns), None if table is None else table[: len(cells)]
+        return cls(count, every, stars, cells, weights, part.astype(np.int32), int(parts))
 
     @property
     def nodes(self) -> Ints:
@@ -72,8 +79,13 @@ def in_order(topology: Topology, chosen: Flags) -> Ints:
     return nodes[np.lexsort((topology.memory[nodes], topology.near_colours[nodes]))]
 
 
-def free_nodes_of(topology: Topology, cells: NDArray[np.intp] | Flags) -> Flags:
-    """(N,) which free nodes the cells (rows of ``near``) have."""
+def free_nodes_of(topology: Topology, rows: Flags) -> Flags:
+    """(N,) which free nodes some rows of ``near`` (T, bool) have."""
+    return free_among(topology, topology.near[rows])
+
+
+def free_among(topology: Topology, nodes: Ints) -> Flags:
+    """(N,) which nodes are free and among some, by places in memory."""
     chosen = np.zeros(len(topology.memory), dtype=bool)
-    chosen[topology.near[cells].ravel()] = True
+    chosen[nodes.ravel()] = True
     return chosen & topology.near_free

@@ -21,16 +21,17 @@ class UntanglingStep(NamedTuple):
 
 
 class StillInverted(NamedTuple):
-    """A cell that is not untangled: its row in ``Topology.near``, why, and where (x, y, in coordinates of the run)."""
+    """A cell that is not untangled: its row in ``Topology.near``, of a quad the first, why, and where (x, y, in
+    coordinates of the run)."""
 
-    triangle: int
+    row: int
     reason: str
     place: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class Untangled:
-    """points: (N, 2) in memory order. before, after: how many cells have an area of zero or less (exact signs).
+    """points: (N, 2) in memory order. before, after: how many cells have a corner of zero area or less (exact signs).
 
     taken: ALL, PART or NOTHING of what was tried; why: if not all, what stood against it, else "". steps: what was
     done. unmended: the cells that are still inverted, or positive within rounding only, ascending.

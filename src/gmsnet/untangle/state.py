@@ -7,25 +7,25 @@ from functools import cached_property
 import numpy as np
 
 from gmsnet.kernels.star.guard import Precision
-from gmsnet.kernels.untangle import untangling as kernels
+from gmsnet.kernels.untangle import cells, untangling
 from gmsnet.measure.signs import exact_signs
 from gmsnet.topology.topology import Topology
+from gmsnet.untangle.cells import first_rows, whole_cells
 from gmsnet.untangle.patch import Flags, Floats, Ints, Patch, free_nodes_of, in_order
 
 
 class UntanglingState:
     """points: (N, 2) in memory order, of which free nodes are moved. before: the same at first, not changed.
 
-    signs: (T,) exact signs at first. bad: (T,) which cells are to be untangled: not certified
-    (kernels.untangle.untangling), and inverted at first or with a node that has moved. left: how many. frozen: (N,)
-    free nodes that stand still all the same. work: iterations of L-BFGS so far, times nodes.
+    bad: (T,) the rows of ``Topology.near`` of the cells that are to be untangled: not certified
+    (kernels.untangle.cells), and inverted at first (was_bad) or with a node that has moved. left: how many cells.
+    frozen: (N,) free nodes that stand still all the same. work: iterations of L-BFGS so far, times nodes.
     """
 
     def __init__(self, points: Floats, topology: Topology, precision: Precision) -> None:
         self.before, self.topology, self.precision = points, topology, precision
         self.points = points.copy()
-        self.signs = exact_signs(points, topology.near, topology.near_orientation)
-        self.was_bad = self.signs <= 0
+        self.was_bad = whole_cells(topology, exact_signs(points, topology.near, topology.near_orientation) <= 0)
         self.bad = np.empty(len(topology.near), dtype=bool)
         self.left = self.work = 0
         self.frozen = np.zeros(len(points), dtype=bool)
@@ -34,21 +34,22 @@ class UntanglingState:
     @cached_property
     def worst(self) -> float:
         """An upper bound of the minimum D/L at first of the cells that can change, 0 if none of them was inverted."""
-        triangles, orientation, *_ = self.topology.changeable
         precision = self.precision
         return min(
-            float(kernels.least_ratio(self.before, triangles, orientation, precision.unit, precision.grain)), 0.0
+            float(cells.least_ratio(self.before, self.topology.changeable, precision.unit, precision.grain)), 0.0
         )
 
     def look(self) -> int:
         """Finds the bad cells of the points as they are now; returns how many there are."""
         precision, topology = self.precision, self.topology
         self.left = int(
-            kernels.find_bad(
-                self.points, self.before, topology.near, topology.near_orientation, self.was_bad, precision.unit,
-                precision.grain, self.bad,
+            cells.find_bad(
+                self.points, self.before, topology.simplices, self.was_bad, precision.unit, precision.grain, self.bad
             )
-        )  # fmt: skip
+        )
+        if self.left and topology.near_cells is not None:
+            self.bad = whole_cells(topology, self.bad)
+            self.left = len(first_rows(topology, self.bad))
         return self.left
 
     def bad_nodes(self) -> Flags:
@@ -60,22 +61,18 @@ class UntanglingState:
 
         When it is the turn of their neighbours, these have nothing to mend any more.
         """
-        topology, precision = self.topology, self.precision
-        shares = kernels.bad_shares(
-            self.points, nodes, topology.near_start, topology.near_ring, precision.unit, precision.grain
-        )
+        precision = self.precision
+        shares = untangling.bad_shares(self.points, nodes, self.topology.links, precision.unit, precision.grain)
         return nodes[np.argsort(-shares, kind="stable")]
 
     def bad_among(self, moved: Flags) -> Flags:
         """(N,) of some free nodes that may have moved, and of their neighbours, those with an uncertified cell."""
         topology, precision = self.topology, self.precision
         around = moved.copy()
-        kernels.grow(around, topology.near_start, topology.near_ring, 1)
+        untangling.grow(around, topology.near_start, topology.near_ring, 1)
         around &= ~self.frozen
         nodes = np.flatnonzero(around).astype(np.int32)  # as elsewhere, so that nothing is compiled twice
-        shares = kernels.bad_shares(
-            self.points, nodes, topology.near_start, topology.near_ring, precision.unit, precision.grain
-        )
+        shares = untangling.bad_shares(self.points, nodes, topology.links, precision.unit, precision.grain)
         around[nodes[shares == 0.0]] = False
         return around
 
@@ -85,15 +82,15 @@ class UntanglingState:
         The worst come first. weighing: see the kernel.
         """
         topology, precision = self.topology, self.precision
-        kernels.average(
-            self.points, self.worst_first(nodes), topology.near_start, topology.near_ring, weighing, precision.unit,
-            precision.grain, precision.single,
+        untangling.average(
+            self.points, self.worst_first(nodes), topology.links, weighing, precision.unit, precision.grain,
+            precision.single,
         )  # fmt: skip
 
     def around(self, rings: int) -> Patch:
         """The patch of the free nodes of bad cells and those within so many rings of them."""
         chosen = self.bad_nodes()
-        kernels.grow(chosen, self.topology.near_start, self.topology.near_ring, rings)
+        untangling.grow(chosen, self.topology.near_start, self.topology.near_ring, rings)
         chosen &= ~self.frozen
         return Patch.of(self.topology, in_order(self.topology, chosen))
 
@@ -108,7 +105,7 @@ class UntanglingState:
         if precision.single:
             kept = points.copy()
             kept[: patch.count] = self.rounded(points[: patch.count])
-        return int(kernels.uncertified(kept, patch.cells, precision.unit, precision.grain))
+        return int(untangling.uncertified(kept, patch.cells, precision.unit, precision.grain))
 
     def certified(self, points: Floats, patch: Patch) -> bool:
         """Are all cells of a patch certified, its points (m, 2) rounded?"""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.simplex.mean_ratio2 import TWO_SQRT3
-from gmsnet.kernels.untangle import untangling as kernels
+from gmsnet.kernels.untangle import cells, untangling
 from gmsnet.untangle.newton import keep_gains
 from gmsnet.untangle.patch import Flags, free_nodes_of, in_order
 from gmsnet.untangle.result import UntanglingStep
@@ -29,9 +29,9 @@ def take(tangle: UntanglingState) -> str:
     floor = tangle.worst
     tried, first = moved(tangle).sum(), 0
     while True:
-        count = kernels.find_violated(
-            tangle.points, tangle.before, topology.near, topology.near_orientation, tangle.was_bad, floor,
-            precision.unit, precision.grain, violated,
+        count = cells.find_violated(
+            tangle.points, tangle.before, topology.simplices, tangle.was_bad, floor, precision.unit, precision.grain,
+            violated,
         )  # fmt: skip
         if not count:
             break
@@ -69,9 +69,8 @@ def restore(tangle: UntanglingState) -> UntanglingStep:
     sweeps = 0
     for _ in range(BACK_SWEEPS):
         sweeps += 1
-        if not kernels.go_back(
-            tangle.points, tangle.before, nodes, topology.near_start, topology.near_ring, FINE / TWO_SQRT3,
-            precision.unit, precision.grain,
-        ):  # fmt: skip
+        if not untangling.go_back(
+            tangle.points, tangle.before, nodes, topology.links, FINE / TWO_SQRT3, precision.unit, precision.grain
+        ):
             break
     return UntanglingStep("back where possible", len(nodes), sweeps, tangle.left)

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
+from gmsnet.kernels.star.pattern import Stars
 from gmsnet.kernels.untangle import barrier
 
 
@@ -45,16 +46,16 @@ def numeric(function, x, h=1e-6):
 def test_energy_and_gradient(seed, epsilon):
     points, cells, scale = tangled(seed)
     gradient = np.empty_like(points)
-    value = barrier.energy(points, cells, scale, epsilon, gradient)
+    value = barrier.energy(points, cells, None, scale, epsilon, gradient)
     assert value == pytest.approx(twin(points, cells, scale, epsilon), rel=1e-7)
-    expected = numeric(lambda p: barrier.energy(p, cells, scale, epsilon, np.empty_like(p)), points)
+    expected = numeric(lambda p: barrier.energy(p, cells, None, scale, epsilon, np.empty_like(p)), points)
     np.testing.assert_allclose(gradient, expected, rtol=1e-4, atol=1e-5 * np.abs(expected).max())
 
 
 def test_a_valid_mesh_has_the_sum_of_q_in_the_limit():
     points = np.array([[0, 0], [1, 0], [0.5, np.sqrt(0.75)], [1.5, np.sqrt(0.75)]])
     cells = np.array([[0, 1, 2], [1, 3, 2]], dtype=np.int32)
-    assert barrier.energy(points, cells, np.ones(4), 1e-9, np.empty((4, 2))) == pytest.approx(2.0)
+    assert barrier.energy(points, cells, None, np.ones(4), 1e-9, np.empty((4, 2))) == pytest.approx(2.0)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(3, 9), st.sampled_from([1.0, 0.1, 0.01]))
@@ -67,8 +68,8 @@ def test_star_is_the_part_of_the_energy_that_moves(seed, degree, epsilon):
     scale = 0.5 + rng.random(degree + 1)
     cells = np.array([(0, 1 + i, 1 + (i + 1) % degree) for i in range(degree)], dtype=np.int32)
     gradient = np.empty_like(points)
-    value, gx, gy, xx, xy, yy = barrier.star(points, *points[0], 0, start, ring, scale, epsilon)
-    assert value == pytest.approx(barrier.energy(points, cells, scale, epsilon, gradient), rel=1e-9)
+    value, gx, gy, xx, xy, yy = barrier.star(points, *points[0], 0, Stars(start, ring), scale, epsilon)
+    assert value == pytest.approx(barrier.energy(points, cells, None, scale, epsilon, gradient), rel=1e-9)
     np.testing.assert_allclose([gx, gy], gradient[0], rtol=1e-6, atol=1e-9 * abs(value))
     assert xx >= 0
     assert yy >= 0
@@ -80,10 +81,10 @@ def test_the_hessian_is_exact_where_all_is_far_from_inverted():
     angle = np.pi / 3 * np.arange(6)
     points = np.vstack([[0.1, -0.2], np.column_stack([np.cos(angle), np.sin(angle)])])
     ring, start, scale = np.arange(1, 7, dtype=np.int32), np.array([0, 6], dtype=np.int32), np.ones(7)
-    _, _, _, xx, xy, yy = barrier.star(points, *points[0], 0, start, ring, scale, 1e-6)
+    _, _, _, xx, xy, yy = barrier.star(points, *points[0], 0, Stars(start, ring), scale, 1e-6)
 
     def gradient(place):
-        return np.array(barrier.star(points, *place, 0, start, ring, scale, 1e-6)[1:3])
+        return np.array(barrier.star(points, *place, 0, Stars(start, ring), scale, 1e-6)[1:3])
 
     h = 1e-6
     columns = [(gradient(points[0] + h * e) - gradient(points[0] - h * e)) / (2 * h) for e in np.eye(2)]
@@ -93,7 +94,7 @@ def test_the_hessian_is_exact_where_all_is_far_from_inverted():
 def test_deep_below_zero_nothing_cancels():
     points = np.array([[0.0, 0.0], [0.0, 1e3], [1e3, 0.0]])
     gradient = np.empty_like(points)
-    value = barrier.energy(points, np.array([[0, 1, 2]], dtype=np.int32), np.ones(3), 1e-3, gradient)
+    value = barrier.energy(points, np.array([[0, 1, 2]], dtype=np.int32), None, np.ones(3), 1e-3, gradient)
     assert value == pytest.approx(2e6 / np.sqrt(3) * 4e6 / 1e-6, rel=1e-6)
     assert np.isfinite(gradient).all()
 

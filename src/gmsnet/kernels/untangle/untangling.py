@@ -1,51 +1,14 @@
-"""Which cells are to be untangled, the patches around them, and plain Laplacian sweeps that no guard holds back.
-
-A cell is *certified* if its determinant exceeds the error bound of kernels.simplex.predicates with all coordinates
-known up to ±δ, δ = unit·(its largest coordinate) + grain: then it is positive as it is written, too.
-"""
+"""The patches around cells that are to be untangled, and plain Laplacian sweeps that no guard holds back."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import kernel, part
-from gmsnet.kernels.simplex.predicates import determinant_and_bound
-from gmsnet.kernels.star.guard import margin_above, ratio_of
+from gmsnet.kernels.jit.compile import inlined, kernel, part
+from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at, weights_of
+from gmsnet.kernels.untangle.cells import margin, share
 
 TINY = 1e-290  # stands in for a squared length of zero
-
-
-@part
-def margin(points, a, b, c, unit, grain):
-    """By how much the determinant of the triangle a, b, c exceeds its bound; positive: certified."""
-    ax, ay, bx, by = points[a, 0], points[a, 1], points[b, 0], points[b, 1]
-    cx, cy = points[c, 0], points[c, 1]
-    reach = max(max(max(abs(ax), abs(ay)), max(abs(bx), abs(by))), max(abs(cx), abs(cy)))
-    value, bound = determinant_and_bound(ax, ay, bx, by, cx, cy, unit * reach + grain)
-    return value - bound
-
-
-@kernel
-def find_bad(points, before, triangles, orientation, was_bad, unit, grain, bad):
-    """Marks the cells that are to be untangled: not certified, and inverted at first or with a node that has moved.
-
-    points, before: (N, 2), now and at first. triangles: (T, 3). orientation: (T,) ±1. was_bad, bad: (T,) bool. Returns
-    how many.
-    """
-    count = 0
-    for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        bad[t] = was_bad[t]
-        if not was_bad[t]:
-            for i in (a, b, c):
-                if points[i, 0] != before[i, 0] or points[i, 1] != before[i, 1]:
-                    bad[t] = True
-        if bad[t]:
-            if orientation[t] < 0:
-                b, c = c, b
-            bad[t] = not margin(points, a, b, c, unit, grain) > 0.0
-            count += bad[t]
-    return count
 
 
 @kernel
@@ -71,102 +34,128 @@ def grow(chosen, start, ring, rings):
     return True
 
 
-@kernel
-def cut(nodes, start, ring, number):
-    """The patch of some free nodes, in numbers of its own: the nodes in the order given, then those of their rings.
+@inlined
+def star_of(stars, v):
+    """Of node v: where the nodes around it begin, how many they are, how many simplices it has, and the pattern."""
+    first = stars.start[v]
+    n, pattern = stars.start[v + 1] - first, pattern_at(stars.patterns, stars.pattern, v)
+    return first, n, count_of(pattern, n), pattern
 
-    number: (N,) of −1, and again so at the end. Returns every (m,) node of the patch, and in the patch's numbers start,
-    ring (CSR) of the nodes and the cells (c, 3), counter-clockwise, that have one of them.
+
+@inlined
+def put_row(table, row, weights):
+    """Weights into a row of a table (c, 3), if there is one."""
+    if table is not None:
+        table[row, 0], table[row, 1], table[row, 2] = weights.a, weights.b, weights.opposite
+
+
+@kernel
+def cut(nodes, stars, number, table):
+    """The patch of some free nodes, in numbers of its own: the nodes in the order given, then those around them.
+
+    number: (N,) of −1, and again so at the end. table: room for the weights of as many simplices as the nodes have,
+    None where all are equilateral. Returns every (m,) node of the patch, and in the patch's numbers start and around
+    (CSR) of the nodes and the simplices (c, 3), counter-clockwise, that have one of them. Each begins with the first
+    of the nodes that it has, and row c of the table has its weights seen from there.
     """
-    count, spokes = len(nodes), 0
+    count, spokes, most = len(nodes), 0, 0
     for k in range(count):
         number[nodes[k]] = k
-        spokes += start[nodes[k] + 1] - start[nodes[k]]
+        _, n, simplices, _ = star_of(stars, nodes[k])
+        spokes += n
+        most += simplices
     every = np.empty(count + spokes, dtype=np.int32)
     for k in range(count):  # assigning a slice would take seconds to compile
         every[k] = nodes[k]
-    new_start = np.zeros(count + 1, dtype=np.int32)
-    new_ring = np.empty(spokes, dtype=np.int32)
-    cells = np.empty((spokes, 3), dtype=np.int32)
+    start = np.zeros(count + 1, dtype=np.int32)
+    around = np.empty(spokes, dtype=np.int32)
+    cells = np.empty((most, 3), dtype=np.int32)
     end, size, made = 0, count, 0
     for k in range(count):
-        v = nodes[k]
-        for at in range(start[v], start[v + 1]):
-            other = ring[at]
+        first, n, simplices, pattern = star_of(stars, nodes[k])
+        for at in range(first, first + n):
+            other = stars.around[at]
             if number[other] < 0:
                 number[other] = size
                 every[size] = other
                 size += 1
-            new_ring[end] = number[other]
+            around[end] = number[other]
             end += 1
-        new_start[k + 1] = end
-        for at in range(new_start[k], end):
-            a, b = new_ring[at - 1 if at > new_start[k] else end - 1], new_ring[at]
-            if (a >= count or a > k) and (b >= count or b > k):  # its first node of the patch makes the cell
+        start[k + 1] = end
+        for s in range(simplices):
+            i, j = pair_of(pattern, n, s)
+            a, b = around[start[k] + i], around[start[k] + j]
+            if (a >= count or a > k) and (b >= count or b > k):  # its first node of the patch makes the simplex
                 cells[made, 0], cells[made, 1], cells[made, 2] = k, a, b
+                put_row(table, made, weights_of(pattern, s, np.float64))
                 made += 1
     for k in range(size):
         number[every[k]] = -1
-    return every[:size].copy(), new_start, new_ring, cells[:made].copy()
+    return every[:size].copy(), start, around, cells[:made].copy()
 
 
 @part
-def bad_in_star(points, v, start, ring, unit, grain):
-    """How many cells of the star of v are not certified."""
+def bad_in_star(points, v, stars, unit, grain):
+    """How many simplices of the star of v are not certified."""
     count = 0
-    before = ring[start[v + 1] - 1]
-    for at in range(start[v], start[v + 1]):
-        after = ring[at]
-        count += not margin(points, v, before, after, unit, grain) > 0.0
-        before = after
+    first, n, simplices, pattern = star_of(stars, v)
+    for k in range(simplices):
+        i, j = pair_of(pattern, n, k)
+        count += not margin(points, v, stars.around[first + i], stars.around[first + j], unit, grain) > 0.0
     return count
 
 
 @kernel
-def bad_shares(points, nodes, start, ring, unit, grain):
-    """Which share of the cells of each node's star is not certified."""
+def bad_shares(points, nodes, stars, unit, grain):
+    """Which share of the simplices of each node's star is not certified."""
     out = np.empty(len(nodes))
     for k in range(len(nodes)):
-        v = nodes[k]
-        out[k] = bad_in_star(points, v, start, ring, unit, grain) / (start[v + 1] - start[v])
+        _, _, simplices, _ = star_of(stars, nodes[k])
+        out[k] = bad_in_star(points, nodes[k], stars, unit, grain) / simplices
     return out
 
 
 @kernel
-def average(points, nodes, start, ring, weighing, unit, grain, single):
-    """Puts each of the nodes, one after another, into the mean of its ring, if a cell of its star is bad by then.
+def average(points, nodes, stars, weighing, unit, grain, single):
+    """Puts each of the nodes, one after another, into the mean of its neighbours, if its star is bad by then.
 
-    Whatever becomes of those cells. weighing: so many steps from the mean towards the geometric median (E. Weiszfeld,
+    Whatever becomes of its cells. weighing: so many steps from the mean towards the geometric median (E. Weiszfeld,
     Tôhoku Mathematical Journal 43, 1937), which a neighbour far away hardly pulls. single: rounded to float32.
     """
     for v in nodes:
-        if not bad_in_star(points, v, start, ring, unit, grain):
+        if not bad_in_star(points, v, stars, unit, grain):
             continue
+        first, n, _, pattern = star_of(stars, v)
         x, y = 0.0, 0.0
-        for k in range(start[v], start[v + 1]):
-            x += points[ring[k], 0]
-            y += points[ring[k], 1]
-        degree = start[v + 1] - start[v]
-        x /= degree
-        y /= degree
+        for k in range(n):
+            other, weight = stars.around[first + k], neighbour_weight(pattern, k)
+            x += weight * points[other, 0]
+            y += weight * points[other, 1]
+        x /= neighbours(pattern, n)
+        y /= neighbours(pattern, n)
         for _ in range(weighing):
-            x, y = weigh(points, v, start, ring, x, y)
+            x, y = weigh(points, v, stars, x, y)
         if single:
             x, y = np.float64(np.float32(x)), np.float64(np.float32(y))
         points[v, 0], points[v, 1] = x, y
 
 
 @part
-def weigh(points, v, start, ring, x, y):
-    """The mean of the ring of v weighted by the inverse distances from (x, y), the nearest one's a little larger."""
+def weigh(points, v, stars, x, y):
+    """The mean of the neighbours of v weighted by the inverse distances from (x, y), the nearest one's a little
+    larger."""
+    first, n, _, pattern = star_of(stars, v)
     nearest = np.inf
-    for k in range(start[v], start[v + 1]):
-        dx, dy = points[ring[k], 0] - x, points[ring[k], 1] - y
-        nearest = min(nearest, dx * dx + dy * dy)
+    for k in range(n):
+        other = stars.around[first + k]
+        dx, dy = points[other, 0] - x, points[other, 1] - y
+        if neighbour_weight(pattern, k) > 0.0:
+            nearest = min(nearest, dx * dx + dy * dy)
     total, sx, sy = 0.0, 0.0, 0.0
-    for k in range(start[v], start[v + 1]):
-        dx, dy = points[ring[k], 0] - x, points[ring[k], 1] - y
-        weight = 1.0 / np.sqrt(dx * dx + dy * dy + 0.1 * nearest + TINY)
+    for k in range(n):
+        other = stars.around[first + k]
+        dx, dy = points[other, 0] - x, points[other, 1] - y
+        weight = neighbour_weight(pattern, k) / np.sqrt(dx * dx + dy * dy + 0.1 * nearest + TINY)
         total += weight
         sx += weight * dx
         sy += weight * dy
@@ -174,26 +163,28 @@ def weigh(points, v, start, ring, x, y):
 
 
 @kernel
-def go_back(points, before, nodes, start, ring, limit, unit, grain):
+def go_back(points, before, nodes, stars, limit, unit, grain):
     """Puts nodes (one after another) back to where they were at first where nothing is lost by it; how many are back.
 
-    All cells of the star must be certified before and after it; those that then have a node elsewhere than at first
-    must have a D/L of at least limit or what they had.
+    All simplices of the star must be certified before and after it; those that then have a node elsewhere than at
+    first must have a D/L of at least limit or what they had.
     """
     back = 0
     for v in nodes:
         x, y = points[v, 0], points[v, 1]
-        if (x == before[v, 0] and y == before[v, 1]) or bad_in_star(points, v, start, ring, unit, grain):
+        if (x == before[v, 0] and y == before[v, 1]) or bad_in_star(points, v, stars, unit, grain):
             continue
-        end = start[v + 1]
+        first, n, simplices, pattern = star_of(stars, v)
         fits = True
-        for at in range(start[v], end):
-            a, b = ring[at - 1 if at > start[v] else end - 1], ring[at]
-            least = min(limit, share(points, v, a, b))
+        for k in range(simplices):
+            i, j = pair_of(pattern, n, k)
+            a, b, weights = stars.around[first + i], stars.around[first + j], weights_of(pattern, k, np.float64)
+            least = min(limit, share(points, v, a, b, weights))
             points[v, 0], points[v, 1] = before[v, 0], before[v, 1]
             away = points[a, 0] != before[a, 0] or points[a, 1] != before[a, 1]
             away |= points[b, 0] != before[b, 0] or points[b, 1] != before[b, 1]
-            fits = margin(points, v, a, b, unit, grain) > 0.0 and (not away or share(points, v, a, b) >= least)
+            fits = margin(points, v, a, b, unit, grain) > 0.0
+            fits = fits and (not away or share(points, v, a, b, weights) >= least)
             points[v, 0], points[v, 1] = x, y
             if not fits:
                 break
@@ -205,78 +196,8 @@ def go_back(points, before, nodes, start, ring, limit, unit, grain):
 
 @kernel
 def uncertified(points, cells, unit, grain):
-    """How many of the cells (c, 3), counter-clockwise, are not certified."""
+    """How many of the simplices (c, 3), counter-clockwise, are not certified."""
     count = 0
     for t in range(len(cells)):
         count += not margin(points, cells[t, 0], cells[t, 1], cells[t, 2], unit, grain) > 0.0
     return count
-
-
-@kernel
-def find_violated(points, before, triangles, orientation, was_bad, floor, unit, grain, violated):
-    """Marks the cells with a node that has moved which stand against taking the points; returns how many.
-
-    Those are the cells that were positive and are not certified, and those that were not positive, are not certified,
-    and not certified above floor either, a D/L of at most 0 (L the sum of the squared sides).
-    """
-    count = 0
-    for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        violated[t] = False
-        for i in (a, b, c):
-            if points[i, 0] != before[i, 0] or points[i, 1] != before[i, 1]:
-                violated[t] = True
-        if not violated[t]:
-            continue
-        if orientation[t] < 0:
-            b, c = c, b
-        violated[t] = not margin(points, a, b, c, unit, grain) > 0.0
-        if violated[t] and was_bad[t]:
-            violated[t] = not surplus_over(points, a, b, c, unit, grain, floor) > 0.0
-        count += violated[t]
-    return count
-
-
-@kernel
-def find_slivers(points, before, triangles, orientation, limit, slivers):
-    """Marks the cells with a node that has moved whose D/L is below a limit."""
-    for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        slivers[t] = False
-        for i in (a, b, c):
-            if points[i, 0] != before[i, 0] or points[i, 1] != before[i, 1]:
-                slivers[t] = True
-        if slivers[t]:
-            if orientation[t] < 0:
-                b, c = c, b
-            slivers[t] = share(points, a, b, c) < limit
-
-
-@part
-def share(points, a, b, c):
-    """D/L of the triangle a, b, c; 0 where all its nodes are in one place."""
-    px, py = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
-    qx, qy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
-    lengths = 2.0 * (px * px + py * py + qx * qx + qy * qy - px * qx - py * qy)
-    return (px * qy - py * qx) / lengths if lengths > 0.0 else 0.0
-
-
-@part
-def surplus_over(points, a, b, c, unit, grain, floor):
-    """By how much D of the triangle a, b, c exceeds floor·L and the bounds of both; positive: certified above it."""
-    px, py = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
-    qx, qy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
-    reach = max(abs(points[a, 0]), abs(points[a, 1])) + ((abs(px) + abs(py)) + (abs(qx) + abs(qy)))
-    return margin_above(px, py, qx, qy, unit * reach + grain, floor, None)
-
-
-@kernel
-def least_ratio(points, triangles, orientation, unit, grain):
-    """The minimum that a bound of D/L from above is over the cells (kernels.star.guard); 1/q is 2√3 times that."""
-    least = np.inf
-    for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        if orientation[t] < 0:
-            b, c = c, b
-        least = min(least, ratio_of(points, b, c, a, unit, grain, None))
-    return least
