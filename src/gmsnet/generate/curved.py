@@ -47,7 +47,7 @@ def second_order(
         raise InputError(f"only triangles, quads and lines can be given middle nodes, got {wrong[0]!r} cells")
     rng = generator(seed)
     sides = [_sides(block.nodes, CORNERS[block.kind]) for block in mesh.cells]
-    edges, number = np.unique(np.concatenate(sides).reshape(-1, 2), axis=0, return_inverse=True)
+    edges, number = np.unique(np.concatenate([side.reshape(-1, 2) for side in sides]), axis=0, return_inverse=True)
     of_block = np.split(number.reshape(-1), np.cumsum([side.shape[0] * side.shape[1] for side in sides])[:-1])
     uses = np.zeros(len(edges), dtype=np.int64)
     for block, index in zip(mesh.cells, of_block, strict=True):
@@ -108,10 +108,61 @@ def disc_of_quads(rings: int, sectors: int = 8) -> Mesh:
         last = new
     nodes = np.concatenate(cells)
     lines = np.stack([last, np.roll(last, -1)], axis=-1)
-    blocks = CellBlock("quad", nodes, np.zeros(len(nodes), dtype=np.int64)), CellBlock(
-        "line", lines, np.ones(len(lines), dtype=np.int64)
+    blocks = (
+        CellBlock("quad", nodes, np.zeros(len(nodes), dtype=np.int64)),
+        CellBlock("line", lines, np.ones(len(lines), dtype=np.int64)),
     )
     return Mesh(np.concatenate(points), blocks, {(1, 1): "circle"})
+
+
+def waved(mesh: Mesh, amount: float) -> Mesh:
+    """The mesh with all nodes moved along smooth waves, edges of second-order cells with them.
+
+    A point (x, y) goes to (x + amount·sin(2πy), y + amount·sin(2πx)) in units of the mesh's extent, a map without folds
+    below an amount of 1/2π. Raises InputError for an amount that is not between 0 and that.
+    """
+    if not 0 <= amount < 1 / (2 * np.pi):
+        raise InputError(f"waves must have an amount from 0 to below 1/2π, got {amount!r}")
+    low, extent = mesh.points.min(axis=0), np.ptp(mesh.points, axis=0).max()
+    place = (mesh.points - low) / extent
+    return mesh.with_points(low + extent * (place + amount * np.sin(2 * np.pi * place[:, ::-1])))
+
+
+def throw(mesh: Mesh, *, middles: float, corners: float = 0.0, seed: int = 0) -> Mesh:
+    """A second-order mesh with its inner nodes thrown out of place, often into invalid cells.
+
+    middles, corners: the largest distance, in edge lengths (corners: of the shortest edge at the node). Nodes of the
+    boundary and of line cells stay. Middles are thrown from where they are, not from where corners were thrown.
+
+    Raises InputError where the mesh has no second-order cells, and for negative distances.
+    """
+    if not (np.isfinite([middles, corners]).all() and min(middles, corners) >= 0):
+        raise InputError(f"distances must be 0 or more, got {middles!r} and {corners!r}")
+    rng = generator(seed)
+    counts = {"triangle6": 3, "quad8": 4, "quad9": 4}
+    blocks = [block for block in mesh.cells if block.kind in counts]
+    if not blocks:
+        raise InputError("the mesh has no second-order triangles or quads")
+    rows = []
+    for block in blocks:
+        k = counts[block.kind]
+        rows.append(np.concatenate([_sides(block.nodes[:, :k], k), block.nodes[:, k : 2 * k, None]], axis=2))
+    edges, uses = np.unique(np.concatenate([row.reshape(-1, 3) for row in rows]), axis=0, return_counts=True)
+    held = np.zeros(len(mesh.points), dtype=bool)
+    held[edges[uses != 2]] = True
+    for block in mesh.cells:
+        if block.dimension < 2:
+            held[block.nodes] = True
+    length = np.linalg.norm(mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]], axis=1)
+    reach = np.full(len(mesh.points), np.inf)
+    for column in range(2):
+        np.minimum.at(reach, edges[:, column], corners * length)
+    np.minimum.at(reach, edges[:, 2], middles * length)
+    for block in blocks:
+        if block.kind == "quad9":
+            reach[block.nodes[:, 8]] = reach[block.nodes[:, 4:8]].min(axis=1)
+    reach[held | ~np.isfinite(reach)] = 0.0
+    return mesh.with_points(mesh.points + reach[:, None] * _in_disc(rng, len(reach)))
 
 
 def _sides(nodes: Ints, corners: int) -> Ints:
@@ -123,4 +174,4 @@ def _sides(nodes: Ints, corners: int) -> Ints:
 def _in_disc(rng: np.random.Generator, count: int) -> Floats:
     """(count, 2) random points of the unit disc."""
     radius, angle = np.sqrt(rng.random(count)), 2 * np.pi * rng.random(count)
-    return radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.asarray(radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))

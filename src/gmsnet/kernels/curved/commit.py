@@ -178,8 +178,8 @@ def commit_curved(points, mesh, i, x, y, guard, work, tally):
     """Moves a node towards (x, y) with what it drags along, as far as the rule allows.
 
     The node may be a corner, a middle or a centre; the offset of a middle or a centre is stored anew. tally: see
-    kernels.star.block. The caller sees to it that the node is free. Returns how many nodes have moved: 0, or it and those that
-    it drags, whose old places stand in the workspace (see ``restore``).
+    kernels.star.block. The caller sees to it that the node is free. Returns how many nodes have moved: 0, or it and
+    those that it drags, whose old places stand in the workspace (see ``restore``).
     """
     dx, dy = x - points[i, 0], y - points[i, 1]
     if not (np.isfinite(dx) and np.isfinite(dy)):

@@ -1,8 +1,8 @@
 """Descent of single nodes on the Bernstein coefficients of the cells around them.
 
-What a node drags along follows it by an affine map. So each coefficient, and for corners each determinant at a
-corner of the straight cell, is a quadratic polynomial in the node's place: six values determine it. With these values v over the mean
-size of the cell's coefficients, and t the place in units of the star's size, the objectives are
+What a node drags along follows it by an affine map. So each coefficient, and for corners each determinant at a corner
+of the straight cell, is a quadratic polynomial in the node's place: six values determine it. With these values v over
+the mean size of the cell's coefficients, and t the place in units of the star's size, the objectives are
 
 - to untangle, Σ max(0, τ − v)²: zero where all v ≥ τ; and
 - to improve, −Σ log v, infinite where a v ≤ 0.
@@ -198,7 +198,7 @@ def least_quality(points, mesh, i, guard, work):
 
 @kernel
 def improve_nodes(points, mesh, nodes, threshold, guard, tally):
-    """Newton steps on −Σ log v at middles and centres (nodes, K) with a cell whose quality is below the threshold.
+    """Newton steps on −Σ log v at free nodes (K,) around which the least quality of the cells is below the threshold.
 
     Moves go through ``commit_curved``. One that lowers the least quality of the cells around the node is taken back.
     """

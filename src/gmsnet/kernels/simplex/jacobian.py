@@ -164,7 +164,10 @@ def sign_everywhere(kind, bound, work):
 
 @part
 def minimum_bound(kind, bound, work):
-    """What det J is certainly not below anywhere in the cell, sharp to TOLERANCE or as DEPTH allows."""
+    """What det J is certainly not below anywhere in the cell, sharp to TOLERANCE or as DEPTH allows.
+
+    It is positive where ``sign_everywhere`` is.
+    """
     start_parts(kind, work)
     largest = 0.0
     for k in range(COEFFICIENTS[kind]):
@@ -173,7 +176,8 @@ def minimum_bound(kind, bound, work):
     while top > 0:
         least, at_corner = smallest(kind, work.stack[top - 1])
         upper = min(upper, at_corner)
-        if least >= upper - TOLERANCE * largest or work.depth[top - 1] == DEPTH:
+        sharp = least >= upper - TOLERANCE * largest and (least > bound or not upper > bound)
+        if sharp or work.depth[top - 1] == DEPTH:
             lower = min(lower, least)
             top -= 1
         else:
@@ -269,3 +273,12 @@ def judge_cells(points, cells, kinds, unit, grain, first, last, sign, quality):
         bound = expand(kind, delta, work)
         sign[c] = sign_everywhere(kind, bound, work)
         quality[c] = quality_of(kind, bound, work)
+
+
+@kernel
+def straight_signs(points, cells, kinds, unit, grain, sign):
+    """``straight_sign`` of each cell, into ``sign`` (C,). Arguments: see ``judge_cells``."""
+    work = cell_workspace()
+    for c in range(len(cells)):
+        delta = unit * gather_cell(points, cells[c], kinds[c], work) + grain
+        sign[c] = straight_sign(kinds[c], delta, work)
