@@ -25,9 +25,16 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-RINGS = (1, 2, 4, 8)  # of cells around the invalid ones, from try to try
-THRESHOLDS = (0.3, 0.1, 0.03, 0.01)  # τ, over the mean size of a cell's coefficients
-INNER_SWEEPS, SWEEPS = 4, 12  # for each τ: of inner middles alone, and of these and corners
+# From try to try: rings of cells around the invalid ones, sweeps for each τ, and the τ, over the mean size of a cell's
+# coefficients. A large τ spreads room between cells; a small one asks of no cell more than it has to give.
+TRIES = (
+    (1, 12, (0.3, 0.1, 0.03, 0.01)),
+    (2, 25, (0.1, 0.02)),
+    (4, 50, (0.3, 0.1, 0.03, 0.01)),
+    (8, 200, (0.1, 0.02)),
+    (8, 200, (0.02,)),
+)
+INNER_SWEEPS = 4  # for each τ: of inner middles alone, before corners move, too
 
 
 class CurvedScore(NamedTuple):
@@ -60,9 +67,9 @@ def untangle_curved(
     corner = free & (np.diff(mesh.edge_start) > 0)
     bad = np.flatnonzero(_signs(points, mesh, np.arange(len(mesh.cells)), precision) != 1)
     before = len(bad)
-    for rings in RINGS:
+    for rings, sweeps, thresholds in TRIES:
         for cells in _patches(mesh, bad, rings):
-            _Patch(points, mesh, cells, inner, corner, precision).untangle()
+            _Patch(points, mesh, cells, inner, corner, precision).untangle(sweeps, thresholds)
         bad = bad[_signs(points, mesh, bad, precision) != 1]
         if not bad.size:
             break
@@ -138,21 +145,21 @@ class _Patch:
         mesh = self.mesh
         return self.points[self.nodes], mesh.ratio[self.edges], mesh.centre_ratio[self.centred]
 
-    def untangle(self) -> None:
+    def untangle(self, sweeps: int, thresholds: tuple[float, ...]) -> None:
         """Leaves the best state that is found, the first one if there is no better."""
         if self.fewest and self.nodes.size:
-            self._search()
+            self._search(sweeps, thresholds)
             points, ratio, centre_ratio = self.best
             self.points[self.nodes] = points
             self.mesh.ratio[self.edges], self.mesh.centre_ratio[self.centred] = ratio, centre_ratio
 
-    def _search(self) -> None:
+    def _search(self, most: int, thresholds: tuple[float, ...]) -> None:
         bad = self.mesh.cells[self.cells[self.valid != 1]]
         straighten(self.points, self.mesh, self.inner[np.isin(self.inner, bad)], self.precision.single)
         if self._judge():
             return
-        for nodes, sweeps in ((self.inner, INNER_SWEEPS), (self.nodes, SWEEPS)):
-            for threshold in THRESHOLDS:
+        for nodes, sweeps in ((self.inner, INNER_SWEEPS), (self.nodes, most)):
+            for threshold in thresholds:
                 for _ in range(sweeps):
                     if not untangling_sweep(self.points, self.mesh, nodes, threshold, self.precision.single):
                         break

@@ -28,7 +28,7 @@ STEPS, SHORTENINGS = 20, 30
 ARMIJO = 1e-4
 LONGEST = 1.0  # step, in sizes of the star
 END = 1e-6  # the shortest step
-STRAIGHTENING = (1e-4, 0.5)  # κ by objective
+STRAIGHTENING = (1e-6, 0.5)  # κ by objective
 SAMPLE = 0.25  # how far away samples are taken, in sizes of the star
 DAMPING = 1e-10  # of the trace
 
