@@ -151,7 +151,7 @@ def throw(mesh: Mesh, *, middles: float, corners: float = 0.0, seed: int = 0) ->
     held = np.zeros(len(mesh.points), dtype=bool)
     held[edges[uses != 2]] = True
     for block in mesh.cells:
-        if block.dimension < 2:
+        if block.dimension in (0, 1):
             held[block.nodes] = True
     length = np.linalg.norm(mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]], axis=1)
     reach = np.full(len(mesh.points), np.inf)

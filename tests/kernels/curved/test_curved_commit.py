@@ -8,13 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import curved, curved_meshes, naive
 
-from gmsnet.kernels.curved.commit import CurvedGuard, commit_all
+from gmsnet.kernels.curved.commit import commit_all
 from gmsnet.kernels.curved.stars import CENTRE, counter_clockwise, dragged
 from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES, NODES
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
+from gmsnet.kernels.star.guard import MeshGuard
 
-VALID = CurvedGuard(2.0**-53, 0.0, False, -np.inf)
-SINGLE = CurvedGuard(2.0**-24, 2.0**-150, True, -np.inf)
+VALID = MeshGuard(2.0**-53, 0.0, False, -np.inf)
+SINGLE = MeshGuard(2.0**-24, 2.0**-150, True, -np.inf)
 
 
 def complex_of(points):
@@ -146,12 +147,17 @@ def test_what_is_no_number_or_no_move_is_dropped_and_leaves_all_bits(bad):
 def test_no_straight_corner_falls_below_the_floor():
     for seed in range(5):
         points, mesh, free = curved_meshes.tables(curved_meshes.known_valid(seed))
-        floor = 0.3
+        floor = 0.3  # of 1/q
+        guard = VALID._replace(floor=floor / 12**0.5)  # of D/L
         before = points.copy()
         nodes = corners_of(mesh, free)
         rng = np.random.default_rng(seed)
         tally = commit(
-            points, mesh, nodes, points[nodes] + 0.1 * rng.normal(size=(len(nodes), 2)), VALID._replace(floor=floor)
+            points,
+            mesh,
+            nodes,
+            points[nodes] + 0.1 * rng.normal(size=(len(nodes), 2)),
+            VALID._replace(floor=floor / 12**0.5),
         )
         assert tally[TRUNCATED] + tally[DROPPED] > 0
         for cell, kind in zip(mesh.cells, mesh.kinds, strict=True):

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from support import curved_meshes
 
-from gmsnet.kernels.curved.commit import CurvedGuard
 from gmsnet.kernels.curved.descend import improve_nodes
+from gmsnet.kernels.star.guard import MeshGuard
 from gmsnet.measure.curved import judge_curved
 from gmsnet.untangle.curved import free_inner, untangle_curved
 
-VALID = CurvedGuard(2.0**-53, 0.0, False, -np.inf)
+VALID = MeshGuard(2.0**-53, 0.0, False, -np.inf)
 
 
 def qualities(points, mesh):

@@ -4,7 +4,7 @@ A node moves together with what it drags along. The move is made if afterwards e
 
 - is certainly valid, or was certainly invalid before and has its smallest Bernstein coefficient certainly risen;
 - has positive determinants at the corners of its straight edges, unless it certainly had not before; and,
-- where a floor is given, has the 1/q of its straight edges certified above it at each corner.
+- where a floor is given, has the D/L of its straight edges certified above it at each corner.
 
 Else the shift is halved, or at last dropped, and all bits are as they were. With the node all cells that it or what it
 drags is in are cells around the node. So nothing else changes, and nodes without a common cell can move at once.
@@ -30,26 +30,15 @@ from gmsnet.kernels.simplex.jacobian import (
     smallest,
     straight_sign,
 )
-from gmsnet.kernels.simplex.predicates import SHEWCHUK, UNDERFLOW, UNIT
+from gmsnet.kernels.simplex.mean_ratio2 import Weights
+from gmsnet.kernels.simplex.predicates import UNIT
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
+from gmsnet.kernels.star.guard import margin_above
 from gmsnet.kernels.star.truncation import HALVINGS
 
 MODEL_ROWS = 20  # of a cell: its coefficients, then the determinants at its straight corners
 SAMPLES = 6  # values that determine a quadratic polynomial in two variables
-TRIANGLE_FACTOR = 1.0 / (2.0 * math.sqrt(3.0))  # D over this and the sum of squared sides is 1/q of a triangle
-
-
-class CurvedGuard(NamedTuple):
-    """What a move must keep.
-
-    unit, grain, single: see kernels.star.guard.Precision. floor: of 1/q at the corners of the straight cells,
-    4√3·area/Σl² of triangles and 2·det/(|e₁|² + |e₂|²) of quads; −∞ at the level VALID.
-    """
-
-    unit: float
-    grain: float
-    single: bool
-    floor: float
+SQUARE_CORNER = Weights(math.sqrt(3.0), math.sqrt(3.0), 0.0, 0.5)
 
 
 class CurvedWorkspace(NamedTuple):
@@ -106,27 +95,8 @@ def restore(points, count, work):
 
 
 @part
-def corner_margin(px, py, qx, qy, delta, floor, triangle):
-    """By how much D of a corner with the edges p and q certainly exceeds floor·N, N = D/(1/q).
-
-    The bounds are those of kernels.star.guard: L is the sum of two squared edges, and of the third in a triangle.
-    """
-    left, right = px * qy, py * qx
-    rx, ry = qx - px, qy - py
-    lengths = (px * px + py * py) + (qx * qx + qy * qy)
-    factor = 0.5
-    if triangle:
-        lengths += rx * rx + ry * ry
-        factor = TRIANGLE_FACTOR
-    around = abs(px) + abs(py) + abs(qx) + abs(qy) + 4.0 * delta
-    bound = SHEWCHUK * (abs(left) + abs(right)) + UNDERFLOW + 4.0 * delta * around
-    bound += abs(floor) * factor * (16.0 * UNIT * lengths + 16.0 * delta * around)
-    return (left - right) - floor * factor * lengths - bound
-
-
-@part
 def above_floor(kind, delta, floor, work):
-    """Is 1/q certified above the floor at each corner of the straight cell that was gathered?"""
+    """Is D/L certified above the floor at each corner of the straight cell that was gathered?"""
     nodes, corners, size = work.nodes, CORNERS[kind], 0.0
     for k in range(corners):
         size = max(size, max(abs(nodes[k, 0]), abs(nodes[k, 1])))
@@ -134,7 +104,12 @@ def above_floor(kind, delta, floor, work):
         after, last = (k + 1) % corners, (k + corners - 1) % corners
         px, py = nodes[after, 0] - nodes[k, 0], nodes[after, 1] - nodes[k, 1]
         qx, qy = nodes[last, 0] - nodes[k, 0], nodes[last, 1] - nodes[k, 1]
-        if not corner_margin(px, py, qx, qy, delta + UNIT * size, floor, corners == 3) > 0.0:
+        known = delta + UNIT * size  # relative to the first node
+        if corners == 3:
+            margin = margin_above(px, py, qx, qy, known, floor, None)
+        else:
+            margin = margin_above(px, py, qx, qy, known, floor, SQUARE_CORNER)
+        if not margin > 0.0:
             return False
     return True
 
@@ -177,9 +152,9 @@ def allowed_now(points, mesh, i, guard, work):
 def commit_curved(points, mesh, i, x, y, guard, work, tally):
     """Moves a node towards (x, y) with what it drags along, as far as the rule allows.
 
-    The node may be a corner, a middle or a centre; the offset of a middle or a centre is stored anew. tally: see
-    kernels.star.block. The caller sees to it that the node is free. Returns how many nodes have moved: 0, or it and
-    those that it drags, whose old places stand in the workspace (see ``restore``).
+    The node may be a corner, a middle or a centre; the offset of a middle or a centre is stored anew. The caller sees
+    to it that the node is free. guard: a MeshGuard. tally: see kernels.star.block. Returns how many nodes have moved:
+    0, or it and those that it drags, whose old places stand in the workspace (see ``restore``).
     """
     dx, dy = x - points[i, 0], y - points[i, 1]
     if not (np.isfinite(dx) and np.isfinite(dy)):
