@@ -1,4 +1,4 @@
-"""Test meshes: random triangles and quads, good and curved meshes, boundary layers, grids, nodes thrown out of place."""
+"""Test meshes: random triangles and quads, good and curved ones, boundary layers, grids, nodes thrown out of place."""
 
 from gmsnet.generate.curved import disc_of_quads, on_circle, second_order, throw, waved
 from gmsnet.generate.curves import Curve

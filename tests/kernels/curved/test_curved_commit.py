@@ -152,13 +152,7 @@ def test_no_straight_corner_falls_below_the_floor():
         before = points.copy()
         nodes = corners_of(mesh, free)
         rng = np.random.default_rng(seed)
-        tally = commit(
-            points,
-            mesh,
-            nodes,
-            points[nodes] + 0.1 * rng.normal(size=(len(nodes), 2)),
-            VALID._replace(floor=floor / 12**0.5),
-        )
+        tally = commit(points, mesh, nodes, points[nodes] + 0.1 * rng.normal(size=(len(nodes), 2)), guard)
         assert tally[TRUNCATED] + tally[DROPPED] > 0
         for cell, kind in zip(mesh.cells, mesh.kinds, strict=True):
             ring = points[cell[: CORNERS[kind]]]
