@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.stars import CENTRE, place, remember
-from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.simplex.bernstein import CORNERS
 from gmsnet.kernels.simplex.jacobian import (
     CellWorkspace,
@@ -68,7 +68,7 @@ def curved_workspace(mesh):
     )  # fmt: skip
 
 
-@part
+@inlined
 def save(points, mesh, i, work):
     """Keeps the coordinates of a node and of what it drags along; returns how many nodes those are."""
     count = 1
@@ -87,21 +87,21 @@ def save(points, mesh, i, work):
     return count
 
 
-@part
+@inlined
 def restore(points, count, work):
     """Writes back what ``save`` has kept."""
     for k in range(count):
         points[work.node[k], 0], points[work.node[k], 1] = work.saved[k, 0], work.saved[k, 1]
 
 
-@part
+@inlined
 def above_floor(kind, delta, floor, work):
     """Is D/L certified above the floor at each corner of the straight cell that was gathered?"""
     nodes, corners, size = work.nodes, CORNERS[kind], 0.0
     for k in range(corners):
         size = max(size, max(abs(nodes[k, 0]), abs(nodes[k, 1])))
     for k in range(1 if corners == 3 else 4):
-        after, last = (k + 1) % corners, (k + corners - 1) % corners
+        after, last = k + 1 if k + 1 < corners else 0, k - 1 if k > 0 else corners - 1
         px, py = nodes[after, 0] - nodes[k, 0], nodes[after, 1] - nodes[k, 1]
         qx, qy = nodes[last, 0] - nodes[k, 0], nodes[last, 1] - nodes[k, 1]
         known = delta + UNIT * size  # relative to the first node
@@ -114,7 +114,7 @@ def above_floor(kind, delta, floor, work):
     return True
 
 
-@part
+@inlined
 def judge_before(points, mesh, i, guard, work):
     """Signs and smallest coefficients (at most so large) of the cells around a node, into the workspace."""
     for k in range(mesh.cell_start[i], mesh.cell_start[i + 1]):
@@ -128,7 +128,7 @@ def judge_before(points, mesh, i, guard, work):
         work.straight[at] = straight_sign(kind, delta, work.cell)
 
 
-@part
+@inlined
 def allowed_now(points, mesh, i, guard, work):
     """Do the cells around a node fulfil the rule, compared with what ``judge_before`` has found?"""
     for k in range(mesh.cell_start[i], mesh.cell_start[i + 1]):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.simplex.bernstein import CORNERS, NODES, QUAD9, WIDEST
 
 NO_EDGE = -1
@@ -140,7 +140,7 @@ def store_ratio(ratio, k, x, y, dx, dy):
         ratio[k, 0], ratio[k, 1] = 0.0, 0.0
 
 
-@part
+@inlined
 def serendipity(points, cells, c):
     """The centre of the eight-node quad with the same outline: (2 Σm − Σp)/4."""
     x, y = 0.0, 0.0
@@ -151,7 +151,7 @@ def serendipity(points, cells, c):
     return x, y
 
 
-@part
+@inlined
 def frame(points, cells, c):
     """f = (p₂ − p₀) − i(p₃ − p₁) of a quad."""
     p, q, r, s = cells[c, 0], cells[c, 1], cells[c, 2], cells[c, 3]
@@ -160,7 +160,7 @@ def frame(points, cells, c):
     return fx, fy
 
 
-@part
+@inlined
 def drag_middle(points, mesh, e, single):
     """Puts the middle of an edge where its stored offset says: (a + b)/2 + ρ(b − a)."""
     a, b, m = mesh.edges[e, 0], mesh.edges[e, 1], mesh.edges[e, 2]
@@ -170,7 +170,7 @@ def drag_middle(points, mesh, e, single):
     put(points, m, x, y, single)
 
 
-@part
+@inlined
 def drag_centre(points, mesh, c, single):
     """Puts the centre of a nine-node quad where its stored offset says."""
     x, y = serendipity(points, mesh.cells, c)
@@ -180,7 +180,7 @@ def drag_centre(points, mesh, c, single):
     put(points, mesh.cells[c, CENTRE], x, y, single)
 
 
-@part
+@inlined
 def put(points, i, x, y, single):
     """Writes a node's coordinates, rounded to single precision where the file keeps that."""
     if single:
@@ -188,7 +188,7 @@ def put(points, i, x, y, single):
     points[i, 0], points[i, 1] = x, y
 
 
-@part
+@inlined
 def place(points, mesh, i, x, y, single):
     """Puts a node at (x, y), and what it drags along: middles of its edges, then centres of its cells."""
     put(points, i, x, y, single)

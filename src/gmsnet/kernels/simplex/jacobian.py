@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.simplex.bernstein import (
     COEFFICIENTS,
     CORNER_COEFFICIENTS,
@@ -70,7 +70,7 @@ def cell_workspace():
     )  # fmt: skip
 
 
-@part
+@inlined
 def gather_cell(points, cell, kind, work):
     """The nodes of a cell, relative to its first one, into the workspace; returns its largest coordinate."""
     x, y, reach = points[cell[0], 0], points[cell[0], 1], 0.0
@@ -81,7 +81,7 @@ def gather_cell(points, cell, kind, work):
     return reach
 
 
-@part
+@inlined
 def expand(kind, delta, work):
     """Coefficients of det J of the gathered cell, into the workspace; returns their error bound B."""
     if kind == TRIANGLE6:
@@ -106,7 +106,7 @@ def expand(kind, delta, work):
     return DATA * data + ROUNDING * (ax * by + ay * bx) + UNDERFLOW + no_number
 
 
-@part
+@inlined
 def smallest(kind, coefficients):
     """The smallest coefficient, and the smallest that is a value of det J at a corner."""
     least, at_corner = coefficients[0], coefficients[0]
@@ -140,13 +140,22 @@ def replace_by_quarters(kind, top, work):
     return top + 3
 
 
-@part
+@inlined
 def sign_everywhere(kind, bound, work):
     """+1: det J is certainly positive everywhere in the cell. −1: it certainly is not. 0: undecided.
 
     The cell's coefficients stand in the workspace, with their error bound. A value that cannot be told from zero ends
     the search: the cell cannot be certified any more.
     """
+    least, _ = smallest(kind, work.coefficients)
+    if least > bound:  # as in most cells
+        return 1
+    return sign_of_parts(kind, bound, work)
+
+
+@part
+def sign_of_parts(kind, bound, work):
+    """``sign_everywhere`` by cutting the cell into quarters."""
     start_parts(kind, work)
     top = 1
     while top > 0:
@@ -185,7 +194,7 @@ def minimum_bound(kind, bound, work):
     return lower - bound
 
 
-@part
+@inlined
 def straight_sign(kind, delta, work):
     """The sign of the cell with straight edges: +1 if the determinants at its corners are certainly positive, −1 if
     one certainly is negative, 0 if that is undecided."""
@@ -193,7 +202,7 @@ def straight_sign(kind, delta, work):
     for k in range(corners):
         size = max(size, max(abs(nodes[k, 0]), abs(nodes[k, 1])))
     for k in range(1 if corners == 3 else 4):
-        after, last = (k + 1) % corners, (k + corners - 1) % corners
+        after, last = k + 1 if k + 1 < corners else 0, k - 1 if k > 0 else corners - 1
         value, bound = determinant_and_bound(
             nodes[after, 0], nodes[after, 1], nodes[last, 0], nodes[last, 1], nodes[k, 0], nodes[k, 1],
             delta + UNIT * size,
