@@ -1,5 +1,6 @@
-"""Test meshes: random triangles and quads, good meshes, boundary layers, grids, nodes thrown out of place."""
+"""Test meshes: random triangles and quads, good and curved ones, boundary layers, grids, nodes thrown out of place."""
 
+from gmsnet.generate.curved import disc_of_quads, on_circle, second_order, throw, waved
 from gmsnet.generate.curves import Curve
 from gmsnet.generate.disturb import disturb
 from gmsnet.generate.good import good_mesh
@@ -16,17 +17,22 @@ from gmsnet.generate.structured import kershaw_mesh, structured_mesh
 __all__ = [
     "SHAPES",
     "Curve",
+    "disc_of_quads",
     "disturb",
     "good_mesh",
     "graded_mesh",
     "hybrid_mesh",
     "kershaw_mesh",
     "layered_mesh",
+    "on_circle",
     "random_mesh",
     "random_quad_mesh",
     "recombine",
+    "second_order",
     "settle",
     "split_edges",
     "split_into_quads",
     "structured_mesh",
+    "throw",
+    "waved",
 ]
