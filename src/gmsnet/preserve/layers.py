@@ -46,8 +46,8 @@ BROKEN = 0.05  # of the mean area around: a cell of less is damaged, and its nod
 class Layers:
     """Cells that are stretched on purpose.
 
-    nodes: (N,) bool by node id, the corners of those cells, but for damaged places. cells: (T,) bool by row of
-    ``Topology.triangles``. median, largest: stretch of those cells, the ratio of the longer to the shorter axis of
+    nodes: (N,) bool by node id, the corners of those cells, but for damaged places. cells: (T,) bool, which
+    triangles and quads. median, largest: stretch of those cells, the ratio of the longer to the shorter axis of
     their Steiner ellipse (1 where there are none). damaged: how many of those cells are inverted, or have less than a
     twentieth of the area of those around; their nodes are left out of ``nodes``, so that they can be untangled.
     """
@@ -137,21 +137,32 @@ def _coherent(triangles: NDArray[np.int32], cells: Floats, rim: Flags) -> Flags:
 
 
 def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers:
-    """From the nodes of layers, by id, to their cells and what can be held of them."""
-    triangles = topology.triangles
+    """From the nodes of layers, by id, to their cells and what can be held of them.
+
+    A quad is stretched where one of its corner simplices is; all its nodes are then held.
+    """
+    triangles, orientation, of_cell = topology.triangles, topology.orientation, topology.near_cells
+    if of_cell is not None:
+        triangles, orientation = topology.memory[topology.near], topology.near_orientation
     cells, number = np.empty((len(triangles), stretch.COLUMNS)), np.empty(len(layer), dtype=np.int32)
     points = planar_points(mesh)
-    stretch.per_cell(points, triangles, topology.orientation, math.inf, cells)
+    stretch.per_cell(points, triangles, orientation, math.inf, cells)
     corners = np.take(layer.astype(np.int8), triangles)
     count = corners[:, 0] + corners[:, 1] + corners[:, 2]  # of a cell's corners that are in a layer
     chosen: Flags = np.asarray(count == 3)
     chosen[_next_row(triangles, layer, count, cells)] = True
+    if of_cell is not None:
+        whole = np.zeros(int(of_cell.max(initial=-1)) + 1, dtype=bool)
+        whole[of_cell[chosen]] = True
+        chosen = whole[of_cell]
     damaged = chosen & (cells[:, stretch.AREA] <= BROKEN * _area_around(triangles, cells, number))
     nodes = np.zeros(len(layer), dtype=bool)
     nodes[triangles[chosen]] = True
     nodes[triangles[damaged]] = False
     lengths = np.exp(cells[chosen, stretch.LENGTH])
-    return Layers(nodes, chosen, float(np.median(lengths)), float(lengths.max()), int(damaged.sum()))
+    first = np.ones(len(chosen), dtype=bool) if of_cell is None else np.append(True, np.diff(of_cell) != 0)
+    broken = damaged.sum() if of_cell is None else len(np.unique(of_cell[damaged]))
+    return Layers(nodes, chosen[first], float(np.median(lengths)), float(lengths.max()), int(broken))
 
 
 def _next_row(triangles: NDArray[np.int32], layer: Flags, count: NDArray[np.int8], cells: Floats) -> NDArray[np.int64]:
