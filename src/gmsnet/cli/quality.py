@@ -1,4 +1,4 @@
-"""``gmsnet quality``: how good the triangles of a mesh are."""
+"""``gmsnet quality``: how good the cells of a mesh are."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def quality(
     plot: Annotated[str | None, typer.Option(metavar="FILE", help="Draw the mesh (.png, .svg or .pdf).")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
-    """Measure the triangles of a mesh: angles, 1/q, 1/q_V, inverted cells, and where the worst ones are."""
+    """Measure the triangles and quads of a mesh: angles, 1/q, inverted cells, and where the worst ones are."""
     from gmsnet.cli.destination import check_drawable, check_picture, shown
 
     if threshold is not None and not -1.0 <= threshold <= 1.0:
@@ -43,7 +43,7 @@ def quality(
     found, others = measure(mesh), unmeasured(mesh)
     if threshold is not None and others and not len(found.cell):
         raise InputError(
-            f"{shown(input)}: a threshold is asked of triangles, and this mesh has none: "
+            f"{shown(input)}: a threshold is asked of triangles and quads, and this mesh has none: "
             f"{others} cannot be measured so far"
         )
     worst = report.worst_cells(mesh, found)
@@ -66,7 +66,7 @@ def quality(
             console.print("\nworst cells (numbers from 0)")
             console.print(report.worst_table(worst))
         else:
-            console.print("there are no triangles to measure")
+            console.print("there are no triangles or quads to measure")
         if others and len(found.cell):
             console.print(f"not measured: {others}")
         if mesh.plane is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,8 @@ FIGURES = (  # of QualityReport.summary(): label, path, number of decimals
     ("1/q, 1st percentile", ("shape", "p1"), 4),
     ("1/q, mean", ("shape", "mean"), 4),
     ("cells with 1/q < 0.3", ("shape", "below_0.3"), 0),
+    ("scaled Jacobian, least", ("scaled_jacobian", "min"), 4),
+    ("scaled Jacobian, mean", ("scaled_jacobian", "mean"), 4),
     ("1/q_V, least", ("aspect", "min"), 4),
     ("1/q_V, mean", ("aspect", "mean"), 4),
     ("min angle, least", ("min_angle", "min"), 2),
@@ -44,7 +47,7 @@ def figures(reports: Mapping[str, QualityReport]) -> Table:
     rows = [
         [label, *(_text(_at(summary, path), decimals) for summary in summaries)] for label, path, decimals in FIGURES
     ]
-    return table(["", *reports], rows)
+    return table(["", *reports], [row for row in rows if any(text != "-" for text in row[1:])])
 
 
 def counts(mesh: Mesh) -> str:
@@ -67,6 +70,7 @@ def worst_cells(mesh: Mesh, report: QualityReport, held: NDArray[np.bool_] | Non
         }
         if held is not None:
             found["held_corners"] = int(held[corners_of(mesh, cell)].sum())
+            found["corners"] = len(corners_of(mesh, cell))
         rows.append(found)
     return rows
 
@@ -81,7 +85,7 @@ def worst_table(cells: Sequence[Mapping[str, Any]]) -> Table:
             f"{cell['min_angle']:.2f}",
             f"{cell['max_angle']:.2f}",
             " ".join(f"{value:.6g}" for value in cell["centre"]),
-            *([f"{cell['held_corners']} of 3"] if "held_corners" in cell else []),
+            *([f"{cell['held_corners']} of {cell['corners']}"] if "held_corners" in cell else []),
         ]
         for cell in cells
     ]
@@ -92,7 +96,13 @@ def worst_table(cells: Sequence[Mapping[str, Any]]) -> Table:
 def stage_table(stages: Sequence[tuple[str, int, Sweep]], patches: bool) -> Table:
     """What was done one after the other: its name, how many sweeps, and the mesh after it, or the patches of it."""
     rows = [
-        [name, f"{sweeps}", f"{sweep.min_shape:.4f}", f"{sweep.mean_shape:.4f}", f"{sweep.qhat:.4f}"]
+        [
+            name,
+            f"{sweeps}",
+            f"{sweep.min_shape:.4f}",
+            f"{sweep.mean_shape:.4f}",
+            "-" if math.isnan(sweep.qhat) else f"{sweep.qhat:.4f}",
+        ]
         for name, sweeps, sweep in stages
     ]
     where = ", in the patches that are smoothed" if patches else ""

@@ -143,22 +143,32 @@ class QualityReport:
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers, ready for JSON: min, mean, max, 1st percentile (p1) and counts beyond thresholds."""
-        document: dict[str, Any] = {"triangles": len(self.cell), "inverted": self.inverted}
+        document: dict[str, Any] = {"triangles": len(self.cells.corners), "inverted": self.inverted}
+        if self.cells.order is not None:
+            document["quads"] = len(self.cells.quads)
         if self.totals is None:
             return document
-        means = (self.totals.low_mean, self.totals.high_mean, self.totals.shape_mean, self.totals.aspect_mean)
-        for name, mean in zip(("min_angle", "max_angle", "shape", "aspect"), means, strict=True):
+        means = {
+            "min_angle": self.totals.low_mean, "max_angle": self.totals.high_mean, "shape": self.totals.shape_mean,
+            "aspect": self.totals.aspect_mean,
+        }  # fmt: skip
+        if self.cells.order is not None:
+            del means["aspect"]  # which quads do not have
+            means["scaled_jacobian"] = math.nan
+        for name, mean in means.items():
             values = getattr(self, name)
             best_is_low = name == "max_angle"
             document[name] = {
                 "min": float(values.min()),
-                "mean": mean,
+                "mean": float(values.mean()) if math.isnan(mean) else mean,
                 "max": float(values.max()),
                 "p1": percentile(values, 99 if best_is_low else 1),
             }
             for limit in THRESHOLDS.get(name, ()):
                 beyond = values > limit if best_is_low else values < limit
                 document[name][f"{'above' if best_is_low else 'below'}_{limit:g}"] = int(np.count_nonzero(beyond))
+        if self.cells.order is not None:
+            return document
         return {**document, "qhat": self.qhat, "qhat_aspect": self.qhat_aspect}
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.measure.report import QualityReport, measure
-from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.mesh import Mesh, measured
 from gmsnet.plot.figure import AFTER
 from gmsnet.topology.topology import Topology
 
@@ -29,19 +29,21 @@ POINTS = 345.6  # across a picture, in printer's points: 4.8 inches
 
 
 def check_mesh(mesh: Mesh) -> None:
-    """Raise what plotting this mesh would raise, before any work: InputError unless it is planar and has triangles."""
+    """Raise what plotting this mesh would raise, before any work: InputError unless it is planar and has measured
+    cells."""
     if mesh.plane is None:
         raise InputError("a picture shows planar meshes only, and this one varies in x, y and z")
-    if not any(block.triangular and len(block.nodes) for block in mesh.cells):
-        raise InputError("a picture shows the quality of triangles, and this mesh has none")
+    if not any(measured(mesh, block) and len(block.nodes) for block in mesh.cells):
+        raise InputError("a picture shows the quality of triangles and quads, and this mesh has none")
 
 
 @dataclass(frozen=True)
 class View:
     """One mesh in its plane, measured.
 
-    title, colour: of its histogram. points: (N × 2). corners: (T × 3) of the triangles of ``report``, in its order.
-    others: the corners of faces that are no triangles. lines: (L × 2) the ends of line cells.
+    title, colour: of its histogram. points: (N × 2). corners: (T × 3 or 4) of the cells of ``report``, in its
+    order, the last one of a triangle twice where there are quads. others: the corners of other faces. lines: (L × 2)
+    the ends of line cells.
     """
 
     title: str
@@ -56,15 +58,17 @@ class View:
     def of(cls, mesh: Mesh, title: str = "", colour: str = AFTER, topology: Topology | None = None) -> View:
         """A planar mesh; with the topology of another state of it, cells that have turned over since are inverted."""
         assert mesh.plane is not None
-        triangles = [block.nodes[:, :3] for block in mesh.cells if block.triangular]
-        faces = [b for b in mesh.cells if b.dimension == 2 and len(b.nodes) and not b.triangular]
+        own = [block for block in mesh.cells if measured(mesh, block)]
+        width = max(block.corners for block in own)
+        corners = [block.nodes[:, np.minimum(np.arange(width), block.corners - 1)] for block in own]
+        faces = [b for b in mesh.cells if b.dimension == 2 and len(b.nodes) and not measured(mesh, b)]
         others = [block.nodes[:, : block.corners] for block in faces]
         lines = [block.nodes[:, :2] for block in mesh.cells if block.dimension == 1]
         return cls(
             title,
             colour,
             mesh.points[:, list(mesh.plane)],
-            np.concatenate(triangles),
+            np.concatenate(corners),
             measure(mesh, topology),
             others,
             np.concatenate([np.zeros((0, 2), dtype=np.int64), *lines]),
@@ -143,9 +147,12 @@ def add_colour_bar(figure: Figure, mappable: ScalarMappable, maps: Sequence[Axes
 
 
 def _thickness(polygons: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(T,) the minimum height of each triangle."""
+    """(T,) the height of each cell over its longest edge, if it were a triangle or a parallelogram."""
     edges = polygons - np.roll(polygons, 1, axis=1)
-    (ax, ay), (bx, by) = edges[:, 0].T, edges[:, 1].T
     longest = np.sqrt((edges**2).sum(axis=2).max(axis=1))
-    thickness: NDArray[np.float64] = np.abs(ax * by - ay * bx) / np.maximum(longest, np.finfo(float).tiny)
+    x, y = polygons[..., 0], polygons[..., 1]
+    twice = np.abs((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1))
+    if polygons.shape[1] == 4:
+        twice = np.where((polygons[:, 2] == polygons[:, 3]).all(axis=1), twice, 0.5 * twice)
+    thickness: NDArray[np.float64] = twice / np.maximum(longest, np.finfo(float).tiny)
     return thickness

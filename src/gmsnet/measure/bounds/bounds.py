@@ -36,7 +36,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.measure.bounds import groups
+from gmsnet.measure.bounds import groups, links
+from gmsnet.measure.cells import MeasuredCells
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.topology import Topology, planar_points
@@ -53,7 +54,7 @@ class Limits:
 
     bound: (G,) of 1/q. kind: (G,) one of the kinds in groups.py. node: (G,) id of the node where it is, −1 for
     held cells. angle: (G,) of a corner, in degrees. first, rows: group g has the rows rows[first[g] : first[g + 1]] of
-    ``Topology.triangles``. cell: (T,) the index of each row among all cells of the mesh. held: (T,) bool, whose nodes
+    the report. cell: (T,) the index of each row among all cells of the mesh. held: (T,) bool, whose nodes
     are all held. points: (N, dim).
     """
 
@@ -125,7 +126,12 @@ def limits(mesh: Mesh, topology: Topology, below: float = 0.9) -> Limits:
     """
     free = np.zeros(len(topology.memory), dtype=bool)
     free[topology.free] = True
-    found = groups.collect(planar_points(mesh), topology.triangles, topology.orientation, free, below)
+    if topology.patterns is not None:
+        cells, cell = MeasuredCells.of(mesh, topology)
+        found, held = links.collect(cells, topology, free, below)
+    else:
+        cell, held = topology.cell, np.all(~free[topology.triangles], axis=1)
+        found = groups.collect(planar_points(mesh), topology.triangles, topology.orientation, free, below)
     return Limits(
         bound=found.bound,
         kind=found.kind,
@@ -133,7 +139,7 @@ def limits(mesh: Mesh, topology: Topology, below: float = 0.9) -> Limits:
         angle=np.degrees(found.angle),
         first=found.first,
         rows=found.rows,
-        cell=topology.cell,
-        held=np.all(~free[topology.triangles], axis=1),
+        cell=cell,
+        held=held,
         points=mesh.points,
     )
