@@ -68,6 +68,8 @@ class Outcome:
             faults.append(f"target not met: {self.shortfall()}")
         if self.result.after.inverted:
             faults.append(f"inverted still: {self.tangle()}")
+        if count := self.result.invalid_curved:
+            faults.append(f"invalid still: {amount(count, 'second-order cell')}")
         return faults
 
     def shortfall(self) -> str:

@@ -213,8 +213,9 @@ def unmeasured(mesh: Mesh) -> str:
 
 
 def measured(mesh: Mesh, block: CellBlock) -> bool:
-    """Is the quality of these cells known: are they triangles, or quads in a plane?"""
-    return block.triangular or (block.kind == "quad" and mesh.plane is not None)
+    """Is the quality of these cells known: are they triangles, or quads in a plane? Second-order ones by their
+    corners."""
+    return block.triangular or (block.dimension == 2 and block.corners == 4 and mesh.plane is not None)
 
 
 def unknown_cells(mesh: Mesh) -> str:

@@ -106,7 +106,7 @@ def stretched_layers(mesh: Mesh, topology: Topology, survey: Survey | None = Non
         layer |= touched & candidates
     held = np.empty(count, dtype=bool)
     held[topology.memory] = layer
-    return _layers(mesh, topology, held)
+    return _layers(mesh, topology, held) or nothing
 
 
 def _seeds(survey: Survey, topology: Topology) -> Flags:
@@ -136,8 +136,8 @@ def _coherent(triangles: NDArray[np.int32], cells: Floats, rim: Flags) -> Flags:
     return np.asarray((nodes**2).sum(axis=1) >= SEED**2)
 
 
-def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers:
-    """From the nodes of layers, by id, to their cells and what can be held of them.
+def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:
+    """From the nodes of layers, by id, to their cells and what can be held of them; None where they make no cell.
 
     A quad is stretched where one of its corner simplices is; all its nodes are then held.
     """
@@ -159,6 +159,8 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers:
     nodes = np.zeros(len(layer), dtype=bool)
     nodes[triangles[chosen]] = True
     nodes[triangles[damaged]] = False
+    if not chosen.any():
+        return None
     lengths = np.exp(cells[chosen, stretch.LENGTH])
     first = np.ones(len(chosen), dtype=bool) if of_cell is None else np.append(True, np.diff(of_cell) != 0)
     broken = damaged.sum() if of_cell is None else len(np.unique(of_cell[damaged]))

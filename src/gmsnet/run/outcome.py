@@ -22,6 +22,7 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.state import Ending, State
 from gmsnet.run.untangle_stage import still_inverted
+from gmsnet.topology.held import OF_SECOND_ORDER
 from gmsnet.topology.topology import Topology, near_points, planar_points
 
 Floats = NDArray[np.float64]
@@ -30,6 +31,8 @@ Floats = NDArray[np.float64]
 def write_back(state: State, options: SmoothOptions, executor: Executor) -> State:
     """The last stage: the best points in the order of the input, and their measures."""
     rank = options.target.rank if options.target else rank_by(options.best_by)
+    if state.second_order is not None and state.second_order.untangled:  # which may cost straight cells their shape
+        rank = inverted_alone
     ending = outcome(state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals)
     nothing = np.empty((0, 2))
     return replace(state, start=nothing, points=nothing, shapes=np.empty(0, dtype=np.float32), ending=ending)
@@ -47,13 +50,25 @@ def result_of(state: State, began: float) -> SmoothResult:
         sweeps=state.history[-1].index if state.history else 0,
         stop_reason=state.stop_reason,
         moved=moved,
-        held=topology.held,
+        held=_held(state),
         history=list(state.history),
         notes=_notes(state),
         unmended=still_inverted(after, state.reasons),
         topology=topology,
         seconds=time.perf_counter() - began,
+        invalid_curved=0 if state.second_order is None else state.second_order.invalid,
     )
+
+
+def _held(state: State) -> dict[str, NDArray[np.int64]]:
+    """Reason → ids; nodes of second-order cells that could move in their stage are not among them."""
+    held = dict(state.topology.held)
+    if state.second_order is not None and OF_SECOND_ORDER in held:
+        still = held.pop(OF_SECOND_ORDER)
+        still = still[~state.second_order.free[still]]
+        if len(still):
+            held[OF_SECOND_ORDER] = still
+    return held
 
 
 def _notes(state: State) -> list[str]:
@@ -98,6 +113,11 @@ def _factors(exponent: int) -> tuple[float, float]:
     """
     most = max(min(exponent, 1000), -1000)
     return 2.0 ** (exponent - most), 2.0**most
+
+
+def inverted_alone(report: QualityReport) -> int:
+    """Fewer inverted cells, and nothing else."""
+    return report.inverted
 
 
 def rank_by(best_by: str) -> Callable[[QualityReport], Any]:

@@ -38,7 +38,7 @@ class SmoothResult:
     held: reason → ids of the nodes that were not free. history: one Sweep for each look. notes: what else there is to
     know, a sentence each. unmended: the cells that untangling could not mend and that are inverted still, and why.
     topology: what follows from the connectivity, with the nodes that were held.
-    seconds: for the whole call.
+    seconds: for the whole call. invalid_curved: how many second-order cells are not certified valid.
     """
 
     mesh: Any
@@ -54,6 +54,7 @@ class SmoothResult:
     unmended: list[StillInvertedCell]
     topology: Topology
     seconds: float
+    invalid_curved: int = 0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "held", HeldNodes(self.held))

@@ -24,6 +24,7 @@ from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
 from gmsnet.preserve.protection import Protection, protected
 from gmsnet.run.options import SmoothOptions
+from gmsnet.run.second_order import second_order_of
 from gmsnet.run.state import State
 from gmsnet.topology.held import REASONS
 from gmsnet.topology.topology import Topology
@@ -57,6 +58,7 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
         named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
         where = " by the point data 'fixed' of the mesh" if fixed is None else ""
         remarks.append(f"fixed: {named}{where}, and held for other reasons anyway")
+    second = second_order_of(given, topology)
     if target and (others := unmeasured(given)):
         remarks.append(f"the target is asked of triangles and quads alone, not of {others}")
     if unknown := unknown_cells(given):
@@ -85,6 +87,7 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
         tuple(remarks),
         totals=totals,
         sliding=sliding,
+        second_order=second,
     )
 
 

@@ -10,6 +10,7 @@ from gmsnet.parallel.interrupts import interruptible
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import write_back
 from gmsnet.run.run import Run
+from gmsnet.run.second_order import improve_second_order
 from gmsnet.run.state import State
 from gmsnet.run.target_run import reach_target
 from gmsnet.run.untangle_stage import untangle_all, untangle_protected
@@ -37,7 +38,7 @@ def sweep(state: State, options: SmoothOptions, executor: Executor) -> State:
     return state.ended(stop_reason, run.interruption)
 
 
-STAGES: tuple[Stage, ...] = (untangle_all, untangle_protected, sweep, improve_near_walls)
+STAGES: tuple[Stage, ...] = (untangle_all, untangle_protected, sweep, improve_near_walls, improve_second_order)
 
 
 def carry_out(state: State, options: SmoothOptions, executor: Executor) -> State:

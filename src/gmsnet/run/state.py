@@ -35,6 +35,21 @@ class Ending(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
+class SecondOrder:
+    """The second-order cells of a mesh (run/second_order.py).
+
+    cells: (C, 9) ids, counter-clockwise, −1 past the last node; kinds: (C,) (kernels.simplex.bernstein). free: (N,)
+    bool by ids. invalid: how many cells are not certified at the end; untangled: some were not at first.
+    """
+
+    cells: NDArray[np.int32]
+    kinds: NDArray[np.int8]
+    free: NDArray[np.bool_]
+    invalid: int = 0
+    untangled: bool = False
+
+
+@dataclass(frozen=True, eq=False)
 class State:
     """Each stage makes a new one. Nothing in it is changed in place.
 
@@ -68,6 +83,7 @@ class State:
     interruption: KeyboardInterrupt | None = None
     ending: Ending | None = None
     sliding: Sliding | None = None
+    second_order: SecondOrder | None = None
 
     @property
     def topology(self) -> Topology:

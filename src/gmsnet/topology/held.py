@@ -6,11 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.topology import connectivity as marks_of
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.fans import Marks
 from gmsnet.topology.polygons import Ints
 
-SMOOTHED = ("triangle", "quad")  # the cell types whose nodes may move
+SMOOTHED = ("triangle", "quad")
+SECOND_ORDER = ("triangle6", "quad8", "quad9")  # whose nodes move in a stage of their own (run/second_order.py)
+OF_SECOND_ORDER = "node of a second-order cell"  # the cell types whose nodes may move
 MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would no longer fit any cache
 
 REASONS = {  # mark → text, in the order in which they count
@@ -25,6 +28,7 @@ REASONS = {  # mark → text, in the order in which they count
     marks_of.CHOSEN: "fixed by the user",
     marks_of.NOT_A_DISK: "star is not one closed fan",
     marks_of.HIGH_VALENCE: f"more than {MOST_NEIGHBOURS} neighbours",
+    marks_of.SECOND_ORDER: OF_SECOND_ORDER,
 }
 
 
@@ -33,12 +37,17 @@ def known_marks(mesh: Mesh, fixed: NDArray[np.bool_] | None, position: Ints) -> 
     marks = np.zeros(len(position), dtype=np.uint16)
     for block in mesh.cells:
         if block.kind not in SMOOTHED:
-            marks[position[block.nodes.ravel()]] |= np.uint16(
-                marks_of.LINE if block.dimension in (0, 1) else marks_of.UNSUPPORTED_CELL
-            )
+            marks[position[block.nodes.ravel()]] |= np.uint16(_mark_of(mesh, block))
     if fixed is not None and fixed.any():
         marks[position[fixed]] |= np.uint16(marks_of.CHOSEN)
     return marks
+
+
+def _mark_of(mesh: Mesh, block: CellBlock) -> int:
+    if block.dimension in (0, 1):
+        return marks_of.LINE
+    curved = block.kind in SECOND_ORDER and mesh.plane is not None
+    return marks_of.SECOND_ORDER if curved else marks_of.UNSUPPORTED_CELL
 
 
 def released(marks: Marks, sliding: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -19,6 +19,7 @@ from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.star import pattern as kernels_stars
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.topology import connectivity, layout, patch
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.plane import in_plane
 from gmsnet.parallel.memory import refuse_unless_free
@@ -121,7 +122,7 @@ class Topology:
             face_cell=written.cell,
             near_origin=faces.origin[whole],
         )
-        if near_sliding.any() or any(block.kind == "quad" and len(block.nodes) for block in mesh.cells):
+        if near_sliding.any() or any(map(_is_quad, mesh.cells)):
             topology = topology.linked(Links.of(faces, near_orientation, start, topology.near_ring, near_sliding))
             four, quads = written.with_corners(4)
             topology = replace(
@@ -246,6 +247,14 @@ class Topology:
         pattern = None if self.near_pattern is None else np.where(free, self.near_pattern, 0)  # 0: of no cells
         return replace(self, near_start=start, near_ring=self.near_ring[np.repeat(free, degree)], near_pattern=pattern)
 
+    def orientation_of(self, cells: NDArray[np.int64]) -> NDArray[np.int8]:
+        """How faces with three or four corners are read, by their indices among all cells of the mesh: ±1."""
+        known = np.concatenate([self.cell, self.quad_cell])
+        order = np.argsort(known)
+        orientation = np.concatenate([self.orientation, self.quad_orientation])[order]
+        found: NDArray[np.int8] = orientation[np.searchsorted(known[order], cells)]
+        return found
+
     @cached_property
     def simplices(self) -> Simplices:
         """The corner simplices of all cells whose nodes may move, in memory order."""
@@ -286,6 +295,10 @@ class Topology:
     def colours(self) -> Ints:
         """(N,) colour of each node by id, −1 where held."""
         return self.near_colours[self.places]
+
+
+def _is_quad(block: CellBlock) -> bool:
+    return block.dimension == 2 and block.corners == 4 and len(block.nodes) > 0
 
 
 def _inverse(order: Ints) -> Ints:

@@ -28,7 +28,8 @@ from gmsnet.kernels.topology.layout import span
     CHOSEN,
     NOT_A_DISK,
     HIGH_VALENCE,
-) = (1 << k for k in range(11))
+    SECOND_ORDER,
+) = (1 << k for k in range(12))
 
 WIDTH = 8  # neighbours: also of nodes with fewer, loops make so many rounds, so that processors foresee their end
 AHEAD = 256  # nodes whose corners are listed at a time
@@ -109,7 +110,7 @@ def walk_fans(first, corner, orientation, region, begin, identity, hub, marks, l
             start[v] = end
             at, count = lists[v] >> 32, lists[v] & HALF
             if count == 0:
-                if not marks[v] & (LINE | UNSUPPORTED_CELL):
+                if not marks[v] & (LINE | UNSUPPORTED_CELL | SECOND_ORDER):
                     marks[v] |= UNUSED
                 continue
             least = LAST
