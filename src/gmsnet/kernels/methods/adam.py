@@ -22,6 +22,7 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, kernel, part
 from gmsnet.kernels.simplex import objectives
+from gmsnet.kernels.simplex.lanes import any_positive
 from gmsnet.kernels.simplex.objectives import GRADIENT, LEAST, METRIC, OUT
 from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.pattern import pattern_at
@@ -99,7 +100,7 @@ def advance(size, correction, out, state):
 def propose(objective, local, n, pattern, sizes, state, out, shift, other):
     """As ``descend``, tangled stars by ``metric``. Work: as there, and other (2·LANES)."""
     descend(objective, local, n, pattern, sizes, state, out, shift)
-    if objective != METRIC and state[TANGLED * LANES :].max() > 0.0:
+    if objective != METRIC and any_positive(state, TANGLED):
         descend(METRIC, local, n, pattern, sizes, state, out, other)
         objectives.choose(state[TANGLED * LANES :], other, shift)
 

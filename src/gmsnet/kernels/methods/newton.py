@@ -23,6 +23,7 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.simplex import objectives
+from gmsnet.kernels.simplex.lanes import any_positive
 from gmsnet.kernels.simplex.objectives import GRADIENT, LEAST, METRIC, OUT, Q2, VALUE, Q
 from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at
@@ -69,9 +70,10 @@ def descend(objective, local, n, pattern, state, out, hessian, shift):
                 state[TANGLED * LANES + lane] = 0.0 if least > 0.0 else 1.0
                 state[LOWEST * LANES + lane] = min(state[LOWEST * LANES + lane], 0.999 * least)
         judge(out, hessian, state)
-        if state[ALIVE * LANES : (ALIVE + 1) * LANES].max() == 0.0:
+        if not any_positive(state, ALIVE):
             break
-    shift[:] = state[X * LANES : (Y + 1) * LANES]
+    for k in range(2 * LANES):  # Y is the row after X
+        shift[k] = state[X * LANES + k]
 
 
 @part
@@ -137,7 +139,7 @@ def propose(objective, local, n, pattern, state, out, hessian, shift, other):
     """As ``descend``, tangled stars by ``metric``. Work: as there, and other (2·LANES)."""
     descend(objective, local, n, pattern, state, out, hessian, shift)
     tangled = state[TANGLED * LANES : (TANGLED + 1) * LANES]
-    if objective != METRIC and tangled.max() > 0.0:
+    if objective != METRIC and any_positive(state, TANGLED):
         descend(METRIC, local, n, pattern, state, out, hessian, other)
         objectives.choose(tangled, other, shift)
 

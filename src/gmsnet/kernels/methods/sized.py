@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.methods import bands
+from gmsnet.kernels.simplex.lanes import any_positive
 from gmsnet.kernels.simplex.objectives import aspect_squared, squares
 from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.block import SIZE
@@ -175,7 +176,7 @@ def descend(local, n, pattern, wanted, weight, state):
                 falls = state[AFTER * LANES + lane] < state[VALUE * LANES + lane]
                 state[OPEN * LANES + lane] = 0.0 if falls else state[OPEN * LANES + lane]
                 state[SHARE * LANES + lane] *= 0.5 if state[OPEN * LANES + lane] > 0.0 else 1.0
-            if state[OPEN * LANES : (OPEN + 1) * LANES].max() == 0.0:
+            if not any_positive(state, OPEN):
                 break
         fell = False
         for lane in range(LANES):
