@@ -15,6 +15,7 @@ from gmsnet.kernels.star import block
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.methods import Field, smoother
 from gmsnet.paper import plain
+from gmsnet.parallel.threads import serial
 from gmsnet.topology.topology import Topology, planar_points
 
 ROW = np.empty(laplacian.ROWS * LANES)
@@ -157,7 +158,7 @@ def test_a_sweep_is_the_plain_sweep_in_the_order_of_the_colours(method, tangle):
         assert gmsnet.quality(mesh).inverted > 5
     field = Field(planar_points(mesh)[topology.memory], topology, Precision())
     name, variant = method
-    smoother(name, variant=variant).sweep(field, lambda work, first, last: [work(first, last)], lambda: True)
+    smoother(name, variant=variant).sweep(field, serial, lambda: True)
     compiled = np.empty_like(field.points)
     compiled[topology.memory] = np.ldexp(field.points, mesh.exponent)
 

@@ -17,6 +17,7 @@ from gmsnet.methods import getme
 from gmsnet.methods.base import Field
 from gmsnet.paper import plain_getme
 from gmsnet.paper.plain import PlainMesh
+from gmsnet.parallel.threads import serial
 from gmsnet.topology.topology import Topology, planar_points
 
 SETTINGS = {  # θ, λ, ρ, η
@@ -54,10 +55,6 @@ def in_file_order(field, mesh):
     return points
 
 
-def unshared(work, first, last):
-    return [work(first, last)]
-
-
 def star_sizes(mesh, topology):
     """(F, 1) the larger side of each star's bounding box."""
     start, ring = topology.patches
@@ -70,7 +67,7 @@ def test_the_variants_have_these_parameters():
         c1 = (1 - weight) * math.tan(theta)
         c2 = weight * (1 - weight) - c1**2
         found = getme.TRANSFORMATIONS[name]
-        assert found == pytest.approx((1 - 3 * c2, c1, rho, eta), rel=1e-15)
+        assert found == pytest.approx((1 - 3 * c2, c1, rho, eta, 0.5, 0.0), rel=1e-15, abs=1e-15)
     assert list(SETTINGS) == list(gmsnet.METHODS["getme"].variants)
 
 
@@ -190,7 +187,7 @@ def test_a_sweep_is_a_step_for_each_free_node_in_whole_periods(nodes, steps, tes
 
     monkeypatch.setattr(getme.kernels, "steps", counted)
     smoother = gmsnet.methods.smoother("getme")
-    smoother.sweep(field, unshared, lambda: asked.append(True) or True)
+    smoother.sweep(field, serial, lambda: asked.append(True) or True)
     assert sum(made) == steps
     assert len(asked) == tests
     assert not smoother.converged
@@ -202,7 +199,7 @@ def test_it_settles_after_twenty_tests_without_gain():
     answers = iter([False] * 19 + [True] + [False] * 20 + [True])
     sweeps = 0
     while not smoother.converged:
-        smoother.sweep(field, unshared, lambda: next(answers))
+        smoother.sweep(field, serial, lambda: next(answers))
         sweeps += 1
     assert sweeps == 4
     assert list(answers) == [True]
@@ -230,7 +227,7 @@ def test_sweep_by_sweep_it_is_the_plain_one(name, make):
     order = [int(field.topology.memory[v]) for row, n in zip(lanes, blocks.filled, strict=True) for v in row[:n]]
     smoother = gmsnet.methods.smoother("getme", variant=name)
     for _ in range(5):
-        tally = smoother.sweep(field, unshared, lambda: True)
+        tally = smoother.sweep(field, serial, lambda: True)
         moved = plain_getme.simultaneous(twin, *SETTINGS[name], order)
         assert tally[MOVED] == moved > 0
         off = (in_file_order(field, mesh) - twin.array())[field.topology.free]

@@ -18,9 +18,13 @@ MOVING = [each for each in CHOICES if METHODS[each["method"]].moves("quad", each
 every_method = pytest.mark.parametrize("method", MOVING, ids=list(map(name_of, MOVING)))
 both_kinds = pytest.mark.parametrize("cut", [0.0, 0.4], ids=["quads", "mixed"])
 
-# What is less than a gain of 0.1 in the mean 1/q in twenty sweeps: these leave all but the worst cells alone, or move
-# them little at a time.
-LESSER_GAINS = {"worst-first": 0.01, "getme-sequential-book": 0.01, "getme-sequential": 0.04}
+# What is less than a gain of 0.05 in the mean 1/q in twenty sweeps.
+LESSER_GAINS = {
+    "worst-first": 0.01,  # leaves all but the worst cells alone
+    "getme-sequential": 0.04,
+    "getme-sequential-book": 0.01,
+    "laplacian-inverse-length": 0.0,  # draws nodes to near neighbours
+}
 
 
 def blocks_of(quads, cut, rng):
@@ -83,7 +87,7 @@ def test_nothing_valid_is_inverted_and_nothing_held_moves(method, seed, n, cut, 
     assert mesh.points[still].tobytes() == result.points[still].tobytes()
     assert result.moved.tolist() == (result.points != mesh.points).any(axis=1).tolist()
     better = (after <= 0).sum() < (before <= 0).sum()
-    assert better or result.after.totals.shape_min >= result.before.totals.shape_min * (1 - 1e-9) - 1e-12
+    assert better or result.after.totals.shape_min >= result.before.totals.shape_min - 1e-9
     for one, other in zip(mesh.cells, result.mesh.cells, strict=True):
         np.testing.assert_array_equal(one.nodes, other.nodes)
 
@@ -141,7 +145,7 @@ def test_squares_stay(method):
 @every_method
 @both_kinds
 def test_it_makes_bad_meshes_better(method, cut):
-    mesh = grid(16, cut, 0.35, 4)
+    mesh = grid(16, cut, 0.24, 4)
     assert (exact(mesh) > 0).all()
     result = gmsnet.smooth(mesh, **method, max_sweeps=20)
     before, after = result.before.totals, result.after.totals
