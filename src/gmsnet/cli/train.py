@@ -13,8 +13,8 @@ from gmsnet.cli.signals import Deferral, Interrupted
 from gmsnet.errors import InputError
 
 if TYPE_CHECKING:
-    from gmsnet.learn.options import Options
-    from gmsnet.learn.train import Progress, TrainResult
+    from gmsnet.learn.options import ModelOptions
+    from gmsnet.learn.train import EpochDone, TrainResult
 
 _NO_OPTIONS = ("out", "model", "resume")  # of a training itself
 STOPPED = 130  # exit code after Ctrl-C, as shells count it
@@ -96,7 +96,7 @@ def train(
     _report(result)
 
 
-def _options(context: typer.Context, out: Path, model: str, *, resume: bool) -> Options:
+def _options(context: typer.Context, out: Path, model: str, *, resume: bool) -> ModelOptions:
     """The options as given; when resuming, those of the checkpoint with what was given on top."""
     from gmsnet.learn.checkpoint import saved_options
     from gmsnet.learn.options import changed, options_for
@@ -125,7 +125,7 @@ def _stop_on_signal() -> Iterator[Callable[[], bool]]:
 
 
 @contextmanager
-def _bar(epochs: int) -> Iterator[Callable[[Progress], None]]:
+def _bar(epochs: int) -> Iterator[Callable[[EpochDone], None]]:
     """A progress bar on standard error, if that is a terminal."""
     from rich import progress as parts
     from rich.console import Console
@@ -141,7 +141,7 @@ def _bar(epochs: int) -> Iterator[Callable[[Progress], None]]:
     with parts.Progress(*columns, console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("training", total=epochs, losses="")
 
-        def on_epoch(at: Progress) -> None:
+        def on_epoch(at: EpochDone) -> None:
             train, validation, _, rate = (sum(values) / len(at.rows) for values in zip(*at.rows.values(), strict=True))
             losses = f"loss {train:.4g}, validation {validation:.4g}, rate {rate:.1g}"
             bar.update(task, completed=at.epoch, losses=losses)

@@ -21,7 +21,7 @@ from gmsnet.io.cells import counted, distinct, first_repeated, places_of
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.gmsh_entities import merge_groups, read_entities, without_interfaces
-from gmsnet.io.gmsh_sections import KINDS, Contents, Elements, Nodes, Source
+from gmsnet.io.gmsh_sections import KINDS, Contents, Cursor, Elements, Nodes
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.text import quoted
 from gmsnet.mesh.mesh import Mesh
@@ -58,7 +58,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
 _READERS = (b"$PhysicalNames", b"$Entities", b"$PartitionedEntities", b"$Nodes", b"$Elements")
 
 
-def _open(data: Data) -> tuple[Source, bool]:
+def _open(data: Data) -> tuple[Cursor, bool]:
     """The file behind its first section, and whether its version is 2.2."""
     head = _HEAD.match(data)
     if head is None and not data[:_BEGIN].lstrip().startswith(b"$NOD"):
@@ -75,14 +75,14 @@ def _open(data: Data) -> tuple[Source, bool]:
         order = {b"\1\0\0\0": "<", b"\0\0\0\1": ">"}.get(one, "")
         if not order:
             raise FormatError(f"byte {at - 4}: the number 1 must follow, which tells the byte order")
-    source = Source(data, at, order)
+    source = Cursor(data, at, order)
     here = source.at
     if source.word() != b"$EndMeshFormat":
         source.fail(here, "expected $EndMeshFormat")
     return source, version == "2.2"
 
 
-def _section(source: Source, title: bytes, found: Contents, old: bool) -> None:
+def _section(source: Cursor, title: bytes, found: Contents, old: bool) -> None:
     """Reads on to the end of the section that has begun."""
     if title == b"ParametricNodes":
         source.fail(source.at, "$ParametricNodes are not supported: save the mesh without parametric coordinates")
@@ -111,7 +111,7 @@ def _section(source: Source, title: bytes, found: Contents, old: bool) -> None:
         source.close(title, words)
 
 
-def _physical_names(source: Source, found: Contents) -> None:
+def _physical_names(source: Cursor, found: Contents) -> None:
     here, text = source.at, source.word()
     if not re.fullmatch(rb"\d{1,18}", text):
         source.fail(here, f"a count was expected, found {quoted(text)}")

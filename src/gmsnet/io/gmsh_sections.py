@@ -88,7 +88,7 @@ class Contents:
     others: dict[str, None] = field(default_factory=dict)
 
 
-class Source:
+class Cursor:
     """A Gmsh file. at: the byte that reading goes on from; order: of a binary file, empty for a text."""
 
     def __init__(self, data: Data, at: int, order: str) -> None:

@@ -21,7 +21,7 @@ from gmsnet.errors import InputError
 from gmsnet.io.atomic import replace_files
 from gmsnet.learn.backend import LambdaLR, ReduceLROnPlateau, torch
 from gmsnet.learn.encoding import safetensors_bytes
-from gmsnet.learn.options import GMSNet2Options, Options, PlateauOptions, options_for
+from gmsnet.learn.options import GMSNet2Options, ModelOptions, PlateauOptions, options_for
 from gmsnet.learn.trainee import Row
 
 NAME = "checkpoint.safetensors"
@@ -43,7 +43,7 @@ class Member:
     history: list[Row] = field(default_factory=list)
 
     @classmethod
-    def of(cls, net: torch.nn.Module, options: Options) -> Member:
+    def of(cls, net: torch.nn.Module, options: ModelOptions) -> Member:
         """The network at the start."""
         optimizer = torch.optim.Adam(net.parameters(), lr=options.learning_rate)
         if isinstance(options, PlateauOptions):
@@ -94,7 +94,7 @@ class Member:
         self.optimizer.load_state_dict({"state": state, "param_groups": groups})
 
 
-def save(folder: Path, options: Options, members: Mapping[str, Member], state: Mapping[str, NDArray[Any]]) -> None:
+def save(folder: Path, options: ModelOptions, members: Mapping[str, Member], state: Mapping[str, NDArray[Any]]) -> None:
     """Write the checkpoint into a folder, with the trainee's state. Raises InputError where it cannot be written."""
     tensors = {f"{name}/{key}": value for name, member in members.items() for key, value in member.tensors().items()}
     tensors |= {f"{STATE}{name}": value for name, value in state.items()}
@@ -123,7 +123,7 @@ def understood(folder: Path) -> Iterator[None]:
         raise InputError(f"{folder / NAME}: not the state of this training; delete it to start anew") from error
 
 
-def saved_options(folder: Path) -> Options | None:
+def saved_options(folder: Path) -> ModelOptions | None:
     """The options of the training whose checkpoint lies in a folder; None if there is none. Raises InputError."""
     if not (folder / NAME).exists():
         return None

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gmsnet.learn.data import DESCRIPTION
 from gmsnet.learn.encoding import safetensors_bytes
-from gmsnet.learn.options import Options
+from gmsnet.learn.options import ModelOptions
 from gmsnet.learn.trainee import Row
 from gmsnet.weights import FORMAT_VERSION
 
@@ -24,7 +24,7 @@ CURVE_POINTS = 200  # of a validation curve that go into the metadata
 
 def weights_bytes(
     tensors: Mapping[str, NDArray[np.float32]],
-    options: Options,
+    options: ModelOptions,
     history: Mapping[str, Sequence[Row]],
     marks: Mapping[str, float],
 ) -> bytes:

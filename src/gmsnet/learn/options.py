@@ -27,7 +27,7 @@ LABELS = ("mesh", "star")  # where NN-Smoothing's labels come from, see ``labels
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(ABC):
+class ModelOptions(ABC):
     """What all models have in common. Raises InputError for values out of range.
 
     epochs: Adam steps, one an epoch. nodes_per_mesh: how many free nodes of each training mesh an epoch draws for each
@@ -85,7 +85,7 @@ class Options(ABC):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlateauOptions(Options):
+class PlateauOptions(ModelOptions):
     """Of models whose learning rate is multiplied by ``decay`` whenever the validation loss has not become better for
     ``patience`` epochs."""
 
@@ -123,7 +123,7 @@ class TrainOptions(PlateauOptions):
 
     @property
     def loss_title(self) -> str:
-        """See Options."""
+        """See ModelOptions."""
         return LOSS_TITLES[self.loss]
 
 
@@ -147,12 +147,12 @@ class NNOptions(PlateauOptions):
 
     @property
     def loss_title(self) -> str:
-        """See Options."""
+        """See ModelOptions."""
         return "mean squared distance to the label"
 
 
 @dataclass(frozen=True, kw_only=True)
-class GMSNet2Options(Options):
+class GMSNet2Options(ModelOptions):
     """For GMSNet 2 (train_gmsnet2). nodes_per_mesh: inside each mesh of the second stage, all of which are moved.
 
     hidden: features H. activation: one of weights.shapes.ACTIVATIONS. meshes: what is learned from, one of ``MESHES``.
@@ -195,28 +195,28 @@ class GMSNet2Options(Options):
 
     @property
     def loss_title(self) -> str:
-        """See Options."""
+        """See ModelOptions."""
         return "¼ log mean q⁴, mean of ten sweeps"
 
     @property
     def traits(self) -> dict[str, str]:
-        """See Options."""
+        """See ModelOptions."""
         return {"activation": self.activation}
 
 
-MODELS: Mapping[str, type[Options]] = MappingProxyType(
+MODELS: Mapping[str, type[ModelOptions]] = MappingProxyType(
     {kind.model: kind for kind in (TrainOptions, GMSNet2Options, NNOptions)}
 )
 
 
-def options_for(model: str, values: Mapping[str, Any]) -> Options:
+def options_for(model: str, values: Mapping[str, Any]) -> ModelOptions:
     """The options of a model, by default but for these values. Raises InputError for those that it does not have."""
     if model not in MODELS:
         raise InputError(f"--model must be one of {', '.join(MODELS)}; got {model!r}")
     return changed(MODELS[model](), values)
 
 
-def changed(options: Options, values: Mapping[str, Any]) -> Options:
+def changed(options: ModelOptions, values: Mapping[str, Any]) -> ModelOptions:
     """These options with other values. Raises InputError for options that the model does not have."""
     known = {f.name for f in fields(options)}
     for name in values:

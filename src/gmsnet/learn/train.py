@@ -20,7 +20,7 @@ from gmsnet.learn.backend import torch
 from gmsnet.learn.checkpoint import NAME, Member, saved_options
 from gmsnet.learn.curves import check_plotting, csv_bytes, png_bytes
 from gmsnet.learn.export import weights_bytes
-from gmsnet.learn.options import GMSNet2Options, NNOptions, Options, TrainOptions
+from gmsnet.learn.options import GMSNet2Options, ModelOptions, NNOptions, TrainOptions
 from gmsnet.learn.train_gmsnet import GMSNetTrainee
 from gmsnet.learn.train_gmsnet2 import GMSNet2Trainee
 from gmsnet.learn.train_nn import NNTrainee
@@ -39,7 +39,7 @@ class Ending(Enum):
 
 
 @dataclass(frozen=True)
-class Progress:
+class EpochDone:
     """How far a training is: after ``epoch`` of ``epochs``, with the losses of this epoch by network."""
 
     epoch: int
@@ -57,7 +57,7 @@ class TrainResult:
     is finished.
     """
 
-    options: Options
+    options: ModelOptions
     ending: Ending
     history: Mapping[str, Sequence[Row]]
     losses: Mapping[str, float]
@@ -70,11 +70,11 @@ class TrainResult:
 
 
 def train(
-    options: Options,
+    options: ModelOptions,
     folder: Path,
     *,
     resume: bool = False,
-    on_epoch: Callable[[Progress], None] | None = None,
+    on_epoch: Callable[[EpochDone], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> TrainResult:
     """Train a model and write weights, curves and checkpoint into a folder (made if it is not there).
@@ -100,7 +100,7 @@ def train(
         for epoch in range(done, options.epochs):
             _epoch(trainee, members, epoch)
             if on_epoch is not None:
-                on_epoch(Progress(epoch + 1, options.epochs, {name: rows[-1] for name, rows in history.items()}))
+                on_epoch(EpochDone(epoch + 1, options.epochs, {name: rows[-1] for name, rows in history.items()}))
             if any(member.diverged for member in members.values()):
                 return TrainResult(options, Ending.DIVERGED, history, {}, _write(folder, _curves(options, history)))
             stop = should_stop is not None and should_stop()
@@ -117,7 +117,7 @@ def train(
         return TrainResult(options, Ending.FINISHED, history, marks, [*written, folder / NAME])
 
 
-def _trainee(options: Options, meshes: Sequence[Mesh]) -> Trainee:
+def _trainee(options: ModelOptions, meshes: Sequence[Mesh]) -> Trainee:
     if isinstance(options, NNOptions):
         return NNTrainee(options, meshes)
     if isinstance(options, GMSNet2Options):
@@ -139,7 +139,7 @@ def _epoch(trainee: Trainee, members: Mapping[str, Member], epoch: int) -> None:
 
 
 def _curves(
-    options: Options, history: Mapping[str, Sequence[Row]], marks: Mapping[str, float] = MappingProxyType({})
+    options: ModelOptions, history: Mapping[str, Sequence[Row]], marks: Mapping[str, float] = MappingProxyType({})
 ) -> dict[str, bytes]:
     names = {"before": "validation_loss_before", "optimum of each star": "validation_loss_optimum"}
     lines = {title: marks[name] for title, name in names.items() if name in marks}
@@ -151,7 +151,7 @@ def _write(folder: Path, contents: Mapping[str, bytes]) -> list[Path]:
     return [folder / name for name in contents]
 
 
-def check_folder(options: Options, folder: Path, *, resume: bool) -> None:
+def check_folder(options: ModelOptions, folder: Path, *, resume: bool) -> None:
     """Raises InputError where a training with these options cannot start in, or go on in, this folder."""
     saved = saved_options(folder)
     if resume and saved is None:

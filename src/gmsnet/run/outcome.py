@@ -20,7 +20,7 @@ from gmsnet.parallel.threads import serial
 from gmsnet.preserve.protection import WALL, wall_note
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.result import SmoothResult
-from gmsnet.run.state import Ending, State
+from gmsnet.run.state import Final, State
 from gmsnet.run.untangle_stage import still_inverted
 from gmsnet.topology.held import OF_SECOND_ORDER
 from gmsnet.topology.topology import Topology, near_points, planar_points
@@ -33,15 +33,15 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
     rank = options.target.rank if options.target else rank_by(options.best_by)
     if state.second_order is not None and state.second_order.untangled:  # which may cost straight cells their shape
         rank = inverted_alone
-    ending = outcome(state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals)
+    final = outcome(state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals)
     nothing = np.empty((0, 2))
-    return replace(state, start=nothing, points=nothing, shapes=np.empty(0, dtype=np.float32), ending=ending)
+    return replace(state, start=nothing, points=nothing, shapes=np.empty(0, dtype=np.float32), final=final)
 
 
 def result_of(state: State, began: float) -> SmoothResult:
     """What the caller gets. began: when the call did, by ``time.perf_counter``."""
-    assert state.ending is not None
-    (points, moved, after), topology = state.ending, state.topology
+    assert state.final is not None
+    (points, moved, after), topology = state.final, state.topology
     return SmoothResult(
         mesh=state.restore(points),
         points=points.copy(),
@@ -76,15 +76,15 @@ def _notes(state: State) -> list[str]:
     if protection.kept is not None:
         near_walls.append(wall_note(len(protection.topology.held.get(WALL, ())), moved=state.released))
     slid = []
-    if state.sliding is not None and state.ending is not None:
-        slid.append(state.sliding.note(planar_points(state.mesh.with_points(state.ending.points)), state.ending.moved))
+    if state.sliding is not None and state.final is not None:
+        slid.append(state.sliding.note(planar_points(state.mesh.with_points(state.final.points)), state.final.moved))
     return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks]
 
 
 def outcome(
     mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
     start: Floats | None = None, executor: Executor = serial, totals: Totals | None = None,
-) -> Ending:  # fmt: skip
+) -> Final:  # fmt: skip
     """The best mesh as it is in the input's order; that of the input if the quick sums misjudged it.
 
     best: (N, 2) in memory order. All nodes that it does not move keep their very bits. rank: of two meshes that of the
@@ -101,9 +101,9 @@ def outcome(
         known = (best, executor, whole) if exact else (None, executor)
         after = measure(mesh.with_points(points), topology, *known)
         if rank(after) <= rank(before):
-            return Ending(points, moved, after)
+            return Final(points, moved, after)
         moved[:] = False
-    return Ending(mesh.points, moved, before)
+    return Final(mesh.points, moved, before)
 
 
 def _factors(exponent: int) -> tuple[float, float]:

@@ -26,7 +26,7 @@ from gmsnet.topology.topology import Topology
 Floats = NDArray[np.float64]
 
 
-class Ending(NamedTuple):
+class Final(NamedTuple):
     """What is left of a mesh after the stages. points: (N, dim) by id. moved: (N,) bool. after: the measures."""
 
     points: Floats
@@ -60,7 +60,7 @@ class State:
     about the input. totals: of the points, where they are known. untangling: what was done about inverted cells,
     reasons: why some are left, by the index of each cell. history: one Sweep for each look. stop_reason: one of
     ``run.stop``, "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
-    sliding: the nodes that move along curves, if any. interruption: what ends the smoothing before its end. ending:
+    sliding: the nodes that move along curves, if any. interruption: what ends the smoothing before its end. final:
     once the mesh is written back to the order of the input; start, points and shapes are then empty, lest the result
     needs more memory than the stages.
     """
@@ -81,7 +81,7 @@ class State:
     stop_reason: str = ""
     released: bool = False
     interruption: KeyboardInterrupt | None = None
-    ending: Ending | None = None
+    final: Final | None = None
     sliding: Sliding | None = None
     second_order: SecondOrder | None = None
 
