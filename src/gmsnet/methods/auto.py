@@ -78,6 +78,14 @@ ABOVE = Phase("MetricLoss, above 1/q = 0.4", lambda: Newton("metric", floor=0.4)
 POLISH = Phase("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1, rounds=8, gain=0.0003)
 
 LARGE_PLAN = (NEWTON._replace(looks=False), WORST._replace(looks=False), MEAN)
+# Quads gain for longer, and what the mean takes back from the worst of them is worth another turn.
+QUADS_PLAN = (
+    NEWTON._replace(gain=0.0005, looks=False),
+    WORST._replace(looks=False),
+    MEAN._replace(gain=0.0003, rounds=20, looks=False),
+    WORST._replace(create=lambda: worst_first(6), looks=False),
+    MEAN._replace(gain=0.0003, rounds=20),
+)
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 
 
@@ -102,7 +110,8 @@ class Auto(Smoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if self.at < 0:
-            self.phases = self.phases or (SMALL_PLAN if len(field.topology.free) <= SMALL else LARGE_PLAN)
+            large = LARGE_PLAN if field.topology.near_shapes is None else QUADS_PLAN
+            self.phases = self.phases or (SMALL_PLAN if len(field.topology.free) <= SMALL else large)
             self._enter(0, field)
         phase = self.phases[self.at]
         tally = self.smoother.sweep(field, executor, test)

@@ -66,9 +66,8 @@ class WorstFirst(Smoother):
             self.cells = candidates(field, executor)
         late = self.next >= len(self.cycles)
         chosen = LAST if late else self.cycles[self.next : self.next + self.at_once]
-        plan = [
-            (max(FEWEST, math.ceil(cycle.share * len(simplices.rows))), cycle.power, cycle.sweeps) for cycle in chosen
-        ]
+        count = simplices.cell_count
+        plan = [(max(FEWEST, math.ceil(cycle.share * count)), cycle.power, cycle.sweeps) for cycle in chosen]
         before, after = kernels.cycles(
             field.points, simplices, self.cells, topology.near_free, topology.memory, topology.links,
             field.guard(executor), np.array(plan), tally,
@@ -90,7 +89,7 @@ def candidates(field: Field, executor: Executor) -> NDArray[np.int32]:
         ranking.shapes(field.points, simplices, first, last, shape)
 
     executor.map(look, 0, -(-len(shape) // LANES))
-    wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * len(shape)))
+    wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * simplices.cell_count))
     cells: NDArray[np.int32] = ranking.worst(shape, wanted)
     field.floor.watch(cells, shape[cells])
     return cells

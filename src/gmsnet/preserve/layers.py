@@ -35,6 +35,7 @@ Floats = NDArray[np.float64]
 REACH = math.log(2.5)  # the mean stretch of a star to which a layer extends; right triangles with legs 1 and 2 have it
 ALIKE = math.log(1.8)  # the same of the mean of v, if in little: the halves of squares have 1.73
 FEWEST = 6  # nodes above SEED that hang together
+FEWEST_OF_QUADS = 16  # the same where there are quads: random ones have up to 9, for their corners are right triangles
 RINGS = 4  # how far a layer extends beyond those, in edges
 EVEN = 0.2  # of the mean area of a star: the minimum of its areas where a layer goes around a corner
 NEXT = 3.0  # how many times the area of a cell's neighbour in a layer its own may be, or the other way round
@@ -122,7 +123,8 @@ def _seeds(survey: Survey, topology: Topology) -> Flags:
     stretch.per_cell(survey.points[nodes], corners, topology.near_orientation[rows], MOST, cells)
     strong = _coherent(corners, cells, survey.rim[nodes] > 0) & survey.suspects[nodes]
     piece = pieces(corners, strong)
-    seeds[nodes[strong & (np.bincount(piece[strong], minlength=len(nodes)) >= FEWEST)[piece]]] = True
+    fewest = FEWEST if topology.near_shapes is None else FEWEST_OF_QUADS
+    seeds[nodes[strong & (np.bincount(piece[strong], minlength=len(nodes)) >= fewest)[piece]]] = True
     return seeds
 
 

@@ -60,6 +60,13 @@ class Simplices(NamedTuple):
     shapes: NDArray[np.uint8] | None = None
     cells: NDArray[np.int32] | None = None
 
+    @property
+    def cell_count(self) -> int:
+        """How many cells they belong to."""
+        if self.cells is None:
+            return len(self.rows)
+        return int(np.count_nonzero(np.diff(self.cells))) + (len(self.cells) > 0)
+
     def take(self, rows: NDArray[np.integer[Any]]) -> Simplices:
         """Some of them."""
         shapes = None if self.shapes is None else self.shapes.take(rows)
