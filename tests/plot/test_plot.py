@@ -126,12 +126,14 @@ def test_any_proportions(tmp_path, stretch):
 
 def test_other_cells_are_shown_too(tmp_path):
     points = [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]]
+    other = CellBlock("polygon", np.array([[0, 1, 5, 4, 3]]), np.zeros(1))
     quads = CellBlock("quad", np.array([[0, 1, 4, 3]]), np.zeros(1))
-    mesh = Mesh(np.array(points), (quads, CellBlock("triangle", np.array([[1, 2, 5], [1, 5, 4]]), np.zeros(2))))
+    triangles = CellBlock("triangle", np.array([[1, 2, 5], [1, 5, 4]]), np.zeros(2))
+    mesh = Mesh(np.array(points), (other, quads, triangles))
     collections = [
         each for each in smoothing._figure([view(mesh)]).axes[0].collections if isinstance(each, PolyCollection)
     ]
-    assert [len(each.get_paths()) for each in collections] == [1, 2]
+    assert [len(each.get_paths()) for each in collections] == [1, 3]
 
 
 def test_the_mesh_after_is_wound_as_the_mesh_before(tmp_path, monkeypatch):

@@ -25,7 +25,6 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import SecondOrder, State
 from gmsnet.topology.held import OF_SECOND_ORDER
 from gmsnet.topology.topology import Topology
-from gmsnet.untangle.curved import free_inner, untangle_curved
 
 LOW = 0.5  # a cell whose certified bound over its straight size is less gets more room
 SWEEPS = 10
@@ -77,6 +76,8 @@ def improve_second_order(state: State, options: SmoothOptions, executor: Executo
     given, precision = state.second_order, state.precision
     if given is None or not given.free.any():
         return state
+    from gmsnet.untangle.curved import free_inner, untangle_curved  # untangling takes 0.15 s more to import
+
     memory = state.topology.memory
     points = np.empty_like(state.points)
     points[memory] = state.points
