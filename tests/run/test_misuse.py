@@ -96,7 +96,7 @@ WRONG = [
     (lambda: gmsnet.smooth(((POINTS * 100).astype(int) + 2**60, CELLS)), r"from 2\*\*53 on are no exact coordinates"),
     (lambda: gmsnet.smooth((POINTS, CELLS[None])), "cells must be an M×3 array"),
     (lambda: gmsnet.smooth((POINTS, CELLS.astype(object))), "cells must be whole numbers, got object"),
-    (lambda: gmsnet.smooth({"points": POINTS, "cells": CELLS}), "builtins.dict is not a mesh"),
+    (lambda: gmsnet.smooth({"nodes": POINTS, "cells": CELLS}), "a mesh given as a mapping has no 'nodes'"),
     (lambda: gmsnet.smooth(each for each in (POINTS, CELLS)), "generator is not a mesh"),
     (lambda: gmsnet.smooth(MESH, None), "method must be the name of one"),
     (lambda: gmsnet.smooth(MESH, fixed=[None]), "fixed must be node ids"),

@@ -113,6 +113,5 @@ def test_the_options_are_those_of_smooth_and_of_the_command_line():
     told = set(re.findall(r"(\w+)(?=[^.]*?:\s)", gmsnet.smooth.__doc__))
     assert {"mesh", "fixed", *options} <= told
     command = inspect.signature(command_line.smooth).parameters
-    assert {name: command[name].default for name in options if name != "callback"} == {
-        name: default for name, default in options.items() if name != "callback"
-    }
+    for name in set(options) - {"callback", "geometry"}:  # those two are objects of Python
+        assert command[name].default == options[name]
