@@ -6,9 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.hand_made import vtk_text
 
+from gmsnet import CellBlock, Mesh
 from gmsnet.cli import main
 from gmsnet.cli.progress import COMPILING
 from gmsnet.generate import random_mesh
@@ -55,9 +57,20 @@ def square(tmp_path, square_bytes) -> Path:
 
 @pytest.fixture
 def quads(tmp_path) -> Path:
-    """Four squares around one inner node, which only cells hold that are not smoothed."""
+    """Four squares around one inner node."""
     points = [(x, y, 0.0) for y in (0.0, 1.0, 2.0) for x in (0.0, 1.0, 2.0)]
     cells = [(a, a + 1, a + 4, a + 3) for a in (0, 1, 3, 4)]
     path = tmp_path / "quads.vtk"
     path.write_text(vtk_text(points, cells, 9))
+    return path
+
+
+@pytest.fixture
+def polygons(tmp_path):
+    """Three pentagons around a node: cells that are neither measured nor smoothed."""
+    angles = np.radians(40.0 * np.arange(9))
+    points = np.vstack([[0.0, 0.0], np.column_stack([np.cos(angles), np.sin(angles)])])
+    cells = np.array([[0, *(1 + (3 * k + np.arange(4)) % 9)] for k in range(3)])
+    path = tmp_path / "polygons.vtk"
+    write(Mesh(points, (CellBlock("polygon", cells, np.zeros(3, dtype=int)),)), path)
     return path

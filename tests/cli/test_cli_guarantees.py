@@ -117,25 +117,28 @@ def test_layers_are_told_and_held(run, tmp_path):
     assert "(fix_layers)" in run("smooth", path, out, "--preserve", "none", "--fix-layers").out
 
 
-def test_no_target_is_met_where_there_is_nothing_to_measure(run, quads, tmp_path):
+def test_no_target_is_met_where_there_is_nothing_to_measure(run, polygons, tmp_path):
     for option in (["--target-quality", 0.3], ["--target-angle", 20]):
-        done = run("smooth", quads, tmp_path / "out.vtk", *option)
+        done = run("smooth", polygons, tmp_path / "out.vtk", *option)
         assert done.code == 2
-        assert "quads.vtk: a target is asked of triangles, and this mesh has none: 4 quad cells cannot be" in done.err
+        assert (
+            "polygons.vtk: a target is asked of triangles and quads, and this mesh has none: 3 polygon cells"
+            in done.err
+        )
         assert not (tmp_path / "out.vtk").exists()
-    done = run("quality", quads, "--threshold", 0.3)
+    done = run("quality", polygons, "--threshold", 0.3)
     assert done.code == 2
-    assert "a threshold is asked of triangles, and this mesh has none: 4 quad cells cannot be measured" in done.err
+    assert "a threshold is asked of triangles and quads, and this mesh has none: 3 polygon cells cannot" in done.err
 
 
 def test_cells_that_a_target_is_not_asked_of_are_told(run, tmp_path):
     path = tmp_path / "mixed.obj"
-    path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0.5 0\nf 1 2 3 4\nf 2 5 3\n")
+    path.write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0.5 0\nv 0.5 1.5 0\nf 1 2 3 6 4\nf 2 5 3\n")
     done = run("smooth", path, tmp_path / "out.obj", "--target-quality", 0.3)
     assert done.code == 0
-    assert "the target is asked of triangles alone, not of 1 quad cell" in done.out
+    assert "the target is asked of triangles and quads alone, not of 1 polygon cell" in done.out
     assert "not of" not in run("smooth", path, tmp_path / "out.obj").out
-    assert "not measured: 1 quad cell" in run("quality", path).out
+    assert "not measured: 1 polygon cell" in run("quality", path).out
 
 
 def test_held_cells_that_miss_an_angle_are_said_to_be_held(run, tmp_path):

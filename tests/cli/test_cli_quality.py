@@ -55,11 +55,11 @@ def test_a_surface_has_no_sign(run, tmp_path):
     assert "surface in space" in done.out
 
 
-def test_no_triangles(run, quads):
-    done = run("quality", quads)
+def test_no_triangles(run, polygons):
+    done = run("quality", polygons)
     assert done.code == 0
-    assert "no triangles" in done.out
-    assert json.loads(run("quality", quads, "--json").out)["triangles"] == 0
+    assert "no triangles or quads to measure" in done.out
+    assert json.loads(run("quality", polygons, "--json").out)["triangles"] == 0
 
 
 def test_plot(run, square, tmp_path):

@@ -124,14 +124,14 @@ def test_a_target_that_is_not_met_is_exit_1_and_names_the_cells(run, square, tmp
         assert done.out == ""
 
 
-def test_nothing_to_move_is_no_error(run, quads, tmp_path):
+def test_nothing_to_move_is_no_error(run, polygons, tmp_path):
     out = tmp_path / "out.vtk"
-    done = run("smooth", quads, out)
+    done = run("smooth", polygons, out)
     assert done.code == 0
-    assert "nothing to move: all 9 nodes are held (boundary: 8, node of a cell that is not smoothed: 1)" in done.out
+    assert "nothing to move: all 10 nodes are held (boundary: 9, node of a cell that is not smoothed: 1)" in done.out
     assert f"written unchanged: {out}" in done.out
-    assert out.read_bytes() == quads.read_bytes()
-    assert json.loads(run("smooth", quads, out, "--json").out)["after"] == {"triangles": 0, "inverted": 0}
+    assert out.read_bytes() == polygons.read_bytes()
+    assert json.loads(run("smooth", polygons, out, "--json").out)["after"] == {"triangles": 0, "inverted": 0}
 
 
 def test_no_gain_is_said_and_the_mesh_is_written_unchanged(run, square, tmp_path):
@@ -194,12 +194,12 @@ def test_plot(run, square, tmp_path, suffix):
     assert picture.read_bytes()[:5] in (b"\x89PNG\r", b"<?xml", b"%PDF-")
 
 
-def test_a_picture_of_a_mesh_without_triangles_is_refused_before_the_work(run, quads, tmp_path):
-    done = run("smooth", quads, tmp_path / "out.vtk", "--plot", tmp_path / "p.png")
+def test_a_picture_of_a_mesh_without_triangles_is_refused_before_the_work(run, polygons, tmp_path):
+    done = run("smooth", polygons, tmp_path / "out.vtk", "--plot", tmp_path / "p.png")
     assert done.code == 2
-    assert "quads.vtk: a picture shows the quality of triangles, and this mesh has none; leave out --plot" in done.err
-    assert listing(tmp_path) == ["quads.vtk"]
-    done = run("quality", quads, "--plot", tmp_path / "p.png")
+    assert "polygons.vtk: a picture shows the quality of triangles and quads, and this mesh has none; leave" in done.err
+    assert listing(tmp_path) == ["polygons.vtk"]
+    done = run("quality", polygons, "--plot", tmp_path / "p.png")
     assert (done.code, done.out) == (2, "")
     assert "leave out --plot" in done.err
 
