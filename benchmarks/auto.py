@@ -37,7 +37,8 @@ from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, Auto
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import outcome, rank_by
 from gmsnet.run.run import Run, Start
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 LESS_MEAN, BELOW_CEILING = 0.004, 0.005
 ROUNDING = 1e-9

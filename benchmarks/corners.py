@@ -15,7 +15,7 @@ from barrier import KAPPA, Problem
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.topology.topology import planar_points
+from gmsnet.topology.ordering import planar_points
 
 
 @dataclass(frozen=True, eq=False)

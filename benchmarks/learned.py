@@ -37,7 +37,8 @@ from gmsnet.parallel.threads import serial
 from gmsnet.plot.figure import new_figure, png_bytes
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run, Start
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 KINDS = {"random": gmsnet.random_mesh, "graded": graded_mesh}
 SWEEPS, SHOWN = 20, (1, 3, 5, 10, 20)

@@ -23,7 +23,8 @@ from gmsnet.kernels.star.guard import WORST, Precision
 from gmsnet.measure.report import measure
 from gmsnet.methods.barrier import RELAXATION, STRETCH, Barrier
 from gmsnet.methods.base import Field
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 SWEEPS, STEPS = 8, 5
 BOUNDS = [(0.0, 1.5), *[(0.8, 2.2)] * STEPS]

@@ -44,7 +44,8 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, smoother
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 RECIPE = " ".join(__doc__[__doc__.index("*Reference*") :].split())
 KEYS = ("qhat", "min_shape", "mean_shape")

@@ -25,7 +25,8 @@ from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field
 from gmsnet.methods.worst_first import CYCLES, Cycle, WorstFirst
 from gmsnet.run.score import Score
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 LONG = tuple(
     Cycle(share, power, sweeps)

@@ -39,7 +39,8 @@ from gmsnet.kernels.star.guard import Precision
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.methods import Field, smoother
 from gmsnet.parallel.threads import workers
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.ordering import near_points
+from gmsnet.topology.topology import Topology
 
 METHODS = ("laplacian", "barrier", "gmsnet")
 TILE, LINE = 10**6, 64  # nodes; bytes

@@ -29,7 +29,8 @@ from sweeps import averaging_matrix
 import gmsnet
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.selection import fixed_mask
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.ordering import near_points
+from gmsnet.topology.topology import Topology
 
 ROW_OF_L = 5  # sweeps of L that are timed at once
 STATUS, RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")

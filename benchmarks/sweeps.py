@@ -27,7 +27,8 @@ from gmsnet.kernels.star.guard import LEVELS, Precision
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods import METHODS, Field, smoother
 from gmsnet.parallel.threads import workers
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 
 def averaging_matrix(topology):

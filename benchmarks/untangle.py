@@ -25,7 +25,8 @@ import gmsnet
 from gmsnet.generate import disturb
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.measure.signs import exact_signs
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 from gmsnet.untangle import untangle
 from gmsnet.untangle.escalation import LAST_PATIENCE
 from gmsnet.untangle.lbfgs import whole

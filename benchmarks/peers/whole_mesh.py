@@ -8,7 +8,7 @@ from corners import Corners
 from reference import Plane as Whole
 
 from gmsnet.mesh.adapters import to_mesh
-from gmsnet.topology.topology import planar_points
+from gmsnet.topology.ordering import planar_points
 from peers.mixed import mesh_of
 from peers.peer import Plane
 

@@ -16,7 +16,7 @@ from gmsnet import CellBlock, Mesh
 from gmsnet.constraints.area import area_changes, areas, borders_of
 from gmsnet.constraints.features import curves_of
 from gmsnet.generate.random import random_mesh
-from gmsnet.topology.topology import planar_points
+from gmsnet.topology.ordering import planar_points
 
 
 def exact_areas(mesh: Mesh, points: np.ndarray) -> dict[int, Fraction]:

@@ -15,7 +15,7 @@ from gmsnet import CellBlock, Mesh
 from gmsnet.constraints.features import curves_of
 from gmsnet.generate.random import random_mesh
 from gmsnet.kernels.star.constraint import limits, locate, snap, tangent_at
-from gmsnet.topology.topology import planar_points
+from gmsnet.topology.ordering import planar_points
 
 
 def ring_mesh(points, **more) -> Mesh:

@@ -12,7 +12,7 @@ import gmsnet
 from gmsnet.constraints.curve import ArcSpline, arc_spline, through
 from gmsnet.constraints.features import curves_of
 from gmsnet.kernels.star.constraint import piece_point, piece_tangent
-from gmsnet.topology.topology import planar_points
+from gmsnet.topology.ordering import planar_points
 
 SHARES = np.linspace(0.0, 1.0, 21)
 

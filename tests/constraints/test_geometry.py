@@ -10,7 +10,7 @@ from gmsnet.constraints.features import curves_of
 from gmsnet.constraints.geometry import Entity, Polylines
 from gmsnet.errors import InputError
 from gmsnet.generate.random import random_mesh
-from gmsnet.topology.topology import planar_points
+from gmsnet.topology.ordering import planar_points
 
 
 class Circle:

@@ -17,7 +17,8 @@ from gmsnet.measure.report import measure, percentile
 from gmsnet.measure.signs import exact_signs
 from gmsnet.measure.totals import totals_of
 from gmsnet.parallel.threads import Serial
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.ordering import near_points
+from gmsnet.topology.topology import Topology
 
 
 def triangles_mesh(points, triangles, **kwargs):

@@ -16,7 +16,8 @@ from gmsnet.kernels.star.guard import Precision
 from gmsnet.methods import Field, smoother
 from gmsnet.paper import plain
 from gmsnet.parallel.threads import serial
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 ROW = np.empty(laplacian.ROWS * LANES)
 

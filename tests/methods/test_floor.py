@@ -13,7 +13,8 @@ from gmsnet.kernels.star.guard import Precision
 from gmsnet.methods import floor as module
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.threads import serial
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.ordering import near_points
+from gmsnet.topology.topology import Topology
 
 HELD_BACK, ALL_MOVED = np.array([9, 1, 0]), np.array([10, 0, 0])
 

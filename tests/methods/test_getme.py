@@ -18,7 +18,8 @@ from gmsnet.methods.base import Field
 from gmsnet.paper import plain_getme
 from gmsnet.paper.plain import PlainMesh
 from gmsnet.parallel.threads import serial
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 SETTINGS = {  # θ, λ, ρ, η
     "sequential": (math.pi / 3, 0.0, 1.0, 0),

@@ -19,7 +19,8 @@ import gmsnet
 from gmsnet.kernels.star.guard import LEVELS, STAR, VALID
 from gmsnet.methods import Field, smoother
 from gmsnet.run.run import precision_of
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 EXAMPLES = int(os.environ.get("GMSNET_GUARD_EXAMPLES", "6"))
 SWEEPS = 3

@@ -11,7 +11,8 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import sized
 from gmsnet.methods.sized import BAND, WEIGHT, Sized, banded, room_for
 from gmsnet.paper.cases import CASES
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 
 def doubles(points, triangles):

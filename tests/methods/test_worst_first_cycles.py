@@ -8,7 +8,8 @@ import gmsnet
 from gmsnet.kernels.star.guard import VALID, WORST, Precision
 from gmsnet.methods.base import Field
 from gmsnet.methods.worst_first import CYCLES, WorstFirst
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 
 def field_of(mesh, level):

@@ -12,7 +12,8 @@ from gmsnet.kernels.star.guard import WORST, Precision
 from gmsnet.methods import METHODS, Field, StarSmoother, smoother
 from gmsnet.methods.getme import SimultaneousGetme
 from gmsnet.parallel.threads import Process, Threads, serial
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.ordering import near_points
+from gmsnet.topology.topology import Topology
 
 MESH = gmsnet.random_mesh(3000, seed=4)
 TOPOLOGY = Topology.of(MESH)

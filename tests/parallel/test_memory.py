@@ -16,7 +16,8 @@ from gmsnet.preserve.layers import stretched_layers
 from gmsnet.preserve.survey import Survey
 from gmsnet.run import set_up as engine
 from gmsnet.topology import topology
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.ordering import near_points
+from gmsnet.topology.topology import Topology
 
 MEMINFO = """\
 MemTotal:       24600000 kB

@@ -9,7 +9,8 @@ import gmsnet
 from gmsnet.measure.report import measure
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.run.outcome import outcome, rank_by
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.ordering import near_points
+from gmsnet.topology.topology import Topology
 
 BEST = rank_by("shape")
 

@@ -14,7 +14,8 @@ from gmsnet.measure.report import measure
 from gmsnet.measure.target import Target
 from gmsnet.run import stop
 from gmsnet.run.target_run import rows_missing
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.ordering import near_points
+from gmsnet.topology.topology import Topology
 
 
 @pytest.fixture(scope="module")

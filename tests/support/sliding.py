@@ -8,7 +8,7 @@ from gmsnet import Mesh
 from gmsnet.constraints.constraints import constraint_of
 from gmsnet.constraints.features import Curves
 from gmsnet.kernels.star.constraint import Constraint, snap
-from gmsnet.topology.topology import planar_points
+from gmsnet.topology.ordering import planar_points
 
 
 def constraint_by_ids(mesh: Mesh, curves: Curves, geometry=None) -> Constraint:

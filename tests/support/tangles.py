@@ -6,7 +6,8 @@ import numpy as np
 
 from gmsnet import CellBlock, Mesh
 from gmsnet.kernels.star.guard import Precision
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 from gmsnet.untangle import untangle
 
 

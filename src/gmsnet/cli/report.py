@@ -10,7 +10,8 @@ import numpy as np
 from rich.table import Table
 
 from gmsnet.cli.output import table
-from gmsnet.mesh.display import amount, cells_in_words
+from gmsnet.mesh.cell_block import cells_in_words
+from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from gmsnet.constraints.outline import Flags, Outline, outline_of
 from gmsnet.kernels.topology import chains
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.held import SMOOTHED
+from gmsnet.topology.ordering import planar_points
 from gmsnet.topology.polygons import Ints
-from gmsnet.topology.topology import planar_points
 
 Floats = NDArray[np.float64]
 

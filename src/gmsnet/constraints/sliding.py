@@ -14,7 +14,7 @@ from gmsnet.constraints.features import Curves, curves_of
 from gmsnet.constraints.geometry import Geometry
 from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.topology.topology import planar_points
+from gmsnet.topology.ordering import planar_points
 
 Flags = NDArray[np.bool_]
 REASON = "node of a curve that slides"  # why such nodes stand still while cells are untangled

@@ -13,7 +13,8 @@ from gmsnet.kernels.simplex import measures as kernels
 from gmsnet.measure.signs import exact_signs
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.plane import exponent_of
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
 

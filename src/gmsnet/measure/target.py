@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.methods.below import missed
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.measure.report import QualityReport
-from gmsnet.topology.topology import planar_points
+from gmsnet.topology.ordering import planar_points
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,14 @@ from gmsnet.cells.table import CELLS, CellKind
 from gmsnet.errors import InputError
 from gmsnet.mesh.arrays import whole_numbers
 from gmsnet.mesh.display import amount
+
+
+def cells_in_words(cells: Iterable[CellBlock]) -> list[str]:
+    """How many cells there are of each kind, as "12 quad cells"."""
+    counts: dict[str, int] = {}
+    for block in cells:
+        counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
+    return [amount(count, f"{kind} cell") for kind, count in counts.items()]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from gmsnet.mesh.cell_block import CellBlock
 
 NAMES = 6  # at most of them are shown of a mesh
 
@@ -26,14 +22,6 @@ def plain(value: float, digits: int = 3) -> str:
     if rounded == 0.0 or not 1e-4 <= abs(rounded) < 1e9:
         return f"{rounded:g}"
     return f"{rounded:,.0f}" if abs(rounded) >= 10 ** (digits - 1) else f"{rounded:.{digits}g}"
-
-
-def cells_in_words(cells: Iterable[CellBlock]) -> list[str]:
-    """How many cells there are of each kind, as "12 quad cells"."""
-    counts: dict[str, int] = {}
-    for block in cells:
-        counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
-    return [amount(count, f"{kind} cell") for kind, count in counts.items()]
 
 
 def listed(names: Iterable[str]) -> str:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.mesh.arrays import plain_array
-from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.cell_block import CellBlock, cells_in_words
 from gmsnet.mesh.checks import (
     arrays_per_block,
     cell_blocks,
@@ -24,7 +24,7 @@ from gmsnet.mesh.checks import (
     region_names_of,
     rows_of,
 )
-from gmsnet.mesh.display import amount, cells_in_words, html_table, listed
+from gmsnet.mesh.display import amount, html_table, listed
 from gmsnet.mesh.plane import exponent_of
 
 

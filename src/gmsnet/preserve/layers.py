@@ -27,7 +27,8 @@ from gmsnet.mesh.display import plain
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.preserve.survey import FEW, MOST, SEED, Survey
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex import survey as kernels
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.ordering import near_points
 from gmsnet.topology.stars import Ints
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.topology import Topology
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]

@@ -23,7 +23,8 @@ from gmsnet.run.result import SmoothResult
 from gmsnet.run.state import Final, State
 from gmsnet.run.untangle_stage import still_inverted
 from gmsnet.topology.held import OF_SECOND_ORDER
-from gmsnet.topology.topology import Topology, near_points, planar_points
+from gmsnet.topology.ordering import near_points, planar_points
+from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
 

@@ -24,7 +24,8 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.score import NONE, Score
 from gmsnet.run.stop import CALLBACK, INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.run.sweep import Sweep
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.ordering import near_points
+from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
 

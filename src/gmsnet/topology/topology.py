@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +20,12 @@ from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.topology import connectivity, layout, patch
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.mesh.plane import in_plane
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
 from gmsnet.topology.fans import closed_fans
 from gmsnet.topology.held import MOST_NEIGHBOURS, known_marks, released, sorted_out
 from gmsnet.topology.links import Links
+from gmsnet.topology.ordering import inverse, memory_order, planar_points, taken
 from gmsnet.topology.polygons import Faces, Offsets, check_size
 from gmsnet.topology.stars import Colouring, Flags, Ints, Stars
 
@@ -92,8 +91,8 @@ class Topology:
         nodes, corners = len(mesh.points), check_size(mesh)
         refuse_unless_free(nodes * PER_NODE + corners * PER_CORNER, f"the connectivity of {nodes:,} nodes")
         planar = planar_points(mesh)
-        (memory, position), written = side_by_side(threads, partial(_memory_order, planar), partial(Faces.of, mesh))
-        faces, planar = side_by_side(threads, partial(written.renumbered, position), partial(_taken, planar, memory))
+        (memory, position), written = side_by_side(threads, partial(memory_order, planar), partial(Faces.of, mesh))
+        faces, planar = side_by_side(threads, partial(written.renumbered, position), partial(taken, planar, memory))
         marks = known_marks(mesh, fixed, position)
         points = None if mesh.plane is None else planar
         near_orientation, start, ring = closed_fans(faces, points, marks, memory, MOST_NEIGHBOURS)
@@ -221,7 +220,7 @@ class Topology:
     @cached_property
     def places(self) -> Ints:
         """(N,) the place in memory of each node by id."""
-        return _inverse(self.memory)
+        return inverse(self.memory)
 
     @cached_property
     def near_colours(self) -> Ints:
@@ -299,58 +298,3 @@ class Topology:
 
 def _is_quad(block: CellBlock) -> bool:
     return block.dimension == 2 and block.corners == 4 and len(block.nodes) > 0
-
-
-def _inverse(order: Ints) -> Ints:
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order), dtype=order.dtype)
-    return place
-
-
-def _memory_order(points: NDArray[np.float64]) -> tuple[Ints, Ints]:
-    """The ids in memory order, and the place of each."""
-    nodes = len(points)
-    memory, position = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
-    keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
-    layout.morton_order(points, keys, other, memory, position)
-    return memory, position
-
-
-class Flat(Protocol):
-    """Points in a plane: a Mesh, or what is kept of one. See there."""
-
-    @property
-    def points(self) -> NDArray[np.float64]:
-        """(N × 2 or N × 3) coordinates."""
-        ...
-
-    @property
-    def plane(self) -> tuple[int, int] | None:
-        """The two axes."""
-        ...
-
-    @property
-    def exponent(self) -> int:
-        """The power of two by which ``planar_points`` divides them."""
-        ...
-
-
-def planar_points(mesh: Flat) -> NDArray[np.float64]:
-    """The points in the plane of the mesh (N, 2), divided by 2 to the power of its ``exponent``, which is exact.
-
-    The largest coordinate is then near 1, so that products of tiny or huge ones neither under- nor overflow. Of a mesh
-    that is not planar, the first two coordinates.
-    """
-    points = in_plane(mesh.points, mesh.plane)
-    if abs(mesh.exponent) < 1000:
-        return np.ascontiguousarray(points * 2.0**-mesh.exponent)
-    return np.ldexp(points, -mesh.exponent)
-
-
-def near_points(mesh: Flat, topology: Topology) -> NDArray[np.float64]:
-    """The same by places in memory."""
-    return _taken(planar_points(mesh), topology.memory)
-
-
-def _taken(points: NDArray[np.float64], memory: Ints) -> NDArray[np.float64]:
-    return np.take(points, memory, axis=0)

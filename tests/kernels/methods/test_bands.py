@@ -11,7 +11,8 @@ import gmsnet
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import bands
 from gmsnet.kernels.star import stars
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 WIDTH = 0.1
 

@@ -14,7 +14,8 @@ from gmsnet.kernels.methods import below, missing, ranking
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import Precision, plain_guard
 from gmsnet.measure.target import Target
-from gmsnet.topology.topology import Topology, near_points
+from gmsnet.topology.ordering import near_points
+from gmsnet.topology.topology import Topology
 
 coordinate = st.floats(-4.0, 4.0).map(lambda x: round(x, 3))
 point = st.tuples(coordinate, coordinate)

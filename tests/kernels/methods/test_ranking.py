@@ -11,7 +11,8 @@ import gmsnet
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import ranking
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 
 def test_shapes_are_those_of_the_report():

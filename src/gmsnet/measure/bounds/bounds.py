@@ -40,7 +40,8 @@ from gmsnet.measure.bounds import groups, links
 from gmsnet.measure.cells import MeasuredCells
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.topology.topology import Topology, planar_points
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
