@@ -46,14 +46,16 @@ def test_value_and_step(doublings, degree):
         place, ring = valid_star(rng, degree)
         most = largest(ring, place)
         inverse = 1 / (math.sqrt(3) * most)
-        value, dx, dy, least = kernels.newton(ring.ravel(), degree, None, *place, inverse, doublings)
+        value, dx, dy, least = kernels.newton(ring.ravel(), degree, None, *place, inverse, doublings, None, 0)
         f, g, h = naive_objectives.derivatives_at(f"q{p}", ring, place)
         f, g, h = (degree * (x / most**p) for x in (f, g, h))
         newton = -np.linalg.solve(h, g)
         longer = 1 / max(1 - (1 + 1 / p) * (-g @ newton) / f, 1 / kernels.MOST)
         assert kernels.largest(ring.ravel(), degree, None, *place) == pytest.approx(1 / inverse, rel=1e-12)
         assert value == pytest.approx(f, rel=1e-10)
-        assert kernels.value_at(ring.ravel(), degree, None, *place, inverse, doublings) == pytest.approx(f, rel=1e-10)
+        assert kernels.value_at(ring.ravel(), degree, None, *place, inverse, doublings, None, 0) == pytest.approx(
+            f, rel=1e-10
+        )
         assert least == pytest.approx(naive_objectives.least_area(ring, place), rel=1e-12)
         np.testing.assert_allclose([dx, dy], longer * newton, rtol=1e-5, atol=1e-12)
 
@@ -68,7 +70,7 @@ def test_the_objective_never_rises(doublings, seed, degree):
         return
     inverse = 1 / (math.sqrt(3) * largest(ring, place))
     for _ in range(3):
-        there = np.array(kernels.descend(ring.ravel(), degree, None, *place, inverse, doublings))
+        there = np.array(kernels.descend(ring.ravel(), degree, None, *place, inverse, doublings, None, 0))
         before, after = (kernels.value_at(ring.ravel(), degree, None, *x, inverse, doublings) for x in (place, there))
         assert after <= before * (1 + 1e-12)
         assert naive_objectives.least_area(ring, there) > 0
@@ -79,8 +81,10 @@ def test_the_objective_never_rises(doublings, seed, degree):
 def test_the_scale_does_not_matter(scale):
     """Powers that under- or overflow with the scale that is given are taken with the star's own."""
     place, ring = valid_star(np.random.default_rng(4), 6)
-    one = kernels.descend(ring.ravel(), 6, None, *place, 1 / (math.sqrt(3) * largest(ring, place)), 6)
-    np.testing.assert_allclose(kernels.descend(ring.ravel(), 6, None, *place, scale, 6), one, rtol=0, atol=1e-9)
+    one = kernels.descend(ring.ravel(), 6, None, *place, 1 / (math.sqrt(3) * largest(ring, place)), 6, None, 0)
+    np.testing.assert_allclose(
+        kernels.descend(ring.ravel(), 6, None, *place, scale, 6, None, 0), one, rtol=0, atol=1e-9
+    )
 
 
 def test_high_powers_find_the_best_worst_triangle():
@@ -88,7 +92,9 @@ def test_high_powers_find_the_best_worst_triangle():
     for _ in range(10):
         place, ring = valid_star(rng, 5)
         for doublings in (3, 4, 5, 6, 7, 8, 8, 8):
-            place = np.array(kernels.descend(ring.ravel(), 5, None, *place, 1 / largest(ring, place), doublings))
+            place = np.array(
+                kernels.descend(ring.ravel(), 5, None, *place, 1 / largest(ring, place), doublings, None, 0)
+            )
         around = place + 0.01 * rng.normal(size=(2000, 2))
         assert largest(ring, place) < 1.02 * min(largest(ring, other) for other in around)
 
@@ -96,7 +102,7 @@ def test_high_powers_find_the_best_worst_triangle():
 def test_a_tangled_star_goes_to_the_mean():
     angles = 2 * np.pi * np.arange(5) / 5
     ring = np.column_stack([np.cos(angles), np.sin(angles)])
-    np.testing.assert_allclose(kernels.descend(ring.ravel(), 5, None, 2.0, 0.0, 1.0, 5), [0, 0], atol=1e-12)
+    np.testing.assert_allclose(kernels.descend(ring.ravel(), 5, None, 2.0, 0.0, 1.0, 5, None, 0), [0, 0], atol=1e-12)
 
 
 @pytest.mark.parametrize("level", [VALID, WORST, STAR])
@@ -130,7 +136,7 @@ def test_the_guard_is_that_of_blocks(level, single):
         room, counts = np.empty(3 * degree + 1), np.zeros(2, dtype=int)
         for i in range(LANES):
             n, _ = kernels.gather(points, i, Stars(start, around), guard, room)
-            tx, ty, halvings = kernels.way_there(room, n, None, *points[i], *targets[i], unit, 0.0, single)
+            tx, ty, halvings = kernels.way_there(room, n, None, *points[i], *targets[i], guard, i)
             # In blocks fewer halvings are made where floors refuse a shift.
             given_up = halvings == kernels.HALVINGS or (
                 halvings >= truncation.FEW_HALVINGS and (one[i] == points[i]).all()

@@ -304,7 +304,7 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
         if len(guard) == WITH_FLOORS or slides(guard.constraint):
             stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
             continue
-        stars.aim(blocks, block, work, shift, guard)
+        stars.aim_block(blocks, block, work, shift, guard)
         stars.store(points, blocks, block, workspace, shift, guard, workspace.counts)
     for k in range(len(tally)):
         tally[k] += workspace.counts[k]

@@ -182,7 +182,7 @@ def sweep(points, blocks, first, last, guard, variant, tally):
         ask_ahead(points, blocks, block + 1)
         propose(local, n, pattern_at(blocks.patterns, blocks.pattern, block), variant, floor, row, shift)
         if variant == SMART and len(guard) != WITH_FLOORS and not slides(guard.constraint):
-            stars.aim(blocks, block, workspace.work, shift, guard)
+            stars.aim_block(blocks, block, workspace.work, shift, guard)
             certify_smart(row, guard.unit, guard.grain, workspace.work)
             stars.store(points, blocks, block, workspace, shift, guard, workspace.counts)
         else:

@@ -173,7 +173,7 @@ def sweep(points, blocks, first, last, guard, tally):
             put(points, blocks, block, star, work, workspace.counts)
         else:
             prepare(star, n, work, shift, steps)
-            stars.aim(blocks, block, work, steps, guard)
+            stars.aim_block(blocks, block, work, steps, guard)
             stars.store(points, blocks, block, workspace, steps, guard, workspace.counts)
     for k in range(len(tally)):
         tally[k] += workspace.counts[k]

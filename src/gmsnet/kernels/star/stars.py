@@ -98,7 +98,7 @@ def commit(points, blocks, block, workspace, local, shift, guard, tally):
     """
     n, work = blocks.degree[block], workspace.work
     pattern = pattern_at(blocks.patterns, blocks.pattern, block)
-    aim(blocks, block, work, shift, guard)
+    aim_block(blocks, block, work, shift, guard)
     if len(guard) == WITH_FLOORS:
         gather_floors(blocks, block, guard, work)
         certify_stars(workspace.star, n, pattern, 1.0, guard.unit, guard.grain, work)
@@ -109,19 +109,25 @@ def commit(points, blocks, block, workspace, local, shift, guard, tally):
 
 
 @part
-def aim(blocks, block, work, shift, guard):
-    """The targets: the free nodes plus size·shift; of those that slide, the place on the curve that this leads to.
+def aim_block(blocks, block, work, shift, guard):
+    """The targets of a block; of nodes that slide, the place on the curve that their shift leads to.
 
     The shift of such a node becomes what leads there.
     """
+    aim(work, shift, guard.single)
+    snap_targets(guard.constraint, centre_of(blocks, block), work, shift)
+
+
+@part
+def aim(work, shift, single):
+    """The targets: the free nodes plus size·shift."""
     for lane in range(LANES):
         size = work[SIZE * LANES + lane]
         work[TARGET * LANES + lane] = work[CENTRE * LANES + lane] + size * shift[lane]
         work[(TARGET + 1) * LANES + lane] = work[(CENTRE + 1) * LANES + lane] + size * shift[LANES + lane]
-    if guard.single:
+    if single:
         for k in range(TARGET * LANES, (TARGET + 2) * LANES):
             work[k] = np.float64(np.float32(work[k]))
-    snap_targets(guard.constraint, centre_of(blocks, block), work, shift)
 
 
 @part
