@@ -53,9 +53,7 @@ def test_value_and_step(doublings, degree):
         longer = 1 / max(1 - (1 + 1 / p) * (-g @ newton) / f, 1 / kernels.MOST)
         assert kernels.largest(ring.ravel(), degree, None, *place) == pytest.approx(1 / inverse, rel=1e-12)
         assert value == pytest.approx(f, rel=1e-10)
-        assert kernels.value_at(ring.ravel(), degree, None, *place, inverse, doublings, None, 0) == pytest.approx(
-            f, rel=1e-10
-        )
+        assert kernels.value_at(ring.ravel(), degree, None, *place, inverse, doublings) == pytest.approx(f, rel=1e-10)
         assert least == pytest.approx(naive_objectives.least_area(ring, place), rel=1e-12)
         np.testing.assert_allclose([dx, dy], longer * newton, rtol=1e-5, atol=1e-12)
 
