@@ -23,7 +23,7 @@ def compile_something():
 @pytest.mark.parametrize("enabled", [True, False])
 def test_off_a_terminal_one_line_tells_of_compilation(capsys, enabled):
     with Progress(10, enabled=enabled) as progress:
-        progress.stage("reading")
+        progress.begin("reading")
         assert capsys.readouterr().err == ""
         compile_something()
         compile_something()
