@@ -11,7 +11,7 @@ from pathlib import Path
 
 TARGET = Path(__file__).with_name("messages.md")
 SOURCE = Path(__file__).parents[1] / "src" / "gmsnet"
-ERRORS = {"InputError", "FormatError", "MissingExtraError", "Interrupted"}
+ERRORS = {"InputError", "FormatError", "MissingExtraError", "UnusableNumbaError", "Interrupted"}
 INTRODUCTION = """\
 # What gmsnet says of input that it cannot use
 

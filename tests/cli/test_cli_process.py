@@ -38,6 +38,23 @@ def test_help_loads_nothing_heavy(arguments):
     assert done.stdout.startswith("Usage: gmsnet" if arguments != ["--version"] else "gmsnet 0.")
 
 
+@pytest.mark.parametrize("command", ["smooth", "quality"])
+@pytest.mark.parametrize(
+    ("setting", "value", "told"),
+    [("NUMBA_DISABLE_JIT", "1", b"unset NUMBA_DISABLE_JIT"), ("NUMBA_NUM_THREADS", "0", b"begin with NUMBA_")],
+)
+def test_a_numba_that_cannot_compile_is_told_in_one_line(square, tmp_path, command, setting, value, told):
+    arguments = [command, square, *([tmp_path / "out.su2"] if command == "smooth" else [])]
+    done = subprocess.run(
+        [*GMSNET, *map(str, arguments)], capture_output=True, env={**PLAIN, setting: value}, timeout=300, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert done.stderr.startswith(b"gmsnet: error: Numba ")
+    assert told in done.stderr
+    assert done.stderr.count(b"\n") == 1
+    assert not (tmp_path / "out.su2").exists()
+
+
 def test_no_arguments_shows_help_and_fails():
     done = gmsnet()
     assert done.returncode == 2

@@ -19,6 +19,7 @@ from gmsnet.cli import generate, methods, quality, reproduce, smooth, train
 from gmsnet.cli.signals import Interrupted
 from gmsnet.cli.visible import visible
 from gmsnet.errors import GmsnetError
+from gmsnet.kernels.jit.usable import UnusableNumbaError
 from gmsnet.parallel.interrupts import interruptible
 
 DONE, BAD_INPUT = 0, 2
@@ -93,7 +94,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         raise
     except BrokenPipeError:
         return _close_pipe()
-    except (GmsnetError, UsageError, OSError) as error:
+    except (GmsnetError, UsageError, OSError, UnusableNumbaError) as error:
         return _fail(error.format_message() if isinstance(error, UsageError) else _describe(error))  # type: ignore[attr-defined]
     except Interrupted as interruption:
         return _interrupted(str(interruption))

@@ -64,7 +64,7 @@ def smooth(
     preserve: Annotated[
         str,
         typer.Option(
-            help="shape: hold layers of cells that are stretched on purpose; size: keep the areas of cells, too; none.",
+            help="shape: hold layers of cells that are stretched on purpose; size: weigh areas of cells, too; none.",
             autocompletion=lambda: ["shape", "size", "none"],
         ),
     ] = "shape",

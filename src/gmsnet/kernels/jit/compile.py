@@ -18,7 +18,19 @@ from typing import Any
 if folder := os.environ.get("GMSNET_CACHE"):
     os.environ.setdefault("NUMBA_CACHE_DIR", folder)  # Numba reads it when it is imported
 
-import numba
+from gmsnet.kernels.jit.usable import UnusableNumbaError
+
+try:
+    import numba
+except ValueError as error:  # it reads its settings as it is imported
+    raise UnusableNumbaError(
+        f"Numba cannot start: {error} Look at the variables of the environment that begin with NUMBA_"
+    ) from error
+if getattr(numba.config, "DISABLE_JIT", 0):
+    raise UnusableNumbaError(
+        "Numba is told not to compile, without which kernels would take hours: unset NUMBA_DISABLE_JIT"
+    )
+
 from numba.extending import typeof_impl
 
 from gmsnet.kernels.jit.cache import make_trustworthy
