@@ -23,7 +23,8 @@ class Linked(Fan):
 
     def __init__(self, triangles, quads):
         self.triangles, self.quads = triangles, quads
-        self.pattern = pattern_at.py_func(patterns_of([(triangles, quads, triangles > 0 < quads)]), np.zeros(1, dtype=np.int32), 0)
+        kind = (triangles, quads, triangles > 0 < quads)
+        self.pattern = pattern_at.py_func(patterns_of([kind]), np.zeros(1, dtype=np.int32), 0)
 
     def simplices(self, _):
         at, table = range(self.pattern.simplices), self.pattern.patterns
