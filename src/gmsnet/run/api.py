@@ -48,14 +48,16 @@ def smooth(
     the best is returned: the one with the fewest inverted cells, then with the largest q̂ (for a target: with the fewest
     cells that miss it), the input among them.
 
-    mesh: (points, cells) arrays, a Mesh, or a meshio, meshlane or PyVista object; it is not changed. method: a name
+    mesh: (points, cells) arrays, a dict of arrays, a Mesh, or an object of meshio, meshlane, PyVista, scikit-fem,
+    Matplotlib or SciPy; it is not changed. method: a name
     in METHODS. variant, objective: names out of the method's own lists (default: their first). max_sweeps: at most
     so many sweeps; in most, each node is visited once, in those of ``worst-first`` some nodes are often. threads:
     at most so many (default: the processors at hand); the result is the same bits for any number. target_quality,
     target_angle: the minimum 1/q, in (0, 1], and the minimum angle, in (0, 60] degrees, that every cell is to have:
     only cells that miss it and what is around them are smoothed, until none misses it. fixed: nodes to hold besides
     boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. preserve: "shape" holds the
-    nodes of layers that are stretched on purpose, "size" besides keeps the areas of cells, "none" neither.
+    nodes of layers that are stretched on purpose, "size" besides weighs the areas of cells,
+    without a bound, "none" neither.
     fix_layers: hold stretched layers whatever ``preserve`` says. untangle: mend inverted cells first, where there
     are any. guard: what each sweep keeps besides validity: "valid" nothing (as the paper), "worst" that the worst
     1/q of the cells with a free node never falls, "star" that the worst 1/q around any free node never falls. seed:
@@ -101,5 +103,5 @@ def smooth_with(mesh: Any, options: SmoothOptions, fixed: Any = None) -> SmoothR
 
 @interruptible()
 def quality(mesh: Any) -> QualityReport:
-    """The measures of a mesh's triangles: (points, cells) arrays, a Mesh, or a meshio, meshlane or PyVista object."""
+    """The measures of a mesh's triangles and quads: arrays, or any object that ``smooth`` takes."""
     return measure(to_mesh(mesh)[0])
