@@ -8,6 +8,7 @@ import gmsnet
 from gmsnet.kernels.star.guard import VALID, WORST, Precision
 from gmsnet.methods.base import Field
 from gmsnet.methods.worst_first import CYCLES, WorstFirst
+from gmsnet.parallel.threads import serial
 from gmsnet.topology.ordering import planar_points
 from gmsnet.topology.topology import Topology
 
@@ -17,19 +18,15 @@ def field_of(mesh, level):
     return Field(planar_points(mesh)[topology.memory].copy(), topology, Precision(), level)
 
 
-def share(work, first, last):
-    return [work(first, last)]
-
-
 def swept(field, smoother, sweeps):
     tally = np.zeros(3, dtype=np.int64)
     for _ in range(sweeps):
-        tally += smoother.sweep(field, share, lambda: True)
+        tally += smoother.sweep(field, serial, lambda: True)
     return tally
 
 
 def worst(field):
-    points, (triangles, turn) = field.points, field.topology.changeable
+    points, (triangles, turn, *_) = field.points, field.topology.changeable
     a, b, c = (points[triangles[:, k]] for k in range(3))
     d = turn * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     return (2 * np.sqrt(3) * d / sum(((u - v) ** 2).sum(axis=1) for u, v in ((a, b), (b, c), (c, a)))).min()

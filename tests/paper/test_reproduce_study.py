@@ -46,7 +46,7 @@ def test_a_settled_training_converges(tmp_path):
     assert first.end == pytest.approx(0.21, abs=1e-6)
     assert first.swing < 1e-3
     assert first.worse == 0
-    assert first.converged == 24  # 1 − exp(−24/10) is the first above 0.9
+    assert first.settled == 24  # 1 − exp(−24/10) is the first above 0.9
 
 
 @pytest.mark.parametrize(
@@ -68,4 +68,4 @@ def test_epochs_worse_than_no_move_are_counted_after_the_first(tmp_path):
     values[: study.EARLY] = [1.0] * study.EARLY
     values[100:118] = [0.31] * 18
     assert studied(tmp_path, {"q": values}).of("q")[0].worse == pytest.approx(0.1)
-    assert studied(tmp_path, {"q": curve(-0.5)}).of("q")[0].converged is None
+    assert studied(tmp_path, {"q": curve(-0.5)}).of("q")[0].settled is None
