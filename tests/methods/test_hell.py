@@ -47,10 +47,16 @@ def test_nothing_is_lost_and_nothing_gets_worse(method, level, seed, nodes):
     mesh, rng = hellish(seed, nodes), np.random.default_rng(seed)
     before = mesh.points.tobytes()
     levels = ["shape", "none", "size"] if method["method"] in ("auto", "sized") else ["shape", "none"]
-    result = gmsnet.smooth(
-        mesh, **method, guard=level, max_sweeps=int(rng.integers(0, 5)), untangle=bool(rng.random() < 0.5),
+    options = dict(
+        **method, guard=level, max_sweeps=int(rng.integers(0, 5)), untangle=bool(rng.random() < 0.5),
         preserve=str(rng.choice(levels)), threads=int(rng.integers(1, 3)),
     )  # fmt: skip
+    try:
+        result = gmsnet.smooth(mesh, **options)
+    except gmsnet.InputError as error:  # some methods refuse quads
+        if "moves triangles alone" in str(error) and any(block.kind == "quad" for block in mesh.cells):
+            return
+        raise
     assert mesh.points.tobytes() == before
     triangles, regions, others, lower = faces_and_lines(mesh)
     held = naive.held_nodes(len(mesh.points), triangles, regions, others, lower)
