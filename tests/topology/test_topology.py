@@ -85,7 +85,7 @@ def test_triangles_among_polygons_lines_and_nonsense(seed, nodes):
     triangles = np.array([np.roll(t[:: rng.choice([1, -1])], rng.integers(3)) for t in triangles])
     extra = [
         CellBlock(kind, cells := rng.integers(nodes, size=(rng.integers(2), size)), np.zeros(len(cells), dtype=int))
-        for kind, size in (("quad", 4), ("polygon", 5), ("triangle6", 6), ("line", 2), ("vertex", 1))
+        for kind, size in (("polygon", 4), ("polygon", 5), ("triangle6", 6), ("line", 2), ("vertex", 1))
     ]
     others = [c for block in extra[:2] for c in block.nodes.tolist()]
     others += [c[:3] for c in extra[2].nodes.tolist()]
