@@ -6,8 +6,6 @@ those of corners.py: 1/q of a quad is that of its worst corner, the mean is over
 
 from __future__ import annotations
 
-import json
-import sys
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -64,14 +62,7 @@ def measured(job: dict[str, Any]) -> dict[str, Any]:
     return {"free": int(corners.problem.free.sum()), "L": median(units), "levels": levels}
 
 
-def main() -> None:
-    from peers.worker import pin
-
-    job, result = (Path(name) for name in sys.argv[1:])
-    pin()
-    found = measured(json.loads(job.read_text(encoding="utf-8")))
-    result.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    from peers.worker import answer
+
+    answer(measured)

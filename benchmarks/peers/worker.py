@@ -12,6 +12,7 @@ import json
 import os
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -143,7 +144,8 @@ def pin() -> None:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
-def main() -> None:
+def answer(measured: Callable[[dict[str, Any]], Any]) -> None:
+    """Measures the job in the first file named on the command line and writes what was found to the second."""
     job, result = (Path(name) for name in sys.argv[1:])
     pin()
     found = measured(json.loads(job.read_text(encoding="utf-8")))
@@ -151,4 +153,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    answer(measured)

@@ -9,21 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.naive_curves import sagittas
-from support.sliding import constraint_by_ids, push
+from support.sliding import constraint_by_ids, push, ring_mesh
 
-from gmsnet import CellBlock, Mesh
+from gmsnet import Mesh
 from gmsnet.constraints.features import curves_of
 from gmsnet.generate.random import random_mesh
 from gmsnet.kernels.star.constraint import limits, locate, snap, tangent_at
 from gmsnet.topology.ordering import planar_points
-
-
-def ring_mesh(points, **more) -> Mesh:
-    points = np.asarray(points, dtype=float)
-    count = len(points)
-    rim = np.arange(count)
-    triangles = np.column_stack([rim, (rim + 1) % count, np.full(count, count)])
-    return Mesh(np.vstack([points, points.mean(axis=0)]), (CellBlock("triangle", triangles, np.zeros(count)),), **more)
 
 
 def moved_about(mesh: Mesh, seed: int, rounds: int, reach: float):

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.naive_curves import naive_chains, patchwork
+from support.sliding import ring_mesh
 
 import gmsnet
 from gmsnet import CellBlock, Mesh
@@ -29,15 +30,6 @@ def edges_of(nodes) -> frozenset[tuple[int, int]]:
 
 def chains_of(curves: Curves) -> set[Chain]:
     return {(bool(curves.closed[c]), edges_of(curves.nodes_of(c))) for c in range(len(curves))}
-
-
-def ring_mesh(points, **more) -> Mesh:
-    """A fan of triangles around the middle of a closed polyline; the middle is the last node."""
-    points = np.asarray(points, dtype=float)
-    count = len(points)
-    rim = np.arange(count)
-    triangles = np.column_stack([rim, (rim + 1) % count, np.full(count, count)])
-    return Mesh(np.vstack([points, points.mean(axis=0)]), (CellBlock("triangle", triangles, np.zeros(count)),), **more)
 
 
 def on_circle(angles, radius=1.0):

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet import Mesh
+from gmsnet import CellBlock, Mesh
 from gmsnet.constraints.constraints import constraint_of
 from gmsnet.constraints.features import Curves
 from gmsnet.kernels.star.constraint import Constraint, snap
 from gmsnet.topology.ordering import planar_points
+
+
+def ring_mesh(points, **more) -> Mesh:
+    """A fan of triangles around the middle of a closed polyline; the middle is the last node."""
+    points = np.asarray(points, dtype=float)
+    count = len(points)
+    rim = np.arange(count)
+    triangles = np.column_stack([rim, (rim + 1) % count, np.full(count, count)])
+    return Mesh(np.vstack([points, points.mean(axis=0)]), (CellBlock("triangle", triangles, np.zeros(count)),), **more)
 
 
 def constraint_by_ids(mesh: Mesh, curves: Curves, geometry=None) -> Constraint:

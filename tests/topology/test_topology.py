@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -326,3 +328,19 @@ def test_clockwise_meshes_of_any_size_are_wound_right(size):
     topology = Topology.of(mesh_of(points * size, triangles[:, ::-1]))
     assert topology.orientation.tolist() == [-1] * 6
     assert topology.free.tolist() == [0]
+
+
+@pytest.mark.parametrize(("corner", "again"), list(permutations(range(4), 2)))
+def test_nodes_of_a_quad_that_names_a_corner_twice_are_held(corner, again):
+    points, triangles = wheel(6)
+    quad = np.array([[0, 1, 2, 3]])
+    quad[0, again] = quad[0, corner]
+    topology = Topology.of(mesh_of(points, triangles, extra=[CellBlock("quad", quad, np.zeros(1, dtype=int))]))
+    assert not set(topology.free.tolist()) & set(quad.ravel().tolist())
+
+
+def test_a_closed_one_ring_of_triangles_and_a_collapsed_quad_is_held():
+    points = np.array([[0.61, 0.84], [0.64, 0.59], [0.46, 0.55], [0.01, 0.48], [0.21, 0.88]])
+    quad = CellBlock("quad", np.array([[3, 1, 1, 2]]), np.zeros(1, dtype=int))
+    mesh = mesh_of(points, np.array([[4, 2, 3], [2, 1, 0], [4, 0, 2]]), extra=[quad])
+    assert not len(Topology.of(mesh).free)

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.descend import improve_nodes
-from gmsnet.kernels.curved.stars import CurvedMesh, counter_clockwise, curved_mesh
+from gmsnet.kernels.curved.stars import counter_clockwise, curved_mesh
 from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES, WIDEST
 from gmsnet.kernels.star.block import MOVED
-from gmsnet.kernels.star.guard import LEVELS, VALID, MeshGuard
+from gmsnet.kernels.star.guard import LEVELS, VALID, MeshGuard, Precision
+from gmsnet.kernels.topology import connectivity
 from gmsnet.measure.curved import judge_curved
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.executor import Executor
@@ -88,7 +89,9 @@ def improve_second_order(state: State, options: SmoothOptions, executor: Executo
     was = points.copy()
     if options.untangle and (before != 1).any():
         untangle_curved(points, mesh, free, precision)
-    floor = -math.inf if options.guard == LEVELS[VALID] else _floor(points, mesh)
+    floor = -math.inf
+    if options.guard != LEVELS[VALID]:
+        floor = _floor(points[memory], state.topology, free[memory], precision)
     guard, tally = MeshGuard(*precision, floor), np.zeros(3, dtype=np.int64)
     inner = np.flatnonzero(free_inner(mesh, free))
     corners = np.flatnonzero(free & (np.diff(mesh.edge_start) > 0))
@@ -116,15 +119,13 @@ def _counted(cells: int) -> str:
     return f"{cells:,} invalid cell{'' if cells == 1 else 's'}"
 
 
-def _floor(points: NDArray[np.float64], mesh: CurvedMesh) -> float:
-    """The least D/L of the corners of the straight cells, or −∞ if one is inverted (kernels.star.guard)."""
-    least = math.inf
-    for kind, corners in enumerate(CORNERS):
-        nodes = points[mesh.cells[mesh.kinds == kind][:, :corners]]
-        for k in range(1 if corners == 3 else corners):
-            a, b = nodes[:, (k + 1) % corners] - nodes[:, k], nodes[:, k - 1] - nodes[:, k]
-            d = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-            squares = (a**2).sum(axis=1) + (b**2).sum(axis=1)
-            squares = squares + ((a - b) ** 2).sum(axis=1) if corners == 3 else math.sqrt(3.0) * squares
-            least = min(least, float((d / np.maximum(squares, np.finfo(float).tiny)).min(initial=math.inf)))
-    return least * (1.0 - 1e-12) if least > 0.0 else -math.inf
+def _floor(points: NDArray[np.float64], topology: Topology, free: NDArray[np.bool_], precision: Precision) -> float:
+    """An upper bound of the least D/L of the straight cells with a free corner, −∞ if one of them may be inverted.
+
+    points, free: in memory order.
+    """
+    from gmsnet.kernels.untangle.cells import least_ratio
+
+    rows = connectivity.touching(topology.near, free)
+    least = float(least_ratio(points, topology.simplices.take(rows), precision.unit, precision.grain))
+    return least if least > 0.0 else -math.inf

@@ -14,6 +14,7 @@ from gmsnet.kernels.topology.connectivity import CHOSEN
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.measure.target import Target
 from gmsnet.mesh.adapters import to_mesh
+from gmsnet.mesh.display import plain
 from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured
 from gmsnet.mesh.selection import fixed_mask
 from gmsnet.methods import Smoother, StarSmoother
@@ -110,6 +111,6 @@ def check_mesh(mesh: Mesh, target: Target) -> None:
         extent = np.ptp(mesh.points, axis=0)
         raise InputError(
             "this is a curved surface (x, y and z all vary, by "
-            + ", ".join(f"{e:.3g}" for e in extent)
+            + ", ".join(plain(e) for e in extent)
             + "): only meshes in a plane of constant x, y or z can be smoothed so far"
         )

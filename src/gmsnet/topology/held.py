@@ -38,9 +38,18 @@ def known_marks(mesh: Mesh, fixed: NDArray[np.bool_] | None, position: Ints) -> 
     for block in mesh.cells:
         if block.kind not in SMOOTHED:
             marks[position[block.nodes.ravel()]] |= np.uint16(_mark_of(mesh, block))
+        elif block.kind == "quad":
+            marks[position[block.nodes[_collapsed(block.nodes)].ravel()]] |= np.uint16(marks_of.UNSUPPORTED_CELL)
     if fixed is not None and fixed.any():
         marks[position[fixed]] |= np.uint16(marks_of.CHOSEN)
     return marks
+
+
+def _collapsed(quads: Ints) -> NDArray[np.bool_]:
+    """(F,) which quads (F, 4) name a corner twice: no place of their nodes makes them valid."""
+    a, b, c, d = quads.T
+    found: NDArray[np.bool_] = (a == b) | (b == c) | (c == d) | (d == a) | (a == c) | (b == d)
+    return found
 
 
 def _mark_of(mesh: Mesh, block: CellBlock) -> int:
