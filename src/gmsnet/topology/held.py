@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,9 +13,9 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.fans import Marks
 from gmsnet.topology.polygons import Ints
 
-SMOOTHED = ("triangle", "quad")
+SMOOTHED = ("triangle", "quad")  # the cell types whose nodes may move
 SECOND_ORDER = ("triangle6", "quad8", "quad9")  # whose nodes move in a stage of their own (run/second_order.py)
-OF_SECOND_ORDER = "node of a second-order cell"  # the cell types whose nodes may move
+OF_SECOND_ORDER = "node of a second-order cell"
 MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would no longer fit any cache
 
 REASONS = {  # mark → text, in the order in which they count
@@ -45,7 +47,7 @@ def known_marks(mesh: Mesh, fixed: NDArray[np.bool_] | None, position: Ints) -> 
     return marks
 
 
-def _collapsed(quads: Ints) -> NDArray[np.bool_]:
+def _collapsed(quads: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
     """(F,) which quads (F, 4) name a corner twice: no place of their nodes makes them valid."""
     a, b, c, d = quads.T
     found: NDArray[np.bool_] = (a == b) | (b == c) | (c == d) | (d == a) | (a == c) | (b == d)
