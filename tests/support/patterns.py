@@ -24,10 +24,11 @@ class Linked(Fan):
     def __init__(self, triangles, quads):
         self.triangles, self.quads = triangles, quads
         kind = (triangles, quads, triangles > 0 < quads)
-        self.pattern = pattern_at.py_func(patterns_of([kind]), np.zeros(1, dtype=np.int32), 0)
+        self.table = patterns_of([kind])  # which the pattern has by its addresses
+        self.pattern = pattern_at.py_func(self.table, np.zeros(1, dtype=np.int32), 0)
 
     def simplices(self, _):
-        at, table = range(self.pattern.simplices), self.pattern.patterns
+        at, table = range(self.pattern.simplices), self.table
         return [(*table.pair[k].tolist(), table.weight[k].tolist()) for k in at]
 
     def star(self, rng):

@@ -93,7 +93,7 @@ def test_all_at_once_a_node_goes_to_the_weighted_mean_of_its_places(triangles, q
     star = Linked(triangles, quads)
     centre, around = star.star(np.random.default_rng(quads))
     ring = (around - centre) @ [1, 1j]
-    own = star.pattern.patterns
+    own = star.table
     total, places = 0.0, 0.0
     for k, (i, j, weights) in enumerate(star.simplices(len(ring))):
         if weights[2] == 0:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import inlined
+from gmsnet.kernels.jit.load import load
 from gmsnet.kernels.simplex.mean_ratio2 import Weights
 
 
@@ -44,14 +45,18 @@ class Patterns(NamedTuple):
 class Link(NamedTuple):
     """The pattern of one star: its first simplex in the table, how many it has, its first row, and the table.
 
-    neighbours: the sum of ``neighbour`` over its rows.
+    neighbours: the sum of ``neighbour`` over its rows. pair, other, weight, neighbour: the addresses of the arrays of
+    Patterns, which must outlive the link (kernels.jit.load says why).
     """
 
     first: int
     simplices: int
     row: int
     neighbours: float
-    patterns: Patterns
+    pair: int
+    other: int
+    weight: int
+    neighbour: int
 
 
 class Stars(NamedTuple):
@@ -73,8 +78,12 @@ def pattern_at(patterns, numbers, at):
     if patterns is None:
         return None
     number = numbers[at]
-    first = patterns.first[number]
-    return Link(first, patterns.first[number + 1] - first, patterns.row[number], patterns.neighbours[number], patterns)
+    first = np.int64(patterns.first[number])
+    return Link(
+        first, patterns.first[number + 1] - first, np.int64(patterns.row[number]), patterns.neighbours[number],
+        patterns.pair.ctypes.data, patterns.other.ctypes.data,
+        patterns.weight.ctypes.data, patterns.neighbour.ctypes.data,
+    )  # fmt: skip
 
 
 @inlined
@@ -90,8 +99,8 @@ def pair_of(pattern, n, k):
     """The rows of a and b of simplex k."""
     if pattern is None:
         return (n - 1 if k == 0 else k - 1), k
-    at = pattern.first + k
-    return np.int64(pattern.patterns.pair[at, 0]), np.int64(pattern.patterns.pair[at, 1])
+    at = 2 * (pattern.first + k)
+    return np.int64(load(np.int32, pattern.pair, at)), np.int64(load(np.int32, pattern.pair, at + 1))
 
 
 @inlined
@@ -99,7 +108,7 @@ def other_of(pattern, k, i):
     """The row of the remaining node of the cell of simplex k; i, a row of its own, where there is none."""
     if pattern is None:
         return i
-    return np.int64(pattern.patterns.other[pattern.first + k])
+    return np.int64(load(np.int32, pattern.other, pattern.first + k))
 
 
 @inlined
@@ -107,8 +116,9 @@ def weights_of(pattern, k, real):
     """The weights of simplex k in the type ``real``; None for the equilateral ones of a fan."""
     if pattern is None:
         return None
-    weight, at = pattern.patterns.weight, pattern.first + k
-    return Weights(real(weight[at, 0]), real(weight[at, 1]), real(weight[at, 2]), real(0.5))
+    weight, at = pattern.weight, 3 * (pattern.first + k)
+    a, b, opposite = load(np.float64, weight, at), load(np.float64, weight, at + 1), load(np.float64, weight, at + 2)
+    return Weights(real(a), real(b), real(opposite), real(0.5))
 
 
 @inlined
@@ -116,7 +126,7 @@ def neighbour_weight(pattern, row):
     """Half the number of cells in which an edge joins the row to the free node; 1 for all rows of a fan."""
     if pattern is None:
         return 1.0
-    return pattern.patterns.neighbour[pattern.row + row]
+    return load(np.float64, pattern.neighbour, pattern.row + row)
 
 
 @inlined
