@@ -5,7 +5,7 @@
 
 The meshes are those of quads.py; how tools are run and timed is told in peers/__init__.py: each in a process of its own
 on one processor, the whole way from arrays to arrays, L beside each run. Tools: Gmsh Laplace2D and Relocate2D, MFEM's
-TMOP with the metrics 2 and 58, whole-mesh L-BFGS on q², Mesquite's feasible Newton
+TMOP with the metrics 2 and 58, whole-mesh L-BFGS on q², MeshKernel's orthogonalization, Mesquite's feasible Newton
 (ShapeImprovementWrapper) and conjugate gradients (ShapeImprover). What to install: peers/requirements.txt.
 
 For each tool: its final state, what that took, and how many times as fast gmsnet comes to 99 % of the tool's mean and
