@@ -56,7 +56,7 @@ QUAD_PEERS = [
     Peer("Mesquite Newton", QUALITY, "mesquite_wrappers:Wrapper", (), (1, 2, 3, 5, 10), "calls", "LGPL-2.1",
          {"wrapper": "ShapeImprovementWrapper"}, program=PROGRAM),
     Peer("Mesquite CG", QUALITY, "mesquite_wrappers:Wrapper", (), (1, 2, 3, 5, 10), "calls", "LGPL-2.1",
-         {"wrapper": "ShapeImprover"}, most_nodes=2e5, program=PROGRAM),
+         {"wrapper": "ShapeImprover"}, most_nodes=2e4, program=PROGRAM),
 ]  # fmt: skip
 
 OWN = [
