@@ -50,10 +50,10 @@ PEERS = [
 ]  # fmt: skip
 
 QUAD_PEERS = [
-    Peer("meshkernel", QUALITY, "meshkernel_orthogonalize:Orthogonalize", ("meshkernel",), (1, 2, 3, 5, 10, 20, 30),
+    Peer("meshkernel", QUALITY, "meshkernel_orthogonalize:Orthogonalize", ("meshkernel",), (1, 2, 3, 5, 10, 20),
          "outer iterations", "LGPL", {"factor": 0.5},
          note="the default 0.975 has a smaller mean and least 1/q, and smoothing alone, 0, inverts cells"),
-    Peer("Mesquite Newton", QUALITY, "mesquite_wrappers:Wrapper", (), (1, 2, 3, 5, 10), "calls", "LGPL-2.1",
+    Peer("Mesquite Newton", QUALITY, "mesquite_wrappers:Wrapper", (), (1, 2, 3), "calls", "LGPL-2.1",
          {"wrapper": "ShapeImprovementWrapper"}, program=PROGRAM),
     Peer("Mesquite CG", QUALITY, "mesquite_wrappers:Wrapper", (), (1, 2, 3, 5, 10), "calls", "LGPL-2.1",
          {"wrapper": "ShapeImprover"}, most_nodes=2e4, program=PROGRAM),
