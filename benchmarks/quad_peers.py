@@ -5,7 +5,8 @@
 
 The meshes are those of quads.py; how tools are run and timed is told in peers/__init__.py: each in a process of its own
 on one processor, the whole way from arrays to arrays, L beside each run. Tools: Gmsh Laplace2D and Relocate2D, MFEM's
-TMOP with the metrics 2 and 58, whole-mesh L-BFGS on q². What to install: peers/requirements.txt.
+TMOP with the metrics 2 and 58, whole-mesh L-BFGS on q², MeshKernel's orthogonalization, Mesquite's feasible Newton
+(ShapeImprovementWrapper) and conjugate gradients (ShapeImprover). What to install: peers/requirements.txt.
 
 For each tool: its final state, what that took, and how many times as fast gmsnet comes to 99 % of the tool's mean and
 of its least 1/q (its own time to that, over ours; both in L). "–": the tool does not better the input, or gmsnet does
@@ -23,10 +24,13 @@ from machine import describe
 from peers.mixed import saved
 from peers.results import MEAN, MIN, goal, level_to
 from peers.runner import run_peer
-from peers.table import OWN, named
+from peers.table import OWN, QUAD_PEERS, named
 from quads import KINDS, SMALL, made
 
-TOOLS = ("Gmsh Laplace2D", "Gmsh Relocate2D", "MFEM TMOP 2", "MFEM TMOP 58", "L-BFGS on q²")
+TOOLS = (
+    "Gmsh Laplace2D", "Gmsh Relocate2D", "MFEM TMOP 2", "MFEM TMOP 58", "L-BFGS on q²",
+    *(peer.name for peer in QUAD_PEERS),
+)  # fmt: skip
 
 
 def times(theirs, ours, key, before):

@@ -15,10 +15,10 @@ gmsnet, whose effort is ``max_sweeps`` and whose time is that of the whole call,
 included.
 
 *Time* is that of the processor (user and system, of all threads of the process): on a machine that does nothing else
-that is what a clock shows, for a process with one thread, and what other programs do falls on nobody. Medians of
-several runs. Between the runs of each process stand runs of L, one product of SciPy's sparse averaging matrix with the
-coordinates, and tools are compared in multiples of the L of their own process: a machine that is slower for a while is
-slower for both.
+that is what a clock shows, for a process with one thread, and what other programs do falls on nobody. A tool in a
+program of its own tells its own, without the files between. Medians of several runs. Between the runs of each process
+stand runs of L, one product of SciPy's sparse averaging matrix with the coordinates, and tools are compared in
+multiples of the L of their own process: a machine that is slower for a while is slower for both.
 
 *Memory* is the peak of the process in one run beyond what it held before, with the arrays of the mesh and the imports.
 

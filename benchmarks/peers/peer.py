@@ -20,7 +20,8 @@ class Peer:
     kind: AVERAGING, QUALITY or OURS. tool: "module:class" in this folder. packages: distributions that must be there,
     whose versions are printed, the tool's own first. efforts: ascending, the last one for the final state; empty where
     the tool itself says them. counts: what the efforts count. options: arguments of the class. licence: of the tool.
-    most_nodes: of larger meshes it is left out, because it would take hours. note: what else there is to know.
+    most_nodes: of larger meshes it is left out, because it would take hours. note: what else there is to know. program:
+    for a tool in a program of its own, the environment variable that names it.
     """
 
     name: str
@@ -33,10 +34,14 @@ class Peer:
     options: Mapping[str, Any] = field(default_factory=dict)
     most_nodes: float = float("inf")
     note: str = ""
+    program: str = ""
 
 
 class Tool(Protocol):
-    """A tool at work on one mesh. ``Tool(plane, **options)`` is the set-up."""
+    """A tool at work on one mesh. ``Tool(plane, **options)`` is the set-up.
+
+    One in a program of its own has ``seconds``, too: what set-up, smoothing and the way back took there.
+    """
 
     def smooth(self, effort: int) -> None: ...
 

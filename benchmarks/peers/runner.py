@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from importlib.metadata import PackageNotFoundError, version
@@ -31,6 +32,8 @@ def run_peer(
         found: dict[str, Any] = {"versions": versions(peer)}
     except PackageNotFoundError as error:
         return {"status": "not installed", "reason": f"there is no {error.name}"}
+    if peer.program and shutil.which(os.environ.get(peer.program, "")) is None:
+        return {"status": "not installed", "reason": f"{peer.program} names no program"}
     if nodes > peer.most_nodes:
         return found | {"status": "left out", "reason": f"above {peer.most_nodes:,.0f} nodes it takes too long"}
     job = {"peer": peer.name, "mesh": str(mesh), "small": str(small)}

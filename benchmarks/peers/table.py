@@ -2,11 +2,12 @@
 
 How the options were found: each tool's documentation, then trials on random squares and jittered good meshes of 10,000
 nodes. Averaging tools run without relaxation (factor 1: faster by half and no worse than the small factors that some
-have by default) and without a convergence test; none has one that sees quality.
+have by default) and without a convergence test; none has one that sees quality. QUAD_PEERS are for quad_peers.py alone.
 """
 
 from __future__ import annotations
 
+from peers.mesquite_wrappers import PROGRAM
 from peers.peer import AVERAGING, OURS, QUALITY, Peer
 
 SWEEPS = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50)
@@ -48,6 +49,16 @@ PEERS = [
          "MIT", {"move": "gmsnet"}, most_nodes=2e5, note="plain Python and PyTorch, a node at a time, as the paper's"),
 ]  # fmt: skip
 
+QUAD_PEERS = [
+    Peer("meshkernel", QUALITY, "meshkernel_orthogonalize:Orthogonalize", ("meshkernel",), (1, 2, 3, 5, 10, 20),
+         "outer iterations", "LGPL", {"factor": 0.5},
+         note="the default 0.975 has a smaller mean and least 1/q, and smoothing alone, 0, inverts cells"),
+    Peer("Mesquite Newton", QUALITY, "mesquite_wrappers:Wrapper", (), (1, 2, 3), "calls", "LGPL-2.1",
+         {"wrapper": "ShapeImprovementWrapper"}, program=PROGRAM),
+    Peer("Mesquite CG", QUALITY, "mesquite_wrappers:Wrapper", (), (1, 2, 3, 5, 10), "calls", "LGPL-2.1",
+         {"wrapper": "ShapeImprover"}, most_nodes=2e4, program=PROGRAM),
+]  # fmt: skip
+
 OWN = [
     Peer("gmsnet auto", OURS, "ours:Smooth", ("gmsnet",), (), "sweeps", "MIT", {"method": "auto"}),
     Peer("gmsnet laplacian plain", OURS, "ours:Smooth", ("gmsnet",), (), "sweeps", "MIT",
@@ -68,4 +79,4 @@ ABSENT = {
 
 def named(name: str) -> Peer:
     """The row with this name. Raises KeyError."""
-    return {peer.name: peer for peer in (*PEERS, *OWN)}[name]
+    return {peer.name: peer for peer in (*PEERS, *QUAD_PEERS, *OWN)}[name]

@@ -86,7 +86,8 @@ def run(peer: Peer, arrays: Plane, effort: int) -> Run:
     moments.append(time.process_time())
     clock, most = time.perf_counter() - clock, peak()
     points = points.copy()  # they may be the tool's own memory
-    return Run(np.diff(moments).tolist(), clock, most, points, tool.cells())
+    seconds = getattr(tool, "seconds", None) or np.diff(moments).tolist()
+    return Run(seconds, clock, most, points, tool.cells())
 
 
 def level(effort: int, runs: list[Run], units: list[float], plane: Plane) -> dict[str, Any]:

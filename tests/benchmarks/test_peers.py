@@ -158,6 +158,16 @@ def test_a_tool_that_is_not_installed_is_reported_and_nothing_is_started(tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("path", [None, "", "/no/such/program"])
+def test_a_tool_whose_program_is_not_there_is_reported(tmp_path, monkeypatch, path):
+    peer = Peer("nobody", QUALITY, "nothing:Nothing", (), (1,), "calls", "none", program="NO_SUCH_DRIVER")
+    if path is not None:
+        monkeypatch.setenv(peer.program, path)
+    found = runner.run_peer(peer, tmp_path, tmp_path, 10, {"folder": tmp_path})
+    assert found == {"status": "not installed", "reason": "NO_SUCH_DRIVER names no program"}
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_tool_that_fails_and_one_that_takes_too_long_are_reported(tmp_path):
     options = {"repeats": 1, "patience": 0.0, "limit": 60.0, "folder": tmp_path}
     peer = Peer("nobody", QUALITY, "nothing:Nothing", ("numpy",), (1,), "sweeps", "none", most_nodes=100)
@@ -246,8 +256,9 @@ def test_the_meshes_are_kept_and_valid(tmp_path):
 
 
 def test_every_row_of_the_table_can_be_told_from_the_others():
+    every = [*table.PEERS, *table.QUAD_PEERS, *table.OWN]
+    assert [table.named(peer.name) for peer in every] == every
+    assert all(tuple(sorted(set(peer.efforts))) == peer.efforts for peer in every)
     rows = [*table.PEERS, *table.OWN]
-    assert len({peer.name for peer in rows}) == len(rows)
     assert len({str(plots.style(peer)["color"]) + plots.style(peer)["marker"] for peer in rows}) == len(rows)
     assert {peer.kind for peer in rows} == {AVERAGING, QUALITY, OURS}
-    assert all(tuple(sorted(set(peer.efforts))) == peer.efforts for peer in rows)

@@ -15,10 +15,23 @@ sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
 import quads
 from corners import Corners
-from peers import mixed, scipy_matrix
+from peers import mesquite_wrappers, mixed, scipy_matrix, worker
 from peers.ours import Smooth
-from peers.peer import Plane
+from peers.peer import QUALITY, Peer, Plane
 from peers.whole_mesh import Lbfgs
+
+DRIVER = """
+import pathlib, sys
+_, name, calls, given, found = sys.argv
+head, *lines = pathlib.Path(given).read_text().splitlines()
+nodes, triangles, quads = map(int, head.split())
+assert name == "Fake" and len(lines) == nodes + triangles + quads
+text = f"0.25 {calls}\\n"
+for x, y, held in map(str.split, lines[:nodes]):
+    text += f"{float(x) + (held == '0')!r} {float(y) + (held == '0')!r}\\n"
+pathlib.Path(found).write_text(text)
+pathlib.Path(__file__).with_name("cells").write_text(" ".join(lines[nodes:]))
+"""
 
 
 @pytest.fixture(scope="module", params=[*quads.KINDS, "patch"])
@@ -70,6 +83,22 @@ def test_our_own_tool_takes_mixed_meshes(mesh, plane):
     assert tool.points().shape == mesh.points.shape
     assert tool.cells() is None
     assert tool.efforts()[-1] == tool.result.sweeps
+
+
+def test_a_program_gets_the_mesh_and_tells_its_own_seconds(mesh, plane, tmp_path, monkeypatch):
+    program = tmp_path / "driver"
+    program.write_text(f"#!{sys.executable}\n{DRIVER}")
+    program.chmod(0o700)
+    monkeypatch.setenv(mesquite_wrappers.PROGRAM, str(program))
+    peer = Peer("fake", QUALITY, "mesquite_wrappers:Wrapper", (), (7,), "calls", "none", {"wrapper": "Fake"})
+    found = worker.run(peer, plane, 7)
+    assert found.seconds == [0.25, 7.0, 0.0]
+    assert found.cells is None
+    moved = np.where(plane.held[:, None], plane.points, plane.points + 1.0)
+    assert np.array_equal(found.points, moved)
+    assert (tmp_path / "cells").read_text().split() == [
+        str(k) for part in (plane.cells, plane.quads) for k in part.flat
+    ]
 
 
 def test_triangles_stay_a_mesh_without_quads(tmp_path):
