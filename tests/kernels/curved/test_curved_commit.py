@@ -46,7 +46,7 @@ def straight_signs(points, mesh):
 
 def commit(points, mesh, nodes, targets, guard=VALID):
     tally = np.zeros(3, dtype=np.int64)
-    commit_all(points, mesh, np.asarray(nodes), np.asarray(targets, dtype=float), guard, tally)
+    commit_all(points, mesh, np.asarray(nodes), np.asarray(targets, dtype=float), guard, -np.inf, tally)
     return tally
 
 
