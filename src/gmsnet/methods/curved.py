@@ -18,7 +18,7 @@ from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
 
-PASSES = 2  # over the corners, for those that a neighbour has stopped
+PASSES = 10  # at most, over the corners that are not yet there: what stops one may be a neighbour that goes later
 
 
 class Curved(NamedTuple):
@@ -55,7 +55,9 @@ class Corners(Smoother):
 
         def go() -> None:
             for _ in range(PASSES):
-                if not follow(field.points, self.curved.mesh, self.order, places, guard, self.curved.room, tally):
+                moved = int(tally[MOVED])
+                left = follow(field.points, self.curved.mesh, self.order, places, guard, self.curved.room, tally)
+                if not left or tally[MOVED] == moved:
                     break
 
         def gone() -> bool:

@@ -66,7 +66,7 @@ def _with_corners(state: State) -> Topology:
     given = state.second_order
     if given is None:
         return state.topology
-    free = _near_free_by_id(given.protection.topology) & given.free & (not given.unable)
+    free = _near_free_by_id(given.protection.topology) & given.free
     return given.whole.holding(~(free | _near_free_by_id(state.topology)), OF_SECOND_ORDER)
 
 
