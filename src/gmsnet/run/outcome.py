@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 def write_back(state: State, options: SmoothOptions, executor: Executor) -> State:
     """The last stage: the best points in the order of the input, and their measures."""
     rank = options.target.rank if options.target else rank_by(options.best_by)
-    if state.second_order is not None and state.second_order.untangled:  # which may cost straight cells their shape
+    if state.second_order is not None and state.second_order.invalid[0]:  # whose mending may cost straight cells shape
         rank = inverted_alone
     final = outcome(state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals)
     nothing = np.empty((0, 2))
@@ -42,7 +42,7 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
 def result_of(state: State, began: float) -> SmoothResult:
     """What the caller gets. began: when the call did, by ``time.perf_counter``."""
     assert state.final is not None
-    (points, moved, after), topology = state.final, state.topology
+    points, moved, after = state.final
     return SmoothResult(
         mesh=state.restore(points),
         points=points.copy(),
@@ -55,31 +55,52 @@ def result_of(state: State, began: float) -> SmoothResult:
         history=list(state.history),
         notes=_notes(state),
         unmended=still_inverted(after, state.reasons),
-        topology=topology,
+        topology=_with_corners(state),
         seconds=time.perf_counter() - began,
-        invalid_curved=0 if state.second_order is None else state.second_order.invalid,
+        invalid_curved=0 if state.second_order is None else state.second_order.invalid[1],
     )
 
 
+def _with_corners(state: State) -> Topology:
+    """The topology; of second-order cells with the corners free that were."""
+    given = state.second_order
+    if given is None:
+        return state.topology
+    free = _near_free_by_id(given.protection.topology) & given.free
+    return given.whole.holding(~(free | _near_free_by_id(state.topology)), OF_SECOND_ORDER)
+
+
+def _near_free_by_id(topology: Topology) -> NDArray[np.bool_]:
+    free = np.zeros(len(topology.memory), dtype=bool)
+    free[topology.free] = True
+    return free
+
+
 def _held(state: State) -> dict[str, NDArray[np.int64]]:
-    """Reason → ids; nodes of second-order cells that could move in their stage are not among them."""
-    held = dict(state.topology.held)
-    if state.second_order is not None and OF_SECOND_ORDER in held:
+    """Reason → ids; nodes of second-order cells that could move in their stages are not among them."""
+    held, given = dict(state.topology.held), state.second_order
+    if given is not None and OF_SECOND_ORDER in held:
         still = held.pop(OF_SECOND_ORDER)
-        still = still[~state.second_order.free[still]]
+        still = still[~given.free[still]]
         if len(still):
             held[OF_SECOND_ORDER] = still
     return held
 
 
 def _notes(state: State) -> list[str]:
-    protection, near_walls = state.protection, []
+    protection, near_walls, of_order = state.protection, [], []
     if protection.kept is not None:
         near_walls.append(wall_note(len(protection.topology.held.get(WALL, ())), moved=state.released))
     slid = []
     if state.sliding is not None and state.final is not None:
         slid.append(state.sliding.note(planar_points(state.mesh.with_points(state.final.points)), state.final.moved))
-    return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks]
+    given = state.second_order
+    if given is not None and given.sign is not None and state.final is not None:
+        of_order.append(given.note(state.final.moved))
+        of_order.extend(given.protection.notes)
+        if given.protection.kept is not None:
+            of_order.append(wall_note(len(given.protection.topology.held.get(WALL, ())), moved=False))
+    return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks, *of_order]
 
 
 def outcome(

@@ -17,6 +17,7 @@ from gmsnet.kernels.star.guard import LEVELS, Precision
 from gmsnet.measure.totals import totals_of
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, Smoother, Tally
+from gmsnet.methods.curved import Corners, Curved
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import serial
@@ -38,6 +39,7 @@ class Start(NamedTuple):
     """Where a run starts. points: (N, 2) in memory order, not changed. precision: of the mesh (``precision_of``).
 
     score: of the points, where it is known. history: to go on with. constraint: the curves that nodes slide on.
+    curved: the second-order cells whose corners move.
     """
 
     topology: Topology
@@ -46,6 +48,7 @@ class Start(NamedTuple):
     score: Score | None = None
     history: Sequence[Sweep] = ()
     constraint: Constraint | None = None
+    curved: Curved | None = None
 
     @classmethod
     def of(cls, mesh: Mesh, topology: Topology) -> Start:
@@ -65,7 +68,8 @@ class Run:
         self, start: Start, smoother: Smoother, options: SmoothOptions, executor: Executor = serial,
         missing: Callable[[Floats], NDArray[np.int32]] | None = None,
     ) -> None:  # fmt: skip
-        self.topology, self.smoother, self.options, self.missing = start.topology, smoother, options, missing
+        self.topology, self.options, self.missing = start.topology, options, missing
+        self.smoother = smoother if start.curved is None else Corners(smoother, start.curved)
         self.executor = executor.for_blocks(len(start.topology.free) // LANES)
         level = LEVELS.index(options.guard)
         self.field = Field(start.points.copy(), start.topology, start.precision, level, constraint=start.constraint)

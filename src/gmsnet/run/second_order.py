@@ -1,8 +1,9 @@
-"""The stage of second-order planar cells: what is invalid is made valid, and what is nearly so gets room.
+"""The stage of second-order planar cells: the invalid are made valid, corners smoothed, and narrow cells given room.
 
-Corners of such cells take their middles along (kernels/curved). Nodes of the boundary, of interfaces, of line cells and
-of first-order cells stay, middles among them. A move is taken if all cells around it are certified valid by the
-coefficients of their determinants (docs/guarantees.md).
+The method of the call moves the corners, as if cells were straight, and they take their middles along
+(methods/curved.py). Nodes of the boundary, of interfaces, of line cells and of first-order cells stay, middles among
+them. A move is taken if all cells around it are certified valid by the coefficients of their determinants
+(docs/guarantees.md).
 """
 
 from __future__ import annotations
@@ -14,24 +15,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.descend import improve_nodes
-from gmsnet.kernels.curved.stars import counter_clockwise, curved_mesh
+from gmsnet.kernels.curved.stars import CurvedMesh, counter_clockwise, curved_mesh
 from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES, WIDEST
 from gmsnet.kernels.star.block import MOVED
-from gmsnet.kernels.star.guard import LEVELS, VALID, MeshGuard, Precision
-from gmsnet.kernels.topology import connectivity
+from gmsnet.kernels.star.guard import LEVELS, VALID
 from gmsnet.measure.curved import judge_curved
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.methods import Field, method_named
+from gmsnet.methods.curved import Curved
 from gmsnet.parallel.executor import Executor
+from gmsnet.preserve.protection import protected
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import SecondOrder, State
+from gmsnet.run.stop import CALLBACK, NO_PROGRESS, NOTHING_TO_MOVE
+from gmsnet.run.sweep_stage import sweep
 from gmsnet.topology.held import OF_SECOND_ORDER
+from gmsnet.topology.ordering import planar_points
 from gmsnet.topology.topology import Topology
 
 LOW = 0.5  # a cell whose certified bound over its straight size is less gets more room
 SWEEPS = 10
+FIRST_ORDER = "node of first-order cells"
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
-def second_order_of(mesh: Mesh, topology: Topology) -> SecondOrder | None:
+def second_order_of(mesh: Mesh, topology: Topology, options: SmoothOptions) -> SecondOrder | None:
     """The second-order cells of a planar mesh and which of their nodes may move; None where there are none."""
     blocks = [block for block in mesh.cells if block.kind in NAMES and len(block.nodes)]
     if not blocks or mesh.plane is None:
@@ -55,7 +65,22 @@ def second_order_of(mesh: Mesh, topology: Topology) -> SecondOrder | None:
     may[topology.held.get(OF_SECOND_ORDER, np.empty(0, dtype=np.int64))] = True
     may &= ~first_order
     may[_on_interfaces(table, kind, np.concatenate(regions))] = False
-    return SecondOrder(table, kind, may)
+    first = np.zeros(len(mesh.points), dtype=bool)
+    first[topology.free] = True
+    twin = straight(mesh)
+    whole, near = Topology.and_points(twin, ~(may | first))
+    corners = whole.holding(first, FIRST_ORDER)
+    return SecondOrder(table, kind, may, whole, protected(twin, corners, options.preserve, options.fix_layers, near))
+
+
+def straight(mesh: Mesh) -> Mesh:
+    """The mesh (N × 2, in its plane) with straight cells instead of second-order ones; middles belong to no face."""
+    kinds = {"triangle6": "triangle", "quad8": "quad", "quad9": "quad"}
+    cells = (
+        CellBlock(kinds[block.kind], block.nodes[:, : block.corners], block.regions) if block.kind in kinds else block
+        for block in mesh.cells
+    )
+    return Mesh(planar_points(mesh), tuple(cells))
 
 
 def _on_interfaces(cells: NDArray[np.int32], kinds: NDArray[np.int8], regions: NDArray[np.int64]) -> NDArray[np.int32]:
@@ -72,60 +97,106 @@ def _on_interfaces(cells: NDArray[np.int32], kinds: NDArray[np.int8], regions: N
     return found
 
 
-def improve_second_order(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """Untangles second-order cells, then moves the nodes around those whose certified bound is low."""
-    given, precision = state.second_order, state.precision
-    if given is None or not given.free.any():
+def untangle_second_order(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """Makes the invalid second-order cells valid, as many as can be."""
+    given = state.second_order
+    if given is None:
         return state
-    from gmsnet.untangle.curved import free_inner, untangle_curved  # untangling takes 0.15 s more to import
+    points, mesh, free = _opened(state)
+    sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
+    invalid, least = int((sign != 1).sum()), float(quality.min())
+    by_id = np.empty_like(free)
+    by_id[state.topology.memory] = free
+    known = replace(given, free=by_id, sign=sign, invalid=(invalid, invalid), least=(least, least))
+    state = replace(state, second_order=replace(known, unable=_unable(given, options)))
+    if not (options.untangle and invalid and free.any()):
+        return state
+    from gmsnet.untangle.curved import untangle_curved  # untangling takes 0.15 s more to import
 
-    memory = state.topology.memory
-    points = np.empty_like(state.points)
-    points[memory] = state.points
-    mesh = curved_mesh(points, given.cells, given.kinds, ~given.free)
-    free = given.free.copy()
-    free[mesh.edges[~mesh.dragged].ravel()] = False  # ends and middles of edges with one cell
-    before, quality = judge_curved(points, mesh.cells, mesh.kinds, precision)
-    was = points.copy()
-    if options.untangle and (before != 1).any():
-        untangle_curved(points, mesh, free, precision)
-    floor = -math.inf
+    untangle_curved(points, mesh, free, state.precision)
+    return _judged(state, points, mesh)
+
+
+def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """The sweeps of the method over the corners of second-order cells, which take their middles along."""
+    given = state.second_order
+    if given is None or given.unable or state.stop_reason == CALLBACK or not given.free.any():
+        return state
+    points, mesh, _ = _opened(state)
+    room = -math.inf
     if options.guard != LEVELS[VALID]:
-        floor = _floor(points[memory], state.topology, free[memory], precision)
-    guard, tally = MeshGuard(*precision, floor), np.zeros(3, dtype=np.int64)
-    inner = np.flatnonzero(free_inner(mesh, free))
-    corners = np.flatnonzero(free & (np.diff(mesh.edge_start) > 0))
+        sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
+        room = float(quality[sign == 1].min(initial=LOW))
+    corners = replace(given.protection, base=given.protection.base.holding(~given.free, OF_SECOND_ORDER))
+    ready = replace(
+        state, points=points, totals=None, protection=corners, released=False, sliding=None,
+        smoother=options.smoother(), curved=Curved(mesh, room),
+    )  # fmt: skip
+    done = sweep(ready, options, executor)
+    if done.stop_reason == NOTHING_TO_MOVE:
+        return state
+    state = replace(state, history=done.history, interruption=done.interruption, stop_reason=done.stop_reason)
+    return _judged(state, done.points, mesh)
+
+
+def make_room(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """Moves the nodes around second-order cells whose certified bound is low, inner middles first."""
+    given = state.second_order
+    if given is None or state.stop_reason == CALLBACK or not given.free.any():
+        return state
+    points, mesh, free = _opened(state)
+    topology = given.protection.topology
+    inner = np.flatnonzero(_inner(mesh, free))
+    corners = np.flatnonzero(free & topology.near_free)
+    level, tally = LEVELS.index(options.guard), np.zeros(3, dtype=np.int64)
     for _ in range(min(SWEEPS, options.max_sweeps)):
         moved = int(tally[MOVED])
+        guard = Field(points, topology, state.precision, level).guard(executor)
         improve_nodes(points, mesh, inner, LOW, guard, tally)
         improve_nodes(points, mesh, corners, LOW, guard, tally)
         if tally[MOVED] == moved:
             break
-    after, better = judge_curved(points, mesh.cells, mesh.kinds, precision)
-    lost = ((before == 1) & (after != 1)).any() or (after != 1).sum() > (before != 1).sum()
-    if lost:
-        points, after, better = was, before, quality
-    count = int((points != was).any(axis=1).sum())
-    note = (
-        f"second order: {_counted(int((before != 1).sum()))} before, {_counted(int((after != 1).sum()))} after; "
-        f"the least bound of a determinant over that of the straight cell {quality.min():.3g} before, "
-        f"{better.min():.3g} after; {count:,} of {int(free.sum()):,} free nodes moved"
+    if state.stop_reason == NOTHING_TO_MOVE:
+        state = state.ended(NO_PROGRESS)
+    return _judged(state, points, mesh)
+
+
+def _opened(state: State) -> tuple[Floats, CurvedMesh, Flags]:
+    """A copy of the points, the second-order cells, and which nodes may move, all by places in memory."""
+    given = state.second_order
+    assert given is not None
+    topology, points = state.topology, state.points.copy()
+    table = np.where(given.cells >= 0, topology.places[given.cells], np.int32(-1))
+    free = given.free[topology.memory]
+    mesh = curved_mesh(points, table, given.kinds, ~free)
+    free[mesh.edges[~mesh.dragged].ravel()] = False  # ends and middles of edges with one cell
+    return points, mesh, free
+
+
+def _inner(mesh: CurvedMesh, free: Flags) -> Flags:
+    """(N,) the middles and centres that may move by themselves."""
+    from gmsnet.untangle.curved import free_inner  # which takes 0.15 s to import
+
+    return free_inner(mesh, free)
+
+
+def _judged(state: State, points: Floats, mesh: CurvedMesh) -> State:
+    """The state with these points, and how its cells are now; as it was if one of them has lost its validity."""
+    given = state.second_order
+    assert given is not None
+    assert given.sign is not None
+    sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
+    if ((given.sign == 1) & (sign != 1)).any():
+        return state
+    invalid, least = (given.invalid[0], int((sign != 1).sum())), (given.least[0], float(quality.min()))
+    return replace(
+        state, points=points, totals=None, second_order=replace(given, sign=sign, invalid=invalid, least=least)
     )
-    made = replace(given, free=free, invalid=int((after != 1).sum()), untangled=bool((before != 1).any()))
-    return replace(state, points=points[memory], totals=None, second_order=made, remarks=(*state.remarks, note))
 
 
-def _counted(cells: int) -> str:
-    return f"{cells:,} invalid cell{'' if cells == 1 else 's'}"
-
-
-def _floor(points: NDArray[np.float64], topology: Topology, free: NDArray[np.bool_], precision: Precision) -> float:
-    """An upper bound of the least D/L of the straight cells with a free corner, −∞ if one of them may be inverted.
-
-    points, free: in memory order.
-    """
-    from gmsnet.kernels.untangle.cells import least_ratio
-
-    rows = connectivity.touching(topology.near, free)
-    least = float(least_ratio(points, topology.simplices.take(rows), precision.unit, precision.grain))
-    return least if least > 0.0 else -math.inf
+def _unable(given: SecondOrder, options: SmoothOptions) -> str:
+    """Why the method does not move corners, to be added to the note; "" if it does."""
+    quads = (given.kinds != NAMES.index("triangle6")).any()
+    if not quads or method_named(options.method_name).moves("quad", options.objective):
+        return ""
+    return f"; {options.method_name} moves triangles alone, so that no corner was moved for its cells' shape"

@@ -59,7 +59,7 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
         named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
         where = " by the point data 'fixed' of the mesh" if fixed is None else ""
         remarks.append(f"fixed: {named}{where}, and held for other reasons anyway")
-    second = second_order_of(given, topology)
+    second = second_order_of(given, topology, options)
     if target and (others := unmeasured(given)):
         remarks.append(f"the target is asked of triangles and quads alone, not of {others}")
     if unknown := unknown_cells(given):

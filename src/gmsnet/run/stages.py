@@ -1,18 +1,16 @@
-"""What ``smooth`` does one after the other: untangling, sweeps (for a target, on patches), the cells near walls."""
+"""What ``smooth`` does one after the other: untangling, sweeps, the cells near walls, second-order cells."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Protocol
 
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import write_back
-from gmsnet.run.run import Run
-from gmsnet.run.second_order import improve_second_order
+from gmsnet.run.second_order import make_room, smooth_corners, untangle_second_order
 from gmsnet.run.state import State
-from gmsnet.run.target_run import reach_target
+from gmsnet.run.sweep_stage import sweep
 from gmsnet.run.untangle_stage import untangle_all, untangle_protected
 from gmsnet.run.wall_stage import improve_near_walls
 
@@ -28,17 +26,9 @@ class Stage(Protocol):
         ...
 
 
-def sweep(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """Sweeps of the method over all free nodes; for a target, over patches around the cells that miss it."""
-    if options.target:
-        return reach_target(state, options, executor)
-    run = Run(state.run_start(options.best_by), state.smoother, options, executor)
-    stop_reason = run.to_the_end()
-    state = replace(state, points=run.best, totals=run.best_score.totals, history=tuple(run.history))
-    return state.ended(stop_reason, run.interruption)
-
-
-STAGES: tuple[Stage, ...] = (untangle_all, untangle_protected, sweep, improve_near_walls, improve_second_order)
+STAGES: tuple[Stage, ...] = (
+    untangle_all, untangle_protected, sweep, improve_near_walls, untangle_second_order, smooth_corners, make_room,
+)  # fmt: skip
 
 
 def carry_out(state: State, options: SmoothOptions, executor: Executor) -> State:

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.sliding import Sliding
+from gmsnet.kernels.simplex.bernstein import CORNERS
 from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.measure.report import QualityReport
 from gmsnet.measure.totals import Totals
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
+from gmsnet.methods.curved import Curved
 from gmsnet.preserve.protection import Protection
 from gmsnet.run.run import Start, precision_of
 from gmsnet.run.score import Score
@@ -39,14 +41,41 @@ class SecondOrder:
     """The second-order cells of a mesh (run/second_order.py).
 
     cells: (C, 9) ids, counter-clockwise, −1 past the last node; kinds: (C,) (kernels.simplex.bernstein). free: (N,)
-    bool by ids. invalid: how many cells are not certified at the end; untangled: some were not at first.
+    bool by ids. whole: the connectivity of the mesh with straight cells, where corners are free, too; protection: of
+    that, with corners alone free, and what of it is protected. sign: (C,) of det J in each cell, as it is now. invalid:
+    how many cells are not certified valid, least: the least certified bound over a straight cell's size, both at first
+    and now. None of the three is known before the first stage. unable: why the method does not move corners.
     """
 
     cells: NDArray[np.int32]
     kinds: NDArray[np.int8]
     free: NDArray[np.bool_]
-    invalid: int = 0
-    untangled: bool = False
+    whole: Topology
+    protection: Protection
+    sign: NDArray[np.int8] | None = None
+    invalid: tuple[int, int] = (0, 0)
+    least: tuple[float, float] = (0.0, 0.0)
+    unable: str = ""
+
+    @property
+    def corners(self) -> NDArray[np.bool_]:
+        """(N,) by id: which nodes are a corner."""
+        found = np.zeros(len(self.free), dtype=bool)
+        for kind, count in enumerate(CORNERS):
+            found[self.cells[self.kinds == kind, :count]] = True
+        return found
+
+    def note(self, moved: NDArray[np.bool_]) -> str:
+        """What was done. moved: (N,) by id."""
+        before, after = (f"{count:,} invalid cell{'' if count == 1 else 's'}" for count in self.invalid)
+        least = self.least if moved.any() else self.least[:1] * 2
+        corners, free = self.corners, self.free
+        return (
+            f"second order: {before} before, {after} after; the least bound of a determinant over that of the straight "
+            f"cell {least[0]:.3g} before, {least[1]:.3g} after; {(moved & corners).sum():,} of "
+            f"{(free & corners).sum():,} free corners and {(moved & free & ~corners).sum():,} of "
+            f"{(free & ~corners).sum():,} free middle nodes moved{self.unable}"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +89,8 @@ class State:
     about the input. totals: of the points, where they are known. untangling: what was done about inverted cells,
     reasons: why some are left, by the index of each cell. history: one Sweep for each look. stop_reason: one of
     ``run.stop``, "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
-    sliding: the nodes that move along curves, if any. interruption: what ends the smoothing before its end. final:
+    sliding: the nodes that move along curves, if any. curved: while the corners of second-order cells move, those cells
+    (``second_order``, which is all that is known of them). interruption: what ends the smoothing before its end. final:
     once the mesh is written back to the order of the input; start, points and shapes are then empty, lest the result
     needs more memory than the stages.
     """
@@ -84,6 +114,7 @@ class State:
     final: Final | None = None
     sliding: Sliding | None = None
     second_order: SecondOrder | None = None
+    curved: Curved | None = None
 
     @property
     def topology(self) -> Topology:
@@ -98,7 +129,7 @@ class State:
     def run_start(self, best_by: str) -> Start:
         """Where a run over the whole mesh starts."""
         score = None if self.totals is None else Score.of(self.totals, best_by)
-        return Start(self.topology, self.points, self.precision, score, self.history, self.constraint)
+        return Start(self.topology, self.points, self.precision, score, self.history, self.constraint, self.curved)
 
     @property
     def constraint(self) -> Constraint | None:

@@ -78,7 +78,7 @@ def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterato
         measure = partial(totals_of, state.points, patch.scored)
         before = Score(measure, options.best_by, corners if clear else missing(state.points), positive)
         run = Run(
-            Start(patch, state.points, precision, before, state.history, state.constraint),
+            Start(patch, state.points, precision, before, state.history, state.constraint, state.curved),
             smoother,
             options,
             executor,

@@ -27,7 +27,9 @@ class StillInvertedCell(NamedTuple):
 
 
 def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """Moves the free nodes so that fewer cells are inverted."""
+    """Moves the free nodes so that fewer cells are inverted; those of second-order cells have a stage of their own."""
+    if state.second_order is not None and not len(state.topology.free):
+        return state
     return _untangled(state) if options.untangle and state.before.inverted else state
 
 

@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import curved, curved_meshes, naive
 
-from gmsnet.kernels.curved.commit import commit_all
+from gmsnet.kernels.curved.commit import commit_all, follow
 from gmsnet.kernels.curved.stars import CENTRE, counter_clockwise, dragged
 from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES, NODES
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
-from gmsnet.kernels.star.guard import MeshGuard
+from gmsnet.kernels.star.guard import MeshGuard, StarGuard
+from gmsnet.measure.curved import judge_curved
 
 VALID = MeshGuard(2.0**-53, 0.0, False, -np.inf)
 SINGLE = MeshGuard(2.0**-24, 2.0**-150, True, -np.inf)
@@ -46,7 +47,7 @@ def straight_signs(points, mesh):
 
 def commit(points, mesh, nodes, targets, guard=VALID):
     tally = np.zeros(3, dtype=np.int64)
-    commit_all(points, mesh, np.asarray(nodes), np.asarray(targets, dtype=float), guard, tally)
+    commit_all(points, mesh, np.asarray(nodes), np.asarray(targets, dtype=float), guard, -np.inf, tally)
     return tally
 
 
@@ -189,3 +190,59 @@ def test_middles_on_the_boundary_and_held_ones_are_not_dragged():
     for (_, _, m), goes in zip(mesh.edges, mesh.dragged, strict=True):
         assert goes == (uses[m] == 2)
     assert (free[mesh.edges[:, 2]] == mesh.dragged).all()
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=30)
+def test_no_valid_cell_comes_below_the_room(seed):
+    rng = np.random.default_rng(seed)
+    points, mesh, free = curved_meshes.tables(curved_meshes.known_valid(seed % 20))
+    room = judge_curved(points, mesh.cells, mesh.kinds)[1].min() * rng.choice([0.3, 1.0])
+    nodes, tally = rng.choice(np.flatnonzero(free), 12), np.zeros(3, dtype=np.int64)
+    commit_all(points, mesh, nodes, points[nodes] + 0.2 * rng.normal(size=(12, 2)), VALID, room, tally)
+    sign, quality = judge_curved(points, mesh.cells, mesh.kinds)
+    assert (sign == 1).all()
+    assert quality.min() >= room * (1 - 1e-12)
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=30)
+def test_no_cell_comes_below_the_floors_of_its_corners(seed):
+    """Each straight cell that changes is then above the largest of the floors at its corners."""
+    rng = np.random.default_rng(seed)
+    points, mesh, free = curved_meshes.tables(curved_meshes.known_valid(seed % 20))
+    before, floors = points.copy(), np.full(len(points), -np.inf)
+    corners = corners_of(mesh, free)
+    floors[corners] = rng.uniform(0.0, 0.2, len(corners))
+    guard, tally = StarGuard(2.0**-53, 0.0, False, -np.inf, None, floors), np.zeros(3, dtype=np.int64)
+    nodes = rng.choice(corners, 12)
+    commit_all(points, mesh, nodes, points[nodes] + 0.1 * rng.normal(size=(12, 2)), guard, -np.inf, tally)
+    for cell, kind in zip(mesh.cells, mesh.kinds, strict=True):
+        ring = cell[: CORNERS[kind]]
+        if (points[ring] != before[ring]).any():
+            assert inverse_q(points[ring]) >= floors[ring].max() * 12**0.5
+
+
+def test_a_middle_moves_in_a_cell_whose_straight_edges_are_at_the_floor():
+    points, mesh, free = curved_meshes.tables(curved_meshes.known_valid(2))
+    middle = mesh.edges[mesh.dragged, 2][0]
+    assert free[middle]
+    target = points[middle] + 1e-4
+    assert commit(points, mesh, [middle], [target], VALID._replace(floor=0.28)).tolist() == [1, 0, 0]
+
+
+def test_nodes_follow_in_their_order_and_those_that_are_there_stay():
+    """Its slow twin: ``commit_all`` of one node after the other, without those that are there."""
+    for seed in range(5):
+        points, mesh, free = curved_meshes.tables(curved_meshes.known_valid(seed))
+        rng, nodes = np.random.default_rng(seed), corners_of(mesh, free)
+        places = points.copy()
+        places[nodes[1:]] += 0.05 * rng.normal(size=(len(nodes) - 1, 2))
+        slow, expected = points.copy(), np.zeros(3, dtype=np.int64)
+        for i in nodes[1:]:
+            expected += commit(slow, mesh, [i], places[[i]])
+        tally = np.zeros(3, dtype=np.int64)
+        left = follow(points, mesh, nodes, places, VALID, -np.inf, tally)
+        np.testing.assert_array_equal(points, slow)
+        np.testing.assert_array_equal(tally, expected)
+        assert left == (points[nodes] != places[nodes]).any(axis=1).sum()

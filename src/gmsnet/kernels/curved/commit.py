@@ -3,8 +3,9 @@
 A node moves together with what it drags along. The move is made if afterwards each cell around the node
 
 - is certainly valid, or was certainly invalid before and has its smallest Bernstein coefficient certainly risen;
-- has positive determinants at the corners of its straight edges, unless it certainly had not before; and,
-- where a floor is given, has the D/L of its straight edges certified above it at each corner.
+- has positive determinants at the corners of its straight edges, unless it certainly had not before;
+- where the node is a corner and a floor is given, has the D/L of its straight edges certified above it at each corner;
+- has a ``quality_of`` of ``room`` or more, unless it was not certainly valid before.
 
 Else the shift is halved, or at last dropped, and all bits are as they were. With the node all cells that it or what it
 drags is in are cells around the node. So nothing else changes, and nodes without a common cell can move at once.
@@ -26,14 +27,16 @@ from gmsnet.kernels.simplex.jacobian import (
     cell_workspace,
     expand,
     gather_cell,
+    quality_of,
     sign_everywhere,
     smallest,
+    straight_mean,
     straight_sign,
 )
 from gmsnet.kernels.simplex.mean_ratio2 import Weights
 from gmsnet.kernels.simplex.predicates import UNIT
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
-from gmsnet.kernels.star.guard import margin_above
+from gmsnet.kernels.star.guard import WITH_FLOORS, margin_above
 from gmsnet.kernels.star.truncation import HALVINGS
 
 MODEL_ROWS = 20  # of a cell: its coefficients, then the determinants at its straight corners
@@ -115,6 +118,23 @@ def above_floor(kind, delta, floor, work):
 
 
 @inlined
+def floor_of(guard, cell, kind):
+    """The floor of a cell's D/L: of the mesh, or the largest of its corners' at the level STAR."""
+    floor = guard.floor
+    if len(guard) == WITH_FLOORS:
+        for k in range(CORNERS[kind]):
+            floor = max(floor, guard.floors[cell[k]])
+    return floor
+
+
+@inlined
+def has_room(kind, bound, room, work):
+    """Is the ``quality_of`` the expanded cell ``room`` or more? Most often its coefficients tell, uncut."""
+    least, _ = smallest(kind, work.coefficients)
+    return least - bound >= room * straight_mean(kind, work) or quality_of(kind, bound, work) >= room
+
+
+@inlined
 def judge_before(points, mesh, i, guard, work):
     """Signs and smallest coefficients (at most so large) of the cells around a node, into the workspace."""
     for k in range(mesh.cell_start[i], mesh.cell_start[i + 1]):
@@ -129,15 +149,17 @@ def judge_before(points, mesh, i, guard, work):
 
 
 @inlined
-def allowed_now(points, mesh, i, guard, work):
+def allowed_now(points, mesh, i, guard, room, work):
     """Do the cells around a node fulfil the rule, compared with what ``judge_before`` has found?"""
+    is_corner = mesh.edge_start[i] < mesh.edge_start[i + 1]  # else straight cells stay as they are
     for k in range(mesh.cell_start[i], mesh.cell_start[i + 1]):
         c, at = mesh.cell_of[k], k - mesh.cell_start[i]
         kind = mesh.kinds[c]
         delta = guard.unit * gather_cell(points, mesh.cells[c], kind, work.cell) + guard.grain
         if work.straight[at] != -1 and straight_sign(kind, delta, work.cell) != 1:
             return False
-        if guard.floor > -np.inf and not above_floor(kind, delta, guard.floor, work.cell):
+        floor = floor_of(guard, mesh.cells[c], kind)
+        if is_corner and floor > -np.inf and not above_floor(kind, delta, floor, work.cell):
             return False
         bound = expand(kind, delta, work.cell)
         least, _ = smallest(kind, work.cell.coefficients)
@@ -145,16 +167,19 @@ def allowed_now(points, mesh, i, guard, work):
             continue
         if sign_everywhere(kind, bound, work.cell) != 1:
             return False
+        if room > -np.inf and work.sign[at] == 1 and not has_room(kind, bound, room, work.cell):
+            return False
     return True
 
 
 @part
-def commit_curved(points, mesh, i, x, y, guard, work, tally):
+def commit_curved(points, mesh, i, x, y, guard, room, work, tally):
     """Moves a node towards (x, y) with what it drags along, as far as the rule allows.
 
     The node may be a corner, a middle or a centre; the offset of a middle or a centre is stored anew. The caller sees
-    to it that the node is free. guard: a MeshGuard. tally: see kernels.star.block. Returns how many nodes have moved:
-    0, or it and those that it drags, whose old places stand in the workspace (see ``restore``).
+    to it that the node is free. guard: a MeshGuard or StarGuard, floors by node. room: see above, −∞ for none. tally:
+    see kernels.star.block. Returns how many nodes have moved: 0, or it and those that it drags, whose old places stand
+    in the workspace (see ``restore``).
     """
     dx, dy = x - points[i, 0], y - points[i, 1]
     if not (np.isfinite(dx) and np.isfinite(dy)):
@@ -166,7 +191,7 @@ def commit_curved(points, mesh, i, x, y, guard, work, tally):
         place(points, mesh, i, work.saved[0, 0] + dx, work.saved[0, 1] + dy, guard.single)
         if points[i, 0] == work.saved[0, 0] and points[i, 1] == work.saved[0, 1]:
             break
-        if allowed_now(points, mesh, i, guard, work):
+        if allowed_now(points, mesh, i, guard, room, work):
             remember(points, mesh, i)
             tally[MOVED] += 1
             tally[TRUNCATED] += halving > 0
@@ -179,8 +204,23 @@ def commit_curved(points, mesh, i, x, y, guard, work, tally):
 
 
 @kernel
-def commit_all(points, mesh, nodes, targets, guard, tally):
+def commit_all(points, mesh, nodes, targets, guard, room, tally):
     """``commit_curved`` for nodes (K,) towards targets (K, 2), one after the other."""
     work = curved_workspace(mesh)
     for k in range(len(nodes)):
-        commit_curved(points, mesh, nodes[k], targets[k, 0], targets[k, 1], guard, work, tally)
+        commit_curved(points, mesh, nodes[k], targets[k, 0], targets[k, 1], guard, room, work, tally)
+
+
+@kernel
+def follow(points, mesh, nodes, places, guard, room, tally):
+    """``commit_curved`` for those of the nodes (K,) that are not yet where ``places`` (N, 2) says, in their order.
+
+    Returns how many are still not there.
+    """
+    work, left = curved_workspace(mesh), 0
+    for k in range(len(nodes)):
+        i = nodes[k]
+        if points[i, 0] != places[i, 0] or points[i, 1] != places[i, 1]:
+            commit_curved(points, mesh, i, places[i, 0], places[i, 1], guard, room, work, tally)
+            left += points[i, 0] != places[i, 0] or points[i, 1] != places[i, 1]
+    return left

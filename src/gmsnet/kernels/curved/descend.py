@@ -211,7 +211,7 @@ def improve_nodes(points, mesh, nodes, threshold, guard, tally):
         x, y, fell = descent(points, mesh, i, IMPROVE, 0.0, work)
         if not fell:
             continue
-        count = commit_curved(points, mesh, i, x, y, guard, work, tally)
+        count = commit_curved(points, mesh, i, x, y, guard, -np.inf, work, tally)
         if count > 0 and not least_quality(points, mesh, i, guard, work) >= before:
             restore(points, count, work)
             remember(points, mesh, i)

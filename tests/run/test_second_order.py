@@ -1,0 +1,222 @@
+"""Second-order meshes: straight cells become as good as those of the first-order twin, and all cells stay valid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import curved_meshes
+
+import gmsnet
+from gmsnet.generate import random_mesh, recombine
+from gmsnet.generate.curved import second_order, throw
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.methods import METHODS
+from gmsnet.run import stop
+
+CORNERS = {"triangle6": 3, "quad8": 4, "quad9": 4}
+BASES = {
+    "triangle6": lambda seed: random_mesh(150, seed=seed),
+    "quad8": lambda seed: curved_meshes.quad_grid(9),
+    "quad9": lambda seed: curved_meshes.quad_grid(8),
+    "mixed": lambda seed: recombine(random_mesh(150, seed=seed), least=0.6),
+}
+
+
+def twins(kind, seed=1, amount=0.25):
+    """The same jittered, valid mesh of straight cells, of the first order and of the second."""
+    base, quads = BASES[kind](seed), "quad8" if kind == "quad8" else "quad9"
+    base = Mesh(base.points, base.cells)
+    while True:
+        thrown = throw(second_order(base, quads=quads), middles=0.0, corners=amount, seed=seed)
+        first = base.with_points(thrown.points[: len(base.points)])
+        if not gmsnet.quality(first).inverted:
+            return first, second_order(first, quads=quads)
+        amount *= 0.8
+
+
+def boundary(mesh):
+    """(N,) bool: nodes of edges with one cell, middles among them."""
+    corners = [np.roll(b.nodes[:, : CORNERS[b.kind]], -1, axis=1) for b in mesh.cells if b.kind in CORNERS]
+    rows = [
+        np.stack([b.nodes[:, : CORNERS[b.kind]], after, b.nodes[:, CORNERS[b.kind] : 2 * CORNERS[b.kind]]], axis=-1)
+        for b, after in zip((b for b in mesh.cells if b.kind in CORNERS), corners, strict=True)
+    ]
+    edges = np.concatenate([row.reshape(-1, 3) for row in rows])
+    _, at, uses = np.unique(edges[:, 2], return_index=True, return_counts=True)
+    found = np.zeros(len(mesh.points), dtype=bool)
+    found[edges[at[uses == 1]]] = True
+    return found
+
+
+def assert_sound(mesh, result):
+    """All cells certified, held nodes and the boundary bit for bit, and ``moved`` tells what moved."""
+    sign, _ = curved_meshes.judged(mesh.with_points(result.points))
+    assert (sign == 1).all()
+    assert result.invalid_curved == 0
+    changed = (result.points != mesh.points).any(axis=1)
+    np.testing.assert_array_equal(changed, result.moved)
+    assert not changed[boundary(mesh)].any()
+    for ids in result.held.values():
+        assert not changed[ids].any()
+
+
+def shape(report):
+    return np.array([report.totals.shape_min, report.totals.shape_mean])
+
+
+@pytest.mark.parametrize("guard", ["worst", "star", "valid"])
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", BASES)
+def test_straight_cells_become_as_good_as_those_of_the_first_order_twin(kind, seed, guard):
+    first, second = twins(kind, seed)
+    expected, result = gmsnet.smooth(first, guard=guard), gmsnet.smooth(second, guard=guard)
+    assert_sound(second, result)
+    np.testing.assert_array_equal(shape(result.before), shape(expected.before))
+    allowance = [0.03, 0.005] if kind == "mixed" else [0.005, 0.005]  # a quad's bound may not fall below a half
+    assert (shape(result.after) >= shape(expected.after) - allowance).all()
+    assert shape(result.after)[1] > shape(result.before)[1]
+    assert result.sweeps > 0
+    assert result.stop_reason == stop.NO_PROGRESS
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_curved_meshes_become_valid_and_better(seed):
+    mesh = (curved_meshes.known_valid if seed % 2 else curved_meshes.thrown)(seed)
+    result = gmsnet.smooth(mesh)
+    assert_sound(mesh, result)
+    if seed % 2:
+        assert shape(result.after)[0] >= shape(result.before)[0]
+        quality = curved_meshes.judged(mesh)[1].min(), curved_meshes.judged(result.mesh)[1].min()
+        assert quality[1] >= min(quality[0], 0.5) - 1e-9
+
+
+def stars(mesh, points):
+    """(N,) the minimum 1/q of the straight cells around each corner."""
+    least = np.full(len(points), np.inf)
+    for block in mesh.cells:
+        count = CORNERS.get(block.kind, 0)
+        for k in range(count):
+            corner, after, last = (block.nodes[:, j % count] for j in (k, k + 1, k + count - 1))
+            p, q = points[after] - points[corner], points[last] - points[corner]
+            cross, squares = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0], (p * p + q * q).sum(axis=1)
+            far = ((p - q) ** 2).sum(axis=1)
+            value = 2 * np.sqrt(3) * cross / (squares + far) if count == 3 else 2 * cross / squares
+            for j in range(count):
+                np.minimum.at(least, block.nodes[:, j], value)
+    return least
+
+
+@pytest.mark.parametrize("kind", BASES)
+def test_at_the_level_star_no_star_gets_worse(kind):
+    _, mesh = twins(kind)
+    result = gmsnet.smooth(mesh, "laplacian", guard="star", max_sweeps=5)
+    assert_sound(mesh, result)
+    corners = np.flatnonzero(~boundary(mesh))
+    before, after = stars(mesh, mesh.points)[corners], stars(mesh, result.points)[corners]
+    assert (after >= before - 1e-9).all()
+    assert result.moved.any()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("kind", ["triangle6", "quad9"])
+def test_each_method_moves_corners_or_says_why_not(kind, method):
+    _, mesh = twins(kind)
+    result = gmsnet.smooth(mesh, method, max_sweeps=10)
+    assert_sound(mesh, result)
+    (note,) = (note for note in result.notes if note.startswith("second order"))
+    if kind == "triangle6" or METHODS[method].moves("quad"):
+        assert "moves triangles alone" not in note
+        assert shape(result.after)[1] > shape(result.before)[1]
+        assert result.sweeps > 0
+    else:
+        assert "moves triangles alone" in note
+        assert result.sweeps == 0
+        assert not result.moved[: len(mesh.cells[0].nodes)].all()
+
+
+def test_what_is_chosen_stays_and_its_middles_follow_the_other_end():
+    _, mesh = twins("triangle6")
+    inner = np.flatnonzero(~boundary(mesh))
+    corner, middle = inner[0], inner[-1]
+    result = gmsnet.smooth(mesh, fixed=[corner, middle])
+    assert_sound(mesh, result)
+    assert not result.moved[[corner, middle]].any()
+    assert result.moved.any()
+
+
+def test_the_sweeps_end_as_those_of_other_meshes_do():
+    _, mesh = twins("quad9")
+    seen = []
+    limited = gmsnet.smooth(mesh, "barrier", max_sweeps=2, callback=lambda sweep: seen.append(sweep))
+    assert (limited.sweeps, limited.stop_reason, len(seen)) == (2, stop.MAX_SWEEPS, 2)
+    stopped = gmsnet.smooth(mesh, "barrier", callback=lambda sweep: True)
+    assert (stopped.sweeps, stopped.stop_reason) == (1, stop.CALLBACK)
+    assert_sound(mesh, stopped)
+    none = gmsnet.smooth(mesh, max_sweeps=0)
+    assert not none.moved.any()
+    assert "0 of 49 free corners" in none.notes[-1]
+
+
+def test_a_target_ends_the_run_when_it_is_met():
+    _, mesh = twins("triangle6")
+    result = gmsnet.smooth(mesh, target_quality=0.5)
+    assert_sound(mesh, result)
+    assert result.stop_reason == stop.TARGET_REACHED
+    assert result.after.shape.min() >= 0.5
+
+
+@pytest.mark.parametrize("sweeps", [1, 3])
+def test_ctrl_c_leaves_the_best_mesh_with_its_middles(sweeps):
+    _, mesh = twins("triangle6")
+
+    def interrupt(sweep):
+        if sweep.index == sweeps:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        gmsnet.smooth(mesh, "barrier", callback=interrupt)
+    result = caught.value.result
+    assert result.stop_reason == stop.INTERRUPTED
+    assert_sound(mesh, result)
+    assert result.moved.any()
+    ends, nodes = mesh.cells[0].nodes[:, :3], mesh.cells[0].nodes[:, 3:]
+    straight = (result.points[ends] + result.points[np.roll(ends, -1, axis=1)]) / 2
+    np.testing.assert_allclose(result.points[nodes], straight, atol=1e-12)
+
+
+def test_stretched_layers_are_held_as_in_the_first_order_twin():
+    first = curved_meshes.quad_grid(12, 2.0)
+    result = gmsnet.smooth(second_order(first))
+    layers = [note for note in result.notes if "anisotropic on purpose" in note]
+    assert layers == [note for note in gmsnet.smooth(first).notes if "anisotropic on purpose" in note]
+    assert len(layers) == 1
+    free = gmsnet.smooth(second_order(first), preserve="none")
+    assert free.moved.sum() > result.moved.sum()
+
+
+def test_first_order_cells_beside_them_move_in_their_own_sweeps():
+    """Cells on the left are of the second order, the others of the first; nodes between them stay."""
+    first, second = twins("triangle6")
+    triangles = first.cells[0].nodes
+    left = first.points[triangles][:, :, 0].mean(axis=1) < np.median(first.points[:, 0])
+    cells = (
+        CellBlock("triangle", triangles[~left], np.zeros((~left).sum(), dtype=int)),
+        CellBlock("triangle6", second.cells[0].nodes[left], np.zeros(left.sum(), dtype=int)),
+    )
+    mesh = Mesh(second.points, cells)
+    result = gmsnet.smooth(mesh)
+    between = np.intersect1d(triangles[left], triangles[~left])
+    assert not result.moved[between].any()
+    only_left, only_right = np.setdiff1d(triangles[left], between), np.setdiff1d(triangles[~left], between)
+    assert result.moved[only_left].any()
+    assert result.moved[only_right].any()
+    assert shape(result.after)[1] > shape(result.before)[1]
+    sign, _ = curved_meshes.judged(result.mesh)
+    assert (sign == 1).all()
+
+
+def test_the_bound_of_the_worst_cell_knows_that_corners_move():
+    _, mesh = twins("triangle6")
+    result = gmsnet.smooth(mesh)
+    assert result.limits.ceiling >= shape(result.after)[0]
