@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, Auto, to_come
+from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, WHOLE, Auto, to_come
 from gmsnet.paper.cases import CASES
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run, Start
@@ -68,8 +67,8 @@ def test_the_default_is_better_than_every_other_method_in_the_worst_cell():
         assert best.after.qhat > other.after.qhat
 
 
-def test_a_slow_change_of_the_whole_mesh_takes_many_newton_sweeps_but_not_all():
-    """All free nodes pressed to one side: sweeps go on, and leave time for the worst cells."""
+def test_a_slow_change_of_the_whole_mesh_takes_all_nodes_at_once():
+    """All free nodes pressed to one side: sweeps are too slow, and the mesh is as good again as before."""
     mesh = gmsnet.smooth(gmsnet.random_mesh(2000, seed=5)).mesh
     free, points = Topology.of(mesh).free, mesh.points.copy()
     points[free, 0] **= 3
@@ -77,13 +76,11 @@ def test_a_slow_change_of_the_whole_mesh_takes_many_newton_sweeps_but_not_all():
     result = gmsnet.smooth(pressed, preserve="none")
     assert result.before.inverted > 0
     assert result.after.inverted == 0
-    newton = [sweep for sweep in result.history if sweep.stage.startswith("Newton on q")]
-    assert newton[-1].index == SMALL_PLAN[0].rounds * SMALL_PLAN[0].sweeps
-    assert all(b.mean_shape > a.mean_shape for a, b in pairwise(newton))
-    assert newton[-1].mean_shape > newton[0].mean_shape + 0.15
-    worst = [sweep for sweep in result.history if sweep.stage == "worst first"]
-    assert worst
-    assert worst[-1].min_shape > newton[-1].min_shape
+    stages = [sweep.stage for sweep in result.history]
+    assert WHOLE in stages[0]
+    assert "worst first" in stages
+    assert result.after.shape.mean() > gmsnet.quality(mesh).shape.mean() - 0.005
+    assert result.after.shape.min() > gmsnet.quality(mesh).shape.min() - 0.01
 
 
 @pytest.mark.parametrize("seed", range(3))

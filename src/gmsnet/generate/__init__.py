@@ -1,7 +1,8 @@
-"""Test meshes: random triangles and quads, good and curved ones, boundary layers, grids, nodes thrown out of place."""
+"""Test meshes: random triangles and quads, good and curved ones, layers, grids, deformed ones, thrown nodes."""
 
 from gmsnet.generate.curved import disc_of_quads, on_circle, second_order, throw, waved
 from gmsnet.generate.curves import Curve
+from gmsnet.generate.deformed import moved_hole_mesh, sheared_mesh, swirled_mesh, terrain_mesh, zigzag_mesh
 from gmsnet.generate.disturb import disturb
 from gmsnet.generate.good import good_mesh
 from gmsnet.generate.graded import graded_mesh
@@ -24,15 +25,20 @@ __all__ = [
     "hybrid_mesh",
     "kershaw_mesh",
     "layered_mesh",
+    "moved_hole_mesh",
     "on_circle",
     "random_mesh",
     "random_quad_mesh",
     "recombine",
     "second_order",
     "settle",
+    "sheared_mesh",
     "split_edges",
     "split_into_quads",
     "structured_mesh",
+    "swirled_mesh",
+    "terrain_mesh",
     "throw",
     "waved",
+    "zigzag_mesh",
 ]

@@ -10,6 +10,9 @@ On meshes of up to SMALL free nodes, where all this takes milliseconds, more is 
 as there is anything to gain, and around the worst cells come sweeps of Newton's method on MetricLoss, for the mean,
 with every cell kept above a floor.
 
+Where nodes creep, many neighbours together one way (methods/creep.py), or much more is to come than the next rounds
+will bring, the mesh is deformed as a whole: then all nodes move at once (methods/whole_mesh.py), and the phase goes on.
+
 A phase goes on as long as more than its ``gain`` in the mean of 1/q (of a sample of the cells) is to come, if gains go
 on as the last two did. What each phase is worth is measured by ``benchmarks/auto.py``; see docs/auto.md.
 
@@ -26,11 +29,14 @@ from typing import NamedTuple
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.measures import mean_shape_of_sample
 from gmsnet.kernels.star.block import MOVED
+from gmsnet.kernels.star.guard import STAR
 from gmsnet.measure.target import Target
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
+from gmsnet.methods.creep import Creep
 from gmsnet.methods.optimize import Newton
+from gmsnet.methods.whole_mesh import WholeMesh
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
 from gmsnet.parallel.executor import Executor
 
@@ -38,6 +44,12 @@ SMALL = 5000  # free nodes
 SAMPLE = 32  # blocks of cells
 ALWAYS = 10**9  # sweeps
 RELAXATION = 1.6  # of the Newton steps
+SLOW = 0.02  # in the mean of 1/q: so much to come, by the last two gains, is more than sweeps should be left to bring
+AHEAD = 50  # times the last gain are at most expected to come
+PASSES = 8  # over the worst cells and what follows them, at most
+# In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
+PASS_GAIN, LAST_GAIN = 0.002, 0.003
+WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 
 
 class Phase(NamedTuple):
@@ -97,8 +109,15 @@ class Auto(Smoother):
     def __init__(self, phases: Sequence[Phase] = ()) -> None:
         self.phases = phases
         self.at = -1
+        self.creep: Creep | None = None
+        self.whole = 0  # how often all nodes have moved at once
+        self.slow = False
+        self.passes, self.least = 0, -math.inf  # passes over the worst cells, and the least 1/q after the last one
+        self.again = -1  # the phase to go back to in the end, if there is one
 
     def _enter(self, phase: int, field: Field) -> None:
+        if phase == len(self.phases) and self.again >= 0:
+            phase, self.again = self.again, -1
         self.at, self.made, self.rounds, self.gained = phase, 0, 0, math.inf
         if phase == len(self.phases):
             self.converged = True
@@ -111,17 +130,56 @@ class Auto(Smoother):
         """See Smoother."""
         if self.at < 0:
             large = LARGE_PLAN if field.topology.near_shapes is None else QUADS_PLAN
+            if not self.phases and field.level != STAR:
+                self.creep = Creep.of(field)
             self.phases = self.phases or (SMALL_PLAN if len(field.topology.free) <= SMALL else large)
             self._enter(0, field)
         phase = self.phases[self.at]
+        if self.slow:
+            return self._move_all(field, executor, test)
+        watched = self.creep if phase.rounds > 1 and self.made + 1 == self._wanted else None
+        if watched is not None:
+            watched.start(field.points)
         tally = self.smoother.sweep(field, executor, test)
         self.phase = phase.name
         self.made += 1
         self.looks = False
-        wanted = phase.first if phase.first and not self.rounds else phase.sweeps
-        if self.made == wanted or self.smoother.converged or not tally[MOVED]:
+        if self.made == self._wanted or self.smoother.converged or not tally[MOVED]:
             self._end_round(field)
         return tally
+
+    @property
+    def _wanted(self) -> int:
+        """How many sweeps this round has."""
+        phase = self.phases[self.at]
+        return phase.first if phase.first and not self.rounds else phase.sweeps
+
+    def _move_all(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
+        """All nodes at once; then the phase goes on as if it began."""
+        self.slow, self.looks, self.phase = False, False, WHOLE
+        self.whole += 1
+        tally = WholeMesh().sweep(field, executor, test)
+        if tally[MOVED]:
+            self.rounds, self.made, self.gained = 0, 0, math.inf
+            self.mean = mean_shape(field)
+        else:
+            self.whole = MOST_WHOLE
+        return tally
+
+    def _look_at_worst(self, smoother: WorstFirst) -> None:
+        """Is the worst cell to have another turn, once others have made room for it?"""
+        self.passes += 1
+        gains = smoother.least >= self.least + PASS_GAIN
+        if self.passes == 1 and self.phases is not SMALL_PLAN:
+            gains = smoother.gained >= LAST_GAIN
+        self.again = self.at if gains and self.passes < PASSES else -1
+        self.least = smoother.least
+
+    def _is_slow(self, field: Field, ahead: float) -> bool:
+        """Is the mesh deformed as a whole? ahead: what is to come in the mean of 1/q."""
+        if self.creep is None or self.whole >= MOST_WHOLE:
+            return False
+        return ahead > SLOW or self.creep.is_one(field.points)
 
     def _end_round(self, field: Field) -> None:
         """Makes the phase once more where that pays, else goes on to the next one, or settles."""
@@ -130,15 +188,21 @@ class Auto(Smoother):
         self.made = 0
         goes_on = False
         if self.rounds < phase.rounds:
-            mean = mean_shape(field)
+            mean, ahead = mean_shape(field), 0.0
             if phase.first and self.rounds == 1:
                 goes_on = True
             else:
                 before, self.gained = self.gained, mean - self.mean
-                goes_on = to_come(before, self.gained) > phase.gain
+                ahead = to_come(before, self.gained)
+                goes_on = ahead > phase.gain
+                ahead = min(ahead, AHEAD * self.gained) if before < math.inf else 0.0
             self.mean = mean
+            self.slow = self._is_slow(field, ahead)
+            goes_on = goes_on or self.slow
         target_reached = self.smoother.target_reached
         self.looks = self.rounds % phase.often == 0 if goes_on else phase.looks or target_reached
+        if isinstance(self.smoother, WorstFirst) and self.creep is not None:
+            self._look_at_worst(self.smoother)
         if not goes_on:
             self._enter(len(self.phases) if target_reached else self.at + 1, field)
 

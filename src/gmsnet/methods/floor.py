@@ -43,6 +43,10 @@ class Floor:
         self.enough = self.LOOKS
         self._watch(np.unique(cells[np.argpartition(shape, few)[: few + 1]] // LANES))
 
+    def forget(self) -> None:
+        """All nodes may be elsewhere: which blocks hold the worst is not known."""
+        self.blocks = None
+
     def swept(self, tally: NDArray[np.int64]) -> None:
         """Takes note of what happened to the shifts of a whole sweep."""
         self.unhindered += not (tally[TRUNCATED] or tally[DROPPED])

@@ -50,7 +50,12 @@ GAIN = 1e-4  # in the minimum 1/q: less is none
 
 
 class WorstFirst(Smoother):
-    """See the module. at_once: how many cycles a sweep makes; a ranking of all cells costs more than a late cycle."""
+    """See the module. at_once: how many cycles a sweep makes; a ranking of all cells costs more than a late cycle.
+
+    least: the minimum 1/q after the last sweep. gained: what the last cycle of it has brought.
+    """
+
+    least = gained = -math.inf
 
     def __init__(self, cycles: tuple[Cycle, ...] = CYCLES, at_once: int = 1) -> None:
         self.cycles, self.at_once = cycles, at_once
@@ -64,16 +69,17 @@ class WorstFirst(Smoother):
         simplices = topology.changeable
         if self.cells is None or self.next >= len(self.cycles):
             self.cells = candidates(field, executor)
-        late = self.next >= len(self.cycles)
-        chosen = LAST if late else self.cycles[self.next : self.next + self.at_once]
+        goes_on = self.next >= len(self.cycles)
+        chosen = LAST if goes_on else self.cycles[self.next : self.next + self.at_once]
         count = simplices.cell_count
         plan = [(max(FEWEST, math.ceil(cycle.share * count)), cycle.power, cycle.sweeps) for cycle in chosen]
-        before, after = kernels.cycles(
+        before, late, after = kernels.cycles(
             field.points, simplices, self.cells, topology.near_free, topology.memory, topology.links,
             field.guard(executor), np.array(plan), tally,
         )  # fmt: skip
         self.next += len(chosen)
-        self.converged = late and after < before + GAIN
+        self.converged = goes_on and after < before + GAIN
+        self.least, self.gained = after, after - late
         return tally
 
 

@@ -21,7 +21,8 @@ LEAST = 1e-6  # of 1/q, where cells are inverted: the scale of q is taken from t
 
 @kernel
 def cycles(points, simplices, cells, free, memory, stars, guard, plan, tally):
-    """Makes the cycles of a plan among the cells; returns the minimum 1/q of these before and after it.
+    """Makes the cycles of a plan among the cells; returns the minimum 1/q of these before it, before its last cycle,
+    and after it.
 
     cells: indices of corner simplices. free: (N,) bool. memory: (N,) ids. stars: of all nodes (kernels.star.pattern).
     plan: (C, 3) of cells to take, log₂ of the power p, and visits to their free nodes. tally: (3,), added to.
@@ -30,15 +31,16 @@ def cycles(points, simplices, cells, free, memory, stars, guard, plan, tally):
     for i in range(len(points)):
         mark[i] = False
     shapes_of(points, simplices, cells, shape)
-    before = least(shape)
+    before = late = least(shape)
     for c in range(len(plan)):
+        late = least(shape)
         wanted = min(plan[c, 0], len(cells))
         limit = smallest(shape, wanted - 1)
-        scale = max(least(shape), LEAST) / math.sqrt(3.0)
+        scale = max(late, LEAST) / math.sqrt(3.0)
         nodes = free_nodes(simplices.rows, cells, shape, limit, free, memory, mark)
         visit(points, nodes, stars, guard, plan[c, 1], plan[c, 2], scale, None, mark, None, tally)
         shapes_of(points, simplices, cells, shape)
-    return before, least(shape)
+    return before, late, least(shape)
 
 
 @part

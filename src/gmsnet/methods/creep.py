@@ -1,0 +1,57 @@
+"""Whether nodes creep: neighbours all move one way, sweep after sweep, each by little.
+
+Sweeps over single stars even out what differs from node to node at once. What they leave to later sweeps are long
+waves, in which the shifts of neighbours are alike. Of the nodes of a window, neighbours in memory and so in the plane,
+the coherence of their shifts is |Σ shift|²/(n Σ |shift|²): 1/n for shifts of their own, 1 for shifts in common. After
+five sweeps it is 0.05 to 0.2 on random and jittered meshes, 0.6 to 0.95 on sheared or swirled ones.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.methods.base import Field
+
+WINDOW, WINDOWS = 64, 64  # nodes; windows at most, evenly taken
+FEWEST = 4  # windows: smaller meshes are done by sweeps
+COHERENT = 0.5  # over all windows
+# Of the whole mesh: a wave as long as the mesh, which moves by so much a sweep, has this share of Σq to lose.
+WORTHWHILE = 0.01
+
+
+class Creep:
+    """Some nodes, and where they were before a sweep. nodes: (n, WINDOW) places in memory. free: how many move."""
+
+    def __init__(self, nodes: NDArray[np.intp], free: int) -> None:
+        self.nodes, self.free = nodes, free
+        self.before = np.empty((0, 2))
+
+    @classmethod
+    def of(cls, field: Field) -> Creep | None:
+        """Of a mesh; None for small ones."""
+        free = np.flatnonzero(field.topology.near_free)
+        count = len(free) // WINDOW
+        if count < FEWEST:
+            return None
+        windows = free[: count * WINDOW].reshape(count, WINDOW)
+        return cls(windows[np.unique(np.linspace(0, count - 1, min(count, WINDOWS)).astype(int))], len(free))
+
+    def start(self, points: NDArray[np.float64]) -> None:
+        """A sweep begins."""
+        self.before = points[self.nodes]
+
+    def is_one(self, points: NDArray[np.float64]) -> bool:
+        """Did the nodes creep in the sweep that began last?"""
+        shifts = points[self.nodes] - self.before
+        square = float((shifts * shifts).sum())
+        if not square > 0.0:
+            return False
+        together = shifts.sum(axis=1)
+        coherence = float((together * together).sum()) / (WINDOW * square)
+        edges = np.diff(points[self.nodes], axis=1)
+        edge = float((edges * edges).sum()) / edges[..., 0].size
+        rows = math.sqrt(self.free) / math.pi
+        return coherence >= COHERENT and square / shifts[..., 0].size * rows * rows >= WORTHWHILE * edge

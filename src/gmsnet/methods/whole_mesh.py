@@ -1,0 +1,256 @@
+"""All free nodes at once: conjugate gradients on Σq over the mesh, preconditioned by multigrid.
+
+Where a mesh is deformed as a whole, over n rows of cells, sweeps over single stars need about n² of themselves. Here
+long waves go as fast as short ones. The start is the mesh as it is, or harmonic places (Tutte: How to draw a graph,
+1963), where these have no inverted cell and a smaller Σq. From there come nonlinear conjugate gradients (Polak and
+Ribière; Nocedal, Wright: Numerical Optimization, section 5.2) with the Laplacian of kernels.whole.graph, which follows
+the mesh, for a preconditioner. No step goes as far as where a first cell has no area left.
+
+It is a transaction: what comes out is taken if the guard allows each cell, and Σq is smaller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.simplex.mean_ratio2 import WEIGHTS
+from gmsnet.kernels.star.block import MOVED
+from gmsnet.kernels.star.guard import VALID
+from gmsnet.kernels.untangle.barrier import energy
+from gmsnet.kernels.untangle.cells import find_bad
+from gmsnet.kernels.whole import graph, multigrid, steps
+from gmsnet.kernels.whole.graph import Matrix
+from gmsnet.methods.base import Field, Smoother, Tally
+from gmsnet.methods.worst_first import WorstFirst
+from gmsnet.parallel.executor import Executor
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+ITERATIONS, HARMONIC_ITERATIONS = 120, 30
+ACCURATE = 1e-4  # of the first residual: harmonic places need not be more so
+REFRESH = 10  # iterations after which the Laplacian is formed anew
+SETTLED, PATIENCE = 3e-5, 2  # a smaller share of Σq gained in so many iterations one after the other is the end
+ARMIJO, HALVINGS, INSIDE = 1e-4, 25, 0.9
+COARSEST, COARSE_SWEEPS = 60, 6
+TWICE = 2  # levels below the finest on which a correction may be made of two
+ENOUGH = 0.25  # of the residual that is left after the first correction: then there is no second one
+REPAIRS = 3  # lists of cycles on the worst cells, where they are worse than the guard allows
+
+
+class Multigrid:
+    """An approximate inverse of a Laplacian."""
+
+    def __init__(self, matrix: Matrix) -> None:
+        self.levels: list[tuple[Matrix, Ints]] = []
+        while len(matrix.diagonal) > COARSEST:
+            aggregate, smaller = multigrid.coarser(matrix)
+            if len(smaller.diagonal) > 0.8 * len(matrix.diagonal):
+                break
+            self.levels.append((matrix, aggregate))
+            matrix = smaller
+        self.coarsest = matrix
+
+    def __call__(self, residual: Floats) -> Floats:
+        """One cycle: (n, 2) to (n, 2)."""
+        return self._cycle(residual, 0)
+
+    def _cycle(self, b: Floats, level: int) -> Floats:
+        x = np.empty_like(b)
+        if level == len(self.levels):
+            multigrid.settled(self.coarsest, COARSE_SWEEPS, b, x)
+            return x
+        matrix, aggregate = self.levels[level]
+        multigrid.forth(matrix, b, x)
+        rest = np.empty((len(self._matrix(level + 1).diagonal), 2))
+        multigrid.remainder(matrix, aggregate, b, x, rest)
+        correct = self._twice if level < TWICE else self._cycle
+        multigrid.back(matrix, aggregate, correct(rest, level + 1), b, x)
+        return x
+
+    def _twice(self, b: Floats, level: int) -> Floats:
+        """One or two cycles, combined as conjugate gradients would (Notay's K-cycle)."""
+        matrix = self._matrix(level)
+        first, of_first = self._cycle(b, level), np.empty_like(b)
+        multigrid.times(matrix, first, of_first)
+        bend = multigrid.product(first, of_first)
+        if not bend > 0.0:
+            return first
+        share = multigrid.product(first, b) / bend
+        rest = b - share * of_first
+        if multigrid.product(rest, rest) <= ENOUGH * ENOUGH * multigrid.product(b, b):
+            scaled: Floats = share * first
+            return scaled
+        second, of_second = self._cycle(rest, level), np.empty_like(b)
+        multigrid.times(matrix, second, of_second)
+        common = multigrid.product(second, of_first)
+        own = multigrid.product(second, of_second) - common * common / bend
+        more = multigrid.product(second, rest) / own if own > 0.0 else 0.0
+        both: Floats = (share - more * common / bend) * first + more * second
+        return both
+
+    def _matrix(self, level: int) -> Matrix:
+        return self.levels[level][0] if level < len(self.levels) else self.coarsest
+
+
+@dataclass(eq=False)
+class Problem:
+    """Σq over corner simplices as a function of the places of some nodes.
+
+    cells: (S, 3) counter-clockwise. table: (S, 3) weights, None where all are 1. moved: (n,) the nodes that move.
+    number: (N,) their rows, −1 for others. matrix: the Laplacian. nothing: (N,) zeros.
+    """
+
+    cells: Ints
+    table: Floats | None
+    moved: NDArray[np.intp]
+    number: Ints
+    matrix: Matrix
+    nothing: Floats
+
+    @classmethod
+    def of(cls, field: Field) -> Problem:
+        """Of the free nodes that do not slide and have no cell that is not certified positive."""
+        topology, precision = field.topology, field.precision
+        simplices, free = topology.changeable, topology.near_free.copy()
+        if field.constraint is not None:
+            free[field.constraint.row >= 0] = False
+        bad, every = np.empty(len(simplices.rows), dtype=bool), np.ones(len(simplices.rows), dtype=bool)
+        if find_bad(field.points, field.points, simplices, every, precision.unit, precision.grain, bad):
+            free[simplices.rows[bad]] = False
+        rows, orientation = simplices.rows, simplices.orientation
+        table = None if simplices.shapes is None else WEIGHTS[simplices.shapes]
+        good = free[rows].any(axis=1)
+        cells = np.where(orientation[:, None] > 0, rows, rows[:, [0, 2, 1]])[good]
+        table = None if table is None else table[good]
+        moved = np.flatnonzero(free)
+        number = np.full(len(free), -1, dtype=np.int32)
+        number[moved] = np.arange(len(moved), dtype=np.int32)
+        start, column = graph.neighbours(cells, table, number, len(moved))
+        matrix = Matrix(start, column, np.empty(len(column)), np.empty(len(moved)))
+        return cls(np.ascontiguousarray(cells), table, moved, number, matrix, np.zeros(len(free)))
+
+    def inverse(self, points: Floats, *, even: bool = False) -> Multigrid:
+        """Of the Laplacian for the points as they are."""
+        graph.assemble(points, self.cells, self.table, self.number, even, self.matrix)
+        return Multigrid(self.matrix)
+
+    def value(self, points: Floats, gradient: Floats) -> float:
+        """Σq, and its gradient (N, 2); more than any mesh has where a cell is inverted."""
+        total: float = energy(points, self.cells, self.table, self.nothing, 0.0, gradient)
+        return total
+
+    def harmonic(self, points: Floats) -> Floats:
+        """Each node that moves at the weighted mean of its neighbours."""
+        inverse = self.inverse(points, even=True)
+        rest, x = np.empty((len(self.moved), 2)), np.zeros((len(self.moved), 2))
+        graph.pull_of_neighbours(points, self.cells, self.table, self.number, rest)
+        close = ACCURATE**2 * multigrid.product(rest, rest)
+        z = inverse(rest)
+        along, slope, image = z, multigrid.product(rest, z), np.empty_like(z)
+        for _ in range(HARMONIC_ITERATIONS):
+            if not slope > 0.0:
+                break
+            multigrid.times(self.matrix, along, image)
+            share = slope / multigrid.product(along, image)
+            x += share * along
+            before, rest = rest, rest - share * image
+            if multigrid.product(rest, rest) <= close:
+                break
+            z = inverse(rest)
+            following = multigrid.product(rest, z)
+            along = z + ((following - multigrid.product(before, z)) / slope) * along  # z is not quite linear in rest
+            slope = following
+        found = points.copy()
+        found[self.moved] += x
+        return found
+
+    def minimise(self, points: Floats) -> Floats:
+        """Where conjugate gradients lead from points (N, 2) without an inverted cell."""
+        gradient = np.empty_like(points)
+        value = self.value(points, gradient)
+        slopes = gradient[self.moved]
+        inverse, age, small, length = self.inverse(points), 0, 0, 1.0
+        z = inverse(slopes)
+        fall = multigrid.product(slopes, z)
+        along = -z
+        for _ in range(ITERATIONS):
+            slope = multigrid.product(slopes, along)
+            if not slope < 0.0:
+                along, slope = -z, -fall
+            shifts = np.zeros_like(points)
+            shifts[self.moved] = along
+            length = min(length, INSIDE * steps.largest_step(points, self.cells, shifts))
+            for _ in range(HALVINGS):
+                there = points + length * shifts
+                after = self.value(there, gradient)
+                if after <= value + ARMIJO * length * slope:
+                    break
+                length *= 0.5
+            else:
+                break
+            small = small + 1 if value - after < SETTLED * value else 0
+            points, value = there, after
+            if small == PATIENCE:
+                break
+            before, slopes = slopes, gradient[self.moved]
+            age += 1
+            if age == REFRESH:
+                inverse, age = self.inverse(points), 0
+                z = inverse(slopes)
+                fall, along, length = multigrid.product(slopes, z), -z, 1.0
+                continue
+            z = inverse(slopes)
+            share = max(0.0, multigrid.product(slopes - before, z) / fall)
+            fall = multigrid.product(slopes, z)
+            along = share * along - z
+            length *= 2.0
+        return points
+
+
+class WholeMesh(Smoother):
+    """One sweep moves all nodes. Not for the level STAR, whose floors such moves do not know."""
+
+    stops_when_idle = False
+
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
+        """See Smoother."""
+        self.converged = True
+        tally = np.zeros(3, dtype=np.int64)
+        problem = Problem.of(field)
+        if not len(problem.moved):
+            return tally
+        before, gradient = field.points, np.empty_like(field.points)
+        value, start, harmonic = problem.value(before, gradient), before, problem.harmonic(before)
+        if problem.value(harmonic, gradient) < value:
+            start = harmonic
+        found = self._allowed(problem.minimise(start), field, executor)
+        if found is not None and problem.value(found, gradient) < value:
+            tally[MOVED] = (found != before).any(axis=1).sum()
+            field.points[:] = found
+            field.floor.forget()
+        return tally
+
+    def _allowed(self, points: Floats, field: Field, executor: Executor) -> Floats | None:
+        """The points as they can be taken, perhaps after cycles on the worst cells; None if they cannot be."""
+        floor = max(field.guard(executor).floor, 0.0)
+        for repair in range(REPAIRS + 1):
+            if field.precision.single:
+                points = points.astype(np.float32).astype(np.float64)
+            below = steps.count_below(
+                points, field.points, field.topology.changeable, floor, field.precision.unit, field.precision.grain
+            )
+            if not below:
+                return points
+            if repair == REPAIRS or not floor > 0.0:
+                return None
+            points = points.copy()
+            aside = Field(points, field.topology, field.precision, VALID, constraint=field.constraint)
+            worst_first = WorstFirst()
+            for _ in worst_first.cycles:
+                worst_first.sweep(aside, executor, lambda: False)
+        return None

@@ -1,0 +1,154 @@
+"""All nodes at once: meshes that are deformed as a whole come to their optimum, and the guard allows what is taken."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support import quads as naive
+
+import gmsnet
+from gmsnet.generate import disturb, hybrid_mesh, kershaw_mesh, moved_hole_mesh, sheared_mesh, swirled_mesh, zigzag_mesh
+from gmsnet.kernels.star.block import MOVED
+from gmsnet.kernels.star.guard import VALID, WORST, Precision
+from gmsnet.methods import Field
+from gmsnet.methods.auto import WHOLE
+from gmsnet.methods.creep import Creep
+from gmsnet.methods.whole_mesh import WholeMesh
+from gmsnet.parallel.threads import serial
+from gmsnet.run.run import precision_of
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
+
+HALVES = 3**0.5 / 2  # 1/q of the halves of a square
+DEFORMED = {
+    "sheared": lambda: sheared_mesh(40, amplitude=0.9, waves=2),
+    "swirled": lambda: swirled_mesh(40),
+    "zigzag": lambda: zigzag_mesh(30),
+}
+QUADS = {
+    "sheared quads": lambda: sheared_mesh(40, amplitude=0.9, waves=2, cells="quad"),
+    "swirled quads": lambda: swirled_mesh(40, cells="quad"),
+    "zigzag quads": lambda: zigzag_mesh(30, cells="quad"),
+}
+
+
+def field_of(mesh, level=WORST):
+    topology = Topology.of(mesh)
+    return Field(planar_points(mesh)[topology.memory], topology, precision_of(mesh), level)
+
+
+@pytest.mark.parametrize("name", [*DEFORMED, *QUADS])
+def test_a_grid_that_was_deformed_is_even_again(name):
+    mesh = {**DEFORMED, **QUADS}[name]()
+    result = gmsnet.smooth(mesh, preserve="none")
+    assert any(WHOLE in sweep.stage for sweep in result.history)
+    best = HALVES if name in DEFORMED else 1.0
+    assert result.after.shape.min() > best - 0.005
+    assert not result.after.inverted
+
+
+@pytest.mark.parametrize("level", [VALID, WORST])
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("name", ["sheared", "swirled quads", "mixed"])
+def test_what_is_taken_keeps_the_guard(name, single, level):
+    makers = {**DEFORMED, **QUADS, "mixed": lambda: disturb(m := hybrid_mesh(600, seed=1), Topology.of(m).free, 0.3)}
+    mesh = makers[name]()
+    points = np.float64(np.float32(mesh.points)) if single else mesh.points
+    mesh = gmsnet.Mesh(points, mesh.cells, single=single)
+    field = field_of(mesh, level)
+    before = field.points.copy()
+    tally = WholeMesh().sweep(field, serial, lambda: False)
+    assert tally[MOVED] > 0
+    held = ~field.topology.near_free
+    assert field.points[held].tobytes() == before[held].tobytes()
+    after = np.empty_like(field.points)
+    after[field.topology.memory] = np.ldexp(field.points, mesh.exponent)
+    moved = mesh.with_points(after)
+    if single:
+        assert (np.float64(np.float32(after)) == after).all()
+    was, now = naive.figures(mesh), naive.figures(moved)
+    assert now["invalid"] == 0
+    assert now["mean"] > was["mean"]
+    if level == WORST:
+        assert now["min"] >= was["min"]
+
+
+def test_cells_that_are_inverted_stay_as_they_are():
+    mesh = sheared_mesh(20, amplitude=0.5)
+    topology = Topology.of(mesh)
+    points = mesh.points.copy()
+    points[topology.free[150]] += 0.3
+    field = field_of(mesh.with_points(points))
+    before = field.points.copy()
+    tally = WholeMesh().sweep(field, serial, lambda: False)
+    assert tally[MOVED] > 0
+    bad = gmsnet.quality(mesh.with_points(points)).sign < 0
+    nodes = np.isin(field.topology.memory, mesh.cells[0].nodes[bad])
+    assert bad.any()
+    assert field.points[nodes].tobytes() == before[nodes].tobytes()
+
+
+def test_nothing_is_moved_where_nothing_can_be():
+    mesh = sheared_mesh(2)
+    field = field_of(mesh)
+    field.topology = field.topology.holding(np.ones(len(mesh.points), dtype=bool), "test")
+    assert WholeMesh().sweep(field, serial, lambda: False)[MOVED] == 0
+
+
+def test_the_best_is_left_as_it_is():
+    field = field_of(sheared_mesh(20, amplitude=0.0))
+    before = field.points.copy()
+    WholeMesh().sweep(field, serial, lambda: False)
+    assert np.abs(field.points - before).max() < 1e-6
+
+
+def test_nodes_that_slide_wait():
+    mesh = swirled_mesh(24)
+    points = mesh.points.copy()
+    side = np.flatnonzero((points[:, 1] == 0.0) & (points[:, 0] > 0.0) & (points[:, 0] < 1.0))
+    points[side, 0] **= 1.2
+    result = gmsnet.smooth(mesh.with_points(points), slide=True, preserve="none")
+    assert any(WHOLE in sweep.stage for sweep in result.history)
+    assert not result.after.inverted
+    assert (result.points[side, 1] == 0.0).all()
+    assert result.after.shape.min() > HALVES - 0.02
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_meshes_do_not_creep(seed):
+    for mesh in (gmsnet.random_mesh(2000, seed=seed), gmsnet.random_mesh(8000, seed=seed)):
+        assert not any(WHOLE in sweep.stage for sweep in gmsnet.smooth(mesh).history)
+
+
+def test_coherent_shifts_are_creep_and_others_are_not():
+    field, rng = field_of(sheared_mesh(60, amplitude=0.0)), np.random.default_rng(1)
+    creep = Creep.of(field)
+    creep.start(field.points)
+    assert not creep.is_one(field.points)
+    assert creep.is_one(field.points + 0.002)
+    assert not creep.is_one(field.points + 1e-7)
+    assert not creep.is_one(field.points + rng.normal(0.0, 0.002, field.points.shape))
+    assert Creep.of(field_of(gmsnet.random_mesh(100, seed=1))) is None
+
+
+def test_the_level_star_does_without():
+    mesh = sheared_mesh(40, amplitude=0.9)
+    assert not any(WHOLE in sweep.stage for sweep in gmsnet.smooth(mesh, guard="star", preserve="none").history)
+
+
+def test_one_call_ends_where_two_end():
+    for mesh in (sheared_mesh(60, amplitude=0.7), kershaw_mesh(48), moved_hole_mesh(0.04, shift=1.2)):
+        once = gmsnet.smooth(mesh, preserve="none")
+        twice = gmsnet.smooth(once.mesh, preserve="none")
+        assert twice.after.shape.mean() < once.after.shape.mean() + 0.01
+        assert twice.after.shape.min() < once.after.shape.min() + 0.03
+
+
+def test_threads_change_no_bit():
+    mesh = swirled_mesh(50)
+    one, two = (gmsnet.smooth(mesh, preserve="none", threads=threads).points for threads in (1, 2))
+    assert one.tobytes() == two.tobytes()
+
+
+def test_precision_is_that_of_the_mesh():
+    assert Precision() == precision_of(sheared_mesh(4))
