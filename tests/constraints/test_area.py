@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from support.naive_curves import patchwork, sagittas
 from support.sliding import constraint_by_ids, push, slid_at_random
@@ -32,6 +32,7 @@ def exact_areas(mesh: Mesh, points: np.ndarray) -> dict[int, Fraction]:
 
 
 @given(st.integers(0, 2**32 - 1))
+@example(95043149)  # one region, which is not number 0
 def test_areas_are_exact_and_rounded_once(seed):
     rng = np.random.default_rng(seed)
     mesh = patchwork(seed, even=True)

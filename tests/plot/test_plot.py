@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gmsnet.errors import InputError, MissingExtraError
-from gmsnet.generate import random_mesh
+from gmsnet.generate import random_mesh, random_quad_mesh, structured_mesh
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -107,6 +107,16 @@ def test_histograms_count_every_cell():
     for axes in figure.axes[-2:]:
         bars = sum(patch.get_height() for patch in axes.patches if hasattr(patch, "get_height"))
         assert bars == pytest.approx(200)
+
+
+@pytest.mark.parametrize(("mesh", "best"), [
+    (SMALL, 60.0), (structured_mesh(6), 90.0), (random_quad_mesh(60, cells="mixed", seed=1), 90.0)
+])  # fmt: skip
+def test_histograms_of_angles_go_to_the_best_angle(mesh, best):
+    axes = smoothing._figure([view(mesh)]).axes[-1]
+    assert axes.get_xlim()[1] == best
+    bars = sum(patch.get_height() for patch in axes.patches if hasattr(patch, "get_height"))
+    assert bars == pytest.approx(100)
 
 
 @pytest.mark.parametrize("flat", [0, 1, 2])

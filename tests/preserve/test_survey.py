@@ -99,3 +99,14 @@ def test_nodes_between_regions_are_on_the_rim():
     assert set(np.flatnonzero(rim).tolist()) == {
         *held["boundary"].tolist(), *held["interface between regions"].tolist()
     }  # fmt: skip
+
+
+def test_the_rim_is_the_same_where_nodes_slide():
+    """Nodes of the boundary that move along it are still of the boundary."""
+    across, y = np.linspace(0.0, 2.0, 21), np.linspace(-1.0, 1.0, 21)
+    mesh = grid(across, y, region=lambda centre: (centre[:, 1] > 0).astype(int))
+    still, sliding = Topology.of(mesh), Topology.of(mesh, sliding=np.arange(len(mesh.points)) % 3 > 0)
+    assert 0 < len(sliding.held["boundary"]) < len(still.held["boundary"])
+    one, other = Survey.of(mesh, still), Survey.of(mesh, sliding)
+    assert (one.rim[still.places] == other.rim[sliding.places]).all()
+    assert (one.suspects[still.places] == other.suspects[sliding.places]).all()

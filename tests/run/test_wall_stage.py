@@ -69,3 +69,18 @@ def test_nothing_to_move():
     assert last.points.tobytes() == first.start.tobytes()
     assert last.stop_reason == stop.NOTHING_TO_MOVE
     assert last.history == ()
+
+
+def test_the_airfoil_with_nodes_that_slide(real_meshes):
+    """They are near their wall as those that are held would be, and their cells keep their areas, too."""
+    mesh = gmsnet.read(real_meshes / "mesh_NACA0012_inv.su2")
+    result = gmsnet.smooth(mesh, slide=True)
+    first = first_state(mesh, None, OPTIONS.smoother(), replace(OPTIONS, slide=True), serial)
+    kept, wall = first.protection.kept, mesh.markers["airfoil"]
+    assert kept[wall].sum() > 0.9 * len(wall)
+    assert result.moved[wall].sum() > 0.9 * len(wall)
+    triangles = first.topology.triangles
+    cells = kept[triangles].all(axis=1)
+    assert cells.sum() > 1600
+    ratio = doubles(result.points[:, :2], triangles) / doubles(mesh.points[:, :2], triangles)
+    assert np.abs(ratio[cells] - 1.0).max() <= 0.1

@@ -47,7 +47,12 @@ def borders_of(mesh: Mesh, points: Floats) -> Borders:
     if not consistent.all() or (kinds == NON_MANIFOLD).any():
         halves = np.arange(len(twin))  # what does not cancel between faces must be added
     face = halves // 3 if faces.face is None else faces.face[halves]
-    ids, region = np.unique(faces.region, return_inverse=True) if len(faces.region) else (np.zeros(1, np.int64), None)
+    region = None
+    if len(faces.region):
+        ids, region = np.unique(faces.region, return_inverse=True)
+    else:  # one region, or no face
+        blocks = [block.regions[:1] for block in mesh.cells if block.dimension == 2 and len(block.nodes)]
+        ids = np.concatenate([*blocks, np.zeros(1, dtype=np.int64)])[:1]
     forth = turn[face] > 0
     tail = np.where(forth, faces.corner[halves], head[halves]).astype(np.int64)
     return Borders(

@@ -16,11 +16,15 @@ if TYPE_CHECKING:
 def histogram(axes: Axes, views: Sequence[View], name: str, label: str) -> None:
     """The share of cells by a measure (an array of QualityReport, by name), and a mark at the minimum value.
 
-    The axis goes to 60 degrees for ``min_angle`` and to 1 else, and below 0 if cells are inverted.
+    The axis goes to the best value there is: for ``min_angle`` 60 degrees, or 90 where there are quads, and 1 else.
+    Below 0 if cells are inverted.
     """
     values = [getattr(view.report, name) for view in views]
     low = min([0.0, *(float(v.min()) for v in values)])
-    bins = np.linspace(low, 60.0 if name == "min_angle" else 1.0, 61).tolist()
+    best = 1.0
+    if name == "min_angle":
+        best = 90.0 if any(view.corners.shape[1] == 4 for view in views) else 60.0
+    bins = np.linspace(low, best, 61).tolist()
     for view, each in zip(views, values, strict=True):
         share = np.full(len(each), 100.0 / len(each))
         axes.hist(each, bins, weights=share, color=view.colour, alpha=0.35, edgecolor="none")

@@ -26,6 +26,7 @@ from gmsnet.kernels.topology.components import pieces, surroundings
 from gmsnet.mesh.display import plain
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
+from gmsnet.preserve.rows import followed
 from gmsnet.preserve.survey import FEW, MOST, SEED, Survey
 from gmsnet.topology.ordering import planar_points
 from gmsnet.topology.topology import Topology
@@ -157,6 +158,8 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:
     if of_cell is not None:
         whole = np.zeros(int(of_cell.max(initial=-1)) + 1, dtype=bool)
         whole[of_cell[chosen]] = True
+        if len(topology.quads):
+            whole = _followed(topology, points, whole)
         chosen = whole[of_cell]
     damaged = chosen & (cells[:, stretch.AREA] <= BROKEN * _area_around(triangles, cells, number))
     nodes = np.zeros(len(layer), dtype=bool)
@@ -168,6 +171,15 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:
     first = np.ones(len(chosen), dtype=bool) if of_cell is None else np.append(True, np.diff(of_cell) != 0)
     broken = damaged.sum() if of_cell is None else len(np.unique(of_cell[damaged]))
     return Layers(nodes, chosen[first], float(np.median(lengths)), float(lengths.max()), int(broken))
+
+
+def _followed(topology: Topology, points: Floats, whole: Flags) -> Flags:
+    """The faces (F,) of layers, in the order of ``near_cells``, with the quads that continue their rows."""
+    of_file = np.zeros(len(topology.face_cell), dtype=bool)
+    of_file[topology.near_origin[: len(whole)]] = whole
+    number = np.searchsorted(topology.face_cell, topology.quad_cell)
+    of_file[number] = followed(topology.quads, points, of_file[number])
+    return of_file[topology.near_origin[: len(whole)]]
 
 
 def _next_row(triangles: NDArray[np.int32], layer: Flags, count: NDArray[np.int8], cells: Floats) -> NDArray[np.int64]:

@@ -44,7 +44,8 @@ class Survey:
         near = near_points(mesh, topology) if near is None else near
         nodes = np.zeros(len(near), dtype=np.uint8)
         for reason, bit in (("boundary", kernels.BOUNDARY), ("interface between regions", kernels.INTERFACE)):
-            nodes[topology.held.get(reason, np.empty(0, dtype=np.int64))] = bit
+            for found in (topology.held, topology.sliding):
+                nodes[found.get(reason, np.empty(0, dtype=np.int64))] = bit
         rim = np.take(nodes, topology.memory)
         ring = np.zeros((len(rim), 4), dtype=np.float32)
         beside, total = kernels.first_ring(near, topology.near, rim, MOST, ring)

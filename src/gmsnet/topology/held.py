@@ -61,12 +61,18 @@ def _mark_of(mesh: Mesh, block: CellBlock) -> int:
     return marks_of.SECOND_ORDER if curved else marks_of.UNSUPPORTED_CELL
 
 
-def released(marks: Marks, sliding: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Of some nodes (N, by places in memory), those that are held for being on a curve alone; they lose their marks."""
+def released(
+    marks: Marks, sliding: NDArray[np.bool_], position: Ints
+) -> tuple[NDArray[np.bool_], dict[str, NDArray[np.int64]]]:
+    """Of some nodes (N, by places in memory), those that are held for being on a curve alone; they lose their marks.
+
+    And the reasons that they were held for, as in ``sorted_out``.
+    """
     curve = np.uint16(marks_of.BOUNDARY | marks_of.INTERFACE | marks_of.LINE)
     freed: NDArray[np.bool_] = sliding & (marks & curve != 0) & (marks & ~curve == 0)
+    reasons, _, _ = sorted_out(np.where(freed, marks, np.uint16(0)), position)
     marks[freed] = 0
-    return freed
+    return freed, reasons
 
 
 def sorted_out(marks: Marks, position: Ints) -> tuple[dict[str, NDArray[np.int64]], Ints, Ints]:

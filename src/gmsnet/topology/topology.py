@@ -46,6 +46,7 @@ class Topology:
     move. colouring: of all nodes that were free at first, in the order of the ids, so that colours follow from the
     connectivity alone. face_cell: (F,) the index among all cells of the mesh of each face in file order; near_origin:
     the place there of each triangle of ``near``, of each face if not all cells are triangles (``cells_of``).
+    sliding: reason → the ids of the nodes that would be held for it if they did not slide.
     """
 
     plane: tuple[int, int] | None
@@ -70,6 +71,7 @@ class Topology:
     quad_orientation: NDArray[np.int8] = field(default_factory=lambda: np.empty(0, dtype=np.int8))
     face_cell: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     near_origin: Ints = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    sliding: dict[str, NDArray[np.int64]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1, sliding: Flags | None = None) -> Topology:
@@ -96,7 +98,9 @@ class Topology:
         marks = known_marks(mesh, fixed, position)
         points = None if mesh.plane is None else planar
         near_orientation, start, ring = closed_fans(faces, points, marks, memory, MOST_NEIGHBOURS)
-        near_sliding = released(marks, np.zeros(nodes, dtype=bool) if sliding is None else sliding[memory])
+        near_sliding, slid = np.zeros(nodes, dtype=bool), dict[str, NDArray[np.int64]]()
+        if sliding is not None:
+            near_sliding, slid = released(marks, sliding[memory], position)
         held, free, places = sorted_out(marks, position)
         three, triangles = written.with_corners(3)
         whole, near = faces.with_corners(3)
@@ -120,6 +124,7 @@ class Topology:
             colouring=Colouring(places, start, ring),
             face_cell=written.cell,
             near_origin=faces.origin[whole],
+            sliding=slid,
         )
         if near_sliding.any() or any(map(_is_quad, mesh.cells)):
             topology = topology.linked(Links.of(faces, near_orientation, start, topology.near_ring, near_sliding))

@@ -33,7 +33,7 @@ def shares_of(points, topology, kept, shifts):
         stars.fetch(points, blocks, block, room, local)
         centre = blocks.centre[block * LANES : (block + 1) * LANES]
         shift[:] = shifts[centre].T.ravel()
-        bands.shorten(given, blocks, block, room.star, room.work[:LANES], shift)
+        bands.shorten(given, None, blocks, block, room.star, room.work[:LANES], shift)
         left[centre], size[centre] = shift.reshape(2, LANES).T, room.work[:LANES]
     return left, size
 
@@ -75,7 +75,9 @@ def test_what_is_outside_of_its_band_may_go_back_only():
     stars.fetch(now, blocks, 0, room, local)
     for direction, share in ((-0.01, 0.0), (0.01, 1.0)):
         shift = np.full(2 * LANES, direction)
-        bands.shorten(bands.Bands(start, np.ones(4, dtype=bool), WIDTH), blocks, 0, room.star, room.work[:LANES], shift)
+        bands.shorten(
+            bands.Bands(start, np.ones(4, dtype=bool), WIDTH), None, blocks, 0, room.star, room.work[:LANES], shift
+        )
         assert shift[0] == share * direction
 
 

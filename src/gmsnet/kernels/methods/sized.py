@@ -222,7 +222,7 @@ def sweep(points, blocks, wanted, weight, kept, first, last, guard, tally):
         descend(local, n, pattern, goals, weight, state)
         take(local, n, pattern, state, shift)
         if len(kept.kept):
-            bands.shorten(kept, blocks, block, workspace.star, sizes, shift)
+            bands.shorten(kept, guard.constraint, blocks, block, workspace.star, sizes, shift)
         stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
         tally[k] += workspace.counts[k]
