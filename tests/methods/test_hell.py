@@ -32,7 +32,7 @@ def faces_and_lines(mesh):
         if block.kind == "triangle":
             triangles += rows
             regions += block.regions.tolist()
-        elif block.kind == "quad":
+        elif block.kind == "polygon":
             others += rows
         else:
             lower += rows
@@ -51,12 +51,7 @@ def test_nothing_is_lost_and_nothing_gets_worse(method, level, seed, nodes):
         **method, guard=level, max_sweeps=int(rng.integers(0, 5)), untangle=bool(rng.random() < 0.5),
         preserve=str(rng.choice(levels)), threads=int(rng.integers(1, 3)),
     )  # fmt: skip
-    try:
-        result = gmsnet.smooth(mesh, **options)
-    except gmsnet.InputError as error:  # some methods refuse quads
-        if "moves triangles alone" in str(error) and any(block.kind == "quad" for block in mesh.cells):
-            return
-        raise
+    result = gmsnet.smooth(mesh, **options)
     assert mesh.points.tobytes() == before
     triangles, regions, others, lower = faces_and_lines(mesh)
     held = naive.held_nodes(len(mesh.points), triangles, regions, others, lower)
@@ -87,7 +82,7 @@ def test_nothing_is_lost_and_nothing_gets_worse(method, level, seed, nodes):
         # Mending a tangle is one transaction, which keeps the worst of the mesh, not that of each star.
         mended = number == STAR and result.before.inverted
         check(1 if mended else number, was, now, stars)
-    count = len(triangles)  # the quads come after them
+    count = len(triangles)  # polygons of four corners come after them
     assert result.after.sign[:count].tolist() == naive.signs(result.points[:, plane], triangles, orientation)
     assert result.before.sign[:count].tolist() == naive.signs(mesh.points[:, plane], triangles, orientation)
 

@@ -2,7 +2,7 @@
 
 ``hellish`` makes one mesh from a seed; what it can have: holes, parts that lie over each other, bow-ties, edges with
 three cells, nodes and cells twice, cells without area or with a node twice, inverted cells, any winding, hubs with
-hundreds of neighbours, regions, markers, quads, nodes of no cell, tiny, huge and far-away coordinates, a third axis.
+hundreds of neighbours, regions, markers, polygons, nodes of no cell, tiny, huge and far-away coordinates, a third axis.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def _spoiled(rng, points, triangles):
 
 
 def _blocks(rng, triangles, regions, perhaps):
-    """The cells in one block or two, with markers, lone vertices and quads here and there."""
+    """The cells in one block or two, with markers, lone vertices and polygons here and there."""
     cut = int(rng.integers(len(triangles) + 1)) if perhaps(0.3) else len(triangles)
     blocks = [CellBlock("triangle", triangles[:cut], regions[:cut])]
     if cut < len(triangles):
@@ -120,5 +120,5 @@ def _blocks(rng, triangles, regions, perhaps):
     if perhaps(0.1) and len(triangles) > 1:
         corners = np.unique(triangles[:2])
         if len(corners) >= 4:
-            blocks.append(CellBlock("quad", corners[None, :4], np.zeros(1, dtype=int)))
+            blocks.append(CellBlock("polygon", corners[None, :4], np.zeros(1, dtype=int)))
     return blocks
