@@ -123,11 +123,17 @@ def test_random_meshes_do_not_creep(seed):
 def test_coherent_shifts_are_creep_and_others_are_not():
     field, rng = field_of(sheared_mesh(60, amplitude=0.0)), np.random.default_rng(1)
     creep = Creep.of(field)
-    creep.start(field.points)
+
+    def crept(shifts):
+        creep.start(field.points)
+        return creep.is_one(field.points + shifts)
+
     assert not creep.is_one(field.points)
-    assert creep.is_one(field.points + 0.002)
-    assert not creep.is_one(field.points + 1e-7)
-    assert not creep.is_one(field.points + rng.normal(0.0, 0.002, field.points.shape))
+    assert not crept(0.0)
+    assert crept(0.002)
+    assert not crept(1e-7)
+    assert not crept(rng.normal(0.0, 0.002, field.points.shape))
+    assert not creep.is_one(field.points + 0.002)  # no sweep has begun
     assert Creep.of(field_of(gmsnet.random_mesh(100, seed=1))) is None
 
 

@@ -74,11 +74,15 @@ def test_size_takes_the_method_that_keeps_it():
         gmsnet.smooth(mesh, preserve="size", target_quality=0.3)
 
 
-def test_a_delaunay_mesh_of_stretched_points_is_all_layers():
+def test_a_mesh_stretched_as_a_whole_is_smoothed_and_fix_layers_holds_it():
     rng = np.random.default_rng(3)
     points = rng.random((800, 2))
     triangles = Delaunay(points).simplices
-    result = gmsnet.smooth((points * (20.0, 1.0), triangles))
+    mesh = (points * (20.0, 1.0), triangles)
+    result = gmsnet.smooth(mesh)
+    assert LAYER not in result.held
+    assert any("not in layers of a wall" in note and "fix_layers" in note for note in result.notes)
+    result = gmsnet.smooth(mesh, fix_layers=True)
     assert result.stop_reason == "nothing to move" or result.held[LAYER].size > 500
 
 

@@ -27,7 +27,7 @@ class Creep:
 
     def __init__(self, nodes: NDArray[np.intp], free: int) -> None:
         self.nodes, self.free = nodes, free
-        self.before = np.empty((0, 2))
+        self.before: NDArray[np.float64] | None = None
 
     @classmethod
     def of(cls, field: Field) -> Creep | None:
@@ -44,8 +44,11 @@ class Creep:
         self.before = points[self.nodes]
 
     def is_one(self, points: NDArray[np.float64]) -> bool:
-        """Did the nodes creep in the sweep that began last?"""
+        """Did the nodes creep in the sweep that began last? No, if none has begun since this was asked."""
+        if self.before is None:
+            return False
         shifts = points[self.nodes] - self.before
+        self.before = None
         square = float((shifts * shifts).sum())
         if not square > 0.0:
             return False

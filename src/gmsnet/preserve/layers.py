@@ -77,6 +77,13 @@ class Layers:
             f"by {plain(self.median)} in the median and {plain(self.largest)} at most{damaged}"
         )
 
+    @property
+    def away_from_walls(self) -> str:
+        """One sentence of cells that are no layers of a wall."""
+        count = int(self.cells.sum())
+        are = "1 cell is" if count == 1 else f"{count:,} cells are"
+        return f"{are} stretched alike, but not in layers of a wall, and smoothed as others"
+
 
 def stretched_layers(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> Layers:
     """The layers of a planar mesh, as it is now. topology: of this mesh; which nodes it holds has no influence.

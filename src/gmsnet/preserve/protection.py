@@ -13,6 +13,7 @@ from gmsnet.measure.report import SHAPE
 from gmsnet.measure.target import Target
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.sized import BAND
+from gmsnet.preserve.anchored import split
 from gmsnet.preserve.layers import stretched_layers
 from gmsnet.preserve.survey import Survey
 from gmsnet.preserve.walls import near_walls
@@ -62,8 +63,9 @@ class Protection:
 
 
 def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, near: Floats) -> Protection:
-    """What of a mesh is protected: stretched layers, unless ``preserve`` is "none" and fix_layers is false, and the
-    areas of cells next to walls that the mesh is refined towards, unless ``preserve`` is "none".
+    """What of a mesh is protected: stretched layers of walls, unless ``preserve`` is "none", and the areas of cells
+    next to walls that the mesh is refined towards, unless ``preserve`` is "none". fix_layers: all cells that are
+    stretched alike, whatever ``preserve`` is.
 
     near: ``near_points(mesh, topology)``.
     """
@@ -71,7 +73,9 @@ def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, n
     if not len(topology.free):
         return Protection(topology, notes)
     survey = Survey.of(mesh, topology, near)
-    found = stretched_layers(mesh, topology, survey)
+    found, elsewhere = stretched_layers(mesh, topology, survey), None
+    if found and not fix_layers:
+        found, elsewhere = split(mesh, topology, survey, found)
     layers = found.nodes if found and (fix_layers or preserve != NONE) else None
     protection = Protection(topology, notes, layers)
     if layers is not None:
@@ -79,7 +83,9 @@ def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, n
         notes.append(f"{found.summary}; {_amount(len(protection.outer.held.get(LAYER, ())))} held for that ({why})")
     elif found:
         notes.append(f"{found.summary}; nothing is held for that (preserve={preserve!r})")
-    elif fix_layers:
+    if elsewhere:
+        notes.append(f"{elsewhere.away_from_walls}; if they are meant, fix_layers holds them")
+    if fix_layers and not found:
         notes.append("fix_layers: no stretched layers were found, so none are held")
     if preserve != SHAPE:
         return protection

@@ -1,0 +1,140 @@
+"""Which stretched cells are layers of a wall: rows that start at a boundary or interface, lie along it, and grow.
+
+Cells are stretched alike for other reasons, too: a mesh was sheared, swirled or stretched as a whole, or squeezed
+between bodies that moved. Such cells are stretched away from the boundary, or as much inside as there, or across it.
+A layer is thinnest where it starts. So of each piece of stretched cells that hang together, those count that have an
+edge on a wall and are stretched along it: they must be many, thin, and
+
+- much thinner than most of the piece, which has grown from row to row, or
+- thinner, and most of the piece lies along the wall that is nearest, or
+- as even along the wall as rows of one height are made, where most of the piece lies along the wall, and the piece is
+  not the mesh.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.simplex import stretch
+from gmsnet.kernels.topology.components import pieces
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.preserve.layers import Layers
+from gmsnet.preserve.survey import Survey
+from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
+
+Flags = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+
+ALONG = math.cos(math.radians(40.0))  # twice the angle between the stretch and the wall may have this cosine
+FEWEST = 6  # edges on walls
+THIN = math.log(3.5)  # the stretch of the cells there, in the median
+GROWN = math.log(1.25)  # by how much it exceeds that of the piece, in the median
+CLEARLY_THIN, CLEARLY_GROWN = math.log(5.0), math.log(1.7)  # then nothing else is asked
+MOSTLY = 0.72  # of the cells of a layer are stretched along the wall nearest to them
+PART, EVEN = 0.6, math.log(1.05)  # of a piece without growth: share of the mesh, change from cell to cell
+UNEVEN = math.log(1.6)  # more from cell to cell is no row, but the slivers of a hull
+
+
+def split(mesh: Mesh, topology: Topology, survey: Survey, layers: Layers) -> tuple[Layers, Layers]:
+    """Of the stretched cells of a mesh, those that are layers of a wall, and the others."""
+    triangles, orientation, of_cell = topology.triangles, topology.orientation, topology.near_cells
+    chosen = layers.cells
+    if of_cell is not None:
+        triangles, orientation = topology.memory[topology.near], topology.near_orientation
+        chosen = chosen[np.cumsum(np.append(0, np.diff(of_cell) != 0))]
+    rim = np.zeros(len(topology.memory), dtype=bool)
+    rim[topology.memory] = survey.rim > 0
+    part = triangles[chosen]
+    kept = _at_walls(part, orientation[chosen], planar_points(mesh), rim, len(chosen), quads=of_cell is not None)
+    whole = np.zeros(len(chosen), dtype=bool)
+    whole[np.flatnonzero(chosen)[kept]] = True
+    first = np.ones(len(chosen), dtype=bool) if of_cell is None else np.append(True, np.diff(of_cell) != 0)
+    at_walls = whole[first]
+    nodes = np.zeros(len(layers.nodes), dtype=bool)
+    nodes[part[kept]] = True
+    return (
+        replace(layers, nodes=layers.nodes & nodes, cells=at_walls),
+        replace(layers, nodes=layers.nodes & ~nodes, cells=layers.cells & ~at_walls, damaged=0),
+    )
+
+
+def _at_walls(
+    triangles: NDArray[np.int32], orientation: NDArray[np.int8], points: Floats, rim: Flags, of_all: int, *, quads: bool
+) -> Flags:
+    """Which simplices (S, 3), all of them stretched alike with their neighbours, belong to layers of a wall.
+
+    points: (N, 2). rim: (N,) which nodes are on boundaries or interfaces. of_all: how many the mesh has. quads: they
+    may be corners of quads.
+    """
+    cells = np.empty((len(triangles), stretch.COLUMNS))
+    stretch.per_cell(points, triangles, orientation, math.inf, cells)
+    inside = np.zeros(len(points), dtype=bool)
+    inside[triangles] = True
+    piece = pieces(triangles, inside)[triangles[:, 0]]
+    edges = ((0, 1), (0, 2)) if quads else ((0, 1), (0, 2), (1, 2))  # of a quad, those of its corner
+    found = [_edges_on(triangles, points, rim, cells, a, b) for a, b in edges]
+    row, length, aligned, one, two = (np.concatenate(each) for each in zip(*found, strict=True))
+    height = np.log(np.maximum(np.abs(cells[row, stretch.AREA]), stretch.TINY) / length)
+    kept = np.zeros(len(triangles), dtype=bool)
+    for name in np.unique(piece[row]):
+        own, here = piece == name, piece[row] == name
+        along = here & aligned
+        if np.count_nonzero(along) < FEWEST:
+            continue
+        thin = float(np.median(cells[row[along], stretch.LENGTH]))
+        grown = thin - float(np.median(cells[own, stretch.LENGTH]))
+        lie = _along_nearest(triangles[own], points, cells[own], one[along], two[along])
+        change = _change(height[along], one[along], two[along])
+        even = change <= EVEN and np.count_nonzero(own) <= PART * of_all
+        clear = thin >= CLEARLY_THIN and grown >= CLEARLY_GROWN
+        orderly = clear or (thin >= THIN and lie >= MOSTLY and (grown >= GROWN or even))
+        if orderly and change <= UNEVEN:
+            kept |= own
+    return kept
+
+
+def _edges_on(
+    triangles: NDArray[np.int32], points: Floats, rim: Flags, cells: Floats, a: int, b: int
+) -> tuple[NDArray[np.intp], Floats, Flags, NDArray[np.int32], NDArray[np.int32]]:
+    """Of the edges ab with both ends on the rim: the row, the length, whether the cell is stretched along, the ends."""
+    one, two = triangles[:, a], triangles[:, b]
+    row = np.flatnonzero(rim[one] & rim[two])
+    one, two = one[row], two[row]
+    way = points[two] - points[one]
+    length = np.hypot(way[:, 0], way[:, 1])
+    aligned = _aligned(cells[row], way)
+    return row, np.maximum(length, stretch.TINY), aligned, one, two
+
+
+def _change(height: Floats, one: NDArray[np.int32], two: NDArray[np.int32]) -> float:
+    """The mean change of log height between neighbours along a wall, which share an end; +∞ where none do."""
+    node, value = np.concatenate([one, two]), np.concatenate([height, height])
+    order = np.argsort(node, kind="stable")
+    node, value = node[order], value[order]
+    start = np.flatnonzero(np.append(True, node[1:] != node[:-1]))
+    several = np.diff(np.append(start, len(node))) > 1
+    change = np.maximum.reduceat(value, start) - np.minimum.reduceat(value, start)
+    return float(np.mean(change[several])) if several.any() else math.inf
+
+
+def _along_nearest(
+    triangles: NDArray[np.int32], points: Floats, cells: Floats, one: NDArray[np.int32], two: NDArray[np.int32]
+) -> float:
+    """The share of some cells that are stretched along the nearest edge of the wall, from ``one`` to ``two``."""
+    from scipy.spatial import cKDTree  # it takes a tenth of a second to import
+
+    _, nearest = cKDTree((points[one] + points[two]) / 2.0).query(points[triangles].mean(axis=1))
+    return float(_aligned(cells, points[two[nearest]] - points[one[nearest]]).mean())
+
+
+def _aligned(cells: Floats, way: Floats) -> Flags:
+    """Which cells are stretched along a way (n, 2)."""
+    square = np.maximum((way * way).sum(axis=1), stretch.TINY)
+    cosine, sine = (way[:, 0] ** 2 - way[:, 1] ** 2) / square, 2.0 * way[:, 0] * way[:, 1] / square
+    share = cells[:, stretch.ALONG] * cosine + cells[:, stretch.ACROSS] * sine
+    return np.asarray(share >= ALONG * np.maximum(cells[:, stretch.LENGTH], stretch.TINY))

@@ -1,0 +1,95 @@
+"""Layers of walls against cells that are stretched alike for other reasons."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gmsnet.generate import (
+    disturb,
+    kershaw_mesh,
+    layered_mesh,
+    moved_hole_mesh,
+    sheared_mesh,
+    swirled_mesh,
+    terrain_mesh,
+    zigzag_mesh,
+)
+from gmsnet.preserve.anchored import split
+from gmsnet.preserve.layers import stretched_layers
+from gmsnet.preserve.survey import Survey
+from gmsnet.topology.topology import Topology
+
+
+def found(mesh):
+    topology = Topology.of(mesh)
+    survey = Survey.of(mesh, topology)
+    layers = stretched_layers(mesh, topology, survey)
+    return (layers, layers, layers) if not layers else (layers, *split(mesh, topology, survey, layers))
+
+
+def stretched(factor, amount=0.3, seed=1):
+    mesh = sheared_mesh(40, amplitude=0.0)
+    mesh = disturb(mesh, Topology.of(mesh).free, amount, seed=seed)
+    return mesh.with_points(mesh.points * (factor, 1.0))
+
+
+NO_LAYERS = {
+    "sheared": lambda: sheared_mesh(60, 120, amplitude=0.9, waves=2),
+    "sheared quads": lambda: sheared_mesh(30, 90, amplitude=0.6, waves=3, cells="quad"),
+    "swirled": lambda: swirled_mesh(60),
+    "zigzag": lambda: zigzag_mesh(40),
+    "Kershaw": lambda: kershaw_mesh(42),
+    "flat Kershaw": lambda: kershaw_mesh(60, flatness=0.1),
+    "hole moved": lambda: moved_hole_mesh(0.04, shift=1.5, turn=0.7),
+    "terrain": lambda: terrain_mesh(12, ratio=5.0),
+    "stretched": lambda: stretched(2.5),
+    "stretched more": lambda: stretched(6.0),
+}
+LAYERS = {
+    "triangles": lambda: layered_mesh(),
+    "quads": lambda: layered_mesh(cells="quad"),
+    "mixed": lambda: layered_mesh(cells="mixed"),
+    "circle": lambda: layered_mesh(30, 100, body="circle"),
+    "few thick ones": lambda: layered_mesh(10, 5),
+    "hardly any": lambda: layered_mesh(10, 3),
+}
+
+
+@pytest.mark.parametrize("name", NO_LAYERS)
+def test_what_is_stretched_otherwise_is_no_layer(name):
+    layers, at_walls, elsewhere = found(NO_LAYERS[name]())
+    assert not at_walls
+    assert elsewhere.cells.tolist() == layers.cells.tolist()
+
+
+@pytest.mark.parametrize("name", LAYERS)
+def test_layers_of_walls_are_kept_whole(name):
+    layers, at_walls, elsewhere = found(LAYERS[name]())
+    assert at_walls
+    assert not elsewhere
+    assert at_walls.nodes.tolist() == layers.nodes.tolist()
+    assert (at_walls.median, at_walls.largest) == (layers.median, layers.largest)
+
+
+def test_each_piece_is_judged_by_itself():
+    layered, swirl = layered_mesh(10, 50, around=60), swirled_mesh(60)
+    points = np.vstack([layered.points, swirl.points * 2.0 + 20.0])
+    blocks = [
+        type(block)(block.kind, block.nodes + offset, block.regions)
+        for mesh, offset in ((layered, 0), (swirl, len(layered.points)))
+        for block in mesh.cells
+    ]
+    _, at_walls, elsewhere = found(type(layered)(points, tuple(blocks)))
+    inside = np.arange(len(points)) < len(layered.points)
+    assert at_walls.nodes.any()
+    assert elsewhere.nodes.any()
+    assert inside[at_walls.nodes].all()
+    assert not inside[elsewhere.nodes].any()
+
+
+def test_small_changes_of_the_input_are_no_cliff():
+    """Stretched by 2.0 and by 2.1, thrown by 0.15 and by 0.3: nothing is held."""
+    for factor in (1.9, 2.0, 2.1, 2.5, 3.0):
+        for amount in (0.15, 0.3):
+            assert not found(stretched(factor, amount))[1]
