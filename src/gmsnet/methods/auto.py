@@ -45,6 +45,7 @@ SAMPLE = 32  # blocks of cells
 ALWAYS = 10**9  # sweeps
 RELAXATION = 1.6  # of the Newton steps
 SLOW = 0.02  # in the mean of 1/q: so much to come, by the last two gains, is more than sweeps should be left to bring
+POOR = 0.5  # a mean of 1/q below this is not left to sweeps alone
 AHEAD = 50  # times the last gain are at most expected to come
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
@@ -179,7 +180,8 @@ class Auto(Smoother):
         """Is the mesh deformed as a whole? ahead: what is to come in the mean of 1/q."""
         if self.creep is None or self.whole >= MOST_WHOLE:
             return False
-        return ahead > SLOW or self.creep.is_one(field.points)
+        creeps = self.creep.is_one(field.points)
+        return ahead > SLOW or creeps or (self.mean < POOR and not self.whole)
 
     def _end_round(self, field: Field) -> None:
         """Makes the phase once more where that pays, else goes on to the next one, or settles."""

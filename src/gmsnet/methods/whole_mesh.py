@@ -11,7 +11,7 @@ It is a transaction: what comes out is taken if the guard allows each cell, and 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,9 +32,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 ITERATIONS, HARMONIC_ITERATIONS = 120, 30
-ACCURATE = 1e-4  # of the first residual: harmonic places need not be more so
+ACCURATE = (1e-2, 1e-4, 1e-6)  # of the first residual: the next one is for harmonic places with inverted cells
 REFRESH = 10  # iterations after which the Laplacian is formed anew
-SETTLED, PATIENCE = 3e-5, 2  # a smaller share of Σq gained in so many iterations one after the other is the end
+SETTLED, PATIENCE = 1e-4, 2  # a smaller share of Σq gained in so many iterations one after the other is the end
 ARMIJO, HALVINGS, INSIDE = 1e-4, 25, 0.9
 COARSEST, COARSE_SWEEPS = 60, 6
 TWICE = 2  # levels below the finest on which a correction may be made of two
@@ -144,30 +144,31 @@ class Problem:
         total: float = energy(points, self.cells, self.table, self.nothing, 0.0, gradient)
         return total
 
-    def harmonic(self, points: Floats) -> Floats:
-        """Each node that moves at the weighted mean of its neighbours."""
+    def harmonic(self, points: Floats) -> Iterator[Floats]:
+        """Each node that moves at the weighted mean of its neighbours, more and more exactly."""
         inverse = self.inverse(points, even=True)
         rest, x = np.empty((len(self.moved), 2)), np.zeros((len(self.moved), 2))
         graph.pull_of_neighbours(points, self.cells, self.table, self.number, rest)
-        close = ACCURATE**2 * multigrid.product(rest, rest)
+        first = multigrid.product(rest, rest)
         z = inverse(rest)
         along, slope, image = z, multigrid.product(rest, z), np.empty_like(z)
+        goals = list(ACCURATE)
         for _ in range(HARMONIC_ITERATIONS):
-            if not slope > 0.0:
-                break
+            if not (slope > 0.0 and goals):
+                return
             multigrid.times(self.matrix, along, image)
             share = slope / multigrid.product(along, image)
             x += share * along
             before, rest = rest, rest - share * image
-            if multigrid.product(rest, rest) <= close:
-                break
+            if multigrid.product(rest, rest) <= goals[0] * goals[0] * first:
+                goals.pop(0)
+                found = points.copy()
+                found[self.moved] += x
+                yield found
             z = inverse(rest)
             following = multigrid.product(rest, z)
             along = z + ((following - multigrid.product(before, z)) / slope) * along  # z is not quite linear in rest
             slope = following
-        found = points.copy()
-        found[self.moved] += x
-        return found
 
     def minimise(self, points: Floats) -> Floats:
         """Where conjugate gradients lead from points (N, 2) without an inverted cell."""
@@ -225,9 +226,11 @@ class WholeMesh(Smoother):
         if not len(problem.moved):
             return tally
         before, gradient = field.points, np.empty_like(field.points)
-        value, start, harmonic = problem.value(before, gradient), before, problem.harmonic(before)
-        if problem.value(harmonic, gradient) < value:
-            start = harmonic
+        value, start = problem.value(before, gradient), before
+        for harmonic in problem.harmonic(before):
+            if problem.value(harmonic, gradient) < value:
+                start = harmonic
+                break
         found = self._allowed(problem.minimise(start), field, executor)
         if found is not None and problem.value(found, gradient) < value:
             tally[MOVED] = (found != before).any(axis=1).sum()

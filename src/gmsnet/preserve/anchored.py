@@ -32,9 +32,9 @@ Floats = NDArray[np.float64]
 
 ALONG = math.cos(math.radians(40.0))  # twice the angle between the stretch and the wall may have this cosine
 FEWEST = 6  # edges on walls
-THIN = math.log(3.5)  # the stretch of the cells there, in the median
-GROWN = math.log(1.25)  # by how much it exceeds that of the piece, in the median
-CLEARLY_THIN, CLEARLY_GROWN = math.log(5.0), math.log(1.7)  # then nothing else is asked
+THIN = math.log(2.5)  # the length of such an edge over the height of its cell, in the median
+GROWN = math.log(1.25)  # how many times as stretched those cells are as those of the piece, in the medians
+CLEARLY_THIN, CLEARLY_GROWN = math.log(4.0), math.log(1.7)  # then nothing else is asked
 MOSTLY = 0.72  # of the cells of a layer are stretched along the wall nearest to them
 PART, EVEN = 0.6, math.log(1.05)  # of a piece without growth: share of the mesh, change from cell to cell
 UNEVEN = math.log(1.6)  # more from cell to cell is no row, but the slivers of a hull
@@ -86,8 +86,8 @@ def _at_walls(
         along = here & aligned
         if np.count_nonzero(along) < FEWEST:
             continue
-        thin = float(np.median(cells[row[along], stretch.LENGTH]))
-        grown = thin - float(np.median(cells[own, stretch.LENGTH]))
+        thin = float(np.median((np.log(length) - height)[along]))
+        grown = float(np.median(cells[row[along], stretch.LENGTH]) - np.median(cells[own, stretch.LENGTH]))
         lie = _along_nearest(triangles[own], points, cells[own], one[along], two[along])
         change = _change(height[along], one[along], two[along])
         even = change <= EVEN and np.count_nonzero(own) <= PART * of_all
