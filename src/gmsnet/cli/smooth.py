@@ -64,12 +64,12 @@ def smooth(
     preserve: Annotated[
         str,
         typer.Option(
-            help="shape: hold layers of cells that are stretched on purpose; size: weigh areas of cells, too; none.",
+            help="shape: hold layers of stretched cells along walls; size: weigh areas of cells, too; none.",
             autocompletion=lambda: ["shape", "size", "none"],
         ),
     ] = "shape",
     fix_layers: Annotated[
-        bool, typer.Option("--fix-layers", help="Hold layers of stretched cells whatever --preserve says.")
+        bool, typer.Option("--fix-layers", help="Hold all cells that are stretched alike, whatever --preserve says.")
     ] = False,
     untangle: Annotated[
         bool, typer.Option("--untangle/--no-untangle", help="Mend inverted cells first, where there are any.")

@@ -17,7 +17,7 @@ from gmsnet.methods.base import Field
 
 WINDOW, WINDOWS = 64, 64  # nodes; windows at most, evenly taken
 FEWEST = 4  # windows: smaller meshes are done by sweeps
-COHERENT = 0.5  # over all windows
+COHERENT = 0.35  # over all windows
 # Of the whole mesh: a wave as long as the mesh, which moves by so much a sweep, has this share of Σq to lose.
 WORTHWHILE = 0.01
 

@@ -56,11 +56,11 @@ def smooth(
     target_angle: the minimum 1/q, in (0, 1], and the minimum angle, in (0, 60] degrees, that every cell is to have:
     only cells that miss it and what is around them are smoothed, until none misses it. fixed: nodes to hold besides
     boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. preserve: "shape" holds the
-    nodes of layers that are stretched on purpose, "size" besides weighs the areas of cells,
-    without a bound, "none" neither.
-    fix_layers: hold stretched layers whatever ``preserve`` says. untangle: mend inverted cells first, where there
-    are any. guard: what each sweep keeps besides validity: "valid" nothing (as the paper), "worst" that the worst
-    1/q of the cells with a free node never falls, "star" that the worst 1/q around any free node never falls. seed:
+    nodes of stretched layers along walls, "size" besides weighs the areas of cells, without a bound, "none" neither.
+    fix_layers: hold all cells that are stretched alike, whatever ``preserve`` says. untangle: mend inverted cells
+    first, where there are any. guard: what each sweep keeps besides validity: "valid" nothing (as the paper), "worst"
+    that the worst 1/q of the cells with a free node never falls, "star" that the worst 1/q around any free node never
+    falls. seed:
     for methods that draw random numbers (none does so far). callback: called after each look at the mesh, with most
     methods after each sweep; a true answer stops the run. weights: a safetensors file for methods with weights.
     best_by: which 1/q enters the q̂ that says which mesh is the best: "shape" (1/q) or "aspect" (1/q_V, with which
