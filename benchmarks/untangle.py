@@ -3,7 +3,8 @@
     GMSNET_MESHES=FOLDER python benchmarks/untangle.py [--bases 50] [--repeats 3] [--json FILE]
 
 Each base mesh is valid, so a valid mesh with its connectivity and boundary exists. Its free nodes are thrown by up to
-0.5, 1 and 3 mean lengths of their edges, and in a fourth variant one in ten is put anywhere in the mesh's bounding box.
+0.5, 1 and 3 mean lengths of their edges; in a fourth variant one in ten is put anywhere in the mesh's bounding box; in
+three more all are folded: into one point, mirrored, or permuted.
 L-BFGS is the same barrier over all free nodes from the start, by the same rule for ε, until all cells are certified.
 Both are timed in turns, on one thread, set-up (Topology) apart; medians over the repeats.
 """
@@ -37,7 +38,9 @@ REAL = (
     "mesh_NACA0012_inv.su2", "japan_sea.msh", "insulated.msh", "internal.msh", "helmholtz_apartment.vtk",
     "osteonT1_11.mesh", "square_triquad.mesh",
 )  # fmt: skip
-SEVERITIES = ("0.5 edges", "1 edge", "3 edges", "1 in 10 anywhere")
+SCATTERED = ("0.5 edges", "1 edge", "3 edges")
+FOLDED = ("one point", "mirrored", "permuted")
+SEVERITIES = (*SCATTERED, "1 in 10 anywhere", *FOLDED)
 SHAPES = ("square", "circle", "plate", "lshape")
 SIZES = (200, 500, 1000, 2000, 5000, 10_000)
 
@@ -54,14 +57,29 @@ def base(number, folder):
 
 
 def tangled(mesh, topology, severity, seed):
-    if severity != SEVERITIES[-1]:
+    if severity in SCATTERED:
         return disturb(mesh, topology.free, float(severity.split()[0]), seed=seed, keep_valid=False)
     rng = np.random.default_rng(seed)
+    if severity in FOLDED:
+        return folded(mesh, topology.free, severity, rng)
     chosen = rng.choice(topology.free, max(1, len(topology.free) // 10), replace=False)
     plane = list(mesh.plane)
     corner, extent = mesh.points[:, plane].min(axis=0), np.ptp(mesh.points[:, plane], axis=0)
     points = mesh.points.copy()
     points[np.ix_(chosen, plane)] = corner + extent * rng.random((len(chosen), 2))
+    return mesh.with_points(points)
+
+
+def folded(mesh, free, how, rng):
+    """All free nodes in one place, in each other's places, or where a mirror shows them."""
+    points = mesh.points.copy()
+    if how == "one point":
+        points[free] = points[rng.choice(free)]
+    elif how == "mirrored":
+        along = mesh.plane[0]
+        points[free, along] = points[:, along].min() + points[:, along].max() - points[free, along]
+    else:
+        points[free] = points[rng.permutation(free)]
     return mesh.with_points(points)
 
 

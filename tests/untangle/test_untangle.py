@@ -125,6 +125,21 @@ def test_everything_thrown(throw):
     mended(moved(mesh, free, places))
 
 
+@pytest.mark.parametrize("how", ["one point", "mirrored", "permuted"])
+@pytest.mark.parametrize("shape", ["square", "plate", "lshape"])
+def test_a_mesh_that_is_folded_as_a_whole(shape, how):
+    mesh = gmsnet.random_mesh(1500, shape, seed=3)
+    free, rng = Topology.of(mesh).free, np.random.default_rng(3)
+    places = mesh.points[free, :2].copy()
+    if how == "one point":
+        places[:] = places[0]
+    elif how == "mirrored":
+        places[:, 0] = 1.0 - places[:, 0]
+    else:
+        places = rng.permutation(places)
+    mended(moved(mesh, free, places))
+
+
 @pytest.mark.parametrize("degrees", [45, 60, 90, 120])
 @pytest.mark.parametrize(("rings", "nodes"), [(10, 60), (20, 100)])
 def test_a_hole_that_has_been_turned(rings, nodes, degrees):

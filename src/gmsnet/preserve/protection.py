@@ -80,7 +80,9 @@ def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, n
     protection = Protection(topology, notes, layers)
     if layers is not None:
         why = "fix_layers" if preserve == NONE else f"preserve={preserve!r}"
-        notes.append(f"{found.summary}; {_amount(len(protection.outer.held.get(LAYER, ())))} held for that ({why})")
+        mend = "leave fix_layers out" if fix_layers else "preserve='none' lets them move"
+        amount = _amount(len(protection.outer.held.get(LAYER, ())))
+        notes.append(f"{found.summary}; {amount} held for that ({why}); if it is not meant, {mend}")
     elif found:
         notes.append(f"{found.summary}; nothing is held for that (preserve={preserve!r})")
     if elsewhere:
