@@ -8,7 +8,8 @@ import pytest
 
 import gmsnet
 from gmsnet.errors import InputError
-from gmsnet.generate import disturb, layered_mesh
+from gmsnet.generate import disturb, layered_mesh, sheared_mesh
+from gmsnet.methods.auto import WHOLE
 from gmsnet.parallel import memory as available_memory
 from gmsnet.parallel.memory import available, refuse_unless_free
 from gmsnet.preserve import layers
@@ -121,6 +122,13 @@ def test_a_call_allocates_no_more_than_is_asked_for(method, most, threads):
     given = arrays(gmsnet.random_mesh(30_000, seed=0))
     traced = most_traced(lambda: gmsnet.smooth(given, method, max_sweeps=3, threads=threads))
     assert traced <= most * len(given[0])
+
+
+def test_all_nodes_at_once_take_no_more_than_a_call_asks_for():
+    given = arrays(sheared_mesh(160, amplitude=0.5, waves=1))
+    stages = [sweep.stage for sweep in gmsnet.smooth(given).history]
+    assert any(WHOLE in stage for stage in stages)
+    assert most_traced(lambda: gmsnet.smooth(given)) <= engine.BYTES_PER_NODE * len(given[0])
 
 
 def test_the_connectivity_allocates_no_more_than_is_asked_for():

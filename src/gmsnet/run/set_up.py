@@ -33,7 +33,8 @@ from gmsnet.topology.topology import Topology
 Floats = NDArray[np.float64]
 
 MANY = 20_000  # nodes: for the set-up of fewer a second thread is not worth starting
-BYTES_PER_NODE = 400  # that a call takes at most on a mesh of triangles, copies of them included; ``auto`` takes 250
+# That a call takes at most on a mesh of triangles, copies of them included; ``auto`` takes 250, all nodes at once 550.
+BYTES_PER_NODE = 600
 
 
 def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOptions, executor: Executor) -> State:
