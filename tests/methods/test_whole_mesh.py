@@ -7,13 +7,14 @@ import pytest
 from support import quads as naive
 
 import gmsnet
-from gmsnet.generate import disturb, hybrid_mesh, moved_hole_mesh, sheared_mesh, swirled_mesh, zigzag_mesh
+from gmsnet.generate import disturb, hybrid_mesh, kershaw_mesh, moved_hole_mesh, sheared_mesh, swirled_mesh, zigzag_mesh
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import VALID, WORST, Precision
+from gmsnet.kernels.whole.powers import shapes
 from gmsnet.methods import Field
-from gmsnet.methods.auto import WHOLE
+from gmsnet.methods.auto import WHOLE, WHOLE_WORST
 from gmsnet.methods.creep import Creep
-from gmsnet.methods.whole_mesh import WholeMesh
+from gmsnet.methods.whole_mesh import TRADE, Problem, WholeMesh
 from gmsnet.parallel.threads import serial
 from gmsnet.run.run import precision_of
 from gmsnet.topology.ordering import planar_points
@@ -140,6 +141,39 @@ def test_coherent_shifts_are_creep_and_others_are_not():
 def test_the_level_star_does_without():
     mesh = sheared_mesh(40, amplitude=0.9)
     assert not any(WHOLE in sweep.stage for sweep in gmsnet.smooth(mesh, guard="star", preserve="none").history)
+
+
+LIKE_CELLS = {  # and the least 1/q of whole-mesh L-BFGS on q⁸
+    "sheared": (lambda: sheared_mesh(49, 66, amplitude=0.836, waves=1.57), 0.728),
+    "stretched": (lambda: stretched(40, 2.5), 0.596),
+    "hole moved": (lambda: moved_hole_mesh(0.034, shift=1.34, turn=4.19), 0.66),
+    "Kershaw": (lambda: kershaw_mesh(48), 0.508),
+}
+
+
+def stretched(columns, factor):
+    mesh = sheared_mesh(columns, amplitude=0.0)
+    mesh = disturb(mesh, Topology.of(mesh).free, 0.4, seed=1)
+    return mesh.with_points(mesh.points * (factor, 1.0))
+
+
+@pytest.mark.parametrize("name", LIKE_CELLS)
+def test_the_worst_of_many_like_cells_have_a_turn_all_at_once(name):
+    make, least = LIKE_CELLS[name]
+    result = gmsnet.smooth(make(), preserve="none")
+    assert any(WHOLE_WORST in sweep.stage for sweep in result.history)
+    assert result.after.shape.min() > least - 0.005
+
+
+@pytest.mark.parametrize("doublings", [2, 3])
+def test_for_the_worst_cells_the_mean_pays_at_most_so_much(doublings):
+    field = field_of(kershaw_mesh(24))
+    simplices = Problem.of(field)
+    least, mean = shapes(field.points, simplices.cells, simplices.table)
+    assert WholeMesh((doublings,)).sweep(field, serial, lambda: False)[MOVED]
+    now_least, now_mean = shapes(field.points, simplices.cells, simplices.table)
+    assert now_least - least >= TRADE * (mean - now_mean)
+    assert now_least > least
 
 
 def test_one_call_ends_where_two_end():

@@ -37,12 +37,15 @@ def stretched(factor, amount=0.3, seed=1):
 NO_LAYERS = {
     "sheared": lambda: sheared_mesh(60, 120, amplitude=0.9, waves=2),
     "sheared quads": lambda: sheared_mesh(30, 90, amplitude=0.6, waves=3, cells="quad"),
+    "sheared by much": lambda: sheared_mesh(57, 73, amplitude=0.918, waves=2.05),
+    "quads sheared by much": lambda: sheared_mesh(63, 64, amplitude=0.696, waves=2.99, cells="quad"),
     "swirled": lambda: swirled_mesh(60),
     "zigzag": lambda: zigzag_mesh(40),
     "Kershaw": lambda: kershaw_mesh(42),
     "flat Kershaw": lambda: kershaw_mesh(60, flatness=0.1),
     "hole moved": lambda: moved_hole_mesh(0.04, shift=1.5, turn=0.7),
     "terrain": lambda: terrain_mesh(12, ratio=5.0),
+    "terrain of many lines": lambda: terrain_mesh(24, ratio=1.72, seed=829),
     "stretched": lambda: stretched(2.5),
     "stretched more": lambda: stretched(6.0),
 }

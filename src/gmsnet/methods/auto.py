@@ -12,6 +12,7 @@ with every cell kept above a floor.
 
 Where nodes creep, many neighbours together one way (methods/creep.py), or much more is to come than the next rounds
 will bring, the mesh is deformed as a whole: then all nodes move at once (methods/whole_mesh.py), and the phase goes on.
+In the end, where the worst cells are many alike, all nodes move at once for these, and all phases have another turn.
 
 A phase goes on as long as more than its ``gain`` in the mean of 1/q (of a sample of the cells) is to come, if gains go
 on as the last two did. What each phase is worth is measured by ``benchmarks/auto.py``; see docs/auto.md.
@@ -51,6 +52,9 @@ PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
+WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
+GOOD = 0.75  # a least 1/q that needs no more
+NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
 
 
 class Phase(NamedTuple):
@@ -112,7 +116,7 @@ class Auto(Smoother):
         self.at = -1
         self.creep: Creep | None = None
         self.whole = 0  # how often all nodes have moved at once
-        self.slow = False
+        self.slow = self.last = False
         self.passes, self.least = 0, -math.inf  # passes over the worst cells, and the least 1/q after the last one
         self.again = -1  # the phase to go back to in the end, if there is one
 
@@ -121,7 +125,8 @@ class Auto(Smoother):
             phase, self.again = self.again, -1
         self.at, self.made, self.rounds, self.gained = phase, 0, 0, math.inf
         if phase == len(self.phases):
-            self.converged = True
+            self.converged = self.last or not self._is_even(field)
+            self.last = True
             return
         self.smoother = self.phases[phase].create()
         if self.phases[phase].rounds > 1 and not self.phases[phase].first:  # what those gain at first does not count
@@ -135,6 +140,8 @@ class Auto(Smoother):
                 self.creep = Creep.of(field)
             self.phases = self.phases or (SMALL_PLAN if len(field.topology.free) <= SMALL else large)
             self._enter(0, field)
+        if self.at == len(self.phases):
+            return self._move_all_for_worst(field, executor, test)
         phase = self.phases[self.at]
         if self.slow:
             return self._move_all(field, executor, test)
@@ -167,6 +174,16 @@ class Auto(Smoother):
             self.whole = MOST_WHOLE
         return tally
 
+    def _move_all_for_worst(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
+        """All nodes at once, for the worst cells; then all phases have another turn for the mean."""
+        self.looks, self.phase = True, WHOLE_WORST
+        tally = WholeMesh(POWERS).sweep(field, executor, test)
+        if tally[MOVED]:
+            self._enter(0, field)
+        else:
+            self.converged = True
+        return tally
+
     def _look_at_worst(self, smoother: WorstFirst) -> None:
         """Is the worst cell to have another turn, once others have made room for it?"""
         self.passes += 1
@@ -175,6 +192,12 @@ class Auto(Smoother):
             gains = smoother.gained >= LAST_GAIN
         self.again = self.at if gains and self.passes < PASSES else -1
         self.least = smoother.least
+
+    def _is_even(self, field: Field) -> bool:
+        """Is the worst cell one of many like it, which one star at a time cannot better?"""
+        if self.creep is None or self.least >= GOOD:
+            return False
+        return self.whole > 0 or (self.phases is SMALL_PLAN and self.least > mean_shape(field) - NEAR_MEAN)
 
     def _is_slow(self, field: Field, ahead: float) -> bool:
         """Is the mesh deformed as a whole? ahead: what is to come in the mean of 1/q."""

@@ -6,12 +6,16 @@ long waves go as fast as short ones. The start is the mesh as it is, or harmonic
 Ribière; Nocedal, Wright: Numerical Optimization, section 5.2) with the Laplacian of kernels.whole.graph, which follows
 the mesh, for a preconditioner. No step goes as far as where a first cell has no area left.
 
+The same on q⁸ or q⁴ is for the worst cells, where these are many: what one of them needs, its neighbours need, too, and
+no node alone can give it.
+
 It is a transaction: what comes out is taken if the guard allows each cell, and Σq is smaller.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +26,7 @@ from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import VALID
 from gmsnet.kernels.untangle.barrier import energy
 from gmsnet.kernels.untangle.cells import find_bad
-from gmsnet.kernels.whole import graph, multigrid, steps
+from gmsnet.kernels.whole import graph, multigrid, powers, steps
 from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.methods.worst_first import WorstFirst
@@ -35,6 +39,8 @@ ITERATIONS, HARMONIC_ITERATIONS = 120, 30
 ACCURATE = (1e-2, 1e-4, 1e-6)  # of the first residual: the next one is for harmonic places with inverted cells
 REFRESH = 10  # iterations after which the Laplacian is formed anew
 SETTLED, PATIENCE = 1e-4, 2  # a smaller share of Σq gained in so many iterations one after the other is the end
+CLOSE = 1e-6  # the same of a power of q
+TRADE, LEAST_GAIN = 0.5, 1e-4  # in 1/q; most of the mean comes back in the sweeps that follow
 ARMIJO, HALVINGS, INSIDE = 1e-4, 25, 0.9
 COARSEST, COARSE_SWEEPS = 60, 6
 TWICE = 2  # levels below the finest on which a correction may be made of two
@@ -111,9 +117,11 @@ class Problem:
     number: Ints
     matrix: Matrix
     nothing: Floats
+    doublings: int = 0
+    top: float = 1.0
 
     @classmethod
-    def of(cls, field: Field) -> Problem:
+    def of(cls, field: Field, doublings: int = 0) -> Problem:
         """Of the free nodes that do not slide and have no cell that is not certified positive."""
         topology, precision = field.topology, field.precision
         simplices, free = topology.changeable, topology.near_free.copy()
@@ -132,17 +140,36 @@ class Problem:
         number[moved] = np.arange(len(moved), dtype=np.int32)
         start, column = graph.neighbours(cells, table, number, len(moved))
         matrix = Matrix(start, column, np.empty(len(column)), np.empty(len(moved)))
-        return cls(np.ascontiguousarray(cells), table, moved, number, matrix, np.zeros(len(free)))
+        cells = np.ascontiguousarray(cells)
+        top = 1.0
+        if doublings and len(cells):
+            least, _ = powers.shapes(field.points, cells, table)
+            top = 1.0 / least
+        return cls(cells, table, moved, number, matrix, np.zeros(len(free)), doublings, top)
 
     def inverse(self, points: Floats, *, even: bool = False) -> Multigrid:
         """Of the Laplacian for the points as they are."""
-        graph.assemble(points, self.cells, self.table, self.number, even, self.matrix)
+        table = self.table
+        if self.doublings and not even:
+            _, table = self._weighted(points)
+        graph.assemble(points, self.cells, table, self.number, even, self.matrix)
         return Multigrid(self.matrix)
 
     def value(self, points: Floats, gradient: Floats) -> float:
         """Σq, and its gradient (N, 2); more than any mesh has where a cell is inverted."""
+        if self.doublings:
+            power, weights = self._weighted(points)
+            if power < math.inf:
+                energy(points, self.cells, weights, self.nothing, 0.0, gradient)
+            return power
         total: float = energy(points, self.cells, self.table, self.nothing, 0.0, gradient)
         return total
+
+    def _weighted(self, points: Floats) -> tuple[float, Floats]:
+        """See ``powers.weighted``."""
+        weights = np.empty((len(self.cells), 3))
+        total: float = powers.weighted(points, self.cells, self.table, self.top, self.doublings, weights)
+        return total, weights
 
     def harmonic(self, points: Floats) -> Iterator[Floats]:
         """Each node that moves at the weighted mean of its neighbours, more and more exactly."""
@@ -170,6 +197,28 @@ class Problem:
             along = z + ((following - multigrid.product(before, z)) / slope) * along  # z is not quite linear in rest
             slope = following
 
+    def start(self, points: Floats) -> Floats:
+        """The points, or harmonic places where these have a smaller Σq."""
+        if self.doublings:
+            return points
+        gradient = np.empty_like(points)
+        value = self.value(points, gradient)
+        for harmonic in self.harmonic(points):
+            if self.value(harmonic, gradient) < value:
+                return harmonic
+        return points
+
+    def is_better(self, points: Floats, before: Floats) -> bool:
+        """Is that worth taking?"""
+        if not self.doublings:
+            gradient = np.empty_like(points)
+            return self.value(points, gradient) < self.value(before, gradient)
+        (least, mean), (old_least, old_mean) = (
+            powers.shapes(each, self.cells, self.table) for each in (points, before)
+        )
+        gain: float = least - old_least
+        return gain >= LEAST_GAIN and gain >= TRADE * (old_mean - mean)
+
     def minimise(self, points: Floats) -> Floats:
         """Where conjugate gradients lead from points (N, 2) without an inverted cell."""
         gradient = np.empty_like(points)
@@ -194,7 +243,7 @@ class Problem:
                 length *= 0.5
             else:
                 break
-            small = small + 1 if value - after < SETTLED * value else 0
+            small = small + 1 if value - after < (CLOSE if self.doublings else SETTLED) * value else 0
             points, value = there, after
             if small == PATIENCE:
                 break
@@ -214,28 +263,31 @@ class Problem:
 
 
 class WholeMesh(Smoother):
-    """One sweep moves all nodes. Not for the level STAR, whose floors such moves do not know."""
+    """One sweep moves all nodes. Not for the level STAR, whose floors such moves do not know.
+
+    doublings: of the power of q, tried in turn until something is taken. With a power, for the worst cells, that is
+    what gains in the least 1/q at least TRADE times what it costs in the mean.
+    """
 
     stops_when_idle = False
+
+    def __init__(self, doublings: Sequence[int] = (0,)) -> None:
+        self.doublings = doublings
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         self.converged = True
         tally = np.zeros(3, dtype=np.int64)
-        problem = Problem.of(field)
-        if not len(problem.moved):
-            return tally
-        before, gradient = field.points, np.empty_like(field.points)
-        value, start = problem.value(before, gradient), before
-        for harmonic in problem.harmonic(before):
-            if problem.value(harmonic, gradient) < value:
-                start = harmonic
+        for doublings in self.doublings:
+            problem = Problem.of(field, doublings)
+            if not len(problem.moved):
                 break
-        found = self._allowed(problem.minimise(start), field, executor)
-        if found is not None and problem.value(found, gradient) < value:
-            tally[MOVED] = (found != before).any(axis=1).sum()
-            field.points[:] = found
-            field.floor.forget()
+            found = self._allowed(problem.minimise(problem.start(field.points)), field, executor)
+            if found is not None and problem.is_better(found, field.points):
+                tally[MOVED] = (found != field.points).any(axis=1).sum()
+                field.points[:] = found
+                field.floor.forget()
+                break
         return tally
 
     def _allowed(self, points: Floats, field: Field, executor: Executor) -> Floats | None:

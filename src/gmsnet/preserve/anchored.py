@@ -5,7 +5,8 @@ between bodies that moved. Such cells are stretched away from the boundary, or a
 A layer is thinnest where it starts. So of each piece of stretched cells that hang together, those count that have an
 edge on a wall and are stretched along it: they must be many, thin, and
 
-- much thinner than most of the piece, which has grown from row to row, or
+- much thinner than most of the piece, which has grown from row to row by much, or by less where most of the piece or
+  of its edges on walls lie so, or
 - thinner, and most of the piece lies along the wall that is nearest, or
 - as even along the wall as rows of one height are made, where most of the piece lies along the wall, and the piece is
   not the mesh.
@@ -34,7 +35,8 @@ ALONG = math.cos(math.radians(40.0))  # twice the angle between the stretch and 
 FEWEST = 6  # edges on walls
 THIN = math.log(2.5)  # the length of such an edge over the height of its cell, in the median
 GROWN = math.log(1.25)  # how many times as stretched those cells are as those of the piece, in the medians
-CLEARLY_THIN, CLEARLY_GROWN = math.log(4.0), math.log(1.7)  # then nothing else is asked
+CLEARLY_THIN, CLEARLY_GROWN, GROWN_BY_MUCH = math.log(4.0), math.log(1.7), math.log(6.0)
+OF_PIECE, OF_EDGES = 0.66, 0.7  # of the cells, of the edges on walls: a share that lies along them where it is thin
 MOSTLY = 0.72  # of the cells of a layer are stretched along the wall nearest to them
 PART, EVEN = 0.6, math.log(1.05)  # of a piece without growth: share of the mesh, change from cell to cell
 UNEVEN = math.log(1.6)  # more from cell to cell is no row, but the slivers of a hull
@@ -91,7 +93,8 @@ def _at_walls(
         lie = _along_nearest(triangles[own], points, cells[own], one[along], two[along])
         change = _change(height[along], one[along], two[along])
         even = change <= EVEN and np.count_nonzero(own) <= PART * of_all
-        clear = thin >= CLEARLY_THIN and grown >= CLEARLY_GROWN
+        most = lie >= OF_PIECE or np.count_nonzero(along) >= OF_EDGES * np.count_nonzero(here)
+        clear = thin >= CLEARLY_THIN and grown >= (CLEARLY_GROWN if most else GROWN_BY_MUCH)
         orderly = clear or (thin >= THIN and lie >= MOSTLY and (grown >= GROWN or even))
         if orderly and change <= UNEVEN:
             kept |= own
