@@ -175,7 +175,7 @@ def test_a_mesh_too_large_for_the_memory_at_hand_is_refused(monkeypatch):
     monkeypatch.setattr(available_memory, "ALWAYS_FREE", 0)
     monkeypatch.setattr(available_memory, "available", lambda: 10_000)
     assert Topology.of(mesh).free.tolist() == [0]
-    with pytest.raises(InputError, match=r"^smoothing 1,128 nodes needs about 0.000451 GB of memory, but only 1e-05"):
+    with pytest.raises(InputError, match=r"^smoothing 1,128 nodes needs about 0.000677 GB of memory, but only 1e-05"):
         gmsnet.smooth(gmsnet.random_mesh(1000, seed=0))
     with pytest.raises(InputError, match=r"^the connectivity of 1,128 nodes needs about 0.00024\d GB of memory"):
         gmsnet.quality(gmsnet.random_mesh(1000, seed=0))
