@@ -197,7 +197,8 @@ class Auto(Smoother):
         """Is the worst cell one of many like it, which one star at a time cannot better?"""
         if self.creep is None or self.least >= GOOD:
             return False
-        return self.whole > 0 or (self.phases is SMALL_PLAN and self.least > mean_shape(field) - NEAR_MEAN)
+        small, moved = self.phases is SMALL_PLAN, self.whole > 0
+        return (small and moved) or ((small or moved) and self.least > mean_shape(field) - NEAR_MEAN)
 
     def _is_slow(self, field: Field, ahead: float) -> bool:
         """Is the mesh deformed as a whole? ahead: what is to come in the mean of 1/q."""
