@@ -29,6 +29,7 @@ from gmsnet.kernels.untangle.cells import find_bad
 from gmsnet.kernels.whole import graph, multigrid, powers, steps
 from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.base import Field, Smoother, Tally
+from gmsnet.methods.multigrid import Multigrid
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
 
@@ -42,65 +43,7 @@ SETTLED, PATIENCE = 1e-4, 2  # a smaller share of Σq gained in so many iteratio
 CLOSE = 1e-6  # the same of a power of q
 TRADE, LEAST_GAIN = 0.5, 1e-4  # in 1/q; most of the mean comes back in the sweeps that follow
 ARMIJO, HALVINGS, INSIDE = 1e-4, 25, 0.9
-COARSEST, COARSE_SWEEPS = 60, 6
-TWICE = 2  # levels below the finest on which a correction may be made of two
-ENOUGH = 0.25  # of the residual that is left after the first correction: then there is no second one
 REPAIRS = 3  # lists of cycles on the worst cells, where they are worse than the guard allows
-
-
-class Multigrid:
-    """An approximate inverse of a Laplacian."""
-
-    def __init__(self, matrix: Matrix) -> None:
-        self.levels: list[tuple[Matrix, Ints]] = []
-        while len(matrix.diagonal) > COARSEST:
-            aggregate, smaller = multigrid.coarser(matrix)
-            if len(smaller.diagonal) > 0.8 * len(matrix.diagonal):
-                break
-            self.levels.append((matrix, aggregate))
-            matrix = smaller
-        self.coarsest = matrix
-
-    def __call__(self, residual: Floats) -> Floats:
-        """One cycle: (n, 2) to (n, 2)."""
-        return self._cycle(residual, 0)
-
-    def _cycle(self, b: Floats, level: int) -> Floats:
-        x = np.empty_like(b)
-        if level == len(self.levels):
-            multigrid.settled(self.coarsest, COARSE_SWEEPS, b, x)
-            return x
-        matrix, aggregate = self.levels[level]
-        multigrid.forth(matrix, b, x)
-        rest = np.empty((len(self._matrix(level + 1).diagonal), 2))
-        multigrid.remainder(matrix, aggregate, b, x, rest)
-        correct = self._twice if level < TWICE else self._cycle
-        multigrid.back(matrix, aggregate, correct(rest, level + 1), b, x)
-        return x
-
-    def _twice(self, b: Floats, level: int) -> Floats:
-        """One or two cycles, combined as conjugate gradients would (Notay's K-cycle)."""
-        matrix = self._matrix(level)
-        first, of_first = self._cycle(b, level), np.empty_like(b)
-        multigrid.times(matrix, first, of_first)
-        bend = multigrid.product(first, of_first)
-        if not bend > 0.0:
-            return first
-        share = multigrid.product(first, b) / bend
-        rest = b - share * of_first
-        if multigrid.product(rest, rest) <= ENOUGH * ENOUGH * multigrid.product(b, b):
-            scaled: Floats = share * first
-            return scaled
-        second, of_second = self._cycle(rest, level), np.empty_like(b)
-        multigrid.times(matrix, second, of_second)
-        common = multigrid.product(second, of_first)
-        own = multigrid.product(second, of_second) - common * common / bend
-        more = multigrid.product(second, rest) / own if own > 0.0 else 0.0
-        both: Floats = (share - more * common / bend) * first + more * second
-        return both
-
-    def _matrix(self, level: int) -> Matrix:
-        return self.levels[level][0] if level < len(self.levels) else self.coarsest
 
 
 @dataclass(eq=False)
@@ -108,7 +51,8 @@ class Problem:
     """Σq over corner simplices as a function of the places of some nodes.
 
     cells: (S, 3) counter-clockwise. table: (S, 3) weights, None where all are 1. moved: (n,) the nodes that move.
-    number: (N,) their rows, −1 for others. matrix: the Laplacian. nothing: (N,) zeros.
+    number: (N,) their rows, −1 for others. matrix: the Laplacian. nothing: (N,) zeros. doublings: with some,
+    Σ(q/top)^p, p = 2^doublings, instead, top the largest q at first.
     """
 
     cells: Ints

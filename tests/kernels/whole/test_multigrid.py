@@ -15,7 +15,8 @@ from gmsnet.kernels.simplex.mean_ratio2 import WEIGHTS
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.kernels.whole import graph, multigrid
 from gmsnet.methods import Field
-from gmsnet.methods.whole_mesh import Multigrid, Problem
+from gmsnet.methods.multigrid import Multigrid
+from gmsnet.methods.whole_mesh import Problem
 from gmsnet.topology.ordering import planar_points
 from gmsnet.topology.topology import Topology
 

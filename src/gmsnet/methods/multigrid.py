@@ -1,0 +1,72 @@
+"""Multigrid cycles: an approximate inverse of the Laplacian of a mesh. The levels are made by kernels/whole."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.whole import multigrid
+from gmsnet.kernels.whole.graph import Matrix
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+COARSEST, COARSE_SWEEPS = 60, 6
+SLOWEST = 0.8  # of the rows of a level: where the next one has more, it is not worth having
+TWICE = 2  # levels below the finest on which a correction may be made of two
+ENOUGH = 0.25  # of the residual that is left after the first correction: then there is no second one
+
+
+class Multigrid:
+    """An approximate inverse of a Laplacian."""
+
+    def __init__(self, matrix: Matrix) -> None:
+        self.levels: list[tuple[Matrix, Ints]] = []
+        while len(matrix.diagonal) > COARSEST:
+            aggregate, smaller = multigrid.coarser(matrix)
+            if len(smaller.diagonal) > SLOWEST * len(matrix.diagonal):
+                break
+            self.levels.append((matrix, aggregate))
+            matrix = smaller
+        self.coarsest = matrix
+
+    def __call__(self, residual: Floats) -> Floats:
+        """One cycle: (n, 2) to (n, 2)."""
+        return self._cycle(residual, 0)
+
+    def _cycle(self, b: Floats, level: int) -> Floats:
+        x = np.empty_like(b)
+        if level == len(self.levels):
+            multigrid.settled(self.coarsest, COARSE_SWEEPS, b, x)
+            return x
+        matrix, aggregate = self.levels[level]
+        multigrid.forth(matrix, b, x)
+        rest = np.empty((len(self._matrix(level + 1).diagonal), 2))
+        multigrid.remainder(matrix, aggregate, b, x, rest)
+        correct = self._twice if level < TWICE else self._cycle
+        multigrid.back(matrix, aggregate, correct(rest, level + 1), b, x)
+        return x
+
+    def _twice(self, b: Floats, level: int) -> Floats:
+        """One or two cycles, combined as conjugate gradients would (Notay's K-cycle)."""
+        matrix = self._matrix(level)
+        first, of_first = self._cycle(b, level), np.empty_like(b)
+        multigrid.times(matrix, first, of_first)
+        bend = multigrid.product(first, of_first)
+        if not bend > 0.0:
+            return first
+        share = multigrid.product(first, b) / bend
+        rest = b - share * of_first
+        if multigrid.product(rest, rest) <= ENOUGH * ENOUGH * multigrid.product(b, b):
+            scaled: Floats = share * first
+            return scaled
+        second, of_second = self._cycle(rest, level), np.empty_like(b)
+        multigrid.times(matrix, second, of_second)
+        common = multigrid.product(second, of_first)
+        own = multigrid.product(second, of_second) - common * common / bend
+        more = multigrid.product(second, rest) / own if own > 0.0 else 0.0
+        both: Floats = (share - more * common / bend) * first + more * second
+        return both
+
+    def _matrix(self, level: int) -> Matrix:
+        return self.levels[level][0] if level < len(self.levels) else self.coarsest
