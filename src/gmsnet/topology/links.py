@@ -48,10 +48,8 @@ class Links(NamedTuple):
         start = np.zeros(len(chosen) + 1, dtype=offset_type(int(size.sum())))
         np.cumsum(size, out=start[1:])
         around = np.zeros(int(start[-1]) + connectivity.WIDTH, dtype=np.int32)
-        order = np.empty(len(faces), dtype=np.int32)
-        order[faces.origin] = np.arange(len(faces), dtype=np.int32)
         links.list_nodes(
-            first, faces.corner, orientation, order, chosen, both, triangles, quads, fan_start, fan, start, around
+            first, faces.corner, orientation, faces.origin, chosen, both, triangles, quads, fan_start, fan, start, around
         )
         code = (both.astype(np.int64) * OPEN) | triangles.astype(np.int64) << 31 | quads
         code = np.concatenate([[0], code])  # that of no cells is number 0

@@ -35,23 +35,27 @@ def around_corner(first, corner, orientation, f, h):
 
 
 @kernel
-def list_nodes(first, corner, orientation, order, chosen, apart, triangles, quads, fan_start, fan, start, around):
+def list_nodes(first, corner, orientation, origin, chosen, apart, triangles, quads, fan_start, fan, start, around):
     """Writes the nodes around each chosen node, in CSR form.
 
-    order: (F,) the faces in the order of the file, on which alone the order of cells depends. fan_start, fan: the
+    origin: (F,) the place of each face in the file, on which alone the order of cells depends. fan_start, fan: the
     neighbours of each chosen node in CSR form, counter-clockwise. start: (N + 1,) has where the nodes of each begin.
     apart: (N,) the nodes around are listed cell by cell: for each triangle the next two, and then for each quad the
     next three, counter-clockwise. Else a node has triangles alone, and they are its neighbours, or quads alone:
     neighbour and diagonal node in turn.
+
+    Faces that are near in memory have near nodes, and those that are near in the file may not: so faces are gone
+    through as they stand in memory, and the few at a node brought to the order of the file.
     """
-    at = np.empty((2, len(triangles)), dtype=np.int64)
+    begin = np.empty(len(triangles) + 1, dtype=np.int64)  # of the corners at each node that is listed cell by cell
+    begin[0] = 0
     for v in range(len(triangles)):
-        at[0, v] = start[v]
-        at[1, v] = start[v] + 2 * triangles[v]
+        begin[v + 1] = begin[v] + (triangles[v] + quads[v] if chosen[v] and apart[v] else 0)
         if chosen[v] and quads[v] == 0 and not apart[v]:
             for k in range(triangles[v]):
                 around[start[v] + k] = fan[fan_start[v] + k]
-    for f in order:
+    corners, end = np.empty(begin[len(triangles)], dtype=np.int64), begin[:-1].copy()  # 4·face + its corner
+    for f in range(len(first) - 1):
         n = first[f + 1] - first[f]
         if n != 3 and n != 4:
             continue
@@ -59,20 +63,43 @@ def list_nodes(first, corner, orientation, order, chosen, apart, triangles, quad
             v = corner[h]
             if not chosen[v] or (quads[v] == 0 and not apart[v]):
                 continue
-            after, before = around_corner(first, corner, orientation, f, h)
-            if n == 3:
-                around[at[0, v]], around[at[0, v] + 1] = after, before
-                at[0, v] += 2
+            if apart[v]:
+                put_in_order(corners, begin[v], end[v], 4 * f + (h - first[f]), origin)
+                end[v] += 1
                 continue
-            diagonal = corner[h + 2 if h + 2 < first[f + 1] else h - 2]
-            if not apart[v]:
-                k = 0
-                while fan[fan_start[v] + k] != after:
-                    k += 1
-                around[start[v] + 2 * k], around[start[v] + 2 * k + 1] = after, diagonal
+            after, _ = around_corner(first, corner, orientation, f, h)
+            k = 0
+            while fan[fan_start[v] + k] != after:
+                k += 1
+            around[start[v] + 2 * k], around[start[v] + 2 * k + 1] = after, corner[across(first, f, h)]
+    for v in range(len(triangles)):
+        at, quad = np.int64(start[v]), np.int64(start[v]) + 2 * triangles[v]
+        for k in range(begin[v], begin[v + 1]):
+            f = corners[k] // 4
+            h = first[f] + corners[k] % 4
+            after, before = around_corner(first, corner, orientation, f, h)
+            if first[f + 1] - first[f] == 3:
+                around[at], around[at + 1] = after, before
+                at += 2
             else:
-                around[at[1, v]], around[at[1, v] + 1], around[at[1, v] + 2] = after, diagonal, before
-                at[1, v] += 3
+                around[quad], around[quad + 1], around[quad + 2] = after, corner[across(first, f, h)], before
+                quad += 3
+
+
+@inlined
+def across(first, f, h):
+    """The corner of quad f that is not next to its corner h."""
+    return h + 2 if h + 2 < first[f + 1] else h - 2
+
+
+@inlined
+def put_in_order(corners, begin, end, new, origin):
+    """Puts a corner among those from begin to end, which stand as their faces do in the file."""
+    k, place = end, origin[new // 4]
+    while k > begin and origin[corners[k - 1] // 4] > place:
+        corners[k] = corners[k - 1]
+        k -= 1
+    corners[k] = new
 
 
 @kernel
