@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex import measures as quality
+from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL, Simplices
 from gmsnet.kernels.simplex.survey import BOUNDARY
 from gmsnet.kernels.topology.components import pieces
 from gmsnet.mesh.mesh import Mesh
@@ -50,7 +51,7 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
     if not (_edge(_double(points, triangles.take(survey.beside, axis=0))) <= largest).any():
         return kept  # so it is with most meshes
     chosen, rough = np.zeros(len(triangles), dtype=bool), None
-    for wall, cells in _walls(triangles, survey):
+    for wall, cells in _walls(topology.simplices, survey):
         size = _edge(_double(points, triangles[cells]))
         if (size <= largest).mean() < MOST:
             continue
@@ -106,11 +107,14 @@ def _edge(double: Floats | float) -> Floats:
     return np.asarray(np.sqrt(double * (2.0 / np.sqrt(3.0))))
 
 
-def _walls(triangles: Ints, survey: Survey) -> list[tuple[Ints, Ints]]:
-    """The boundary edges (k, 2) of each piece of the boundary that hangs together, and the row of the cell at each."""
-    boundary = (survey.rim & BOUNDARY) > 0
-    edges = triangles[survey.beside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    outer = np.flatnonzero(boundary[edges].all(axis=1))
+def _walls(simplices: Simplices, survey: Survey) -> list[tuple[Ints, Ints]]:
+    """The boundary edges (k, 2) of each piece of the boundary that hangs together, and a row of the cell at each."""
+    boundary, shapes = (survey.rim & BOUNDARY) > 0, simplices.shapes
+    edges = simplices.rows[survey.beside][:, [[0, 1], [1, 2], [2, 0]]]
+    outer = boundary[edges].all(axis=2)
+    if shapes is not None:  # of a corner of a quad, the edge to the next one: so each edge of a cell counts once
+        outer[:, 1:] &= shapes[survey.beside, None] == EQUILATERAL
+    edges, outer = edges.reshape(-1, 2), np.flatnonzero(outer)
     ends = np.sort(edges[outer], axis=1)
     key = ends[:, 0].astype(np.int64) * len(boundary) + ends[:, 1]
     # An edge between two of these nodes that is not on the boundary has both of its cells among these rows.

@@ -49,8 +49,9 @@ class Links(NamedTuple):
         np.cumsum(size, out=start[1:])
         around = np.zeros(int(start[-1]) + connectivity.WIDTH, dtype=np.int32)
         links.list_nodes(
-            first, faces.corner, orientation, faces.origin, chosen, both, triangles, quads, fan_start, fan, start, around
-        )
+            first, faces.corner, orientation, faces.origin, chosen, both, triangles, quads, fan_start, fan, start,
+            around,
+        )  # fmt: skip
         code = (both.astype(np.int64) * OPEN) | triangles.astype(np.int64) << 31 | quads
         code = np.concatenate([[0], code])  # that of no cells is number 0
         kinds, number = np.unique(code, return_inverse=True)
