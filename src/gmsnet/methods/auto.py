@@ -54,6 +54,7 @@ PASS_GAIN, LAST_GAIN = 0.002, 0.003
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
 GOOD = 0.75  # a least 1/q that needs no more
+IDEAL = 0.99  # a least 1/q at which the worst cells have no turn, nor what follows
 NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
 
 
@@ -61,8 +62,9 @@ class Phase(NamedTuple):
     """name: for the record. create: its smoother. sweeps: how many, unless it has settled before.
 
     first: how many for the first time, if others. rounds: how often it is made at most. gain: what must be to come, in
-    the mean of 1/q, for it to be made once more. looks: whether the mesh is measured after it. often:
-    after so many rounds of it, too.
+    the mean of 1/q, for it to be made once more; least: what the last round must have gained for that. lasting: with
+    less than this share of the gain before, no nodes creep: so gains fall where short waves are left, which sweeps even
+    out. looks: whether the mesh is measured after it. often: after so many rounds of it, too.
     """
 
     name: str
@@ -71,6 +73,8 @@ class Phase(NamedTuple):
     first: int = 0
     rounds: int = 1
     gain: float = math.inf
+    least: float = 0.0
+    lasting: float = 0.0
     looks: bool = True
     often: int = 4
 
@@ -80,10 +84,13 @@ def newton(relaxation: float = RELAXATION, *, means: int = 0) -> Barrier:
     return Barrier("q", relaxation, ALWAYS, means)
 
 
-def worst_first(more: int) -> WorstFirst:
-    """The list of cycles, and so many times the highest powers, in one sweep: one guard and one ranking for all."""
+def worst_first(more: int, enough: float = math.inf) -> WorstFirst:
+    """The list of cycles, and so many times the highest powers, in one sweep: one guard and one ranking for all.
+
+    enough: a least 1/q of which nothing more is asked.
+    """
     cycles = CYCLES + LAST * more
-    return WorstFirst(cycles, at_once=len(cycles))
+    return WorstFirst(cycles, len(cycles), enough)
 
 
 NEWTON = Phase("Newton on q", lambda: newton(means=1), 2, first=3, rounds=40, gain=0.006)
@@ -97,11 +104,11 @@ POLISH = Phase("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1,
 LARGE_PLAN = (NEWTON._replace(looks=False), WORST._replace(looks=False), MEAN)
 # Quads gain for longer, and what the mean takes back from the worst of them is worth another turn.
 QUADS_PLAN = (
-    NEWTON._replace(gain=0.0005, looks=False),
-    WORST._replace(looks=False),
-    MEAN._replace(gain=0.0003, rounds=20, looks=False),
-    WORST._replace(create=lambda: worst_first(6), looks=False),
-    MEAN._replace(gain=0.0003, rounds=20),
+    NEWTON._replace(gain=0.0005, least=0.0005, lasting=0.8, looks=False),
+    WORST._replace(create=lambda: worst_first(3, IDEAL), looks=False),
+    MEAN._replace(gain=0.0003, least=0.0002, lasting=math.inf, rounds=20, looks=False),
+    WORST._replace(create=lambda: worst_first(6, IDEAL), looks=False),
+    MEAN._replace(gain=0.0003, least=0.0002, lasting=math.inf, rounds=20),
 )
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 
@@ -200,12 +207,12 @@ class Auto(Smoother):
         small, moved = self.phases is SMALL_PLAN, self.whole > 0
         return (small and moved) or ((small or moved) and self.least > mean_shape(field) - NEAR_MEAN)
 
-    def _is_slow(self, field: Field, ahead: float) -> bool:
-        """Is the mesh deformed as a whole? ahead: what is to come in the mean of 1/q."""
+    def _is_slow(self, field: Field, ahead: float, lasts: bool) -> bool:
+        """Is the mesh deformed as a whole? ahead: what is to come in the mean of 1/q. lasts: gains do not fall fast."""
         if self.creep is None or self.whole >= MOST_WHOLE:
             return False
         creeps = self.creep.is_one(field.points)
-        return ahead > SLOW or creeps or (self.mean < POOR and not self.whole)
+        return (lasts and (ahead > SLOW or creeps)) or (self.mean < POOR and not self.whole)
 
     def _end_round(self, field: Field) -> None:
         """Makes the phase once more where that pays, else goes on to the next one, or settles."""
@@ -214,23 +221,25 @@ class Auto(Smoother):
         self.made = 0
         goes_on = False
         if self.rounds < phase.rounds:
-            mean, ahead = mean_shape(field), 0.0
+            mean, ahead, lasts = mean_shape(field), 0.0, True
             if phase.first and self.rounds == 1:
                 goes_on = True
             else:
                 before, self.gained = self.gained, mean - self.mean
+                lasts = not phase.lasting or self.gained >= phase.lasting * before
                 ahead = to_come(before, self.gained)
-                goes_on = ahead > phase.gain
+                goes_on = ahead > phase.gain and self.gained > phase.least
                 ahead = min(ahead, AHEAD * self.gained) if before < math.inf else 0.0
             self.mean = mean
-            self.slow = self._is_slow(field, ahead)
+            self.slow = self._is_slow(field, ahead, lasts)
             goes_on = goes_on or self.slow
         target_reached = self.smoother.target_reached
         self.looks = self.rounds % phase.often == 0 if goes_on else phase.looks or target_reached
         if isinstance(self.smoother, WorstFirst) and self.creep is not None:
             self._look_at_worst(self.smoother)
         if not goes_on:
-            self._enter(len(self.phases) if target_reached else self.at + 1, field)
+            ends = target_reached or (self.smoother.converged and isinstance(self.smoother, WorstFirst))
+            self._enter(len(self.phases) if ends else self.at + 1, field)
 
 
 def mean_shape(field: Field) -> float:

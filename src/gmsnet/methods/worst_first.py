@@ -52,13 +52,14 @@ GAIN = 1e-4  # in the minimum 1/q: less is none
 class WorstFirst(Smoother):
     """See the module. at_once: how many cycles a sweep makes; a ranking of all cells costs more than a late cycle.
 
-    least: the minimum 1/q after the last sweep. gained: what the last cycle of it has brought.
+    enough: a minimum 1/q with which no cycle is made. least: the minimum 1/q after the last sweep. gained: what the
+    last cycle of it has brought.
     """
 
     least = gained = -math.inf
 
-    def __init__(self, cycles: tuple[Cycle, ...] = CYCLES, at_once: int = 1) -> None:
-        self.cycles, self.at_once = cycles, at_once
+    def __init__(self, cycles: tuple[Cycle, ...] = CYCLES, at_once: int = 1, enough: float = math.inf) -> None:
+        self.cycles, self.at_once, self.enough = cycles, at_once, enough
         self.converged = False
         self.cells: NDArray[np.int32] | None = None
         self.next = 0
@@ -68,7 +69,10 @@ class WorstFirst(Smoother):
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
         simplices = topology.changeable
         if self.cells is None or self.next >= len(self.cycles):
-            self.cells = candidates(field, executor)
+            self.cells, self.least = candidates(field, executor)
+        if self.least >= self.enough:
+            self.converged = True
+            return tally
         goes_on = self.next >= len(self.cycles)
         chosen = LAST if goes_on else self.cycles[self.next : self.next + self.at_once]
         count = simplices.cell_count
@@ -83,8 +87,9 @@ class WorstFirst(Smoother):
         return tally
 
 
-def candidates(field: Field, executor: Executor) -> NDArray[np.int32]:
-    """The worst cells, by their place among those that can change: at least the share CANDIDATES of them.
+def candidates(field: Field, executor: Executor) -> tuple[NDArray[np.int32], float]:
+    """The worst cells, by their place among those that can change: at least the share CANDIDATES of them; and the
+    minimum 1/q.
 
     The floor of the guard is told of the worst of these.
     """
@@ -98,7 +103,7 @@ def candidates(field: Field, executor: Executor) -> NDArray[np.int32]:
     wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * simplices.cell_count))
     cells: NDArray[np.int32] = ranking.worst(shape, wanted)
     field.floor.watch(cells, shape[cells])
-    return cells
+    return cells, float(shape[cells].min(initial=math.inf))
 
 
 def create(options: MethodOptions) -> WorstFirst:
