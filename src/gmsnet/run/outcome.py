@@ -119,7 +119,9 @@ def outcome(
     count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)
     if count:
         points.flags.writeable = False  # so that the mesh need not copy them
-        whole = totals if topology.near_shapes is None else None  # else they are of the cells with a free node alone
+        whole = totals  # unless they are of the cells with a free node alone
+        if whole is not None and topology.scored is not topology.simplices:
+            whole = None
         known = (best, executor, whole) if exact else (None, executor)
         after = measure(mesh.with_points(points), topology, *known)
         if rank(after) <= rank(before):

@@ -76,7 +76,8 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
         before, protection = looked_at(start)
     else:  # most often nothing is protected, and these are the stars that are smoothed
         (before, protection), _ = side_by_side(threads, partial(looked_at, start), lambda: topology.stars)
-    totals = before.totals if topology.near_shapes is None else None  # else a run compares some of the cells
+    compared = protection.topology
+    totals = before.totals if compared.scored is compared.simplices else None  # else a run compares some of the cells
     return State(
         given,
         restore,

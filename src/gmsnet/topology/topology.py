@@ -274,21 +274,27 @@ class Topology:
     @cached_property
     def scored(self) -> Simplices:
         """Those by which meshes on the way are compared: all triangles, or, if not all cells are triangles, the corner
-        simplices of the cells with a free node."""
+        simplices of the cells with a free node; ``simplices`` itself, where these are all."""
         if self.near_cells is None:
             return self.simplices
-        rows = connectivity.touching(self.near, self.near_free)
         cells = np.zeros(int(self.near_cells.max(initial=-1)) + 1, dtype=bool)
-        cells[self.near_cells[rows]] = True
-        return self.simplices.take(np.flatnonzero(cells[self.near_cells]))
+        cells[self.near_cells[self._with_a_free_node]] = True
+        kept = cells[self.near_cells]
+        return self.simplices if kept.all() else self.simplices.take(np.flatnonzero(kept))
 
     @cached_property
     def changeable(self) -> Simplices:
         """Those that have a free node."""
-        rows = connectivity.touching(self.near, self.near_free)
+        rows = self._with_a_free_node
         if len(rows) == len(self.near):
             return self.simplices
         return self.simplices.take(rows)
+
+    @cached_property
+    def _with_a_free_node(self) -> Ints:
+        """Their rows."""
+        rows: Ints = connectivity.touching(self.near, self.near_free)
+        return rows
 
     @cached_property
     def links(self) -> kernels_stars.Stars:
