@@ -37,7 +37,7 @@ from gmsnet.methods.base import Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.creep import Creep
 from gmsnet.methods.optimize import Newton
-from gmsnet.methods.whole_mesh import WholeMesh
+from gmsnet.methods.whole_mesh import CLOSEST, SETTLED, WholeMesh
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
 from gmsnet.parallel.executor import Executor
 
@@ -55,6 +55,7 @@ WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
 GOOD = 0.75  # a least 1/q that needs no more
 IDEAL = 0.99  # a least 1/q at which the worst cells have no turn, nor what follows
+EXACT = 20_000  # free nodes: up to so many, all nodes of such a mesh go to the minimum of Σq, which is near
 NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
 
 
@@ -123,7 +124,7 @@ class Auto(Smoother):
         self.at = -1
         self.creep: Creep | None = None
         self.whole = 0  # how often all nodes have moved at once
-        self.slow = self.last = False
+        self.slow = self.last = self.ideal = False
         self.passes, self.least = 0, -math.inf  # passes over the worst cells, and the least 1/q after the last one
         self.again = -1  # the phase to go back to in the end, if there is one
 
@@ -132,7 +133,7 @@ class Auto(Smoother):
             phase, self.again = self.again, -1
         self.at, self.made, self.rounds, self.gained = phase, 0, 0, math.inf
         if phase == len(self.phases):
-            self.converged = self.last or not self._is_even(field)
+            self.converged = self.last or not (self.ideal or self._is_even(field))
             self.last = True
             return
         self.smoother = self.phases[phase].create()
@@ -148,7 +149,7 @@ class Auto(Smoother):
             self.phases = self.phases or (SMALL_PLAN if len(field.topology.free) <= SMALL else large)
             self._enter(0, field)
         if self.at == len(self.phases):
-            return self._move_all_for_worst(field, executor, test)
+            return (self._move_all if self.ideal else self._move_all_for_worst)(field, executor, test)
         phase = self.phases[self.at]
         if self.slow:
             return self._move_all(field, executor, test)
@@ -173,7 +174,8 @@ class Auto(Smoother):
         """All nodes at once; then the phase goes on as if it began."""
         self.slow, self.looks, self.phase = False, False, WHOLE
         self.whole += 1
-        tally = WholeMesh().sweep(field, executor, test)
+        self.converged = self.ideal
+        tally = WholeMesh(settled=CLOSEST if self.ideal else SETTLED).sweep(field, executor, test)
         if tally[MOVED]:
             self.rounds, self.made, self.gained = 0, 0, math.inf
             self.mean = mean_shape(field)
@@ -238,8 +240,10 @@ class Auto(Smoother):
         if isinstance(self.smoother, WorstFirst) and self.creep is not None:
             self._look_at_worst(self.smoother)
         if not goes_on:
-            ends = target_reached or (self.smoother.converged and isinstance(self.smoother, WorstFirst))
-            self._enter(len(self.phases) if ends else self.at + 1, field)
+            is_ideal = self.smoother.converged and isinstance(self.smoother, WorstFirst)
+            few = self.creep is not None and not self.whole and len(field.topology.free) <= EXACT
+            self.ideal = is_ideal and few
+            self._enter(len(self.phases) if target_reached or is_ideal else self.at + 1, field)
 
 
 def mean_shape(field: Field) -> float:

@@ -40,7 +40,7 @@ ITERATIONS, HARMONIC_ITERATIONS = 120, 30
 ACCURATE = (1e-2, 1e-4, 1e-6)  # of the first residual: the next one is for harmonic places with inverted cells
 REFRESH = 10  # iterations after which the Laplacian is formed anew
 SETTLED, PATIENCE = 1e-4, 2  # a smaller share of Σq gained in so many iterations one after the other is the end
-CLOSE = 1e-6  # the same of a power of q
+CLOSE, CLOSEST = 1e-6, 1e-12  # the same of a power of q; and of Σq where the minimum is near
 TRADE, LEAST_GAIN = 0.5, 1e-4  # in 1/q; most of the mean comes back in the sweeps that follow
 ARMIJO, HALVINGS, INSIDE = 1e-4, 25, 0.9
 REPAIRS = 3  # lists of cycles on the worst cells, where they are worse than the guard allows
@@ -163,8 +163,8 @@ class Problem:
         gain: float = least - old_least
         return gain >= LEAST_GAIN and gain >= TRADE * (old_mean - mean)
 
-    def minimise(self, points: Floats) -> Floats:
-        """Where conjugate gradients lead from points (N, 2) without an inverted cell."""
+    def minimise(self, points: Floats, settled: float) -> Floats:
+        """Where conjugate gradients lead from points (N, 2) without an inverted cell. settled: see SETTLED."""
         gradient = np.empty_like(points)
         value = self.value(points, gradient)
         slopes = gradient[self.moved]
@@ -187,7 +187,7 @@ class Problem:
                 length *= 0.5
             else:
                 break
-            small = small + 1 if value - after < (CLOSE if self.doublings else SETTLED) * value else 0
+            small = small + 1 if value - after < settled * value else 0
             points, value = there, after
             if small == PATIENCE:
                 break
@@ -210,13 +210,13 @@ class WholeMesh(Smoother):
     """One sweep moves all nodes. Not for the level STAR, whose floors such moves do not know.
 
     doublings: of the power of q, tried in turn until something is taken. With a power, for the worst cells, that is
-    what gains in the least 1/q at least TRADE times what it costs in the mean.
+    what gains in the least 1/q at least TRADE times what it costs in the mean. settled: see SETTLED.
     """
 
     stops_when_idle = False
 
-    def __init__(self, doublings: Sequence[int] = (0,)) -> None:
-        self.doublings = doublings
+    def __init__(self, doublings: Sequence[int] = (0,), settled: float = SETTLED) -> None:
+        self.doublings, self.settled = doublings, settled
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
@@ -226,7 +226,8 @@ class WholeMesh(Smoother):
             problem = Problem.of(field, doublings)
             if not len(problem.moved):
                 break
-            found = self._allowed(problem.minimise(problem.start(field.points)), field, executor)
+            start, settled = problem.start(field.points), CLOSE if doublings else self.settled
+            found = self._allowed(problem.minimise(start, settled), field, executor)
             if found is not None and problem.is_better(found, field.points):
                 tally[MOVED] = (found != field.points).any(axis=1).sum()
                 field.points[:] = found
