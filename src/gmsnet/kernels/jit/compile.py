@@ -68,12 +68,18 @@ class Part:
     """A function that kernels call.
 
     What Python needs to call a function takes longer to compile than most parts do: it is made where Python calls one.
-    A part must not print, nor raise an error with computed values in it: that needs Python.
+    A part must not print, nor raise an error with computed values in it: that needs Python. Where kernels are on disk,
+    no part is needed: so Numba is told of one when it compiles a kernel that calls it.
     """
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
-        self.py_func = function
-        self.inside = numba.njit(**options)(function)
+        self.py_func, self.options = function, options
+
+    @cached_property
+    def inside(self) -> Callable[..., Any]:
+        """What kernels call."""
+        compiled: Callable[..., Any] = numba.njit(**self.options)(self.py_func)
+        return compiled
 
     def __call__(self, *arguments: Any) -> Any:
         """For Python, compiled apart from what kernels call."""
