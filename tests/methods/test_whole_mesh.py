@@ -7,12 +7,22 @@ import pytest
 from support import quads as naive
 
 import gmsnet
-from gmsnet.generate import disturb, hybrid_mesh, kershaw_mesh, moved_hole_mesh, sheared_mesh, swirled_mesh, zigzag_mesh
+from gmsnet.generate import (
+    disturb,
+    hybrid_mesh,
+    kershaw_mesh,
+    moved_hole_mesh,
+    random_quad_mesh,
+    sheared_mesh,
+    structured_mesh,
+    swirled_mesh,
+    zigzag_mesh,
+)
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import VALID, WORST, Precision
 from gmsnet.kernels.whole.powers import shapes
 from gmsnet.methods import Field
-from gmsnet.methods.auto import WHOLE, WHOLE_WORST
+from gmsnet.methods.auto import EXACT, SMALL, WHOLE, WHOLE_WORST
 from gmsnet.methods.creep import Creep
 from gmsnet.methods.whole_mesh import TRADE, Problem, WholeMesh
 from gmsnet.parallel.threads import serial
@@ -119,6 +129,26 @@ def test_nodes_that_slide_wait():
 def test_random_meshes_do_not_creep(seed):
     for mesh in (gmsnet.random_mesh(2000, seed=seed), gmsnet.random_mesh(8000, seed=seed)):
         assert not any(WHOLE in sweep.stage for sweep in gmsnet.smooth(mesh).history)
+
+
+def test_random_quads_are_left_to_sweeps():
+    for mesh in (random_quad_mesh(6000, seed=1), random_quad_mesh(6000, cells="mixed", seed=2)):
+        result = gmsnet.smooth(mesh)
+        assert len(result.topology.free) > SMALL
+        assert not any(WHOLE in sweep.stage for sweep in result.history)
+        assert result.after.shape.min() > 0.3
+
+
+def test_nearly_ideal_quads_come_to_the_minimum():
+    mesh = structured_mesh(80)
+    free = Topology.of(mesh).free
+    assert SMALL < len(free) <= EXACT
+    held = np.isin(np.arange(len(mesh.points)), free)
+    result = gmsnet.smooth(disturb(mesh, held, 0.4, seed=1, edge="shortest"))
+    assert WHOLE in result.history[-1].stage
+    assert "worst kept" not in " ".join(sweep.stage for sweep in result.history)
+    assert 1.0 - result.after.shape.min() < 1e-8
+    assert np.abs(result.points - mesh.points).max() < 1e-4 / 80
 
 
 def test_coherent_shifts_are_creep_and_others_are_not():

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from support.layer_meshes import grid
 
 import gmsnet
-from gmsnet.generate import Curve, disturb, good_mesh, layered_mesh
+from gmsnet.generate import Curve, disturb, good_mesh, layered_mesh, random_quad_mesh
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.paper.cases import CASES
 from gmsnet.preserve.layers import stretched_layers
 from gmsnet.preserve.protection import WALL
-from gmsnet.preserve.walls import NEAR, near_walls
+from gmsnet.preserve.survey import Survey
+from gmsnet.preserve.walls import NEAR, _walls, near_walls
 from gmsnet.topology.topology import Topology
 
 
@@ -142,3 +145,21 @@ def test_no_cells_no_extent_and_a_boundary_in_one_line():
     assert not kept(flat).any()
     line = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]), (CellBlock("triangle", [[0, 1, 2]], [0]),))
     assert not kept(line).any()
+
+
+@pytest.mark.parametrize("cells", ["quad", "mixed"])
+def test_walls_of_quads_are_pieces_of_the_boundary(cells):
+    mesh = random_quad_mesh(800, cells=cells, seed=3)
+    topology = Topology.of(mesh)
+    walls = _walls(topology.simplices, Survey.of(mesh, topology))
+    assert len(walls) == 1  # the square
+    edges = {tuple(sorted(edge)) for edge in topology.memory[walls[0][0]].tolist()}
+    count = Counter(
+        tuple(sorted(pair))
+        for block in mesh.cells
+        if block.dimension == 2
+        for nodes in block.nodes.tolist()
+        for pair in zip(nodes, nodes[1:] + nodes[:1], strict=True)
+    )
+    assert len(walls[0][0]) == len(edges)
+    assert edges == {edge for edge, times in count.items() if times == 1}
