@@ -41,20 +41,22 @@ class Creep:
 
     def start(self, points: NDArray[np.float64]) -> None:
         """A sweep begins."""
-        self.before = points[self.nodes]
+        self.before = points.take(self.nodes, axis=0)
 
     def is_one(self, points: NDArray[np.float64]) -> bool:
         """Did the nodes creep in the sweep that began last? No, if none has begun since this was asked."""
         if self.before is None:
             return False
-        shifts = points[self.nodes] - self.before
+        now = points.take(self.nodes, axis=0)
+        shifts = now - self.before
         self.before = None
         square = float((shifts * shifts).sum())
         if not square > 0.0:
             return False
         together = shifts.sum(axis=1)
-        coherence = float((together * together).sum()) / (WINDOW * square)
-        edges = np.diff(points[self.nodes], axis=1)
+        if not float((together * together).sum()) / (WINDOW * square) >= COHERENT:  # so it is on most meshes
+            return False
+        edges = np.diff(now, axis=1)
         edge = float((edges * edges).sum()) / edges[..., 0].size
         rows = math.sqrt(self.free) / math.pi
-        return coherence >= COHERENT and square / shifts[..., 0].size * rows * rows >= WORTHWHILE * edge
+        return square / shifts[..., 0].size * rows * rows >= WORTHWHILE * edge

@@ -35,7 +35,8 @@ def carry_out(state: State, options: SmoothOptions, executor: Executor) -> State
     """The state after all stages, or after the one that was interrupted, written back."""
     for stage in STAGES:
         try:
-            state = interruptible()(stage)(state, options, executor)
+            with interruptible():
+                state = stage(state, options, executor)
         except KeyboardInterrupt as interruption:  # a stage that has nothing of its own to keep
             state = state.interrupted(interruption)
         if state.interruption is not None:
