@@ -110,11 +110,11 @@ def _edge(double: Floats | float) -> Floats:
 def _walls(simplices: Simplices, survey: Survey) -> list[tuple[Ints, Ints]]:
     """The boundary edges (k, 2) of each piece of the boundary that hangs together, and a row of the cell at each."""
     boundary, shapes = (survey.rim & BOUNDARY) > 0, simplices.shapes
-    edges = simplices.rows[survey.beside][:, [[0, 1], [1, 2], [2, 0]]]
-    outer = boundary[edges].all(axis=2)
+    edges = simplices.rows[survey.beside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    at_rim = boundary[edges].all(axis=1)
     if shapes is not None:  # of a corner of a quad, the edge to the next one: so each edge of a cell counts once
-        outer[:, 1:] &= shapes[survey.beside, None] == EQUILATERAL
-    edges, outer = edges.reshape(-1, 2), np.flatnonzero(outer)
+        at_rim &= np.repeat(shapes[survey.beside] == EQUILATERAL, 3) | (np.arange(len(edges)) % 3 == 0)
+    outer = np.flatnonzero(at_rim)
     ends = np.sort(edges[outer], axis=1)
     key = ends[:, 0].astype(np.int64) * len(boundary) + ends[:, 1]
     # An edge between two of these nodes that is not on the boundary has both of its cells among these rows.
