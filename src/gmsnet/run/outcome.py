@@ -34,6 +34,8 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
     rank = options.target.rank if options.target else rank_by(options.best_by)
     if state.second_order is not None and state.second_order.invalid[0]:  # whose mending may cost straight cells shape
         rank = inverted_alone
+    if state.motion is not None:
+        rank = inverted_alone
     final = outcome(state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals)
     nothing = np.empty((0, 2))
     return replace(state, start=nothing, points=nothing, shapes=np.empty(0, dtype=np.float32), final=final)
