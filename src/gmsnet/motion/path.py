@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse
@@ -20,22 +21,37 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Ints = NDArray[np.int32]
+Nodes = NDArray[np.integer[Any]]
 
 RIGID = 1e-6  # of the size of a body: by no more does one that moves as a whole miss its places
+
+
+class Body(NamedTuple):
+    """A part of the boundary that moves as a whole: its nodes, their mean before and after, and the angle of its turn.
+
+    way: of its nodes from the mean, before; rest: what they miss when they are turned, before that.
+    """
+
+    nodes: Nodes
+    middle: complex
+    to: complex
+    angle: float
+    way: Complex
+    rest: Complex
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
     """By places in memory, x + iy in units of the run. start, end: (N,) of all nodes; turn: (N,) radians, as asked for.
 
-    bodies: (N,) the number of the body that a node moves with as a whole, −1 of others. edges: (E, 2) the edges by
-    which a boundary's rotation is told. sure: (N,) where it is.
+    bodies: the parts that move as a whole. edges: (E, 2) the edges by which a boundary's rotation is told. sure: (N,)
+    where it is.
     """
 
     start: Complex
     end: Complex
     turn: Floats
-    bodies: NDArray[np.int32]
+    bodies: tuple[Body, ...]
     edges: Ints
     sure: Flags
 
@@ -56,12 +72,8 @@ class Path:
         if share == 1.0:
             return self.end
         places: Complex = self.start + share * (self.end - self.start)
-        for number in range(int(self.bodies.max(initial=-1)) + 1):
-            own = self.bodies == number
-            middle, to, angle = _rigid(self.start[own], self.end[own], self.turn[own])
-            way = self.start[own] - middle
-            rest = np.exp(-1j * angle) * (self.end[own] - to) - way
-            places[own] = middle + share * (to - middle) + np.exp(1j * angle * share) * (way + share * rest)
+        for nodes, middle, to, angle, way, rest in self.bodies:
+            places[nodes] = middle + share * (to - middle) + np.exp(1j * angle * share) * (way + share * rest)
         return places
 
     def turns(self, share: float) -> Floats:
@@ -73,7 +85,7 @@ class Path:
         turned /= np.abs(turned)
         sums = np.bincount(a, turned.real, len(places)) + np.bincount(b, turned.real, len(places)) + 0j
         sums += 1j * (np.bincount(a, turned.imag, len(places)) + np.bincount(b, turned.imag, len(places)))
-        return _unwrapped(np.angle(sums), asked, self.edges, self.sure, places == self.start)
+        return _unwrapped(np.angle(sums), asked, self.edges, places == self.start)
 
 
 def as_complex(points: Floats) -> Complex:
@@ -101,55 +113,44 @@ def outline(topology: Topology, moved: Flags) -> Ints:
     return np.concatenate([rim, inner])
 
 
-def _rigid(start: Complex, end: Complex, turn: Floats) -> tuple[complex, complex, float]:
-    """The middles before and after, and the angle of the best rotation between, next to what is asked for."""
-    middle, to = complex(start.mean()), complex(end.mean())
-    asked = float(turn.mean())
-    product = complex((np.conj(start - middle) * (end - to)).sum())
-    rest = np.angle(product * np.exp(-1j * asked)) if product else 0.0
-    return middle, to, asked + float(rest)
+def _parts(edges: Ints, count: int) -> list[Nodes]:
+    """The nodes of each connected part of a graph, without nodes that have no edge."""
+    number = scipy.sparse.csgraph.connected_components(_graph(edges, count), directed=False)[1]
+    nodes = np.unique(edges)
+    order = np.argsort(number[nodes], kind="stable")
+    nodes, number = nodes[order], number[nodes[order]]
+    return np.split(nodes, np.flatnonzero(np.diff(number)) + 1) if len(nodes) else []
 
 
-def _parts(edges: Ints, count: int) -> NDArray[np.int32]:
-    graph = scipy.sparse.csr_array(
-        (np.ones(len(edges), dtype=np.int8), (edges[:, 0], edges[:, 1])), shape=(count, count)
-    )
-    part: NDArray[np.int32] = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
-    return part
+def _graph(edges: Ints, count: int) -> scipy.sparse.csr_array:
+    ones = np.ones(len(edges), dtype=np.int8)
+    return scipy.sparse.csr_array((ones, (edges[:, 0], edges[:, 1])), shape=(count, count))
 
 
-def _bodies(start: Complex, end: Complex, turn: Floats, moved: Flags, edges: Ints) -> NDArray[np.int32]:
-    """(N,) numbers of the connected parts of boundaries that are moved as a whole, −1 for all else."""
-    bodies = np.full(len(start), -1, dtype=np.int32)
-    part, count = _parts(edges, len(start)), 0
-    for number in np.unique(part[edges[:, 0]]):
-        own = np.flatnonzero(part == number)
-        if not moved[own].all() or len(own) < 2:
+def _bodies(start: Complex, end: Complex, turn: Floats, moved: Flags, edges: Ints) -> tuple[Body, ...]:
+    """The connected parts of boundaries that are moved as a whole."""
+    bodies = list[Body]()
+    for own in _parts(edges[moved[edges].any(axis=1)], len(start)):
+        if not moved[own].all():
             continue
-        middle, to, angle = _rigid(start[own], end[own], turn[own])
+        middle, to, asked = complex(start[own].mean()), complex(end[own].mean()), float(turn[own].mean())
         way = start[own] - middle
-        if np.abs(np.exp(1j * angle) * way - (end[own] - to)).max() <= RIGID * np.abs(way).max():
-            bodies[own] = count
-            count += 1
-    return bodies
+        product = complex((np.conj(way) * (end[own] - to)).sum()) * np.exp(-1j * asked)
+        angle = asked + (float(np.angle(product)) if product else 0.0)
+        rest = np.exp(-1j * angle) * (end[own] - to) - way
+        if np.abs(rest).max() <= RIGID * np.abs(way).max():
+            bodies.append(Body(own, middle, to, angle, way, rest))
+    return tuple(bodies)
 
 
-def _unwrapped(angle: Floats, asked: Floats, edges: Ints, sure: Flags, still: Flags) -> Floats:
-    """Angles without jumps by full turns along edges; each part next to what is asked for, or to 0 where it is still."""
-    count, full = len(angle), 2.0 * math.pi
-    out, part = np.where(sure, angle, asked), _parts(edges, len(angle))
-    graph = scipy.sparse.csr_array(
-        (np.ones(len(edges), dtype=np.int8), (edges[:, 0], edges[:, 1])), shape=(count, count)
-    )
-    own, first = np.unique(np.where(sure, part, -1), return_index=True)
-    for number, root in zip(own.tolist(), first.tolist(), strict=True):
-        if number < 0:
-            continue
-        order, before = scipy.sparse.csgraph.breadth_first_order(graph, root, directed=False)
+def _unwrapped(angle: Floats, asked: Floats, edges: Ints, still: Flags) -> Floats:
+    """Angles without jumps by full turns along edges; each part next to what is asked for, or to 0 where it stays."""
+    full, graph, out = 2.0 * math.pi, _graph(edges, len(angle)), asked.copy()
+    for own in _parts(edges, len(angle)):
+        order, before = scipy.sparse.csgraph.breadth_first_order(graph, int(own[0]), directed=False)
+        out[order] = angle[order]
         for node in order[1:].tolist():
-            gap = out[before[node]] - out[node]
-            out[node] += full * round(gap / full)
-        anchors = order[still[order]]
-        anchors = anchors if len(anchors) else order
+            out[node] += full * round((out[before[node]] - out[node]) / full)
+        anchors = order[still[order]] if still[order].any() else order
         out[order] += full * np.round((asked[anchors] - out[anchors]).mean() / full)
     return out

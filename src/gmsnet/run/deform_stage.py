@@ -8,6 +8,7 @@ carried, else with their nodes let go; if that fails, it is halved.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +32,7 @@ from gmsnet.run.sweep_stage import sweep
 from gmsnet.run.wall_stage import improve_near_walls
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.cells import first_rows, whole_cells
+from gmsnet.untangle.result import StillInverted
 
 SHORTEST = 1.0 / 128.0  # of the way: a step
 SUFFERED = 0.8  # of its 1/q in the input: a cell that has less is smoothed
@@ -51,9 +53,9 @@ class Step:
 
 
 class Journey:
-    """What stays the same on the way. kept: (N,) the nodes of layers and near refined walls, which follow from the input.
+    """What stays the same on the way.
 
-    held: the topology in which nodes that are moved, and those that slide, stand still. wrong: (T,) rows of cells that
+    of_start: (E,) edges of layers and near refined walls, which follow from the input. shapes: (T,) 1/q at first. held: the topology in which nodes that are moved, and those that slide, stand still. wrong: (T,) rows of cells that
     were not positive when the boundary began to move.
     """
 
@@ -110,21 +112,21 @@ class Journey:
         from gmsnet.untangle import untangle
 
         protection, why = state.protection, ""
-        for topology in dict.fromkeys((protection.topology, protection.outer, protection.base)):
-            topology = topology if self.slides is None else topology.holding(self.slides, REASON)
+        levels = [protection.topology, protection.outer, protection.base]
+        if self.slides is not None:
+            levels = [topology.holding(self.slides, REASON) for topology in levels]
+        for topology in dict.fromkeys(levels):
             done = untangle(step.points, topology, state.precision)
             rest = self.inverted(done.points) & ~self.wrong
             if not rest.any():
                 steps = ", ".join(f"{each.name} ({each.sweeps})" for each in done.steps)
-                let_go = (
-                    "" if topology.free is protection.topology.free else "; layers and nodes near walls were let go"
-                )
+                let_go = "" if topology is levels[0] else "; nodes of layers or near walls were let go for that"
                 note = f"untangling: all {done.before:,} inverted cells mended; {steps}{let_go}"
                 return replace(step, points=done.points, note=note)
             why = self._why(state, topology, rest, {cell.row: cell for cell in done.unmended})
         return replace(step, why=why)
 
-    def _why(self, state: State, topology: Topology, rest: Flags, known: dict) -> str:  # type: ignore[type-arg]
+    def _why(self, state: State, topology: Topology, rest: Flags, known: Mapping[int, StillInverted]) -> str:
         rows = first_rows(topology, rest)
         cell = topology.cells_of(rows[:1])[0]
         count = f"{len(rows):,} cells" if len(rows) > 1 else "1 cell"
