@@ -55,8 +55,9 @@ class Step:
 class Journey:
     """What stays the same on the way.
 
-    of_start: (E,) edges of layers and near refined walls, which follow from the input. shapes: (T,) 1/q at first. held: the topology in which nodes that are moved, and those that slide, stand still. wrong: (T,) rows of cells that
-    were not positive when the boundary began to move.
+    held: the topology in which nodes that are moved, and those that slide, stand still. of_start: (E,) edges of layers
+    and near refined walls, which follow from the input. wrong: (T,) rows of cells that were not positive when the
+    boundary began to move; shapes: (T,) 1/q then.
     """
 
     def __init__(self, state: State, prescribed: Prescribed) -> None:
