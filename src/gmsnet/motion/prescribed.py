@@ -20,7 +20,6 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 ROTATION = "a rotation must be (nodes, degrees, (x, y)) or several of these"
-NOTHING = "there is nothing to move: give a displacement, rotations or both"
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,32 +35,52 @@ class Prescribed:
     turn: Floats
 
     @classmethod
-    def of(cls, mesh: Mesh, displacement: Any = None, nodes: Any = None, rotate: Any = None) -> Prescribed:
+    def of(
+        cls, mesh: Mesh, displacement: Any = None, nodes: Any = None, rotate: Any = None, places: Any = None
+    ) -> Prescribed:
         """From what ``gmsnet.deform`` takes; see there.
 
-        Raises InputError for nodes and markers that the mesh does not have, for displacements of the wrong shape or
-        that are not finite, and for rotations that are none.
+        Raises InputError for nodes and markers that the mesh does not have, for displacements and places of the wrong
+        shape or that are not finite, and for rotations that are none.
         """
-        start = in_plane(mesh.points, mesh.plane)
-        made = cls(np.zeros(len(start), dtype=bool), start.copy(), np.zeros(len(start)))
-        rotations = rotations_of(rotate)
-        if displacement is None and nodes is not None:
-            raise InputError("nodes are named but no displacement is given for them")
-        if displacement is None and not rotations:
-            raise InputError(NOTHING)
-        for chosen, degrees, centre in rotations:
+        if displacement is not None and places is not None:
+            raise InputError("displacement and places both say where nodes are to go: give one of them")
+        if displacement is None and places is None and nodes is not None:
+            raise InputError("nodes are named, but neither a displacement nor places are given for them")
+        if places is not None and rotate is not None:
+            raise InputError("places says where nodes are to go: leave rotate out")
+        made = cls.still(mesh)
+        for chosen, degrees, centre in rotations_of(rotate):
             made.rotate(chosen_nodes(mesh, chosen, "rotate"), degrees, centre)
-        if displacement is not None:
-            made.displace(mesh, displacement, nodes)
-        if not made.moved.any():
-            raise InputError("there is nothing to move: no node is named, or all displacements are zero")
+        given, what = (displacement, "displacement") if places is None else (places, "places")
+        if given is not None:
+            ids = np.arange(len(mesh.points)) if nodes is None else chosen_nodes(mesh, nodes, "nodes")
+            rows = rows_of(mesh, given, len(ids), what, every=nodes is None)
+            once, first, times = np.unique(ids, return_index=True, return_counts=True)
+            if (times > 1).any() and len(ids) == len(rows) > 1:
+                raise InputError(f"nodes names the node {once[times > 1][0]} more than once")
+            rows = rows[first]
+            elsewhere = (rows != (made.places[once] if places is not None else 0.0)).any(axis=1) | (nodes is not None)
+            (made.put if places is not None else made.displace)(once[elsewhere], rows[elsewhere])
+        return made.checked(mesh)
+
+    @classmethod
+    def still(cls, mesh: Mesh) -> Prescribed:
+        """No node is moved."""
+        start = in_plane(mesh.points, mesh.plane)
+        return cls(np.zeros(len(start), dtype=bool), start.copy(), np.zeros(len(start)))
+
+    def checked(self, mesh: Mesh) -> Prescribed:
+        """The same, as the mesh can hold it; InputError where nothing is moved, or to no finite place."""
+        if not self.moved.any():
+            raise InputError("there is nothing to move: give nodes and by how much, or rotations")
         if mesh.single:
             with np.errstate(over="ignore"):
-                made.places[made.moved] = made.places[made.moved].astype(np.float32)
-        wrong = np.flatnonzero(~np.isfinite(made.places).all(axis=1))
+                self.places[self.moved] = self.places[self.moved].astype(np.float32)
+        wrong = np.flatnonzero(~np.isfinite(self.places).all(axis=1))
         if len(wrong):
             raise InputError(f"node {wrong[0]} would be moved to a place that is no finite number")
-        return made
+        return self
 
     def rotate(self, ids: NDArray[np.int64], degrees: float, centre: tuple[float, float]) -> None:
         """Turns some nodes about a centre, counter-clockwise."""
@@ -75,30 +94,27 @@ class Prescribed:
         self.turn[ids] += angle
         self.moved[ids] = True
 
-    def displace(self, mesh: Mesh, displacement: Any, nodes: Any) -> None:
-        """Adds a displacement to the places of some nodes."""
-        ids = np.arange(len(mesh.points)) if nodes is None else chosen_nodes(mesh, nodes, "nodes")
-        shifts = shifts_of(mesh, displacement, len(ids), every=nodes is None)
-        if nodes is None:
-            ids = np.flatnonzero((shifts != 0.0).any(axis=1))
-            shifts = shifts[ids]
-        once, first, times = np.unique(ids, return_index=True, return_counts=True)
-        if (times > 1).any() and len(shifts) > 1:
-            raise InputError(f"nodes names the node {once[times > 1][0]} more than once")
+    def displace(self, ids: NDArray[np.int64], shifts: Floats) -> None:
+        """Adds shifts (n, 2) to the places of some nodes."""
         with np.errstate(over="ignore"):
-            self.places[once] += shifts[first]
-        self.moved[once] = True
+            self.places[ids] += shifts
+        self.moved[ids] = True
+
+    def put(self, ids: NDArray[np.int64], places: Floats) -> None:
+        """Some nodes go to places (n, 2)."""
+        self.places[ids] = places
+        self.moved[ids] = True
 
 
-def shifts_of(mesh: Mesh, displacement: Any, count: int, *, every: bool) -> Floats:
-    """(count, 2) shifts in the plane of the mesh, of one vector for all or of one for each node.
+def rows_of(mesh: Mesh, given: Any, count: int, what: str, *, every: bool) -> Floats:
+    """(count, 2) shifts or places in the plane of the mesh, of one vector for all or of one for each node.
 
     every: one row for each node of the mesh is asked for. Raises InputError for anything else, and where a number is
     not finite or leads out of the plane.
     """
-    values = plain_array(displacement, "displacement")
+    values = plain_array(given, what)
     if values.dtype.kind not in "iuf":
-        raise InputError(f"displacement must be numbers, got {values.dtype} values")
+        raise InputError(f"{what} must be numbers, got {values.dtype} values")
     values = values.astype(np.float64)
     widths = (2,) if mesh.points.shape[1] == 2 else (2, 3)
     one = values.ndim == 1 and len(values) in widths and not every
@@ -106,19 +122,20 @@ def shifts_of(mesh: Mesh, displacement: Any, count: int, *, every: bool) -> Floa
         width = " or ".join(map(str, widths))
         single = "" if every else f"one vector of {width} numbers, or "
         raise InputError(
-            f"displacement must be {single}one row of {width} numbers for each of the {count:,} "
+            f"{what} must be {single}one row of {width} numbers for each of the {count:,} "
             f"{'nodes of the mesh' if every else 'nodes named'}, got the shape {values.shape}"
         )
     rows = np.broadcast_to(values, (count, values.shape[-1])) if one else values
     wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
     if len(wrong):
-        raise InputError(f"displacement must be finite numbers; row {wrong[0]} (counted from 0) is {rows[wrong[0]]}")
+        raise InputError(f"{what} must be finite numbers; row {wrong[0]} (counted from 0) is {rows[wrong[0]].tolist()}")
     if rows.shape[1] == 3 and mesh.plane is not None:
         across = ({0, 1, 2} - set(mesh.plane)).pop()
-        if (rows[:, across] != 0.0).any():
+        level = 0.0 if what == "displacement" else mesh.points[0, across]
+        if (rows[:, across] != level).any():
             raise InputError(
-                f"displacement leads out of the plane of the mesh, in which {'xyz'[across]} does not vary: "
-                f"give 0 as its {'xyz'[across]}"
+                f"{what} leads out of the plane of the mesh, in which {'xyz'[across]} does not vary: "
+                f"give {level:g} as its {'xyz'[across]}"
             )
         return rows[:, list(mesh.plane)]
     return rows[:, :2]

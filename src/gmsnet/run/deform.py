@@ -13,7 +13,7 @@ from gmsnet.kernels.simplex.bernstein import NAMES
 from gmsnet.measure.target import Target
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.mesh.selection import chosen_nodes, fixed_mask
+from gmsnet.mesh.selection import chosen_nodes
 from gmsnet.motion.prescribed import Prescribed
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import workers
@@ -60,6 +60,7 @@ def deform(
     nodes: Any = None,
     *,
     rotate: Any = None,
+    places: Any = None,
     fixed: Any = None,
     preserve: str = "shape",
     fix_layers: bool = False,
@@ -82,7 +83,8 @@ def deform(
     in the order of ``nodes``: ids as given, those of a mask or a marker ascending. nodes: ids, a mask, a marker's name
     or a list of names; None: displacement has one row for each node of the mesh, and those that are not zero are moved.
     rotate: (nodes, degrees, (x, y)), or several of these: turns nodes counter-clockwise about a centre in the plane of
-    the mesh, before they are displaced; more than half a turn is told from this alone. The other options are those of
+    the mesh, before they are displaced; more than half a turn is told from this alone. places: new coordinates instead
+    of a displacement, in the same forms. The other options are those of
     ``smooth``; slide: nodes of boundaries that are not moved may slide along them as the mesh is smoothed.
 
     Raises InputError for what cannot be used, before anything is moved. KeyboardInterrupt: as for ``smooth``.
@@ -91,22 +93,20 @@ def deform(
         fix_layers=fix_layers, preserve=preserve, slide=slide, feature_angle=feature_angle, guard=guard,
         max_sweeps=max_sweeps, threads=threads, callback=callback,
     )  # fmt: skip
-    return deform_with(mesh, options, displacement, nodes, rotate, fixed)
+    given = to_mesh(mesh)[0]
+    check_deformable(given)
+    return deform_with(mesh, options, Prescribed.of(given, displacement, nodes, rotate, places), fixed)
 
 
-def deform_with(
-    mesh: Any, options: SmoothOptions, displacement: Any, nodes: Any, rotate: Any, fixed: Any = None
-) -> DeformResult:
-    """``deform`` with options that have been checked already. The rest: see there."""
+def deform_with(mesh: Any, options: SmoothOptions, prescribed: Prescribed, fixed: Any = None) -> DeformResult:
+    """``deform`` with options and places that have been checked already. The rest: see there."""
     began, result = time.perf_counter(), None
     try:
         smoother, given = options.smoother(), to_mesh(mesh)[0]
         check_deformable(given)
-        prescribed = Prescribed.of(given, displacement, nodes, rotate)
-        held = fixed_mask(given, fixed) | prescribed.moved
         _check_fixed(given, fixed, prescribed)
         with interruptible(), workers(options.thread_count) as executor:
-            state = first_state(mesh, held, smoother, options, executor)
+            state = first_state(mesh, fixed, smoother, options, executor, prescribed.moved)
             move = partial(move_boundary, prescribed=prescribed)
             state = carry_out(state, options, executor, (untangle_all, move))
         try:

@@ -36,6 +36,7 @@ from gmsnet.untangle.result import StillInverted
 
 SHORTEST = 1.0 / 128.0  # of the way: a step
 SUFFERED = 0.8  # of its 1/q in the input: a cell that has less is smoothed
+SLIGHTLY = 0.98  # the same of cells that are worse than the worst one of the input
 RINGS = 6  # around such cells
 CARRIED = "carried along, its shape kept"
 BYTES_PER_NODE = 1500  # of factors and edges, measured
@@ -57,7 +58,7 @@ class Journey:
 
     held: the topology in which nodes that are moved, and those that slide, stand still. of_start: (E,) edges of layers
     and near refined walls, which follow from the input. wrong: (T,) rows of cells that were not positive when the
-    boundary began to move; shapes: (T,) 1/q then.
+    boundary began to move; shapes: (T,) 1/q then; least: the minimum.
     """
 
     def __init__(self, state: State, prescribed: Prescribed) -> None:
@@ -76,6 +77,7 @@ class Journey:
         self.of_start = (kept[a] | ~self.held.near_free[a]) & (kept[b] | ~self.held.near_free[b])
         self.wrong = self.inverted(state.points)
         self.shapes = self.shape(state.points)
+        self.least = float(self.shapes.min(initial=1.0))
 
     def inverted(self, points: Floats) -> Flags:
         """(T,) all rows of the cells that have a corner of no positive area."""
@@ -150,7 +152,8 @@ class Journey:
         """(N,) by id: nodes of cells whose shapes have suffered, and those around."""
         topology, rows = self.held, self.held.near
         now = self.shape(points)
-        bad = whole_cells(topology, now < SUFFERED * self.shapes)
+        worse = (now < self.least) & (now < SLIGHTLY * self.shapes)
+        bad = whole_cells(topology, worse | (now < SUFFERED * self.shapes))
         chosen = np.zeros(len(points), dtype=bool)
         chosen[rows[bad]] = True
         for _ in range(RINGS if bad.any() else 0):

@@ -17,7 +17,7 @@ from gmsnet.measure.totals import Totals
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
-from gmsnet.preserve.protection import WALL, wall_note
+from gmsnet.preserve.protection import WALL, carried_note, wall_note
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.state import Final, State
@@ -92,7 +92,9 @@ def _held(state: State) -> dict[str, NDArray[np.int64]]:
 def _notes(state: State) -> list[str]:
     protection, near_walls, of_order = state.protection, [], []
     if protection.kept is not None:
-        near_walls.append(wall_note(len(protection.topology.held.get(WALL, ())), moved=state.released))
+        count = len(protection.topology.held.get(WALL, ()))
+        told = carried_note(count) if state.motion else wall_note(count, moved=state.released)
+        near_walls.append(told)
     slid = []
     if state.sliding is not None and state.final is not None:
         slid.append(state.sliding.note(planar_points(state.mesh.with_points(state.final.points)), state.final.moved))
