@@ -117,7 +117,8 @@ def cases(wanted):
         ids = mesh.markers["airfoil"]
         at = mesh.points[ids, :2]
         pitched = turned(at, PITCH)
-        for what, places in (("pitch", pitched), ("heave", at + [0.0, HEAVE]), ("both", pitched + [0.0, HEAVE])):
+        up = np.array([0.0, HEAVE])
+        for what, places in (("pitch", pitched), ("heave", at + up), ("both", pitched + up)):
             add(f"{name}: {what}", mesh, ids, places, front, "airfoil")
     plate = plate_mesh()
     ids = plate.markers["hole"]

@@ -35,8 +35,8 @@ UsageError: type[Exception] = next(base for base in typer.BadParameter.__mro__ i
 app = typer.Typer(
     name="gmsnet",
     help="Better elements for any mesh file: moves nodes, changes nothing else and never inverts a cell.",
-    epilog="Exit codes: 0 done, 1 a target is missed, cells stay inverted or a boundary is not in place, 2 bad usage or "
-    "input.",
+    epilog="Exit codes: 0 done, 1 a target is missed, cells stay inverted or a boundary is not in place, "
+    "2 bad usage or input.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},

@@ -1,11 +1,12 @@
 """How nodes inside follow a boundary that moves: each edge turns with its surroundings and keeps its length as it can.
 
-Minimised is Σ w |(y_j − y_i) − e^{iθ} (x_j − x_i)|² over the edges, θ the mean of the rotations at its two ends, and
+Minimised is Σ w s |(y_j − y_i) − e^{iθ} (x_j − x_i)|² over the edges, θ the mean of the rotations at its two ends, and
 w = 1/|x_j − x_i|²: relative changes count, so small cells near walls are the stiffest, and thin layers keep their
-spacing. Rotations of the boundary are known; inside they are harmonic at first (Zayer, Rössl, Karni, Seidel: Harmonic
-guidance for surface deformation, Computer Graphics Forum 24, 2005). Then places and best rotations follow each other by
-turns (Sorkine, Alexa: As-rigid-as-possible surface modeling, Symposium on Geometry Processing, 2007). Motions of all
-boundaries as one body are reproduced but for rounding.
+spacing. s is ten times as much in layers, and falls slowly with the distance from what moves. Rotations of the boundary
+are known; inside they are harmonic at first (Zayer, Rössl, Karni, Seidel: Harmonic guidance for surface deformation,
+Computer Graphics Forum 24, 2005). Then places and best rotations follow each other by turns (Sorkine, Alexa:
+As-rigid-as-possible surface modeling, Symposium on Geometry Processing, 2007). Motions of all boundaries as one body
+are reproduced but for rounding.
 """
 
 from __future__ import annotations
@@ -14,31 +15,44 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse
+import scipy.spatial
 
-from gmsnet.motion.path import Complex, Flags, Floats, Ints
+from gmsnet.motion.path import Complex, Flags, Floats, Ints, as_points
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.harmonic import solver_of
 
 ITERATIONS, SMALL_TURN = 12, 1e-3  # radians
 TINY = 1e-300
+IN_LAYERS = 10.0  # times as stiff
+REACH = 0.5  # of the extent of what moves: at this distance from it edges are 1/√2 times as stiff
 
 
 @dataclass(frozen=True, eq=False)
 class Follower:
-    """edges: (E, 2) of all cells with a free node, diagonals of quads too, by places in memory. free: (N,) bool."""
+    """edges: (E, 2) of all cells with a free node, diagonals of quads too, by places in memory. free: (N,) bool.
+
+    layers: (E,) those within layers and near refined walls. stiffness: (E,) beside what follows from their lengths.
+    """
 
     edges: Ints
     free: Flags
+    layers: Flags
+    stiffness: Floats
 
     @classmethod
-    def of(cls, topology: Topology) -> Follower:
-        """Of the free nodes of a topology."""
+    def of(cls, topology: Topology, points: Complex, moving: Flags, kept: Flags) -> Follower:
+        """Of the free nodes of a topology. moving: (N,) held nodes that go elsewhere. kept: (N,) of layers."""
         rows = topology.near
         edges = np.sort(np.concatenate([rows[:, [0, 1]], rows[:, [0, 2]], rows[:, [1, 2]]]), axis=1)
         edges = edges[topology.near_free[edges].any(axis=1)]
         key = np.unique(edges[:, 0].astype(np.int64) * len(topology.memory) + edges[:, 1])
         edges = np.column_stack(np.divmod(key, len(topology.memory))).astype(np.int32)
-        return cls(edges, topology.near_free)
+        layers = (kept | ~topology.near_free)[edges].all(axis=1) & kept[edges].any(axis=1)
+        at, bodies = as_points(points), as_points(points[moving])
+        away, _ = scipy.spatial.cKDTree(bodies).query(at)
+        reach = max(REACH * float(np.ptp(bodies, axis=0).max()), TINY)
+        stiffness = np.where(layers, IN_LAYERS, 1.0) / np.sqrt(1.0 + away[edges].mean(axis=1) / reach)
+        return cls(edges, topology.near_free, layers, stiffness)
 
     def follow(
         self, points: Complex, turned: Floats, unturned: Complex, places: Complex, turns: Floats, sure: Flags
@@ -51,7 +65,7 @@ class Follower:
         """
         a, b = self.edges.T
         count, free = len(points), self.free
-        weight = 1.0 / np.maximum(unturned.real**2 + unturned.imag**2, TINY)
+        weight = self.stiffness / np.maximum(unturned.real**2 + unturned.imag**2, TINY)
         matrix = scipy.sparse.csr_array((weight, (a, b)), shape=(count, count))
         matrix = matrix + matrix.T
         rows = np.flatnonzero(free)

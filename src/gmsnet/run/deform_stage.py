@@ -18,6 +18,7 @@ from gmsnet.kernels.simplex.mean_ratio2 import WEIGHTS
 from gmsnet.kernels.whole.powers import shape_of_each
 from gmsnet.measure.signs import exact_signs
 from gmsnet.measure.totals import totals_of
+from gmsnet.methods.sized import Sized
 from gmsnet.motion.path import Complex, Flags, Floats, Path, as_complex, as_points
 from gmsnet.motion.prescribed import Prescribed
 from gmsnet.motion.rigid import Follower
@@ -56,9 +57,8 @@ class Step:
 class Journey:
     """What stays the same on the way.
 
-    held: the topology in which nodes that are moved, and those that slide, stand still. of_start: (E,) edges of layers
-    and near refined walls, which follow from the input. wrong: (T,) rows of cells that were not positive when the
-    boundary began to move; shapes: (T,) 1/q then; least: the minimum.
+    held: the topology in which nodes that are moved, and those that slide, stand still. wrong: (T,) rows of cells that
+    were not positive when the boundary began to move; shapes: (T,) 1/q then; least: the minimum.
     """
 
     def __init__(self, state: State, prescribed: Prescribed) -> None:
@@ -67,14 +67,13 @@ class Journey:
         self.held = base if self.slides is None else base.holding(self.slides, REASON)
         refuse_unless_free(BYTES_PER_NODE * len(base.free), f"moving the nodes around {len(base.free):,}")
         self.path = Path.of(prescribed, self.held, state.start, state.mesh.exponent)
-        self.follower = Follower.of(self.held)
         self.start = as_complex(state.points)
         kept = np.zeros(len(self.start), dtype=bool)
         for nodes in (state.protection.layers, state.protection.kept):
             if nodes is not None:
                 kept |= nodes[base.memory]
-        a, b = self.follower.edges.T
-        self.of_start = (kept[a] | ~self.held.near_free[a]) & (kept[b] | ~self.held.near_free[b])
+        moving = self.path.end != self.path.start
+        self.follower = Follower.of(self.held, self.start, moving if moving.any() else ~self.held.near_free, kept)
         self.wrong = self.inverted(state.points)
         self.shapes = self.shape(state.points)
         self.least = float(self.shapes.min(initial=1.0))
@@ -101,7 +100,8 @@ class Journey:
         now = as_complex(state.points)
         a, b = self.follower.edges.T
         unturned = np.exp(-0.5j * (turned[a] + turned[b])) * (now[b] - now[a])
-        unturned[self.of_start] = (self.start[b] - self.start[a])[self.of_start]
+        layers = self.follower.layers
+        unturned[layers] = (self.start[b] - self.start[a])[layers]
         found, turned = self.follower.follow(now, turned, unturned, places, self.path.turns(share), self.path.sure)
         points = _rounded(found, places, self.follower.free, single=state.precision.single)
         if not (self.inverted(points) & ~self.wrong).any():
@@ -214,7 +214,10 @@ def _smoothed(state: State, journey: Journey, options: SmoothOptions, executor: 
     if not region[protection.topology.free].any():
         return state
     within = replace(protection, base=protection.base.holding(~region, CARRIED))
-    done = sweep(replace(state, protection=within, smoother=options.smoother()), options, executor)
+    smoother = options.smoother()
+    if isinstance(smoother, Sized):
+        smoother.start = state.start
+    done = sweep(replace(state, protection=within, smoother=smoother), options, executor)
     near_walls = protection.kept is not None and (region & protection.kept).any()
     if near_walls and done.interruption is None:
         done = improve_near_walls(done, options, executor)
