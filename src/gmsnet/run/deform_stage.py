@@ -39,6 +39,7 @@ SHORTEST = 1.0 / 128.0  # of the way: a step
 SUFFERED = 0.8  # of its 1/q in the input: a cell that has less is smoothed
 SLIGHTLY = 0.98  # the same of cells that are worse than the worst one of the input
 RINGS = 6  # around such cells
+BETWEEN = 30  # sweeps after a step that is not the last
 CARRIED = "carried along, its shape kept"
 BYTES_PER_NODE = 1500  # of factors and edges, measured
 
@@ -179,7 +180,8 @@ def move_boundary(state: State, options: SmoothOptions, executor: Executor, pres
             state = _looked_at(state, step, motion, options, executor)
             if options.callback is not None and options.callback(state.history[-1]):
                 return replace(state, motion=replace(motion, reason=CALLBACK)).ended(CALLBACK)
-            state = _smoothed(state, journey, options, executor)
+            most = options.max_sweeps if share == 1.0 else min(BETWEEN, options.max_sweeps)
+            state = _smoothed(state, journey, replace(options, max_sweeps=state.history[-1].index + most), executor)
             if state.stop_reason in (CALLBACK, INTERRUPTED):
                 break
     except KeyboardInterrupt as interruption:
