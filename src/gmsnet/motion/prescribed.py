@@ -89,8 +89,9 @@ class Prescribed:
         if degrees % 90.0 == 0.0:  # so that quarter turns are exact
             cosine, sine = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(degrees / 90.0 % 4.0)]
         ids = np.unique(ids)
-        x, y = (self.places[ids] - centre).T
-        self.places[ids] = np.column_stack([cosine * x - sine * y, sine * x + cosine * y]) + centre
+        with np.errstate(over="ignore", invalid="ignore"):
+            x, y = (self.places[ids] - centre).T
+            self.places[ids] = np.column_stack([cosine * x - sine * y, sine * x + cosine * y]) + centre
         self.turn[ids] += angle
         self.moved[ids] = True
 

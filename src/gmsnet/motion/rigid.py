@@ -48,7 +48,7 @@ class Follower:
         key = np.unique(edges[:, 0].astype(np.int64) * len(topology.memory) + edges[:, 1])
         edges = np.column_stack(np.divmod(key, len(topology.memory))).astype(np.int32)
         layers = (kept | ~topology.near_free)[edges].all(axis=1) & kept[edges].any(axis=1)
-        at, bodies = as_points(points), as_points(points[moving])
+        at, bodies = as_points(points), as_points(points[moving if moving.any() else ~topology.near_free])
         away, _ = scipy.spatial.cKDTree(bodies).query(at)
         reach = max(REACH * float(np.ptp(bodies, axis=0).max()), TINY)
         stiffness = np.where(layers, IN_LAYERS, 1.0) / np.sqrt(1.0 + away[edges].mean(axis=1) / reach)

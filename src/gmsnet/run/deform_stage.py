@@ -41,6 +41,7 @@ SLIGHTLY = 0.98  # the same of cells that are worse than the worst one of the in
 RINGS = 6  # around such cells
 BETWEEN = 30  # sweeps after a step that is not the last
 CARRIED = "carried along, its shape kept"
+FARTHEST = 2.0**100  # from the origin, in units of the run: products of coordinates must not overflow
 BYTES_PER_NODE = 1500  # of factors and edges, measured
 
 
@@ -73,8 +74,7 @@ class Journey:
         for nodes in (state.protection.layers, state.protection.kept):
             if nodes is not None:
                 kept |= nodes[base.memory]
-        moving = self.path.end != self.path.start
-        self.follower = Follower.of(self.held, self.start, moving if moving.any() else ~self.held.near_free, kept)
+        self.follower = Follower.of(self.held, self.start, self.path.end != self.path.start, kept)
         self.wrong = self.inverted(state.points)
         self.shapes = self.shape(state.points)
         self.least = float(self.shapes.min(initial=1.0))
@@ -103,8 +103,11 @@ class Journey:
         unturned = np.exp(-0.5j * (turned[a] + turned[b])) * (now[b] - now[a])
         layers = self.follower.layers
         unturned[layers] = (self.start[b] - self.start[a])[layers]
-        found, turned = self.follower.follow(now, turned, unturned, places, self.path.turns(share), self.path.sure)
+        with np.errstate(over="ignore", invalid="ignore"):
+            found, turned = self.follower.follow(now, turned, unturned, places, self.path.turns(share), self.path.sure)
         points = _rounded(found, places, self.follower.free, single=state.precision.single)
+        if not (np.abs(points) < FARTHEST).all():
+            return Step(state.points, turned, "places would be too far away for their digits")
         if not (self.inverted(points) & ~self.wrong).any():
             return Step(points, turned)
         if not untangling:
