@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import gmsnet
 from gmsnet import CellBlock, InputError, Mesh
-from gmsnet.generate import disturb, layered_mesh, moved_hole_mesh, random_mesh, second_order, structured_mesh
+from gmsnet.generate import layered_mesh, moved_hole_mesh, random_mesh, second_order, structured_mesh
 from gmsnet.run import stop
 from gmsnet.topology.topology import Topology
 
@@ -44,13 +44,13 @@ def check(mesh, result, ids, places):
     assert all((one.nodes == other.nodes).all() for one, other in zip(mesh.cells, result.mesh.cells, strict=True))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
     st.integers(0, 5), st.sampled_from(["triangle", "quad"]), st.floats(0.0, 0.4), st.floats(-1.0, 1.0),
     st.sampled_from(["top", "every"]), st.booleans(),
 )  # fmt: skip
 def test_whatever_is_asked_for_no_cell_is_inverted(seed, cells, noise, shift, which, single):
-    mesh = random_mesh(80, seed=seed) if cells == "triangle" else structured_mesh(7, 6)
+    mesh = random_mesh(40, seed=seed) if cells == "triangle" else structured_mesh(6, 4)
     if single:
         mesh = Mesh(mesh.points.astype(np.float32), mesh.cells, mesh.region_names, single=True)
     ids = np.flatnonzero(held_nodes(mesh)) if which == "every" else mesh.markers["top"]
@@ -125,7 +125,10 @@ def test_the_same_bits_for_any_number_of_threads(plate):
 
 
 def test_inverted_cells_of_the_input_are_mended_first():
-    mesh = disturb(structured_mesh(10, 10), np.arange(40, 60), 2.5, seed=3)
+    mesh = structured_mesh(10, 10)
+    points = mesh.points.copy()
+    points[[60, 61]] = points[[61, 60]]
+    mesh = mesh.with_points(points)
     assert gmsnet.quality(mesh).inverted > 0
     result = gmsnet.deform(mesh, (0.0, 0.2), "top")
     assert (result.fraction, result.after.inverted) == (1.0, 0)
@@ -161,11 +164,12 @@ def test_boundaries_that_are_not_moved_slide_if_they_may(plate):
 
 
 def test_sizes_are_kept_with_preserve_size(plate):
+    def areas(points):
+        a, b, c = (points[plate.cells[0].nodes[:, k], :2] for k in range(3))
+        return (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+
     def spread(result):
-        a, b, c = (result.points[plate.cells[0].nodes[:, k], :2] for k in range(3))
-        after = np.cross(b - a, c - a)
-        a, b, c = (plate.points[plate.cells[0].nodes[:, k], :2] for k in range(3))
-        return np.std(np.log(after / np.cross(b - a, c - a)))
+        return np.std(np.log(areas(result.points) / areas(plate.points)))
 
     free, sized = (gmsnet.deform(plate, (0.2, 0.0), "hole", preserve=preserve) for preserve in ("shape", "size"))
     assert spread(sized) < spread(free)
@@ -196,7 +200,7 @@ def test_far_away_is_told_and_nothing_breaks(plate):
 
 
 def test_what_cannot_be_used_is_refused(plate):
-    with pytest.raises(InputError, match="fixed names the node .* which is to be moved"):
+    with pytest.raises(InputError, match=r"fixed names the node \d+, which is to be moved"):
         gmsnet.deform(plate, (0.1, 0.0), "hole", fixed="hole")
     with pytest.raises(InputError, match="second-order cells"):
         gmsnet.deform(second_order(structured_mesh(3, 3)), (0.1, 0.0), "top")

@@ -28,7 +28,7 @@ from gmsnet.run.sweep import Sweep
 from gmsnet.run.untangle_stage import untangle_all
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DeformResult(SmoothResult):
     """What ``deform`` returns: a SmoothResult, and how far the boundary has come.
 
