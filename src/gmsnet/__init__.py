@@ -25,12 +25,15 @@ if TYPE_CHECKING:
     from gmsnet.mesh.mesh import Mesh
     from gmsnet.methods import METHODS
     from gmsnet.run.api import quality, smooth
+    from gmsnet.run.deform import DeformResult, deform
     from gmsnet.run.result import SmoothResult
     from gmsnet.run.sweep import Sweep
 
 _HOME = {
+    "DeformResult": "run.deform",
     "SmoothResult": "run.result",
     "Sweep": "run.sweep",
+    "deform": "run.deform",
     "quality": "run.api",
     "smooth": "run.api",
     "FormatError": "errors",
@@ -50,6 +53,7 @@ _HOME = {
 __all__ = [
     "METHODS",
     "CellBlock",
+    "DeformResult",
     "FormatError",
     "GmsnetError",
     "InputError",
@@ -58,6 +62,7 @@ __all__ = [
     "QualityReport",
     "SmoothResult",
     "Sweep",
+    "deform",
     "mesh_from_arrays",
     "quality",
     "random_mesh",

@@ -75,7 +75,7 @@ def test_a_number_is_no_region_of_cells_without_a_name(run, tmp_path, name):
         assert document["held"].get("fixed by the user", 0) == (node == inner)
         assert document["free"] > 30
     done = run("smooth", path, tmp_path / f"out-{name}", "--fix", "wall")
-    assert "there is no marker 'wall' to hold: the mesh has no markers" in done.err
+    assert "there is no marker 'wall': the mesh has no markers" in done.err
 
 
 def test_a_file_with_a_mask_is_not_taken_for_the_nodes_0_and_1(run, square, tmp_path):

@@ -15,7 +15,8 @@ from typing import Annotated
 
 import typer
 
-from gmsnet.cli import generate, methods, quality, reproduce, smooth, train
+from gmsnet.cli import deform, generate, methods, quality, reproduce, smooth, train
+from gmsnet.cli.moves import joined
 from gmsnet.cli.signals import Interrupted
 from gmsnet.cli.visible import visible
 from gmsnet.errors import GmsnetError
@@ -34,12 +35,14 @@ UsageError: type[Exception] = next(base for base in typer.BadParameter.__mro__ i
 app = typer.Typer(
     name="gmsnet",
     help="Better elements for any mesh file: moves nodes, changes nothing else and never inverts a cell.",
-    epilog="Exit codes: 0 done, 1 a target is missed or cells stay inverted, 2 bad usage or input.",
+    epilog="Exit codes: 0 done, 1 a target is missed, cells stay inverted or a boundary is not in place, "
+    "2 bad usage or input.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command()(smooth.smooth)
+app.command()(deform.deform)
 app.command()(quality.quality)
 app.command()(methods.methods)
 app.command()(generate.generate)
@@ -84,7 +87,8 @@ def _run(arguments: Sequence[str] | None) -> int:
             stream.reconfigure(errors="backslashreplace")
     try:
         with interruptible():
-            code = app(arguments, prog_name="gmsnet", standalone_mode=False)
+            given = list(sys.argv[1:] if arguments is None else arguments)
+            code = app(joined(given) if given[:1] == ["deform"] else given, prog_name="gmsnet", standalone_mode=False)
             sys.stdout.flush()
     except SystemExit as error:
         if isinstance(error.__context__, BrokenPipeError):  # Typer makes an exit of it

@@ -60,6 +60,14 @@ def destination_of(source: str, output: str | None, in_place: bool, format: str 
     return Destination(output, key, aside)
 
 
+def refuse_mixture(destination: Destination, json: bool) -> None:
+    """InputError where the mesh and a JSON document would both go to the standard output."""
+    if json and destination.aside:
+        raise InputError(
+            f"--json and the output {destination.path} both want the standard output: write the mesh elsewhere"
+        )
+
+
 def check_picture(plot: str, source: str, destination: Destination | None = None) -> None:
     """InputError where a picture cannot be written to this path, or would overwrite a mesh that is read or written."""
     from gmsnet.plot import check_target

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gmsnet.cli.signals import Deferral, Interrupted
-from gmsnet.cli.visible import visible
-from gmsnet.errors import GmsnetError, InputError
-from gmsnet.parallel.interrupts import interruptible
-
 if TYPE_CHECKING:
-    from gmsnet.cli.destination import Destination
     from gmsnet.mesh.mesh import Mesh
     from gmsnet.run.result import SmoothResult
-    from gmsnet.run.sweep import Sweep
 
 
 def _method_names() -> list[str]:
@@ -127,117 +121,38 @@ def smooth(
 
     Ctrl-C stops the smoothing; the best mesh so far is written. A second one ends at once and writes nothing.
     """
-    from gmsnet.cli.destination import check_drawable, check_picture, destination_of, shown
+    from gmsnet.cli.destination import check_picture, destination_of, refuse_mixture
 
     destination = destination_of(input, output, in_place, output_format)
-    if json and destination.aside:
-        raise InputError(
-            f"--json and the output {destination.path} both want the standard output: write the mesh elsewhere"
-        )
+    refuse_mixture(destination, json)
     if plot is not None:
         check_picture(plot, input, destination)
 
     # Heavy imports only now, when the command line is known to be in order.
-    from gmsnet import io
+    from gmsnet.cli.file_work import Done, FileWork
     from gmsnet.cli.fix import fixed_nodes
-    from gmsnet.cli.progress import Progress
     from gmsnet.cli.smooth_report import Outcome
     from gmsnet.run.api import smooth_with
     from gmsnet.run.options import SmoothOptions
     from gmsnet.run.set_up import check_mesh
 
-    progress, interruption = Progress(max_sweeps, enabled=not quiet), Deferral()
-
-    def after_sweep(sweep: Sweep) -> None:
-        interruption.begin()  # from now on there is something to lose
-        progress.sweep(sweep)
-        if interruption.caught:
-            raise KeyboardInterrupt
-
+    work = FileWork(
+        input, format, destination, in_place=in_place, plot=plot, most_sweeps=max_sweeps, json=json, quiet=quiet
+    )
     options = SmoothOptions(  # before the file is read, which may be large
         method=method, variant=variant, objective=objective, max_sweeps=max_sweeps, threads=threads,
         target_quality=target_quality, target_angle=target_angle, preserve=preserve, fix_layers=fix_layers,
-        untangle=untangle, guard=guard, seed=seed, callback=after_sweep, weights=weights, best_by=best_by,
+        untangle=untangle, guard=guard, seed=seed, callback=work.after_sweep, weights=weights, best_by=best_by,
         slide=True if slide and "all" in slide else slide or None, feature_angle=feature_angle,
     )  # fmt: skip
-    written: str | None = None
-    lost: list[str] = []
-    try:
-        with interruptible(), progress, interruption:
-            progress.begin(f"reading {shown(input)}")
-            mesh = io.read(input, format)
-            try:
-                check_mesh(mesh, options.target)
-            except InputError as error:
-                raise InputError(f"{shown(input)}: {error}") from error
-            if plot is not None:
-                check_drawable(mesh, input)
-            if in_place and mesh.source is not None:
-                destination = replace(destination, format=mesh.source.format)
-            fixed = fixed_nodes(mesh, fix) if fix else None
-            _check_conversion(mesh, destination)
-            progress.begin("preparing")
-            compiled = progress.compilation.seconds
-            try:
-                result = smooth_with(mesh, options, fixed)
-            except KeyboardInterrupt as interrupted:
-                result = _best_so_far(interrupted)
-            compiled = progress.compilation.seconds - compiled
-            interruption.begin()
-            if not in_place or result.moved.any():  # else there is nothing to write
-                progress.begin(f"writing {destination.path}")
-                lost = io.write(result.mesh, destination.path, destination.format)
-                written = destination.path
-            interruption.end()
-            if plot is not None:
-                progress.begin(f"drawing {plot}")
-                _draw(mesh, result.mesh, plot, written)
 
+    def make(mesh: Mesh) -> Callable[[], SmoothResult]:
+        return partial(smooth_with, mesh, options, fixed_nodes(mesh, fix) if fix else None)
+
+    def told(done: Done) -> Outcome:
         choice = {"variant": variant, "objective": objective, "weights": weights}
-        outcome = Outcome(
-            input, written, method, mesh, result, options.target, lost, plot, choice, compiled
-        )  # fmt: skip
-        if json:
-            outcome.print_json()
-        elif not quiet:
-            outcome.print(aside=destination.aside)
-    except KeyboardInterrupt:
-        if written is None:
-            raise
-        raise Interrupted(f"interrupted; the mesh is written to {written}") from None
-    if faults := outcome.faults():
-        for fault in faults:
-            typer.echo(f"gmsnet: {visible(fault)}", err=True)
-        raise typer.Exit(1)
+        return Outcome(
+            input, done.written, method, done.mesh, done.result, options.target, done.lost, plot, choice, done.compiled
+        )
 
-
-def _best_so_far(interrupted: KeyboardInterrupt) -> SmoothResult:
-    """What an interrupted run has made; raises the interruption again where that is nothing."""
-    result: SmoothResult | None = getattr(interrupted, "result", None)
-    if result is None or not (result.history or result.moved.any()):
-        raise interrupted
-    return result
-
-
-def _check_conversion(mesh: Mesh, destination: Destination) -> None:
-    """Raise now what writing would raise after the work: the format of the output cannot hold the mesh."""
-    from gmsnet.io.files import output_format
-
-    entry = output_format(mesh, destination.path, destination.format)
-    if mesh.source is not None and entry.key != mesh.source.format:
-        try:
-            entry.load().write(mesh)
-        except InputError as error:
-            raise InputError(f"{destination.path}: {error}") from error
-
-
-def _draw(before: Mesh, after: Mesh, plot: str, written: str | None) -> None:
-    """The picture; where it fails the error says that the mesh is written."""
-    from gmsnet.plot import plot_smoothing
-
-    try:
-        plot_smoothing(before, after, plot)
-    except Exception as error:
-        kind = InputError if isinstance(error, (GmsnetError, OSError, MemoryError)) else RuntimeError
-        done = "the mesh is left as it is" if written is None else f"mesh written to {written}"
-        raise kind(f"{done}; the picture failed: {str(error) or type(error).__name__}") from error
+    work.carry_out(lambda mesh: check_mesh(mesh, options.target), make, told)

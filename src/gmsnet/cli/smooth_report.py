@@ -188,36 +188,38 @@ class Outcome:
 
     def print_json(self) -> None:
         """The whole outcome as one document."""
+        output.print_json(self.document())
+
+    def document(self) -> dict[str, Any]:
+        """The whole outcome as plain values."""
         result = self.result
         after = result.after
-        output.print_json(
-            {
-                "input": self.input,
-                "output": self.written,
-                "plot": self.plot,
-                "method": self.method,
-                **{key: self.choice.get(key) for key in ("variant", "objective", "weights")},
-                "nodes": len(self.mesh.points),
-                "cells": sum(len(block.nodes) for block in self.mesh.cells),
-                "before": result.before.summary(),
-                "after": after.summary(),
-                "improved": bool(result.moved.any()),
-                "moved": int(result.moved.sum()),
-                "free": self.free,
-                "held": {reason: len(ids) for reason, ids in result.held.items()},
-                "sweeps": result.sweeps,
-                "stop_reason": result.stop_reason,
-                "target_quality": self.target.quality,
-                "target_angle": self.target.angle,
-                "target_met": self.target_met if self.target else None,
-                "below_target": len(self.missed),
-                "ceiling": result.limits.ceiling,
-                "notes": result.notes,
-                "unmended": [cell._asdict() for cell in result.unmended],
-                "worst": self.worst,
-                "lost": self.lost,
-                "history": [asdict(sweep) for sweep in result.history],
-                "seconds": result.seconds,
-                "seconds_compiling": self.compiled,
-            }
-        )
+        return {
+            "input": self.input,
+            "output": self.written,
+            "plot": self.plot,
+            "method": self.method,
+            **{key: self.choice.get(key) for key in ("variant", "objective", "weights")},
+            "nodes": len(self.mesh.points),
+            "cells": sum(len(block.nodes) for block in self.mesh.cells),
+            "before": result.before.summary(),
+            "after": after.summary(),
+            "improved": bool(result.moved.any()),
+            "moved": int(result.moved.sum()),
+            "free": self.free,
+            "held": {reason: len(ids) for reason, ids in result.held.items()},
+            "sweeps": result.sweeps,
+            "stop_reason": result.stop_reason,
+            "target_quality": self.target.quality,
+            "target_angle": self.target.angle,
+            "target_met": self.target_met if self.target else None,
+            "below_target": len(self.missed),
+            "ceiling": result.limits.ceiling,
+            "notes": result.notes,
+            "unmended": [cell._asdict() for cell in result.unmended],
+            "worst": self.worst,
+            "lost": self.lost,
+            "history": [asdict(sweep) for sweep in result.history],
+            "seconds": result.seconds,
+            "seconds_compiling": self.compiled,
+        }

@@ -14,7 +14,7 @@ from gmsnet.mesh.arrays import plain_array
 from gmsnet.mesh.checks import in_words
 from gmsnet.mesh.mesh import Mesh
 
-FORMS = "fixed must be node ids, a mask of bools or names of markers"
+FORMS = "must be node ids, a mask of bools or names of markers"
 
 
 def fixed_mask(mesh: Mesh, fixed: Any = None) -> NDArray[np.bool_]:
@@ -29,38 +29,47 @@ def fixed_mask(mesh: Mesh, fixed: Any = None) -> NDArray[np.bool_]:
     numbers: what they mean cannot be told, and to move nodes that are meant to stay would be worse than to stop.
     """
     mask = _own(mesh)
-    if fixed is None:
-        return mask
-    values = _values(fixed)
-    if values.dtype.kind == "U":
-        for name in values.ravel().tolist():
-            mask[_nodes_of(mesh, name)] = True
-    elif values.dtype == bool:
-        if values.shape != mask.shape:
-            raise InputError(f"a mask of fixed nodes needs one value per node, {mask.shape}, got shape {values.shape}")
-        mask |= values
-    elif _is_mask_of_numbers(values, mask):
-        raise InputError(
-            f"fixed has a 0 or a 1 for each of the {len(mask):,} nodes: give a mask as bools, such as .astype(bool), "
-            "or ids without repetition"
-        )
-    elif values.dtype.kind in "iu":
-        wrong = values[(values < 0) | (values >= len(mask))]
-        if wrong.size:
-            raise InputError(f"fixed names the node {wrong[0]}, but the mesh has {in_words(len(mask))}")
-        mask[values.astype(np.int64)] = True
-    elif values.size or values.dtype.kind != "f":  # an empty list is an array of no floats
-        mend = ": give integers, as by .astype(int)" if values.dtype.kind == "f" else ""
-        raise InputError(f"{FORMS}, got {values.dtype} values{mend}")
+    if fixed is not None:
+        mask[chosen_nodes(mesh, fixed, "fixed")] = True
     return mask
 
 
-def _is_mask_of_numbers(values: NDArray[Any], mask: NDArray[np.bool_]) -> bool:
+def chosen_nodes(mesh: Mesh, chosen: Any, what: str) -> NDArray[np.int64]:
+    """The ids of some nodes, named in any of the forms of ``fixed_mask`` but None; ids as they were given, else
+    ascending.
+
+    what: what messages call them. Raises InputError as ``fixed_mask`` does.
+    """
+    values, forms, count = _values(chosen, what), f"{what} {FORMS}", len(mesh.points)
+    if values.dtype.kind == "U":
+        named = [_nodes_of(mesh, name) for name in values.ravel().tolist()]
+        return named[0] if len(named) == 1 else np.unique(np.concatenate(named))
+    if values.dtype == bool:
+        if values.shape != (count,):
+            raise InputError(f"a mask of {what} nodes needs one value per node, {(count,)}, got shape {values.shape}")
+        return np.flatnonzero(values)
+    if _is_mask_of_numbers(values, count):
+        raise InputError(
+            f"{what} has a 0 or a 1 for each of the {count:,} nodes: give a mask as bools, such as .astype(bool), "
+            "or ids without repetition"
+        )
+    if values.dtype.kind in "iu":
+        wrong = values[(values < 0) | (values >= count)]
+        if wrong.size:
+            raise InputError(f"{what} names the node {wrong[0]}, but the mesh has {in_words(count)}")
+        return values.ravel().astype(np.int64)
+    if values.size or values.dtype.kind != "f":  # an empty list is an array of no floats
+        mend = ": give integers, as by .astype(int)" if values.dtype.kind == "f" else ""
+        raise InputError(f"{forms}, got {values.dtype} values{mend}")
+    return np.empty(0, dtype=np.int64)
+
+
+def _is_mask_of_numbers(values: NDArray[Any], count: int) -> bool:
     """Zeros and ones, one per node: more than the two nodes 0 and 1 could be meant by."""
     return (
         values.dtype.kind in "iuf"
-        and values.shape == mask.shape
-        and len(mask) > 2
+        and values.shape == (count,)
+        and count > 2
         and bool(((values == 0) | (values == 1)).all())
     )
 
@@ -79,8 +88,9 @@ def _own(mesh: Mesh) -> NDArray[np.bool_]:
     return held
 
 
-def _values(fixed: Any) -> NDArray[Any]:
+def _values(fixed: Any, what: str) -> NDArray[Any]:
     """What the user gave as an array: names, bools or numbers, never a mixture."""
+    forms = f"{what} {FORMS}"
     if isinstance(fixed, Set):
         fixed = list(fixed)
     if isinstance(fixed, np.ndarray) and fixed.dtype.kind == "O":
@@ -88,15 +98,15 @@ def _values(fixed: Any) -> NDArray[Any]:
     if isinstance(fixed, (list, tuple)):
         strings = sum(isinstance(value, str) for value in fixed)
         if 0 < strings < len(fixed):
-            raise InputError(f"{FORMS}, got names mixed with other values: give the node ids of all as one list")
+            raise InputError(f"{forms}, got names mixed with other values: give the node ids of all as one list")
         if len({len(value) if isinstance(value, (list, tuple)) else -1 for value in fixed}) > 1:
-            raise InputError(f"{FORMS}, got lists of different lengths within a list: give one flat list")
+            raise InputError(f"{forms}, got lists of different lengths within a list: give one flat list")
         huge = [value for value in fixed if isinstance(value, int) and abs(value) >= 2**63]
         if huge:
-            raise InputError(f"fixed names the node {huge[0]}, which no mesh can have")
+            raise InputError(f"{what} names the node {huge[0]}, which no mesh can have")
     elif not (isinstance(fixed, (str, range)) or hasattr(fixed, "__array__") or np.isscalar(fixed)):
-        raise InputError(f"{FORMS}, got one {type(fixed).__name__}: give a list")
-    return plain_array(fixed, "fixed")
+        raise InputError(f"{forms}, got one {type(fixed).__name__}: give a list")
+    return plain_array(fixed, what)
 
 
 def _nodes_of(mesh: Mesh, name: str) -> NDArray[np.int64]:
@@ -104,7 +114,7 @@ def _nodes_of(mesh: Mesh, name: str) -> NDArray[np.int64]:
     if name in markers:
         return markers[name]
     if not markers:
-        raise InputError(f"there is no marker {name!r} to hold: the mesh has no markers")
+        raise InputError(f"there is no marker {name!r}: the mesh has no markers")
     near = difflib.get_close_matches(name, markers, n=3)
     hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"it has {', '.join(map(repr, markers))}"
     raise InputError(f"the mesh has no marker {name!r}; {hint}")

@@ -24,7 +24,12 @@ BAND = 0.099  # a tenth, and room for the rounding of what is written
 
 
 class Sized(StarSmoother):
-    """Keeps the areas that the cells have when the first sweep begins. bands: areas that stay within hard bounds."""
+    """Keeps the areas that the cells have when the first sweep begins. bands: areas that stay within hard bounds.
+
+    start: (N, 2) in memory order, points whose areas are kept instead.
+    """
+
+    start: NDArray[np.float64] | None = None
 
     def __init__(self, weight: float = WEIGHT, bands: Bands | None = None) -> None:
         self.weight, self.bands = weight, bands or no_bands()
@@ -37,7 +42,8 @@ class Sized(StarSmoother):
             self.topology = field.topology
             blocks = field.topology.stars.blocks
             self.wanted = room_for(blocks)
-            kernels.targets(field.points, field.topology.near, blocks, self.wanted)
+            points = field.points if self.start is None else self.start
+            kernels.targets(points, field.topology.near, blocks, self.wanted)
         return super().sweep(field, executor, test)
 
     def visit(

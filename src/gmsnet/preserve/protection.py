@@ -107,6 +107,14 @@ def wall_note(nodes: int, moved: bool) -> str:
     return f"the mesh is refined towards its walls: the {nodes:,} nodes next to them {so} (preserve={SHAPE!r}){mend}"
 
 
+def carried_note(nodes: int) -> str:
+    """The same of nodes whose walls move."""
+    return (
+        f"the mesh is refined towards its walls: the {nodes:,} nodes next to them are carried along with them "
+        f"(preserve={SHAPE!r}); preserve='none' lets them move on their own"
+    )
+
+
 def _amount(count: int) -> str:
     return f"{count:,} node is" if count == 1 else f"{count:,} nodes are"
 

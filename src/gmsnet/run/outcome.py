@@ -17,7 +17,7 @@ from gmsnet.measure.totals import Totals
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
-from gmsnet.preserve.protection import WALL, wall_note
+from gmsnet.preserve.protection import WALL, carried_note, wall_note
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.state import Final, State
@@ -33,6 +33,8 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
     """The last stage: the best points in the order of the input, and their measures."""
     rank = options.target.rank if options.target else rank_by(options.best_by)
     if state.second_order is not None and state.second_order.invalid[0]:  # whose mending may cost straight cells shape
+        rank = inverted_alone
+    if state.motion is not None:
         rank = inverted_alone
     final = outcome(state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals)
     nothing = np.empty((0, 2))
@@ -90,7 +92,9 @@ def _held(state: State) -> dict[str, NDArray[np.int64]]:
 def _notes(state: State) -> list[str]:
     protection, near_walls, of_order = state.protection, [], []
     if protection.kept is not None:
-        near_walls.append(wall_note(len(protection.topology.held.get(WALL, ())), moved=state.released))
+        count = len(protection.topology.held.get(WALL, ()))
+        told = carried_note(count) if state.motion else wall_note(count, moved=state.released)
+        near_walls.append(told)
     slid = []
     if state.sliding is not None and state.final is not None:
         slid.append(state.sliding.note(planar_points(state.mesh.with_points(state.final.points)), state.final.moved))

@@ -61,11 +61,11 @@ class SmoothResult:
 
     def __repr__(self) -> str:
         """What was done, the most telling figures before and after, and what there is to know: one screen."""
-        return "\n".join([f"SmoothResult: {self._done}", text_table(self._figures), *self._remarks])
+        return "\n".join([f"{type(self).__name__}: {self._done}", text_table(self._figures), *self._remarks])
 
     def _repr_html_(self) -> str:
         """The same for a notebook."""
-        return html_table(f"SmoothResult: {self._done}", self._figures, self._remarks)
+        return html_table(f"{type(self).__name__}: {self._done}", self._figures, self._remarks)
 
     @property
     def _done(self) -> str:

@@ -37,8 +37,11 @@ MANY = 20_000  # nodes: for the set-up of fewer a second thread is not worth sta
 BYTES_PER_NODE = 600
 
 
-def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOptions, executor: Executor) -> State:
-    """The state before the first stage. mesh, fixed: see ``gmsnet.smooth``.
+def first_state(
+    mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOptions, executor: Executor,
+    moved: NDArray[np.bool_] | None = None,
+) -> State:  # fmt: skip
+    """The state before the first stage. mesh, fixed: see ``gmsnet.smooth``. moved: (N,) by id, held beside ``fixed``.
 
     Raises InputError for a mesh that cannot be smoothed or does not fit into memory, and for nodes that it has not.
     """
@@ -50,8 +53,9 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     threads = options.thread_count if len(given.points) >= MANY else 1
     asked = fixed_mask(given, fixed)
-    curves = curves_to_slide_on(given, options.slide, options.feature_angle, asked)
-    topology, start = Topology.and_points(given, asked, threads, None if curves is None else curves.slides)
+    still = asked if moved is None else asked | moved
+    curves = curves_to_slide_on(given, options.slide, options.feature_angle, still)
+    topology, start = Topology.and_points(given, still, threads, None if curves is None else curves.slides)
     sliding = None
     if curves is not None:
         sliding = Sliding.of(given, curves, topology.memory, topology.free, options.geometry)

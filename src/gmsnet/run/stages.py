@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from gmsnet.parallel.executor import Executor
@@ -31,9 +32,9 @@ STAGES: tuple[Stage, ...] = (
 )  # fmt: skip
 
 
-def carry_out(state: State, options: SmoothOptions, executor: Executor) -> State:
+def carry_out(state: State, options: SmoothOptions, executor: Executor, stages: Sequence[Stage] = STAGES) -> State:
     """The state after all stages, or after the one that was interrupted, written back."""
-    for stage in STAGES:
+    for stage in stages:
         try:
             with interruptible():
                 state = stage(state, options, executor)

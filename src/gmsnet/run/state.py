@@ -78,6 +78,15 @@ class SecondOrder:
         )
 
 
+@dataclass(frozen=True)
+class Motion:
+    """How far a boundary has moved. fraction: of its way; steps: in so many; reason: why not further, "" if all."""
+
+    fraction: float = 0.0
+    steps: int = 0
+    reason: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class State:
     """Each stage makes a new one. Nothing in it is changed in place.
@@ -92,7 +101,7 @@ class State:
     sliding: the nodes that move along curves, if any. curved: while the corners of second-order cells move, those cells
     (``second_order``, which is all that is known of them). interruption: what ends the smoothing before its end. final:
     once the mesh is written back to the order of the input; start, points and shapes are then empty, lest the result
-    needs more memory than the stages.
+    needs more memory than the stages. motion: of a boundary that moves (``deform_stage``).
     """
 
     mesh: Mesh
@@ -115,6 +124,7 @@ class State:
     sliding: Sliding | None = None
     second_order: SecondOrder | None = None
     curved: Curved | None = None
+    motion: Motion | None = None
 
     @property
     def topology(self) -> Topology:

@@ -32,14 +32,28 @@ def near_crossings(points: Floats, edges: Ints, cells: Ints) -> Floats:
         pairs = meeting(left[near], right[near], left[near], right[near])
     if pairs is None:  # so much lies over each other that one crossing more or less says nothing
         return found
-    pairs = near[pairs]
-    both = edges[pairs[pairs[:, 0] < pairs[:, 1]]]
-    apart = ~(both[:, 0, :, None] == both[:, 1, None, :]).any(axis=(1, 2))  # edges that share a node do not cross
-    places = crossings(points, both[apart])
+    places = crossings(points, apart(edges, near[pairs]))
     if len(places):
         distance, nearest = scipy.spatial.cKDTree(places).query(middle, p=np.inf)
         found[distance <= reach] = places[nearest[distance <= reach]]
     return found
+
+
+def crossings_of(points: Floats, edges: Ints) -> Floats:
+    """(k, 2) where some edges (e, 2) cross each other; nothing is said where too many lie over each other."""
+    edges = edges[(points[edges[:, 0]] != points[edges[:, 1]]).any(axis=1)]
+    if not len(edges):
+        return np.empty((0, 2))
+    low, high = points[edges].min(axis=1), points[edges].max(axis=1)
+    pairs = meeting(low, high, low, high)
+    return np.empty((0, 2)) if pairs is None else crossings(points, apart(edges, pairs))
+
+
+def apart(edges: Ints, pairs: NDArray[np.intp]) -> Ints:
+    """(p, 2, 2) the pairs of edges, each once, that share no node: those that do, do not cross."""
+    both = edges[pairs[pairs[:, 0] < pairs[:, 1]]]
+    chosen: Ints = both[~(both[:, 0, :, None] == both[:, 1, None, :]).any(axis=(1, 2))]
+    return chosen
 
 
 def meeting(low: Floats, high: Floats, left: Floats, right: Floats) -> NDArray[np.intp] | None:

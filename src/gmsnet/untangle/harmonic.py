@@ -6,6 +6,7 @@ Society 13, 1963); elsewhere it is a start from which little is left to mend, ho
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -27,13 +28,19 @@ def harmonic(points: Floats, patch: Patch) -> Floats:
     joins = scipy.sparse.csc_matrix((weights, (rows, around)), shape=(count, len(points)))
     joins.eliminate_zeros()
     matrix = scipy.sparse.diags_array(degree, format="csc") - joins[:, :count]
-    solver = scipy.sparse.linalg.splu(
+    out = points.copy()
+    out[:count] = solver_of(matrix)(joins[:, count:] @ points[count:])
+    return out
+
+
+def solver_of(matrix: scipy.sparse.csc_array) -> Callable[[Floats], Floats]:
+    """Solves systems with a symmetric, positive definite matrix (n, n) for right-hand sides (n,) or (n, k)."""
+    factors = scipy.sparse.linalg.splu(
         scipy.sparse.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )  # fmt: skip
-    out = points.copy()
-    out[:count] = solver.solve(joins[:, count:] @ points[count:])
-    return out
+    solve: Callable[[Floats], Floats] = factors.solve
+    return solve
 
 
 def within(start: NDArray[np.integer[Any]]) -> NDArray[np.intp]:

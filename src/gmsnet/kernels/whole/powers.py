@@ -23,6 +23,16 @@ def shapes(points, cells, table):
 
 
 @kernel
+def shape_of_each(points, cells, table, out):
+    """1/q of each simplex into out (S,), negative where its area is."""
+    for t in range(len(cells)):
+        i, j, k = cells[t, 0], cells[t, 1], cells[t, 2]
+        ax, ay = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+        bx, by = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1]
+        out[t] = (ax * by - ay * bx) / (KAPPA * half_of(ax, ay, bx, by, row_weights(table, t)))
+
+
+@kernel
 def weighted(points, cells, table, top, doublings, out):
     """Σ(q/top)^p, p = 2^doublings, and the weights (S, 3) of which Σq, held fixed, has here the same gradient.
 

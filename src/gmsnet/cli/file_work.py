@@ -1,0 +1,147 @@
+"""A mesh file in, the same file with other coordinates out: what ``smooth`` and ``deform`` have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import typer
+
+from gmsnet.cli.destination import Destination, check_drawable, shown
+from gmsnet.cli.signals import Deferral, Interrupted
+from gmsnet.cli.visible import visible
+from gmsnet.errors import GmsnetError, InputError
+from gmsnet.parallel.interrupts import interruptible
+
+if TYPE_CHECKING:
+    from gmsnet.cli.smooth_report import Outcome
+    from gmsnet.mesh.mesh import Mesh
+    from gmsnet.run.result import SmoothResult
+    from gmsnet.run.sweep import Sweep
+
+
+class Done(NamedTuple):
+    """What was done. written: the file, None where there was no need to write. lost: by conversion. compiled: seconds
+    of it that went into compilation."""
+
+    mesh: Mesh
+    result: SmoothResult
+    written: str | None
+    lost: list[str]
+    compiled: float
+
+
+class FileWork:
+    """One run on a file. input: its path, format: its format where the suffix does not tell. plot: of a picture."""
+
+    def __init__(
+        self, input: str, format: str | None, destination: Destination, *, in_place: bool, plot: str | None,
+        most_sweeps: int, json: bool, quiet: bool,
+    ) -> None:  # fmt: skip
+        from gmsnet.cli.progress import Progress
+
+        self.input, self.format, self.destination, self.in_place, self.plot = input, format, destination, in_place, plot
+        self.json, self.quiet = json, quiet
+        self.progress, self.interruption = Progress(most_sweeps, enabled=not quiet), Deferral()
+        self.written: str | None = None
+
+    def after_sweep(self, sweep: Sweep) -> None:
+        """The callback of a run."""
+        self.interruption.begin()  # from now on there is something to lose
+        self.progress.sweep(sweep)
+        if self.interruption.caught:
+            raise KeyboardInterrupt
+
+    def carry_out(
+        self, check: Callable[[Mesh], None], make: Callable[[Mesh], Callable[[], SmoothResult]],
+        told: Callable[[Done], Outcome],
+    ) -> None:  # fmt: skip
+        """Reads, works, writes, and prints the outcome; raises Exit with code 1 where that has faults.
+
+        check: of the mesh that was read; the path is put before its InputError. make: what is to be done with it, once
+        the rest of the command line is checked.
+        """
+        try:
+            with interruptible(), self.progress, self.interruption:
+                done = self._work(check, make)
+            outcome = told(done)
+            if self.json:
+                outcome.print_json()
+            elif not self.quiet:
+                outcome.print(aside=self.destination.aside)
+        except KeyboardInterrupt:
+            if self.written is None:
+                raise
+            raise Interrupted(f"interrupted; the mesh is written to {self.written}") from None
+        if faults := outcome.faults():
+            for fault in faults:
+                typer.echo(f"gmsnet: {visible(fault)}", err=True)
+            raise typer.Exit(1)
+
+    def _work(self, check: Callable[[Mesh], None], make: Callable[[Mesh], Callable[[], SmoothResult]]) -> Done:
+        from gmsnet import io
+
+        self.progress.begin(f"reading {shown(self.input)}")
+        mesh = io.read(self.input, self.format)
+        try:
+            check(mesh)
+        except InputError as error:
+            raise InputError(f"{shown(self.input)}: {error}") from error
+        if self.plot is not None:
+            check_drawable(mesh, self.input)
+        destination = self.destination
+        if self.in_place and mesh.source is not None:
+            destination = replace(destination, format=mesh.source.format)
+        work = make(mesh)
+        _check_conversion(mesh, destination)
+        self.progress.begin("preparing")
+        compiled = self.progress.compilation.seconds
+        try:
+            result = work()
+        except KeyboardInterrupt as interrupted:
+            result = _best_so_far(interrupted)
+        compiled = self.progress.compilation.seconds - compiled
+        self.interruption.begin()
+        lost: list[str] = []
+        if not self.in_place or result.moved.any():  # else there is nothing to write
+            self.progress.begin(f"writing {destination.path}")
+            lost = io.write(result.mesh, destination.path, destination.format)
+            self.written = destination.path
+        self.interruption.end()
+        if self.plot is not None:
+            self.progress.begin(f"drawing {self.plot}")
+            _draw(mesh, result.mesh, self.plot, self.written)
+        return Done(mesh, result, self.written, lost, compiled)
+
+
+def _best_so_far(interrupted: KeyboardInterrupt) -> SmoothResult:
+    """What an interrupted run has made; raises the interruption again where that is nothing."""
+    result: SmoothResult | None = getattr(interrupted, "result", None)
+    if result is None or not (result.history or result.moved.any()):
+        raise interrupted
+    return result
+
+
+def _check_conversion(mesh: Mesh, destination: Destination) -> None:
+    """Raise now what writing would raise after the work: the format of the output cannot hold the mesh."""
+    from gmsnet.io.files import output_format
+
+    entry = output_format(mesh, destination.path, destination.format)
+    if mesh.source is not None and entry.key != mesh.source.format:
+        try:
+            entry.load().write(mesh)
+        except InputError as error:
+            raise InputError(f"{destination.path}: {error}") from error
+
+
+def _draw(before: Mesh, after: Mesh, plot: str, written: str | None) -> None:
+    """The picture; where it fails the error says that the mesh is written."""
+    from gmsnet.plot import plot_smoothing
+
+    try:
+        plot_smoothing(before, after, plot)
+    except Exception as error:
+        kind = InputError if isinstance(error, (GmsnetError, OSError, MemoryError)) else RuntimeError
+        done = "the mesh is left as it is" if written is None else f"mesh written to {written}"
+        raise kind(f"{done}; the picture failed: {str(error) or type(error).__name__}") from error

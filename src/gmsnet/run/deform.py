@@ -1,0 +1,147 @@
+"""deform(): boundaries move, the inside follows."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import Any
+
+from gmsnet.errors import InputError
+from gmsnet.kernels.simplex.bernstein import NAMES
+from gmsnet.measure.target import Target
+from gmsnet.mesh.adapters import to_mesh
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.selection import chosen_nodes
+from gmsnet.motion.prescribed import Prescribed
+from gmsnet.parallel.interrupts import interruptible
+from gmsnet.parallel.threads import workers
+from gmsnet.run.deform_stage import move_boundary
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.outcome import result_of
+from gmsnet.run.result import SmoothResult
+from gmsnet.run.set_up import check_mesh, first_state
+from gmsnet.run.stages import carry_out
+from gmsnet.run.state import Motion, State
+from gmsnet.run.sweep import Sweep
+from gmsnet.run.untangle_stage import untangle_all
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DeformResult(SmoothResult):
+    """What ``deform`` returns: a SmoothResult, and how far the boundary has come.
+
+    fraction: of its way, 1.0 where all nodes are at the places asked for. steps: in so many. reason: why it has not
+    come further, "" where it has.
+    """
+
+    fraction: float = 0.0
+    steps: int = 0
+    reason: str = ""
+
+    @property
+    def _remarks(self) -> list[str]:
+        return [self.verdict, *super()._remarks]
+
+    @property
+    def verdict(self) -> str:
+        """How far the boundary has come, in a sentence."""
+        steps = f"in {self.steps} step{'s' if self.steps != 1 else ''}"
+        if self.fraction == 1.0:
+            return f"the boundary is in place ({steps})"
+        far = f"{100.0 * self.fraction:.4g} % of its way" if self.fraction else "no part of its way"
+        return f"the boundary has come {far} ({steps}): {self.reason}"
+
+
+def deform(
+    mesh: Any,
+    displacement: Any = None,
+    nodes: Any = None,
+    *,
+    rotate: Any = None,
+    places: Any = None,
+    fixed: Any = None,
+    preserve: str = "shape",
+    fix_layers: bool = False,
+    slide: Any = None,
+    feature_angle: float = 30.0,
+    guard: str = "worst",
+    max_sweeps: int = 100,
+    threads: int | None = None,
+    callback: Callable[[Sweep], bool | None] | None = None,
+) -> DeformResult:
+    """Moves nodes of a planar mesh's boundary to new places; the nodes inside follow. Changes nothing but coordinates.
+
+    No cell that is valid becomes inverted. At ``fraction`` 1 each node that is moved has the very coordinates asked
+    for; else the mesh is that of the last valid step, and ``reason`` says what stood against the next one. All other
+    nodes that ``smooth`` holds (boundary, interfaces, line cells, ``fixed``) stay. Layers and cells near refined walls
+    keep their shapes as they are carried along; where other cells have lost more than a fifth of their 1/q, the mesh is
+    smoothed around them as by ``smooth``.
+
+    mesh: as for ``smooth``; first-order cells. displacement: one vector for all nodes that are moved, or one for each,
+    in the order of ``nodes``: ids as given, those of a mask or a marker ascending. nodes: ids, a mask, a marker's name
+    or a list of names; None: displacement has one row for each node of the mesh, and those that are not zero are moved.
+    rotate: (nodes, degrees, (x, y)), or several of these: turns nodes counter-clockwise about a centre in the plane of
+    the mesh, before they are displaced; more than half a turn is told from this alone. places: new coordinates instead
+    of a displacement, in the same forms. The other options are those of
+    ``smooth``; slide: nodes of boundaries that are not moved may slide along them as the mesh is smoothed.
+
+    Raises InputError for what cannot be used, before anything is moved. KeyboardInterrupt: as for ``smooth``.
+    """
+    options = SmoothOptions(
+        fix_layers=fix_layers, preserve=preserve, slide=slide, feature_angle=feature_angle, guard=guard,
+        max_sweeps=max_sweeps, threads=threads, callback=callback,
+    )  # fmt: skip
+    given = to_mesh(mesh)[0]
+    check_deformable(given)
+    return deform_with(mesh, options, Prescribed.of(given, displacement, nodes, rotate, places), fixed)
+
+
+def deform_with(mesh: Any, options: SmoothOptions, prescribed: Prescribed, fixed: Any = None) -> DeformResult:
+    """``deform`` with options and places that have been checked already. The rest: see there."""
+    began, result = time.perf_counter(), None
+    try:
+        smoother, given = options.smoother(), to_mesh(mesh)[0]
+        check_deformable(given)
+        _check_fixed(given, fixed, prescribed)
+        with interruptible(), workers(options.thread_count) as executor:
+            state = first_state(mesh, fixed, smoother, options, executor, prescribed.moved)
+            move = partial(move_boundary, prescribed=prescribed)
+            state = carry_out(state, options, executor, (untangle_all, move))
+        try:
+            result = _result(state, began)
+        except KeyboardInterrupt as interruption:
+            state = state.interrupted(interruption)
+            result = _result(state, began)
+        if state.interruption is not None:
+            raise state.interruption
+    except KeyboardInterrupt as interruption:
+        interruption.result = result  # type: ignore[attr-defined]
+        raise
+    return result
+
+
+def check_deformable(mesh: Mesh) -> None:
+    """InputError for meshes that cannot be deformed: volumes, curved surfaces, second-order cells."""
+    check_mesh(mesh, Target(None, None))
+    kinds = sorted({block.kind for block in mesh.cells if block.kind in NAMES and len(block.nodes)})
+    if kinds:
+        raise InputError(
+            f"the mesh has second-order cells ({', '.join(kinds)}): boundaries of first-order cells alone can be moved "
+            "so far"
+        )
+
+
+def _check_fixed(mesh: Mesh, fixed: Any, prescribed: Prescribed) -> None:
+    if fixed is None:
+        return
+    both = [node for node in chosen_nodes(mesh, fixed, "fixed").tolist() if prescribed.moved[node]]
+    if both:
+        raise InputError(f"fixed names the node {min(both)}, which is to be moved: leave it out of one of the two")
+
+
+def _result(state: State, began: float) -> DeformResult:
+    done, motion = result_of(state, began), state.motion or Motion(reason=state.stop_reason)
+    known = {each.name: getattr(done, each.name) for each in fields(SmoothResult)}
+    return DeformResult(**known, fraction=motion.fraction, steps=motion.steps, reason=motion.reason)

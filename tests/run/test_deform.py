@@ -1,0 +1,212 @@
+"""deform(): no cell inverted, places exact, all else as it was, and an honest report where it cannot be done."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import gmsnet
+from gmsnet import CellBlock, InputError, Mesh
+from gmsnet.generate import layered_mesh, moved_hole_mesh, random_mesh, second_order, structured_mesh
+from gmsnet.run import stop
+from gmsnet.topology.topology import Topology
+
+HOLE = np.array([0.5, 0.5])
+
+
+@pytest.fixture(scope="module")
+def plate():
+    return moved_hole_mesh(0.06, shift=0.0)
+
+
+def held_nodes(mesh):
+    held = np.zeros(len(mesh.points), dtype=bool)
+    for ids in Topology.of(mesh).held.values():
+        held[ids] = True
+    return held
+
+
+def check(mesh, result, ids, places):
+    """What holds of every result."""
+    assert result.after.inverted <= result.before.inverted
+    assert 0.0 <= result.fraction <= 1.0
+    still = held_nodes(mesh)
+    still[ids] = False
+    assert (result.points[still] == mesh.points[still]).all()
+    if result.fraction == 1.0:
+        assert (result.points[ids, :2] == places).all()
+        assert result.reason == ""
+    else:
+        assert result.reason
+    assert (result.moved == (result.points != mesh.points).any(axis=1)).all()
+    assert all((one.nodes == other.nodes).all() for one, other in zip(mesh.cells, result.mesh.cells, strict=True))
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.integers(0, 5), st.sampled_from(["triangle", "quad"]), st.floats(0.0, 0.4), st.floats(-1.0, 1.0),
+    st.sampled_from(["top", "every"]), st.booleans(),
+)  # fmt: skip
+def test_whatever_is_asked_for_no_cell_is_inverted(seed, cells, noise, shift, which, single):
+    mesh = random_mesh(40, seed=seed) if cells == "triangle" else structured_mesh(6, 4)
+    if single:
+        mesh = Mesh(mesh.points.astype(np.float32), mesh.cells, mesh.region_names, single=True)
+    ids = np.flatnonzero(held_nodes(mesh)) if which == "every" else mesh.markers["top"]
+    rng = np.random.default_rng(seed)
+    places = mesh.points[ids, :2] + shift + noise * rng.normal(size=(len(ids), 2))
+    if single:
+        places = places.astype(np.float32).astype(float)
+    result = gmsnet.deform(mesh, places=places, nodes=ids, threads=1)
+    assert result.before.inverted == 0
+    check(mesh, result, ids, places)
+
+
+def test_a_hole_is_moved_and_the_mesh_smoothed(plate):
+    ids = plate.markers["hole"]
+    result = gmsnet.deform(plate, (0.2, 0.1), "hole")
+    check(plate, result, ids, plate.points[ids, :2] + [0.2, 0.1])
+    assert (result.fraction, result.steps) == (1.0, 1)
+    assert result.after.shape.min() > 0.3
+    assert result.sweeps > 0
+    assert "the boundary is in place (in 1 step)" in repr(result)
+    assert result.history[0].stage == "moving, 1 of the way"
+
+
+def test_a_small_motion_only_carries_nodes_along(plate):
+    result = gmsnet.deform(plate, (0.004, 0.0), "hole")
+    assert (result.fraction, result.sweeps, result.stop_reason) == (1.0, 0, stop.IN_PLACE)
+
+
+def test_a_hole_that_would_leave_the_plate_stops_before_it(plate):
+    ids = plate.markers["hole"]
+    result = gmsnet.deform(plate, (0.5, 0.0), "hole")
+    check(plate, result, ids, None)
+    assert 0.6 < result.fraction < 0.7  # it touches the side at 0.7
+    assert result.stop_reason == stop.NOT_IN_PLACE
+    assert "boundaries would cross each other at 1 0." in result.reason
+    assert result.points[ids, :2] == pytest.approx(plate.points[ids, :2] + [0.5 * result.fraction, 0.0])
+
+
+@pytest.mark.parametrize("degrees", [60.0, 180.0])
+def test_a_hole_that_turns(plate, degrees):
+    ids = plate.markers["hole"]
+    result = gmsnet.deform(plate, rotate=("hole", degrees, tuple(HOLE)))
+    assert result.fraction == 1.0
+    assert result.after.inverted == 0
+    z = (plate.points[ids, :2] - HOLE) @ [1.0, 1.0j] * np.exp(1j * np.radians(degrees))
+    assert result.points[ids, :2] - HOLE == pytest.approx(np.column_stack([z.real, z.imag]))
+
+
+def test_nodes_inside_can_be_placed_too(plate):
+    node = int(np.flatnonzero(~held_nodes(plate))[0])
+    place = plate.points[[node], :2] + 0.01
+    result = gmsnet.deform(plate, places=place, nodes=[node])
+    check(plate, result, [node], place)
+    assert result.fraction == 1.0
+
+
+@pytest.mark.parametrize("cells", ["triangle", "mixed"])
+def test_layers_are_carried_with_their_wall(cells):
+    mesh = layered_mesh(10, 200.0, 60, cells=cells)
+    ids = mesh.markers["airfoil"]
+    result = gmsnet.deform(mesh, (0.0, 0.5), "airfoil", rotate=("airfoil", -20, (0.25, 0.0)))
+    check(mesh, result, ids, result.points[ids, :2])
+    assert result.fraction == 1.0
+    rows = [points[: 11 * 60, :2].reshape(11, 60, 2) for points in (mesh.points, result.points)]
+    before, after = (np.linalg.norm(np.diff(each, axis=0), axis=-1) for each in rows)
+    assert np.abs(after / before - 1.0).max() < 0.01
+
+
+def test_the_same_bits_for_any_number_of_threads(plate):
+    one, two = (gmsnet.deform(plate, (0.15, -0.1), "hole", threads=threads).points for threads in (1, 2))
+    assert (one == two).all()
+
+
+def test_inverted_cells_of_the_input_are_mended_first():
+    mesh = structured_mesh(10, 10)
+    points = mesh.points.copy()
+    points[[60, 61]] = points[[61, 60]]
+    mesh = mesh.with_points(points)
+    assert gmsnet.quality(mesh).inverted > 0
+    result = gmsnet.deform(mesh, (0.0, 0.2), "top")
+    assert (result.fraction, result.after.inverted) == (1.0, 0)
+
+
+def test_a_callback_stops_the_motion_and_the_sweeps(plate):
+    result = gmsnet.deform(plate, (0.2, 0.0), "hole", callback=lambda sweep: True)
+    assert (result.fraction, result.sweeps, result.stop_reason) == (1.0, 0, stop.CALLBACK)
+    result = gmsnet.deform(plate, (0.2, 0.0), "hole", callback=lambda sweep: sweep.index > 0)
+    assert result.fraction == 1.0
+    assert result.stop_reason == stop.CALLBACK
+
+
+def test_an_interruption_brings_the_last_valid_mesh(plate):
+    def interrupt(sweep):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        gmsnet.deform(plate, (0.2, 0.0), "hole", callback=interrupt)
+    result = caught.value.result
+    assert (result.fraction, result.stop_reason, result.after.inverted) == (1.0, stop.INTERRUPTED, 0)
+    ids = plate.markers["hole"]
+    assert (result.points[ids, :2] == plate.points[ids, :2] + [0.2, 0.0]).all()
+
+
+def test_boundaries_that_are_not_moved_slide_if_they_may(plate):
+    result = gmsnet.deform(plate, (0.2, 0.0), "hole", slide="right")
+    right = plate.markers["right"]
+    assert (result.points[right, 0] == 1.0).all()
+    assert result.moved[right].any()
+    held = gmsnet.deform(plate, (0.2, 0.0), "hole")
+    assert not held.moved[right].any()
+
+
+def test_sizes_are_kept_with_preserve_size(plate):
+    def areas(points):
+        a, b, c = (points[plate.cells[0].nodes[:, k], :2] for k in range(3))
+        return (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+
+    def spread(result):
+        return np.std(np.log(areas(result.points) / areas(plate.points)))
+
+    free, sized = (gmsnet.deform(plate, (0.2, 0.0), "hole", preserve=preserve) for preserve in ("shape", "size"))
+    assert spread(sized) < spread(free)
+
+
+def test_what_comes_in_goes_out():
+    mesh = random_mesh(40, seed=2)
+    pair = (mesh.points, mesh.cells[0].nodes)
+    result = gmsnet.deform(pair, (0.1, 0.0), mesh.markers["top"])
+    assert type(result.mesh) is tuple
+    assert (result.mesh[0][:, :2] == result.points[:, :2]).all()
+
+
+def test_a_plane_of_constant_y():
+    mesh = structured_mesh(5, 5)
+    upright = np.column_stack([mesh.points[:, 0], np.full(len(mesh.points), 3.0), mesh.points[:, 1]])
+    result = gmsnet.deform(Mesh(upright, mesh.cells, mesh.region_names), (0.1, 0.0, 0.3), "top")
+    flat = gmsnet.deform(mesh, (0.1, 0.3), "top")
+    assert (result.points[:, 1] == 3.0).all()
+    assert (result.points[:, [0, 2]] == flat.points[:, :2]).all()
+
+
+def test_far_away_is_told_and_nothing_breaks(plate):
+    result = gmsnet.deform(plate, (1e250, 0.0), "hole")
+    assert result.fraction < 0.01
+    assert result.after.inverted == 0
+    assert result.reason
+
+
+def test_what_cannot_be_used_is_refused(plate):
+    with pytest.raises(InputError, match=r"fixed names the node \d+, which is to be moved"):
+        gmsnet.deform(plate, (0.1, 0.0), "hole", fixed="hole")
+    with pytest.raises(InputError, match="second-order cells"):
+        gmsnet.deform(second_order(structured_mesh(3, 3)), (0.1, 0.0), "top")
+    points = np.random.default_rng(1).random((4, 3))
+    tet = Mesh(points, (CellBlock("tetra", np.array([[0, 1, 2, 3]]), np.zeros(1, dtype=int)),))
+    with pytest.raises(InputError, match="volume mesh"):
+        gmsnet.deform(tet, (0.1, 0.0, 0.0), [0])
+    with pytest.raises(InputError, match="max_sweeps"):
+        gmsnet.deform(plate, (0.1, 0.0), "hole", max_sweeps=-1)
