@@ -29,6 +29,7 @@ from gmsnet.kernels.untangle.cells import find_bad
 from gmsnet.kernels.whole import graph, multigrid, powers, steps
 from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.base import Field, Smoother, Tally
+from gmsnet.methods.conjugate import minimise
 from gmsnet.methods.multigrid import Multigrid
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
@@ -36,13 +37,10 @@ from gmsnet.parallel.executor import Executor
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-ITERATIONS, HARMONIC_ITERATIONS = 120, 30
+HARMONIC_ITERATIONS = 30
 ACCURATE = (1e-2, 1e-4, 1e-6)  # of the first residual: the next one is for harmonic places with inverted cells
-REFRESH = 10  # iterations after which the Laplacian is formed anew
-SETTLED, PATIENCE = 1e-4, 2  # a smaller share of Σq gained in so many iterations one after the other is the end
-CLOSE = 1e-6  # the same of a power of q
+SETTLED, CLOSE = 1e-4, 1e-6  # a smaller share of Σq, or of a power of q, gained in an iteration is little
 TRADE, LEAST_GAIN = 0.5, 1e-4  # in 1/q; most of the mean comes back in the sweeps that follow
-ARMIJO, HALVINGS, INSIDE = 1e-4, 25, 0.9
 REPAIRS = 3  # lists of cycles on the worst cells, where they are worse than the guard allows
 
 
@@ -90,6 +88,11 @@ class Problem:
             least, _ = powers.shapes(field.points, cells, table)
             top = 1.0 / least
         return cls(cells, table, moved, number, matrix, np.zeros(len(free)), doublings, top)
+
+    @property
+    def settled(self) -> float:
+        """What share of the sum, gained in an iteration, is little."""
+        return CLOSE if self.doublings else SETTLED
 
     def inverse(self, points: Floats, *, even: bool = False) -> Multigrid:
         """Of the Laplacian for the points as they are."""
@@ -163,48 +166,6 @@ class Problem:
         gain: float = least - old_least
         return gain >= LEAST_GAIN and gain >= TRADE * (old_mean - mean)
 
-    def minimise(self, points: Floats) -> Floats:
-        """Where conjugate gradients lead from points (N, 2) without an inverted cell."""
-        gradient = np.empty_like(points)
-        value = self.value(points, gradient)
-        slopes = gradient[self.moved]
-        inverse, age, small, length = self.inverse(points), 0, 0, 1.0
-        z = inverse(slopes)
-        fall = multigrid.product(slopes, z)
-        along = -z
-        for _ in range(ITERATIONS):
-            slope = multigrid.product(slopes, along)
-            if not slope < 0.0:
-                along, slope = -z, -fall
-            shifts = np.zeros_like(points)
-            shifts[self.moved] = along
-            length = min(length, INSIDE * steps.largest_step(points, self.cells, shifts))
-            for _ in range(HALVINGS):
-                there = points + length * shifts
-                after = self.value(there, gradient)
-                if after <= value + ARMIJO * length * slope:
-                    break
-                length *= 0.5
-            else:
-                break
-            small = small + 1 if value - after < (CLOSE if self.doublings else SETTLED) * value else 0
-            points, value = there, after
-            if small == PATIENCE:
-                break
-            before, slopes = slopes, gradient[self.moved]
-            age += 1
-            if age == REFRESH:
-                inverse, age = self.inverse(points), 0
-                z = inverse(slopes)
-                fall, along, length = multigrid.product(slopes, z), -z, 1.0
-                continue
-            z = inverse(slopes)
-            share = max(0.0, multigrid.product(slopes - before, z) / fall)
-            fall = multigrid.product(slopes, z)
-            along = share * along - z
-            length *= 2.0
-        return points
-
 
 class WholeMesh(Smoother):
     """One sweep moves all nodes. Not for the level STAR, whose floors such moves do not know.
@@ -226,7 +187,7 @@ class WholeMesh(Smoother):
             problem = Problem.of(field, doublings)
             if not len(problem.moved):
                 break
-            found = self._allowed(problem.minimise(problem.start(field.points)), field, executor)
+            found = self._allowed(minimise(problem, problem.start(field.points)), field, executor)
             if found is not None and problem.is_better(found, field.points):
                 tally[MOVED] = (found != field.points).any(axis=1).sum()
                 field.points[:] = found
