@@ -71,7 +71,9 @@ def smooth(
     ] = "shape",
     metric: Annotated[
         str | None,
-        typer.Option(metavar="FILE", help="Move nodes towards the metric in a Medit .sol or .solb: m11, m12, m22 a node."),
+        typer.Option(
+            metavar="FILE", help="Move nodes towards the metric in a Medit .sol or .solb: m11, m12, m22 a node."
+        ),
     ] = None,
     size: Annotated[
         str | None,

@@ -125,7 +125,9 @@ def _unpacked(data: Data, form: str, at: int) -> int:
 def _kind(kinds: list[int], dimension: int) -> int:
     """The type of the one field. Raises FormatError where there are others, or not in two dimensions."""
     if len(kinds) != 1 or kinds[0] not in NAMES:
-        raise FormatError(f"the types of its fields are {kinds}: one field of type 1 (number) or 3 (tensor) is expected")
+        raise FormatError(
+            f"the types of its fields are {kinds}: one field of type 1 (number) or 3 (tensor) is expected"
+        )
     if kinds[0] != SCALAR and dimension != 2:
         raise FormatError(
             f"Dimension {dimension}: vectors and tensors are read in two dimensions alone; write Dimension 2 and the "

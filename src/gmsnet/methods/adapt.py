@@ -3,8 +3,8 @@
 The sum over the corner simplices of E, the symmetric Dirichlet energy of each against the unit simplex of the metric
 (kernels/metric/quality.py), is minimised by conjugate gradients with multigrid (methods/conjugate.py). What depends on
 the place of the nodes through the metric is part of the gradient (Dobrev, Knupp, Kolev, Mittal, Tomov: The
-target-matrix optimization paradigm for high-order meshes, SIAM Journal on Scientific Computing 41, 2019; Huang, Russell:
-Adaptive moving mesh methods, Springer 2011). Between two rounds a metric that is a function is asked anew.
+target-matrix optimization paradigm for high-order meshes, SIAM Journal on Scientific Computing 41, 2019; Huang,
+Russell: Adaptive moving mesh methods, Springer 2011). Between two rounds a metric that is a function is asked anew.
 
 The rounds: ΣE until it no longer falls; then a power of E for the worst cells, and ΣE again with a barrier that keeps
 what these have gained, as long as that pays.
@@ -22,7 +22,7 @@ from gmsnet.kernels.metric import places
 from gmsnet.kernels.metric.places import Background
 from gmsnet.kernels.metric.quality import energy, qualities
 from gmsnet.kernels.star.block import MOVED
-from gmsnet.kernels.star.guard import WORST
+from gmsnet.kernels.star.guard import VALID
 from gmsnet.kernels.untangle.cells import find_bad
 from gmsnet.kernels.whole import graph, steps
 from gmsnet.kernels.whole.graph import Matrix
@@ -43,7 +43,9 @@ SETTLED = 1e-4  # a smaller share of the sum, gained in an iteration, is little
 ROUNDS, ROUND_GAIN = 12, 2e-4  # of ΣE at most; a smaller share of the mean of 1/E gained in one is the end
 PASSES, PASS_GAIN = 4, 0.002  # over the worst cells; what one must gain in the least 1/E for the next
 DOUBLINGS = 3  # E⁸
+TRADE = 1.0  # what the least 1/E must gain for what it costs in the mean, most of which comes back
 BELOW = 0.99  # times the least 1/E: where the barrier stands that keeps it
+REPAIRS = 4  # times at most is a round made that lowers the least 1/E
 
 
 @dataclass(eq=False)
@@ -70,9 +72,9 @@ class Problem:
     settled: float = SETTLED
 
     @classmethod
-    def of(cls, field: Field, metric: Metric) -> Problem:
-        """Of the free nodes that have no simplex that is not certified positive."""
-        simplices, free = field.topology.changeable, field.topology.near_free.copy()
+    def of(cls, field: Field, metric: Metric, free: NDArray[np.bool_]) -> Problem:
+        """Of the nodes (N,) that are free and have no simplex that is not certified positive."""
+        simplices, free = field.topology.changeable, free.copy()
         precision, count = field.precision, len(simplices.rows)
         bad, every = np.empty(count, dtype=bool), np.ones(count, dtype=bool)
         if find_bad(field.points, field.points, simplices, every, precision.unit, precision.grain, bad):
@@ -114,7 +116,16 @@ class Problem:
         share = np.empty(len(self.cells))
         self.look(points)
         total: float = energy(
-            points, self.cells, self.table, self.logs, self.slopes, self.floor, self.doublings, self.top, gradient, share
+            points,
+            self.cells,
+            self.table,
+            self.logs,
+            self.slopes,
+            self.floor,
+            self.doublings,
+            self.top,
+            gradient,
+            share,
         )
         return total, share
 
@@ -138,7 +149,8 @@ class Problem:
 class Adapt(Smoother):
     """Each sweep is a round over all free nodes, taken if the guard allows each cell and the mesh is better for it.
 
-    At the level WORST the least 1/E over all cells, as it is computed, never falls.
+    At the level WORST the least 1/E over all cells, as it is computed, never falls: where a round would lower it, it is
+    made anew with a barrier, and with the nodes of the cells held that fell below all the same.
     """
 
     stops_when_idle = False
@@ -152,65 +164,80 @@ class Adapt(Smoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         tally = np.zeros(3, dtype=np.int64)
-        problem = Problem.of(field, self.metric)
-        if len(problem.moved):
-            tally[MOVED] = self.step(problem, field)
-        else:
-            self.converged = True
+        tally[MOVED] = self.step(field)
         return tally
 
-    def _even(self, problem: Problem, field: Field) -> int:
+    def _even(self, field: Field) -> int:
         """A round of ΣE."""
         self.phase = PHASE
         before = self._standing(field.points, field)
-        moved = self._taken(minimise(problem, field.points), field, before)
+        moved = self._round(field, before, floor=0.0)
         self.rounds += 1
-        after = self._standing(field.points, field)
-        if not moved or after[1] < before[1] * (1.0 + ROUND_GAIN) or self.rounds == ROUNDS:
+        gained = self._standing(field.points, field)[1] - before[1]
+        if not moved or gained < ROUND_GAIN * before[1] or self.rounds == ROUNDS:
             self.step = self._worst
         return moved
 
-    def _worst(self, problem: Problem, field: Field) -> int:
-        """A round of a power of E, for the worst cells."""
+    def _worst(self, field: Field) -> int:
+        """A round of a power of E, for the worst cells: taken for what they gain, if the others do not lose more."""
         self.phase = WORST_PHASE
         before = self._standing(field.points, field)
+        moved, problem = 0, Problem.of(field, self.metric, field.topology.near_free)
         least = problem.least(field.points)
-        if least > 0.0:
+        if len(problem.moved) and least > 0.0:
             problem.doublings, problem.top = DOUBLINGS, 1.0 / least
-        moved = self._taken(minimise(problem, field.points), field, (before[0], -np.inf)) if least > 0.0 else 0
-        self.gained = self._standing(field.points, field)[0] - before[0]
+            found = self._written(minimise(problem, field.points), field)
+            after = self._standing(found, field)
+            if self._certified(found, field) and TRADE * (before[1] - after[1]) < after[0] - before[0]:
+                moved, self.gained = self._take(found, field), after[0] - before[0]
         self.passes += 1
         self.step = self._kept
         self.converged = not moved
         return moved
 
-    def _kept(self, problem: Problem, field: Field) -> int:
+    def _kept(self, field: Field) -> int:
         """A round of ΣE that keeps the worst cells above a barrier."""
         self.phase = KEPT_PHASE
-        before = self._standing(field.points, field)
-        problem.floor = max(0.0, BELOW * problem.least(field.points))
-        moved = self._taken(minimise(problem, field.points), field, before)
+        moved = self._round(field, self._standing(field.points, field), floor=BELOW)
         self.step = self._worst
         self.converged = self.passes == PASSES or self.gained < PASS_GAIN
         return moved
+
+    def _round(self, field: Field, before: tuple[float, float], floor: float) -> int:
+        """Minimises ΣE with a barrier at a share ``floor`` of the least 1/E; how many nodes move."""
+        free = field.topology.near_free
+        for _ in range(REPAIRS):
+            problem = Problem.of(field, self.metric, free)
+            if not len(problem.moved):
+                return 0
+            problem.floor = floor * max(0.0, problem.least(field.points))
+            found = self._written(minimise(problem, field.points), field)
+            if not self._certified(found, field):
+                return 0
+            if field.level == VALID or self._standing(found, field)[0] >= before[0]:
+                return self._take(found, field) if self._standing(found, field)[1] > before[1] else 0
+            scored = field.topology.scored
+            below = cell_qualities(found, scored, self.metric.at(found)) < before[0]
+            rows = below if scored.cells is None else below[np.unique(scored.cells, return_inverse=True)[1]]
+            free, floor = free.copy(), BELOW
+            free[scored.rows[rows]] = False
+        return 0
 
     def _standing(self, points: Floats, field: Field) -> tuple[float, float]:
         """The least and the mean 1/E of the cells that are compared."""
         values = cell_qualities(points, field.topology.scored, self.metric.at(points))
         return float(values.min(initial=1.0)), float(values.mean()) if len(values) else 1.0
 
-    def _taken(self, points: Floats, field: Field, wanted: tuple[float, float]) -> int:
-        """How many nodes move to their new places: none, unless all cells there are certified, and least and mean are
-        as wanted."""
-        if field.precision.single:
-            points = points.astype(np.float32).astype(np.float64)
-        precision = field.precision
-        changeable = field.topology.changeable
-        if steps.count_below(points, field.points, changeable, 0.0, precision.unit, precision.grain):
-            return 0
-        least, mean = self._standing(points, field)
-        if (field.level == WORST and least < wanted[0]) or mean < wanted[1]:
-            return 0
+    def _written(self, points: Floats, field: Field) -> Floats:
+        """The points as the file will keep them."""
+        return points.astype(np.float32).astype(np.float64) if field.precision.single else points
+
+    def _certified(self, points: Floats, field: Field) -> bool:
+        """Does the guard allow all nodes to go there at once?"""
+        unit, grain = field.precision.unit, field.precision.grain
+        return not steps.count_below(points, field.points, field.topology.changeable, 0.0, unit, grain)
+
+    def _take(self, points: Floats, field: Field) -> int:
         moved = int((points != field.points).any(axis=1).sum())
         field.points[:] = points
         field.floor.forget()

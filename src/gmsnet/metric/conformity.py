@@ -71,7 +71,7 @@ class ConformityChange(NamedTuple):
 
 
 def oriented(simplices: Simplices) -> tuple[Ints, Floats | None]:
-    """The rows (S, 3) of corner simplices counter-clockwise, and the weights (S, 3) of their edges, None if all are 1."""
+    """The rows (S, 3) of corner simplices counter-clockwise, and the weights (S, 3) of their edges, None if all 1."""
     rows, orientation = simplices.rows, simplices.orientation
     cells = np.where(orientation[:, None] > 0, rows, rows[:, [0, 2, 1]])
     return np.ascontiguousarray(cells), None if simplices.shapes is None else WEIGHTS[simplices.shapes]
@@ -84,7 +84,8 @@ def cell_qualities(points: Floats, simplices: Simplices, logs: Floats) -> Floats
     qualities(points, cells, table, logs, values)
     if simplices.cells is None or not len(values):
         return values
-    return np.minimum.reduceat(values, np.flatnonzero(np.append(True, np.diff(simplices.cells) != 0)))
+    least: Floats = np.minimum.reduceat(values, np.flatnonzero(np.append(True, np.diff(simplices.cells) != 0)))
+    return least
 
 
 def edges_of(topology: Topology) -> Ints:
@@ -111,4 +112,4 @@ def edge_lengths(points: Floats, logs: Floats, edges: Ints) -> Floats:
         ratio = np.log(other / one)
         between = (other - one) / ratio
     alike = ~(np.abs(ratio) > 1e-6)  # the mean then, up to rounding
-    return np.where(alike, 0.5 * (one + other), between)
+    return np.asarray(np.where(alike, 0.5 * (one + other), between))

@@ -44,7 +44,9 @@ class Metric:
     own: bool = False
 
     @classmethod
-    def at_nodes(cls, topology: Topology, points: Floats, logs: Floats, exponent: int = 0, *, own: bool = False) -> Metric:
+    def at_nodes(
+        cls, topology: Topology, points: Floats, logs: Floats, exponent: int = 0, *, own: bool = False
+    ) -> Metric:
         """Of logarithms (N, 3) at the nodes, and of points (N, 2), both in memory order; logs in the mesh's own units
         unless ``exponent`` is 0."""
         triangles, adjacent, first = _connected(topology)
@@ -53,13 +55,16 @@ class Metric:
         return cls(triangles, adjacent, first, given, None, exponent, own=own)._scaled(topology, points)
 
     @classmethod
-    def of_place(cls, topology: Topology, points: Floats, function: Callable[[Floats], Floats], exponent: int) -> Metric:
+    def of_place(
+        cls, topology: Topology, points: Floats, function: Callable[[Floats], Floats], exponent: int
+    ) -> Metric:
         """By a function of points (n, 2), in the mesh's own units. points: (N, 2) in memory order."""
         return cls(*_connected(topology), None, function, exponent)._scaled(topology, points)
 
     def at(self, points: Floats) -> Floats:
         """The logarithms (N, 3) at the nodes, which are at points (N, 2)."""
-        return self._logs(points, self.first) + np.array([self.unit, 0.0, 0.0])
+        found: Floats = self._logs(points, self.first) + np.array([self.unit, 0.0, 0.0])
+        return found
 
     def background(self, points: Floats) -> Background:
         """What the metric is between nodes at points (N, 2)."""

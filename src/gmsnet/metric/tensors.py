@@ -48,11 +48,13 @@ def checked_metric(values: Any, count: int, where: str) -> Floats:
     tensors = _numbers(values, FORMS)
     if tensors.shape != (count, 3):
         raise InputError(f"{FORMS}; for {count:,} {where}s it has the shape {tensors.shape}")
-    a, b, c = tensors.T
+    a, _, c = tensors.T
     with np.errstate(over="ignore", invalid="ignore"):
         largest = np.maximum(np.abs(a), np.abs(c))
         scaled = tensors / np.where(largest > 0.0, largest, 1.0)[:, None]
-        good = (a > 0.0) & (c > 0.0) & (scaled[:, 0] * scaled[:, 2] > scaled[:, 1] ** 2) & np.isfinite(tensors).all(axis=1)
+        good = (
+            (a > 0.0) & (c > 0.0) & (scaled[:, 0] * scaled[:, 2] > scaled[:, 1] ** 2) & np.isfinite(tensors).all(axis=1)
+        )
     if not good.all():
         row = int(np.flatnonzero(~good)[0])
         raise InputError(

@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from gmsnet.errors import InputError
 from gmsnet.measure.report import SHAPE
-from gmsnet.measure.target import Target
 from gmsnet.preserve.protection import METRIC, NONE
 
-
-class Options(Protocol):
-    """Those of ``SmoothOptions`` that matter here."""
-
-    metric: object
-    size: object
-    preserve: str
-    method: str
-    guard: str
-    best_by: str
-
-    @property
-    def target(self) -> Target: ...  # noqa: D102
-
-    @property
-    def slides(self) -> bool: ...  # noqa: D102
+if TYPE_CHECKING:
+    from gmsnet.run.options import SmoothOptions
 
 
-def check_adapting(options: Options) -> None:
+def check_adapting(options: SmoothOptions) -> None:
     """InputError where a metric, or sizes, contradict another option, or cannot be had with it."""
     given = [name for name in ("metric", "size") if getattr(options, name) is not None]
     if len(given) > 1:

@@ -70,9 +70,8 @@ def _remark(metric: Metric, options: SmoothOptions) -> str:
         )
     what, times = "metric" if options.size is None else "size", metric.reachable
     if abs(times - 1.0) <= ALLOWED:
-        return f"{what}: nodes were moved towards it; the cells are about as many as it asks for"
+        return f"{what}: the cells are about as many as it asks for"
     few = "too few" if times > 1.0 else "too many"
     return (
-        f"{what}: nodes were moved towards it; the cells are {few} for it, so that edges become {times:.3g} times as "
-        "long as it asks"
+        f"{what}: the cells are {few} for it; edges {times:.3g} times as long as it asks are what their number allows"
     )

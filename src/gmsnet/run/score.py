@@ -23,7 +23,7 @@ NONE = np.empty((0, 3), dtype=np.int32)
 
 
 def in_metric(totals: Totals, points: Floats, simplices: Simplices, metric: Metric) -> Totals:
-    """The same counts, and the least and the mean quality of the cells in a metric; without angles, and so without q̂."""
+    """The same counts, and the least and the mean quality of the cells in a metric: no angles, and so no q̂."""
     values = cell_qualities(points, simplices, metric.at(points))
     nan = math.nan
     return replace(
@@ -91,7 +91,8 @@ class Score:
     def better_than(self, other: Score) -> bool:
         """Fewer inverted cells first, then fewer that miss the target, then a larger q̂, by more than rounding.
 
-        Where not all cells are triangles, and in a metric: then the larger minimum 1/q of the cells with a free node, then their mean.
+        Where not all cells are triangles, and in a metric: then the larger minimum 1/q of the cells that are compared,
+        then their mean.
         """
         if self.counts != other.counts:
             return self.counts < other.counts

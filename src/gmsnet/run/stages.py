@@ -28,7 +28,8 @@ class Stage(Protocol):
 
 
 STAGES: tuple[Stage, ...] = (
-    untangle_all, untangle_protected, take_metric, sweep, improve_near_walls, untangle_second_order, smooth_corners, make_room,
+    untangle_all, untangle_protected, take_metric, sweep, improve_near_walls, untangle_second_order, smooth_corners,
+    make_room,
 )  # fmt: skip
 
 

@@ -92,9 +92,9 @@ class State:
     reasons: why some are left, by the index of each cell. history: one Sweep for each look. stop_reason: one of
     ``run.stop``, "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
     sliding: the nodes that move along curves, if any. curved: while the corners of second-order cells move, those cells
-    (``second_order``, which is all that is known of them). nodal: (N, 3) by id, the logarithms of a metric that is given
-    at nodes. metric: what cells are to become, once it is known; conformity: of the input to it, and of the result.
-    interruption: what ends the smoothing before its end. final:
+    (``second_order``, which is all that is known of them). nodal: (N, 3) by id, the logarithms of a metric that is
+    given at nodes. metric: what cells are to become, once it is known; conformity: of the input to it, and of the
+    result. interruption: what ends the smoothing before its end. final:
     once the mesh is written back to the order of the input; start, points and shapes are then empty, lest the result
     needs more memory than the stages.
     """

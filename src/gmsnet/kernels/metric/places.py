@@ -28,7 +28,7 @@ class Background(NamedTuple):
 
 @kernel
 def adjacency(triangles, order, keys, adjacent):
-    """Fills in ``adjacent``. order: the half-edges 3t + c (opposite to corner c) sorted by their keys, alike for both."""
+    """Fills in ``adjacent``. order: the half-edges 3t + c (opposite to corner c) by keys, which are alike for both."""
     adjacent[:] = -1
     for n in range(len(order) - 1):
         one, other = order[n], order[n + 1]
@@ -81,9 +81,10 @@ def locate(background, start, x, y):
 
 @kernel
 def evaluate(background, places, start, logs, slopes):
-    """The logarithms (n, 3) at places (n, 2), and their slopes (n, 3, 2) there. start: (n,) a triangle to look in first.
+    """The logarithms (n, 3) at places (n, 2), and their slopes (n, 3, 2) there.
 
-    It is written: where each place was found; where it is negative, there is no metric, and the answer is 0. Beyond the boundary the value is that of the nearest place of a triangle.
+    start: (n,) a triangle to look in first; it is written: where each place was found. Where it is negative, there is
+    no metric, and the answer is 0. Beyond the boundary the value is that of the nearest place of a triangle.
     """
     p = background.points
     for n in range(len(places)):

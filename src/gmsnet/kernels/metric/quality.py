@@ -133,7 +133,10 @@ def energy(points, cells, table, logs, slopes, floor, doublings, top, gradient, 
         size = (tau * tau - 1.0) / (tau * tau + 1.0)
         by_length, by_area = steep / length, steep * (size - 1.0) / d
         share[n] = 2.0 * by_length
-        by_u, by_v = by_length * (s * (u * plain + along) + bend * u * skew), by_length * (s * (v * plain + across) + bend * v * skew)
+        by_u, by_v = (
+            by_length * (s * (u * plain + along) + bend * u * skew),
+            by_length * (s * (v * plain + across) + bend * v * skew),
+        )
         by_t = steep * size
         # M̂ times the weighted edges
         fx, fy = wa * ax - wo * ex, wa * ay - wo * ey
