@@ -76,7 +76,9 @@ class Front:
         corners = mesh.points[mesh.cells[0].nodes]
         (ax, ay), (bx, by) = ((corners[:, k] - corners[:, 0]).T for k in (1, 2))
         if not (ax * by > ay * bx).all():
-            raise InputError("so few cells cannot follow a front as thin and as bent: give more nodes, or a shorter edge")
+            raise InputError(
+                "so few cells cannot follow a front as thin and as bent: give more nodes, or a shorter edge"
+            )
         return mesh
 
     @property

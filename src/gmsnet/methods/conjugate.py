@@ -58,6 +58,8 @@ def minimise(problem: Sum, points: Floats) -> Floats:
         slope = multigrid.product(slopes, along)
         if not slope < 0.0:
             along, slope = -z, -fall
+        if not slope < 0.0:  # nothing to gain
+            break
         shifts = np.zeros_like(points)
         shifts[problem.moved] = along
         length = min(length, INSIDE * steps.largest_step(points, problem.cells, shifts))
