@@ -4,7 +4,8 @@ Each cell is the unit cell of one metric. Those of the cells around a node have 
 of them, which slivers hardly change. Distances and means are those of log(M₀^-½ M M₀^-½) about the mean
 M₀ as it is (Moakher: A differential geometric approach to the geometric mean of symmetric positive-definite matrices,
 SIAM Journal on Matrix Analysis 26, 2005), found as Weiszfeld's algorithm finds a geometric median. In the end each
-node's logarithm is the mean of those around it, SMOOTHED times.
+node's logarithm is the mean of those around it, SMOOTHED times. What that takes from peaks comes back: the difference
+is smoothed and added, RETURNED times (twicing: Tukey, Exploratory data analysis, 1977).
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
 
-SMOOTHED = 2
+SMOOTHED, RETURNED = 4, 2
 STEPS = 8  # of Weiszfeld's algorithm
 NEAREST = 0.2  # a distance, in logarithms: nearer cells count alike
 FLAT = 1e-12  # D over the squared sides: cells as flat tell nothing
@@ -44,9 +45,16 @@ def recovered(topology: Topology, points: Floats) -> Floats:
     logs = _medians(touch, tensors)
     near.data[:] = 1.0
     share = 1.0 / np.maximum(near.sum(axis=1), 1.0)
-    for _ in range(SMOOTHED):
-        logs = share[:, None] * (near @ logs)
-    return np.asarray(logs, dtype=np.float64)
+
+    def smoothed(values: Floats) -> Floats:
+        for _ in range(SMOOTHED):
+            values = share[:, None] * (near @ values)
+        return values
+
+    found = smoothed(logs)
+    for _ in range(RETURNED):
+        found = found + smoothed(logs - found)
+    return np.asarray(found, dtype=np.float64)
 
 
 def unit_tensors(corners: Floats, shapes: NDArray[np.uint8] | None) -> tuple[Floats, NDArray[np.bool_]]:

@@ -44,7 +44,7 @@ def take_metric(state: State, options: SmoothOptions, executor: Executor) -> Sta
         def logs(points: Floats) -> Floats:
             return check(function(points), len(points), "point")
 
-        metric = Metric.of_place(topology, state.start, logs, mesh.exponent)
+        metric = Metric.of_place(topology, state.points, logs, mesh.exponent)
     else:
         from gmsnet.preserve.recovered import recovered  # what it needs of SciPy takes time to import
 
