@@ -3,8 +3,8 @@
     python benchmarks/metric.py [--meshes 60] [--seed 0] [--parts adapted size even] [--json FILE]
 
 *adapted*: so many meshes made for a metric with a bent front inside (``gmsnet.generate.Front``: aspects of 2 to 50, 300
-to 3,000 nodes), turned by any angle. Their free nodes are thrown by up to half their shortest edge; every sixth mesh
-stays as it was made. Each is smoothed with ``preserve="metric"``, with the metric as a function and as values at the
+to 3,000 nodes), turned by any angle. Free nodes are thrown by up to half their shortest edge; every sixth mesh stays
+as it was made. Each is smoothed with ``preserve="metric"``, with the metric as a function and as values at the
 thrown nodes, and, to compare, with the defaults and with ``preserve="none"``. All are judged by the metric that the mesh
 was made for: the share of edges that are within ±20 % of 1 long in it, the least quality of shape and size
 (kernels/metric/quality.py), the least 1/q of shape alone. A mesh passes if no cell is inverted, and the share and the
@@ -114,9 +114,7 @@ def adapted(options):
         print(f"{number:4} {what}: {shown}", flush=True)
     for kind, chosen in (("as made", 0), ("thrown", 1)):
         some = [row for k, row in enumerate(rows) if (k % 6 != 0) == bool(chosen)]
-        print(
-            f"\n{len(some)} meshes {kind}, means (least): edges near 1, least quality, least 1/q in the metric, mean quality"
-        )
+        print(f"\n{len(some)} meshes {kind}, means (least): edges near 1, least quality, least 1/q in it, mean quality")
         for name in ("made", "input", *ways):
             figures = np.array([row[name][:4] for row in some])
             text = "   ".join(f"{figures[:, k].mean():.3f} ({figures[:, k].min():.3f})" for k in range(4))
@@ -167,8 +165,8 @@ def smoothed_towards(name, start, mesh, size):
     passes = after.near_one >= NEAR and not result.after.inverted
     shape, inverted = result.after.shape.min(), f"{result.before.inverted:,} → {result.after.inverted}"
     print(
-        f"  {name:30} {start:9} {len(mesh.points):6,} nodes: edges near h {before.near_one:.3f} → {after.near_one:.3f}, "
-        f"near their mean {after.near_mean:.3f}, least quality {before.least:.3f} → {after.least:.3f}, "
+        f"  {name:30} {start:9} {len(mesh.points):6,} nodes: edges near h {before.near_one:.3f} → {after.near_one:.3f},"
+        f" near their mean {after.near_mean:.3f}, least quality {before.least:.3f} → {after.least:.3f}, "
         f"least 1/q {shape:.3f}, inverted {inverted}, {seconds:.2f} s",
         flush=True,
     )
