@@ -3,10 +3,10 @@
     python benchmarks/metric.py [--meshes 60] [--seed 0] [--parts adapted size even] [--json FILE]
 
 *adapted*: so many meshes made for a metric with a bent front inside (``gmsnet.generate.Front``: aspects of 2 to 50, 300
-to 3,000 nodes), turned by any angle. Free nodes are thrown by up to half their shortest edge; every sixth mesh stays
-as it was made. Each is smoothed with ``preserve="metric"``, with the metric as a function and as values at the
-thrown nodes, and, to compare, with the defaults and with ``preserve="none"``. All are judged by the metric that the mesh
-was made for: the share of edges that are within ±20 % of 1 long in it, the least quality of shape and size
+to 3,000 nodes), turned by any angle. Free nodes are thrown by up to half their shortest edge; every sixth mesh is left
+as it was made. Each is smoothed with ``preserve="metric"``, with the metric as a function and as values at the thrown
+nodes, and, to compare, with the defaults and with ``preserve="none"``. All are judged by the metric that the mesh was
+made for: the share of edges that are within ±20 % of 1 long in it, the least quality of shape and size
 (kernels/metric/quality.py), the least 1/q of shape alone. A mesh passes if no cell is inverted, and the share and the
 least quality are not below those of its input.
 

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support import naive
+from support.hell import hellish
 
 import gmsnet
 from gmsnet.generate import Front, disturb, good_mesh, hybrid_mesh, random_mesh, random_quad_mesh, structured_mesh
@@ -149,3 +153,24 @@ def test_a_mesh_in_another_plane_has_the_metric_of_its_plane(thrown):
     upright = gmsnet.smooth(gmsnet.Mesh(points, thrown.cells), metric=FRONT.metric)
     plain = gmsnet.smooth(thrown, metric=FRONT.metric)
     assert upright.points[:, [0, 2]].tobytes() == plain.points.tobytes()
+
+
+@pytest.mark.parametrize("options", [{"preserve": "metric"}, {"size": lambda p: np.full(len(p), 0.1)}])
+@pytest.mark.parametrize("level", ["valid", "worst"])
+@given(seed=st.integers(0, 2**32 - 1), nodes=st.integers(3, 40))
+@settings(max_examples=6, deadline=None)
+def test_nothing_is_lost_on_meshes_from_hell(options, level, seed, nodes):
+    mesh = hellish(seed, nodes)
+    result = gmsnet.smooth(mesh, **options, guard=level, untangle=bool(seed % 3))
+    assert np.isfinite(result.points).all()
+    assert not any(result.moved[ids].any() for ids in result.held.values())
+    topology = result.topology
+    was, now = (
+        naive.signs(points[:, topology.plane], topology.triangles.tolist(), topology.orientation)
+        for points in (mesh.points, result.points)
+    )
+    assert not ((np.array(was) > 0) & (np.array(now) <= 0)).any()
+    if result.conformity is not None and not result.before.inverted:
+        assert result.conformity.after.least >= result.conformity.before.least
+    if mesh.single:
+        assert (np.float64(np.float32(result.points)) == result.points).all()

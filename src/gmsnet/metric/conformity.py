@@ -41,7 +41,7 @@ class Conformity:
         """Of nodes at points (N, 2), in memory order."""
         logs = metric.at(points)
         values = cell_qualities(points, topology.simplices, logs)
-        lengths = edge_lengths(points, logs - np.array([metric.unit, 0.0, 0.0]), edges_of(topology))
+        lengths = metric.reachable * edge_lengths(points, logs, edges_of(topology))
         mean = float(lengths.mean()) if len(lengths) else float("nan")
         near = [float((np.abs(lengths - goal) <= NEAR * goal).mean()) if len(lengths) else mean for goal in (1.0, mean)]
         return cls(

@@ -22,6 +22,7 @@ from gmsnet.topology.topology import Topology
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
+LARGEST = 700.0  # of a logarithm of a float64, about
 PARTS = 4  # a triangle is parted into the square of it to find its area in the metric
 
 
@@ -76,7 +77,7 @@ class Metric:
         """At any points (n, 2). first: (n,) a triangle near each."""
         if self.given is None:
             assert self.function is not None
-            logs = self.function(points * 2.0**self.exponent).copy()
+            logs = self.function(np.ldexp(points, self.exponent)).copy()
             logs[:, 0] += math.log(4.0) * self.exponent
             return logs
         logs = np.empty((len(points), 3))
@@ -88,17 +89,17 @@ class Metric:
         corners = points[self.triangles]
         a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         part = 0.5 * np.maximum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], 0.0) / PARTS**2
-        triangle, total = np.arange(len(self.triangles), dtype=np.int32), 0.0
-        for share in _midpoints(PARTS):
-            logs = self._logs(np.einsum("c,tcx->tx", share, corners), triangle)
-            total += float((part * np.exp(logs[:, 0])).sum())
+        middles, triangle = _midpoints(PARTS), np.arange(len(self.triangles), dtype=np.int32)
+        found = [self._logs(np.einsum("c,tcx->tx", share, corners), triangle)[:, 0] for share in middles]
+        largest = max((float(t.max()) for t in found if len(t)), default=0.0)
+        total = sum(float((part * np.exp(t - largest)).sum()) for t in found)
         wanted = 0.5 * EQUILATERAL_AREA * len(topology.triangles) + SQUARE_AREA * len(topology.quads)
-        return replace(self, unit=math.log(wanted / total)) if total > 0.0 and wanted > 0.0 else self
+        return replace(self, unit=math.log(wanted / total) - largest) if total > 0.0 and wanted > 0.0 else self
 
     @property
     def reachable(self) -> float:
         """How long edges become, in the metric as it is given, if the mesh conforms to it as its cells allow."""
-        return math.exp(-0.5 * self.unit)
+        return math.exp(min(max(-0.5 * self.unit, -LARGEST), LARGEST))
 
 
 def _midpoints(parts: int) -> Floats:

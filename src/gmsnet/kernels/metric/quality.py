@@ -81,7 +81,7 @@ def qualities(points, cells, table, logs, out):
         length += wo * square(bx - ax, by - ay, c, s, u, v)
         shape = TWO_SQRT3 * d / length if length > 0.0 else 0.0
         tau = math.exp(t) * d / area
-        out[n] = shape * (2.0 * tau / (1.0 + tau * tau)) if d > 0.0 else min(shape, 0.0)
+        out[n] = shape * (2.0 / (tau + 1.0 / tau)) if d > 0.0 else min(shape, 0.0)
 
 
 @kernel
@@ -130,7 +130,7 @@ def energy(points, cells, table, logs, slopes, floor, doublings, top, gradient, 
         if not value < np.inf:
             return np.inf
         total += value
-        size = (tau * tau - 1.0) / (tau * tau + 1.0)
+        size = (tau - 1.0 / tau) / (tau + 1.0 / tau)
         by_length, by_area = steep / length, steep * (size - 1.0) / d
         share[n] = 2.0 * by_length
         by_u, by_v = (
