@@ -68,7 +68,7 @@ def test_an_angle_can_be_the_target(run, square, tmp_path):
     ("options", "said"),
     [
         (["--guard", "best"], "guard must be one of 'valid', 'worst', 'star'"),
-        (["--preserve", "everything"], "preserve must be one of 'shape', 'size', 'none'"),
+        (["--preserve", "everything"], "preserve must be one of 'shape', 'size', 'metric', 'none'"),
         (["--preserve", "size", "--method", "cvt"], "cvt does not keep the sizes"),
         (["--preserve", "size", "--target-quality", 0.3], "contradict"),
         (["--target-quality", 1.5], r"must lie in (0, 1]"),

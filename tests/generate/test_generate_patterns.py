@@ -12,7 +12,16 @@ import gmsnet
 from gmsnet.cli import main
 from gmsnet.cli.generate import generate
 from gmsnet.errors import InputError
-from gmsnet.generate import disturb, hybrid_mesh, kershaw_mesh, layered_mesh, random_mesh, random_quad_mesh, settle
+from gmsnet.generate import (
+    adapted_mesh,
+    disturb,
+    hybrid_mesh,
+    kershaw_mesh,
+    layered_mesh,
+    random_mesh,
+    random_quad_mesh,
+    settle,
+)
 from gmsnet.generate import structured_mesh as grid
 
 app = typer.Typer()
@@ -43,6 +52,7 @@ def run(*arguments):
         ("--pattern structured --cells mixed --nodes 200 --interface", lambda: hybrid_mesh(200, interface=True)),
         ("--pattern kershaw --columns 6 --rows 4 --flatness 0.1", lambda: kershaw_mesh(6, 4, flatness=0.1)),
         ("--pattern kershaw", lambda: kershaw_mesh(33)),
+        ("--pattern adapted --nodes 200 --aspect 3", lambda: adapted_mesh(200, 3.0)),
         ("--pattern o-grid --layers 4 --aspect 50 --around 40", lambda: layered_mesh(4, 50.0, 40, cells="mixed")),
         ("--pattern o-grid --layers 2 --around 30 --cells quad --body circle --aspect 9",
          lambda: layered_mesh(2, 9.0, 30, cells="quad", body="circle")),
@@ -64,7 +74,7 @@ def test_command_makes_what_the_functions_make(tmp_path, options, expected):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--pattern zigzag", "unknown pattern 'zigzag'; there are random, structured, o-grid, kershaw"),
+        ("--pattern zigzag", "unknown pattern 'zigzag'; there are random, structured, o-grid, adapted, kershaw"),
         ("--cells hex", "--pattern random makes --cells triangle or quad or mixed, not 'hex'"),
         ("--pattern kershaw --cells mixed", "--pattern kershaw makes --cells quad, not 'mixed'"),
         ("--pattern structured --cells triangle", "--pattern structured makes --cells quad or mixed, not 'triangle'"),

@@ -16,11 +16,16 @@ def generate(
     out: Annotated[str, typer.Argument(metavar="OUT", help="The file to write; its suffix tells the format.")],
     pattern: Annotated[
         str,
-        typer.Option(help="random, structured (rows and columns), o-grid (layers around a body) or kershaw (zigzag)."),
+        typer.Option(
+            help="random, structured (rows and columns), o-grid (layers around a body), adapted (to a front inside) or "
+            "kershaw (zigzag)."
+        ),
     ] = "random",
     cells: Annotated[
         str | None,
-        typer.Option(help="triangle, quad or mixed.", show_default="triangle if random, mixed if o-grid, else quad"),
+        typer.Option(
+            help="triangle, quad or mixed.", show_default="triangle if random or adapted, mixed if o-grid, else quad"
+        ),
     ] = None,
     shape: Annotated[
         str | None,
@@ -55,7 +60,8 @@ def generate(
     ] = False,
     layers: Annotated[int | None, typer.Option(help="Of o-grid: rows of stretched cells.", show_default="20")] = None,
     aspect: Annotated[
-        float | None, typer.Option(help="Of o-grid: ratio of the sides at the wall.", show_default="1000")
+        float | None,
+        typer.Option(help="Of o-grid: ratio of the sides at the wall (1000). Of adapted: at the front (10)."),
     ] = None,
     around: Annotated[int | None, typer.Option(help="Of o-grid: nodes on the wall.", show_default="120")] = None,
     body: Annotated[str | None, typer.Option(help="Of o-grid: airfoil or circle.", show_default="airfoil")] = None,

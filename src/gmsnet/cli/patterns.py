@@ -73,6 +73,15 @@ def _o_grid(cells: str) -> Callable[[Given, float, int], Mesh]:
     return make
 
 
+def _adapted(given: Given, size: float, seed: int) -> Mesh:
+    from gmsnet.generate import adapted_mesh
+    from gmsnet.generate.arguments import positive
+
+    positive(size, "the size")
+    mesh = adapted_mesh(**_named(given, "nodes", "aspect"))
+    return mesh.with_points(mesh.points * size)
+
+
 RANDOM = frozenset({"nodes", "shape", "rings", "boundary", "settle"})
 GRID = frozenset({"nodes", "columns", "rows"})
 LAYERS = frozenset({"layers", "aspect", "around", "body"})
@@ -92,6 +101,7 @@ PATTERNS: dict[str, dict[str, Generator]] = {  # pattern → its cells, the defa
         "quad": Generator(_o_grid("quad"), LAYERS),
         "triangle": Generator(_o_grid("triangle"), LAYERS),
     },
+    "adapted": {"triangle": Generator(_adapted, frozenset({"nodes", "aspect"}))},
     "kershaw": {"quad": Generator(_kershaw, GRID | {"flatness"})},
 }
 

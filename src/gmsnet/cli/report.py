@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from gmsnet.measure.report import QualityReport
+    from gmsnet.metric.conformity import ConformityChange
     from gmsnet.run.sweep import Sweep
 
 WORST = 5  # cells are shown
@@ -94,8 +95,17 @@ def worst_table(cells: Sequence[Mapping[str, Any]]) -> Table:
     return table([*columns, *(["held corners"] if with_held else [])], rows)
 
 
-def stage_table(stages: Sequence[tuple[str, int, Sweep]], patches: bool) -> Table:
-    """What was done one after the other: its name, how many sweeps, and the mesh after it, or the patches of it."""
+def conformity(change: ConformityChange) -> Table:
+    """How the mesh conforms to the metric, before and after: one row a figure."""
+    before, after = (each.figures() for each in change)
+    return table(["", "before", "after"], [[*one, other] for one, (_, other) in zip(before, after, strict=True)])
+
+
+def stage_table(stages: Sequence[tuple[str, int, Sweep]], patches: bool, of: str = "1/q") -> Table:
+    """What was done one after the other: its name, how many sweeps, and the mesh after it, or the patches of it.
+
+    of: whose least and mean are told.
+    """
     rows = [
         [
             name,
@@ -107,7 +117,7 @@ def stage_table(stages: Sequence[tuple[str, int, Sweep]], patches: bool) -> Tabl
         for name, sweeps, sweep in stages
     ]
     where = ", in the patches that are smoothed" if patches else ""
-    return table([f"stage{where}", "sweeps", "1/q, least", "1/q, mean", "q-hat"], rows)
+    return table([f"stage{where}", "sweeps", f"{of}, least", f"{of}, mean", "q-hat"], rows)
 
 
 def corners_of(mesh: Mesh, cell: int) -> NDArray[np.int64]:

@@ -58,10 +58,21 @@ def smooth(
     preserve: Annotated[
         str,
         typer.Option(
-            help="shape: hold layers of stretched cells along walls; size: weigh areas of cells, too; none.",
-            autocompletion=lambda: ["shape", "size", "none"],
+            help="shape: hold layers of stretched cells along walls; size: weigh areas of cells, too; metric: keep all "
+            "stretch and sizes as a smooth metric; none.",
+            autocompletion=lambda: ["shape", "size", "metric", "none"],
         ),
     ] = "shape",
+    metric: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE", help="Move nodes towards the metric in a Medit .sol or .solb: m11, m12, m22 a node."
+        ),
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Move nodes towards the lengths of edges in such a file: one number a node."),
+    ] = None,
     fix_layers: Annotated[
         bool, typer.Option("--fix-layers", help="Hold all cells that are stretched alike, whatever --preserve says.")
     ] = False,
@@ -131,6 +142,7 @@ def smooth(
     # Heavy imports only now, when the command line is known to be in order.
     from gmsnet.cli.file_work import Done, FileWork
     from gmsnet.cli.fix import fixed_nodes
+    from gmsnet.cli.metric import values_at_nodes
     from gmsnet.cli.smooth_report import Outcome
     from gmsnet.run.api import smooth_with
     from gmsnet.run.options import SmoothOptions
@@ -144,6 +156,7 @@ def smooth(
         target_quality=target_quality, target_angle=target_angle, preserve=preserve, fix_layers=fix_layers,
         untangle=untangle, guard=guard, seed=seed, callback=work.after_sweep, weights=weights, best_by=best_by,
         slide=True if slide and "all" in slide else slide or None, feature_angle=feature_angle,
+        **values_at_nodes(metric, size),
     )  # fmt: skip
 
     def make(mesh: Mesh) -> Callable[[], SmoothResult]:

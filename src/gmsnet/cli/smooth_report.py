@@ -136,11 +136,14 @@ class Outcome:
         if len(result.after.cell):
             console.print()
             console.print(report.figures({"before": result.before, "after": result.after}))
+            if result.conformity is not None:
+                console.print(report.conformity(result.conformity))
             console.print(f"\nworst cells{' now' if moved else ''} (numbers from 0)")
             console.print(report.worst_table(self.worst))
             console.print()
         if stages := self.stages():
-            console.print(report.stage_table(stages, bool(self.target)))
+            of = "quality" if self.result.conformity is not None else "1/q"
+            console.print(report.stage_table(stages, bool(self.target), of))
             console.print()
         console.print(self.verdict())
         for note in self.result.notes:
@@ -193,7 +196,7 @@ class Outcome:
     def document(self) -> dict[str, Any]:
         """The whole outcome as plain values."""
         result = self.result
-        after = result.after
+        after, change = result.after, result.conformity
         return {
             "input": self.input,
             "output": self.written,
@@ -204,6 +207,7 @@ class Outcome:
             "cells": sum(len(block.nodes) for block in self.mesh.cells),
             "before": result.before.summary(),
             "after": after.summary(),
+            "conformity": None if change is None else {k: v.summary() for k, v in change._asdict().items()},
             "improved": bool(result.moved.any()),
             "moved": int(result.moved.sum()),
             "free": self.free,

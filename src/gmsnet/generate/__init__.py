@@ -1,5 +1,6 @@
-"""Test meshes: random triangles and quads, good and curved ones, layers, grids, deformed ones, thrown nodes."""
+"""Test meshes: random triangles and quads, good, curved, adapted ones, layers, grids, deformed, thrown nodes."""
 
+from gmsnet.generate.adapted import Front, adapted_mesh
 from gmsnet.generate.curved import disc_of_quads, on_circle, second_order, throw, waved
 from gmsnet.generate.curves import Curve
 from gmsnet.generate.deformed import moved_hole_mesh, sheared_mesh, swirled_mesh, terrain_mesh, zigzag_mesh
@@ -18,6 +19,8 @@ from gmsnet.generate.structured import kershaw_mesh, structured_mesh
 __all__ = [
     "SHAPES",
     "Curve",
+    "Front",
+    "adapted_mesh",
     "disc_of_quads",
     "disturb",
     "good_mesh",

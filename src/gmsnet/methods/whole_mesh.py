@@ -29,6 +29,7 @@ from gmsnet.kernels.untangle.cells import find_bad
 from gmsnet.kernels.whole import graph, multigrid, powers, steps
 from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.base import Field, Smoother, Tally
+from gmsnet.methods.conjugate import minimise
 from gmsnet.methods.multigrid import Multigrid
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
@@ -36,13 +37,11 @@ from gmsnet.parallel.executor import Executor
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-ITERATIONS, HARMONIC_ITERATIONS = 120, 30
+HARMONIC_ITERATIONS = 30
 ACCURATE = (1e-2, 1e-4, 1e-6)  # of the first residual: the next one is for harmonic places with inverted cells
-REFRESH = 10  # iterations after which the Laplacian is formed anew
-SETTLED, PATIENCE = 1e-4, 2  # a smaller share of Σq gained in so many iterations one after the other is the end
-CLOSE, CLOSEST = 1e-6, 1e-12  # the same of a power of q; and of Σq where the minimum is near
+# A smaller share of Σq, or of a power of q, gained in an iteration is little; and of Σq where the minimum is near.
+SETTLED, CLOSE, CLOSEST = 1e-4, 1e-6, 1e-12
 TRADE, LEAST_GAIN = 0.5, 1e-4  # in 1/q; most of the mean comes back in the sweeps that follow
-ARMIJO, HALVINGS, INSIDE = 1e-4, 25, 0.9
 REPAIRS = 3  # lists of cycles on the worst cells, where they are worse than the guard allows
 
 
@@ -163,48 +162,6 @@ class Problem:
         gain: float = least - old_least
         return gain >= LEAST_GAIN and gain >= TRADE * (old_mean - mean)
 
-    def minimise(self, points: Floats, settled: float) -> Floats:
-        """Where conjugate gradients lead from points (N, 2) without an inverted cell. settled: see SETTLED."""
-        gradient = np.empty_like(points)
-        value = self.value(points, gradient)
-        slopes = gradient[self.moved]
-        inverse, age, small, length = self.inverse(points), 0, 0, 1.0
-        z = inverse(slopes)
-        fall = multigrid.product(slopes, z)
-        along = -z
-        for _ in range(ITERATIONS):
-            slope = multigrid.product(slopes, along)
-            if not slope < 0.0:
-                along, slope = -z, -fall
-            shifts = np.zeros_like(points)
-            shifts[self.moved] = along
-            length = min(length, INSIDE * steps.largest_step(points, self.cells, shifts))
-            for _ in range(HALVINGS):
-                there = points + length * shifts
-                after = self.value(there, gradient)
-                if after <= value + ARMIJO * length * slope:
-                    break
-                length *= 0.5
-            else:
-                break
-            small = small + 1 if value - after < settled * value else 0
-            points, value = there, after
-            if small == PATIENCE:
-                break
-            before, slopes = slopes, gradient[self.moved]
-            age += 1
-            if age == REFRESH:
-                inverse, age = self.inverse(points), 0
-                z = inverse(slopes)
-                fall, along, length = multigrid.product(slopes, z), -z, 1.0
-                continue
-            z = inverse(slopes)
-            share = max(0.0, multigrid.product(slopes - before, z) / fall)
-            fall = multigrid.product(slopes, z)
-            along = share * along - z
-            length *= 2.0
-        return points
-
 
 class WholeMesh(Smoother):
     """One sweep moves all nodes. Not for the level STAR, whose floors such moves do not know.
@@ -227,7 +184,7 @@ class WholeMesh(Smoother):
             if not len(problem.moved):
                 break
             start, settled = problem.start(field.points), CLOSE if doublings else self.settled
-            found = self._allowed(problem.minimise(start, settled), field, executor)
+            found = self._allowed(minimise(problem, start, settled), field, executor)
             if found is not None and problem.is_better(found, field.points):
                 tally[MOVED] = (found != field.points).any(axis=1).sum()
                 field.points[:] = found

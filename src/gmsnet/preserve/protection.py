@@ -19,8 +19,8 @@ from gmsnet.preserve.survey import Survey
 from gmsnet.preserve.walls import near_walls
 from gmsnet.topology.topology import Topology
 
-SIZE, NONE = "size", "none"
-PRESERVE = (SHAPE, SIZE, NONE)
+SIZE, METRIC, NONE = "size", "metric", "none"
+PRESERVE = (SHAPE, SIZE, METRIC, NONE)
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -64,7 +64,8 @@ class Protection:
 
 def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, near: Floats) -> Protection:
     """What of a mesh is protected: stretched layers of walls, unless ``preserve`` is "none", and the areas of cells
-    next to walls that the mesh is refined towards, unless ``preserve`` is "none". fix_layers: all cells that are
+    next to walls that the mesh is refined towards, if it is "shape". "metric" holds nothing: see run/metric_stage.py.
+    fix_layers: all cells that are
     stretched alike, whatever ``preserve`` is.
 
     near: ``near_points(mesh, topology)``.
@@ -76,16 +77,16 @@ def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, n
     found, elsewhere = stretched_layers(mesh, topology, survey), None
     if found and not fix_layers:
         found, elsewhere = split(mesh, topology, survey, found)
-    layers = found.nodes if found and (fix_layers or preserve != NONE) else None
+    layers = found.nodes if found and (fix_layers or preserve not in (METRIC, NONE)) else None
     protection = Protection(topology, notes, layers)
     if layers is not None:
-        why = "fix_layers" if preserve == NONE else f"preserve={preserve!r}"
+        why = "fix_layers" if preserve in (METRIC, NONE) else f"preserve={preserve!r}"
         mend = "leave fix_layers out" if fix_layers else "preserve='none' lets them move"
         amount = _amount(len(protection.outer.held.get(LAYER, ())))
         notes.append(f"{found.summary}; {amount} held for that ({why}); if it is not meant, {mend}")
-    elif found:
+    elif found and preserve != METRIC:
         notes.append(f"{found.summary}; nothing is held for that (preserve={preserve!r})")
-    if elsewhere:
+    if elsewhere and preserve != METRIC:
         notes.append(f"{elsewhere.away_from_walls}; if they are meant, fix_layers holds them")
     if fix_layers and not found:
         notes.append("fix_layers: no stretched layers were found, so none are held")

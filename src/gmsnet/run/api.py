@@ -41,6 +41,8 @@ def smooth(
     slide: Any = None,
     feature_angle: float = 30.0,
     geometry: Any = None,
+    metric: Any = None,
+    size: Any = None,
 ) -> SmoothResult:
     """Moves the free nodes of a planar triangle mesh so that its elements become better; changes nothing else.
 
@@ -56,7 +58,8 @@ def smooth(
     target_angle: the minimum 1/q, in (0, 1], and the minimum angle, in (0, 60] degrees, that every cell is to have:
     only cells that miss it and what is around them are smoothed, until none misses it. fixed: nodes to hold besides
     boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. preserve: "shape" holds the
-    nodes of stretched layers along walls, "size" besides weighs the areas of cells, without a bound, "none" neither.
+    nodes of stretched layers along walls, "size" besides weighs the areas of cells, without a bound, "none" neither;
+    "metric" holds nothing, and moves nodes towards a smooth metric that is recovered from the cells as they are.
     fix_layers: hold all cells that are stretched alike, whatever ``preserve`` says. untangle: mend inverted cells
     first, where there are any. guard: what each sweep keeps besides validity: "valid" nothing (as the paper), "worst"
     that the worst 1/q of the cells with a free node never falls, "star" that the worst 1/q around any free node never
@@ -67,6 +70,9 @@ def smooth(
     the paper's tables are formed). slide: whether nodes of boundaries, interfaces and line cells move along their
     curves: None (they stay), True, or names of markers whose nodes may. feature_angle: degrees; a curve ends where it
     turns by more. geometry: what to slide on instead of arcs through the input's nodes (docs/sliding.md).
+    metric: the tensors of which the cells are to be unit cells, by shape and size (docs/metric.md): an array (N, 3) of
+    m11, m12, m22 at the nodes, or a function from points (n, 2) to such an array. size: the same for lengths h of
+    edges: an array (N,), or a function from points (n, 2) to one (n,); its metric is h⁻²·I.
 
     Raises InputError for what cannot be used, and where memory does not suffice, before anything is moved. A
     KeyboardInterrupt (Ctrl-C, or raised by the callback) reaches the caller; its attribute ``result`` is then the
@@ -76,7 +82,7 @@ def smooth(
         method=method, variant=variant, objective=objective, max_sweeps=max_sweeps, threads=threads,
         target_quality=target_quality, target_angle=target_angle, preserve=preserve, fix_layers=fix_layers,
         untangle=untangle, guard=guard, seed=seed, callback=callback, weights=weights, best_by=best_by,
-        slide=slide, feature_angle=feature_angle, geometry=geometry,
+        slide=slide, feature_angle=feature_angle, geometry=geometry, metric=metric, size=size,
     )  # fmt: skip
     return smooth_with(mesh, options, fixed)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,8 @@ from gmsnet.measure.report import ASPECT, SHAPE
 from gmsnet.measure.target import Target
 from gmsnet.methods import METHODS, Method, MethodOptions, Smoother, chosen
 from gmsnet.parallel.threads import available_threads
-from gmsnet.preserve.protection import PRESERVE, method_for
+from gmsnet.preserve.protection import METRIC, PRESERVE, method_for
+from gmsnet.run.metric_options import check_adapting
 from gmsnet.run.sweep import Sweep
 
 
@@ -48,6 +49,8 @@ class SmoothOptions:
     slide: SlideChoice = None
     feature_angle: float = FEATURE_ANGLE
     geometry: Geometry | None = None
+    metric: Any = field(default=None, compare=False)
+    size: Any = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         _check_whole("max_sweeps", self.max_sweeps, 0)
@@ -74,6 +77,7 @@ class SmoothOptions:
         _check_flag("untangle", self.untangle)
         check_sliding(self.feature_angle, self.geometry)
         self._method()
+        check_adapting(self)
 
     @property
     def target(self) -> Target:
@@ -97,6 +101,16 @@ class SmoothOptions:
     def slides(self) -> bool:
         """May nodes of curves move along them?"""
         return self.slide is not None and self.slide is not False
+
+    @property
+    def adapts(self) -> bool:
+        """Are cells to become those of a metric?"""
+        return self.metric is not None or self.size is not None or self.preserve == METRIC
+
+    @property
+    def preserved(self) -> str:
+        """What is preserved: with a metric or sizes that are given, these and nothing else."""
+        return METRIC if self.adapts else self.preserve
 
     @property
     def method_name(self) -> str:

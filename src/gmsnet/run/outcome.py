@@ -15,6 +15,7 @@ from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.report import ASPECT, QualityReport, measure
 from gmsnet.measure.totals import Totals
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.metric.conformity import Conformity, ConformityChange
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 from gmsnet.preserve.protection import WALL, carried_note, wall_note
@@ -34,9 +35,12 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
     rank = options.target.rank if options.target else rank_by(options.best_by)
     if state.second_order is not None and state.second_order.invalid[0]:  # whose mending may cost straight cells shape
         rank = inverted_alone
-    if state.motion is not None:
+    if state.motion is not None or state.metric is not None:  # in which meshes were compared
         rank = inverted_alone
     final = outcome(state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals)
+    if state.metric is not None:
+        near = near_points(state.mesh.with_points(final.points), state.topology)
+        state = replace(state, conformity=(*state.conformity, Conformity.of(near, state.topology, state.metric)))
     nothing = np.empty((0, 2))
     return replace(state, start=nothing, points=nothing, shapes=np.empty(0, dtype=np.float32), final=final)
 
@@ -60,6 +64,7 @@ def result_of(state: State, began: float) -> SmoothResult:
         topology=_with_corners(state),
         seconds=time.perf_counter() - began,
         invalid_curved=0 if state.second_order is None else state.second_order.invalid[1],
+        conformity=None if state.metric is None else ConformityChange(*state.conformity),
     )
 
 

@@ -13,6 +13,7 @@ from gmsnet.measure.bounds.bounds import Limits, limits
 from gmsnet.measure.report import QualityReport
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.display import amount, html_table, plain, text_table
+from gmsnet.metric.conformity import ConformityChange
 from gmsnet.run.sweep import Sweep as Sweep
 from gmsnet.run.untangle_stage import StillInvertedCell
 from gmsnet.topology.topology import Topology
@@ -38,7 +39,9 @@ class SmoothResult:
     held: reason → ids of the nodes that were not free. history: one Sweep for each look. notes: what else there is to
     know, a sentence each. unmended: the cells that untangling could not mend and that are inverted still, and why.
     topology: what follows from the connectivity, with the nodes that were held.
-    seconds: for the whole call. invalid_curved: how many second-order cells are not certified valid.
+    seconds: for the whole call. invalid_curved: how many second-order cells are not certified valid. conformity: before
+    and after, to the metric or the sizes that were asked for; None without any. With one, the least and the mean 1/q in
+    ``history`` are those in the metric.
     """
 
     mesh: Any
@@ -55,6 +58,7 @@ class SmoothResult:
     topology: Topology
     seconds: float
     invalid_curved: int = 0
+    conformity: ConformityChange | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "held", HeldNodes(self.held))
@@ -75,7 +79,9 @@ class SmoothResult:
 
     @property
     def _figures(self) -> list[tuple[str, ...]]:
-        pairs = zip(self.before.figures(), self.after.figures(), strict=True)
+        pairs = [*zip(self.before.figures(), self.after.figures(), strict=True)]
+        if self.conformity is not None:
+            pairs += zip(*(each.figures() for each in self.conformity), strict=True)
         return [("", "before", "after"), *((*before, after) for before, (_, after) in pairs)]
 
     @property

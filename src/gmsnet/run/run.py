@@ -18,11 +18,12 @@ from gmsnet.measure.totals import totals_of
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, Smoother, Tally
 from gmsnet.methods.curved import Corners, Curved
+from gmsnet.metric.field import Metric
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import serial
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.score import NONE, Score
+from gmsnet.run.score import NONE, Score, in_metric
 from gmsnet.run.stop import CALLBACK, INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.ordering import near_points
@@ -39,7 +40,7 @@ class Start(NamedTuple):
     """Where a run starts. points: (N, 2) in memory order, not changed. precision: of the mesh (``precision_of``).
 
     score: of the points, where it is known. history: to go on with. constraint: the curves that nodes slide on.
-    curved: the second-order cells whose corners move.
+    curved: the second-order cells whose corners move. metric: in which meshes are compared, if not in the plain one.
     """
 
     topology: Topology
@@ -49,6 +50,7 @@ class Start(NamedTuple):
     history: Sequence[Sweep] = ()
     constraint: Constraint | None = None
     curved: Curved | None = None
+    metric: Metric | None = None
 
     @classmethod
     def of(cls, mesh: Mesh, topology: Topology) -> Start:
@@ -69,6 +71,7 @@ class Run:
         missing: Callable[[Floats], NDArray[np.int32]] | None = None,
     ) -> None:  # fmt: skip
         self.topology, self.options, self.missing = start.topology, options, missing
+        self.metric = start.metric
         self.smoother = smoother if start.curved is None else Corners(smoother, start.curved)
         self.executor = executor.for_blocks(len(start.topology.free) // LANES)
         level = LEVELS.index(options.guard)
@@ -153,6 +156,8 @@ class Run:
         """The sums over all triangles of the coordinates as they are."""
         points = self.field.points
         totals = totals_of(points, self.topology.scored, self.executor)
+        if self.metric is not None and totals is not None:
+            totals = in_metric(totals, points, self.topology.scored, self.metric)
         return Score.of(totals, self.options.best_by, self.missing(points) if self.missing else NONE)
 
     def _stalled(self) -> bool:

@@ -4,17 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.measure.report import ASPECT
 from gmsnet.measure.totals import Totals
+from gmsnet.metric.conformity import cell_qualities
+from gmsnet.metric.field import Metric
+
+Floats = NDArray[np.float64]
 
 ROUNDING = 1e-12  # a smaller gain in q̂ is no gain
 NONE = np.empty((0, 3), dtype=np.int32)
+
+
+def in_metric(totals: Totals, points: Floats, simplices: Simplices, metric: Metric) -> Totals:
+    """The same counts, and the least and the mean quality of the cells in a metric: no angles, and so no q̂."""
+    values = cell_qualities(points, simplices, metric.at(points))
+    nan = math.nan
+    return replace(
+        totals, low_mean=nan, low_min=nan, high_mean=nan, high_max=nan, aspect_mean=nan, aspect_min=nan,
+        shape_mean=float(values.mean()), shape_min=float(values.min()),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +91,8 @@ class Score:
     def better_than(self, other: Score) -> bool:
         """Fewer inverted cells first, then fewer that miss the target, then a larger q̂, by more than rounding.
 
-        Where not all cells are triangles: then the larger minimum 1/q of the cells with a free node, then their mean.
+        Where not all cells are triangles, and in a metric: then the larger minimum 1/q of the cells that are compared,
+        then their mean.
         """
         if self.counts != other.counts:
             return self.counts < other.counts

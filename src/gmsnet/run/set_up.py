@@ -24,6 +24,7 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
 from gmsnet.preserve.protection import Protection, protected
+from gmsnet.run.metric_stage import check_given
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.second_order import second_order_of
 from gmsnet.run.state import State
@@ -65,6 +66,9 @@ def first_state(
         where = " by the point data 'fixed' of the mesh" if fixed is None else ""
         remarks.append(f"fixed: {named}{where}, and held for other reasons anyway")
     second = second_order_of(given, topology, options)
+    if options.adapts and second is not None:
+        raise InputError("a metric for second-order cells cannot be had so far: leave out metric, size and preserve")
+    values = check_given(options, len(given.points))
     if target and (others := unmeasured(given)):
         remarks.append(f"the target is asked of triangles and quads alone, not of {others}")
     if unknown := unknown_cells(given):
@@ -74,12 +78,18 @@ def first_state(
 
     def looked_at(near: Floats) -> tuple[QualityReport, Protection]:
         before = measure(given, topology, near, executor.for_blocks(0), shapes=shapes)
-        return before, protected(given, topology, options.preserve, options.fix_layers, near)
+        return before, protected(given, topology, options.preserved, options.fix_layers, near)
 
     if threads == 1 or target or not isinstance(smoother, Auto | StarSmoother):
         before, protection = looked_at(start)
     else:  # most often nothing is protected, and these are the stars that are smoothed
         (before, protection), _ = side_by_side(threads, partial(looked_at, start), lambda: topology.stars)
+    if values is not None and before.inverted:
+        raise InputError(
+            f"{'metric' if options.size is None else 'size'} is given at the nodes of a mesh with "
+            f"{before.inverted:,} inverted cells, between which it has no meaning: untangle the mesh first, or give a "
+            "function of place"
+        )
     compared = protection.topology
     totals = before.totals if compared.scored is compared.simplices else None  # else a run compares some of the cells
     return State(
@@ -95,6 +105,7 @@ def first_state(
         totals=totals,
         sliding=sliding,
         second_order=second,
+        nodal=values,
     )
 
 

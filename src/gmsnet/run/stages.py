@@ -7,6 +7,7 @@ from typing import Protocol
 
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
+from gmsnet.run.metric_stage import take_metric
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import write_back
 from gmsnet.run.second_order import make_room, smooth_corners, untangle_second_order
@@ -28,7 +29,8 @@ class Stage(Protocol):
 
 
 STAGES: tuple[Stage, ...] = (
-    untangle_all, untangle_protected, sweep, improve_near_walls, untangle_second_order, smooth_corners, make_room,
+    untangle_all, untangle_protected, take_metric, sweep, improve_near_walls, untangle_second_order, smooth_corners,
+    make_room,
 )  # fmt: skip
 
 

@@ -18,6 +18,8 @@ from gmsnet.measure.totals import Totals
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.methods.curved import Curved
+from gmsnet.metric.conformity import Conformity
+from gmsnet.metric.field import Metric
 from gmsnet.preserve.protection import Protection
 from gmsnet.run.run import Start, precision_of
 from gmsnet.run.score import Score
@@ -99,7 +101,9 @@ class State:
     reasons: why some are left, by the index of each cell. history: one Sweep for each look. stop_reason: one of
     ``run.stop``, "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
     sliding: the nodes that move along curves, if any. curved: while the corners of second-order cells move, those cells
-    (``second_order``, which is all that is known of them). interruption: what ends the smoothing before its end. final:
+    (``second_order``, which is all that is known of them). nodal: (N, 3) by id, the logarithms of a metric that is
+    given at nodes. metric: what cells are to become, once it is known; conformity: of the input to it, and of the
+    result. interruption: what ends the smoothing before its end. final:
     once the mesh is written back to the order of the input; start, points and shapes are then empty, lest the result
     needs more memory than the stages. motion: of a boundary that moves (``deform_stage``).
     """
@@ -125,6 +129,9 @@ class State:
     second_order: SecondOrder | None = None
     curved: Curved | None = None
     motion: Motion | None = None
+    nodal: Floats | None = None
+    metric: Metric | None = None
+    conformity: tuple[Conformity, ...] = ()
 
     @property
     def topology(self) -> Topology:
@@ -139,7 +146,9 @@ class State:
     def run_start(self, best_by: str) -> Start:
         """Where a run over the whole mesh starts."""
         score = None if self.totals is None else Score.of(self.totals, best_by)
-        return Start(self.topology, self.points, self.precision, score, self.history, self.constraint, self.curved)
+        return Start(
+            self.topology, self.points, self.precision, score, self.history, self.constraint, self.curved, self.metric
+        )  # fmt: skip
 
     @property
     def constraint(self) -> Constraint | None:

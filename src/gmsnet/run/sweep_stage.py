@@ -17,5 +17,6 @@ def sweep(state: State, options: SmoothOptions, executor: Executor) -> State:
         return reach_target(state, options, executor)
     run = Run(state.run_start(options.best_by), state.smoother, options, executor)
     stop_reason = run.to_the_end()
-    state = replace(state, points=run.best, totals=run.best_score.totals, history=tuple(run.history))
+    totals = None if state.metric is not None else run.best_score.totals  # those are in the metric
+    state = replace(state, points=run.best, totals=totals, history=tuple(run.history))
     return state.ended(stop_reason, run.interruption)

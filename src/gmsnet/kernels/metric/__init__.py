@@ -1,0 +1,1 @@
+"""Cells measured by a metric: a symmetric positive definite tensor at each place, by which lengths are 1."""

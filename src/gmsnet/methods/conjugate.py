@@ -1,0 +1,89 @@
+"""Nonlinear conjugate gradients over the places of all moving nodes at once, preconditioned by multigrid.
+
+Polak and Ribière's (Nocedal, Wright: Numerical Optimization, section 5.2). No step goes as far as where a first simplex
+has no area left, and each lowers the sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.whole import multigrid, steps
+
+Floats = NDArray[np.float64]
+
+ITERATIONS = 120
+REFRESH = 10  # iterations after which the preconditioner is formed anew
+PATIENCE = 2  # iterations one after the other that gain little are the end
+ARMIJO, HALVINGS, INSIDE = 1e-4, 25, 0.9
+
+
+class Sum(Protocol):
+    """A sum over simplices as a function of the places of some nodes.
+
+    cells: (S, 3) counter-clockwise. moved: (n,) the nodes that move.
+    """
+
+    @property
+    def cells(self) -> NDArray[np.int32]: ...  # noqa: D102
+
+    @property
+    def moved(self) -> NDArray[np.intp]: ...  # noqa: D102
+
+    def value(self, points: Floats, gradient: Floats) -> float:
+        """The sum at points (N, 2), and its gradient (N, 2); more than any mesh has where a cell is inverted."""
+
+    def inverse(self, points: Floats) -> Callable[[Floats], Floats]:
+        """About the inverse of its second derivative there, (n, 2) to (n, 2)."""
+
+
+def minimise(problem: Sum, points: Floats, settled: float) -> Floats:
+    """Where conjugate gradients lead from points (N, 2) without an inverted cell.
+
+    settled: a smaller share of the sum, gained in an iteration, is little.
+    """
+    gradient = np.empty_like(points)
+    value = problem.value(points, gradient)
+    slopes = gradient[problem.moved]
+    inverse, age, small, length = problem.inverse(points), 0, 0, 1.0
+    z = inverse(slopes)
+    fall = multigrid.product(slopes, z)
+    along = -z
+    for _ in range(ITERATIONS):
+        slope = multigrid.product(slopes, along)
+        if not slope < 0.0:
+            along, slope = -z, -fall
+        if not slope < 0.0:  # nothing to gain
+            break
+        shifts = np.zeros_like(points)
+        shifts[problem.moved] = along
+        length = min(length, INSIDE * steps.largest_step(points, problem.cells, shifts))
+        for _ in range(HALVINGS):
+            there = points + length * shifts
+            after = problem.value(there, gradient)
+            if after <= value + ARMIJO * length * slope:
+                break
+            length *= 0.5
+        else:
+            break
+        small = small + 1 if value - after < settled * value else 0
+        points, value = there, after
+        if small == PATIENCE:
+            break
+        before, slopes = slopes, gradient[problem.moved]
+        age += 1
+        if age == REFRESH:
+            inverse, age = problem.inverse(points), 0
+            z = inverse(slopes)
+            fall, along, length = multigrid.product(slopes, z), -z, 1.0
+            continue
+        z = inverse(slopes)
+        share = max(0.0, multigrid.product(slopes - before, z) / fall)
+        fall = multigrid.product(slopes, z)
+        along = share * along - z
+        length *= 2.0
+    return points
