@@ -9,7 +9,7 @@ import gmsnet
 from gmsnet.generate import disturb
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import sized
-from gmsnet.methods.sized import BAND, WEIGHT, Sized, banded, room_for
+from gmsnet.methods.sized import WEIGHT, Sized, places_of
 from gmsnet.paper.cases import CASES
 from gmsnet.topology.ordering import planar_points
 from gmsnet.topology.topology import Topology
@@ -96,7 +96,8 @@ def wanted_areas(mesh):
     """D of the triangles of all stars, and what it is to be."""
     topology = Topology.of(mesh)
     blocks = topology.stars.blocks
-    room = room_for(blocks)
+    first, count = places_of(blocks)
+    room = sized.Wanted(first, np.empty(count))
     points = planar_points(mesh)[topology.memory]
     sized.targets(points, topology.near, blocks, room)
     areas = room.double
@@ -167,29 +168,3 @@ def test_the_areas_are_those_at_the_first_sweep():
     whole, again = run([one] * 6), run([Sized() for _ in range(6)])
     assert run([Sized()] * 6).tobytes() == whole.tobytes()
     assert np.abs(whole - again).max() > 1e-3
-
-
-def test_bands_hold_whatever_the_smoother_wants():
-    """Areas of kept cells stay within a tenth of those of the start, sweep after sweep; shapes gain all the same."""
-    from gmsnet.kernels.star.guard import Precision
-    from gmsnet.methods import Field
-    from gmsnet.parallel.threads import serial
-
-    mesh = gmsnet.random_mesh(400, seed=2)
-    topology = Topology.of(mesh)
-    start = planar_points(mesh)[topology.memory]
-    kept = mesh.points[topology.memory, 0] < 0.6
-    field = Field(start.copy(), topology, Precision())
-    smoother = banded(start, kept)
-    cells = kept[topology.near].all(axis=1)
-    for _ in range(10):
-        tally = smoother.sweep(field, serial, lambda: True)
-        ratio = doubles(field.points, topology.near) / doubles(start, topology.near)
-        assert np.abs(ratio[cells] - 1.0).max() <= BAND + 1e-9
-        assert tally[0] > 0
-    assert np.abs(ratio[~cells] - 1.0).max() > 1.0
-    points = mesh.points.copy()
-    points[topology.memory] = field.points
-    before, after = (gmsnet.quality(m).shape[kept[np.argsort(topology.memory)][topology.triangles].all(axis=1)]
-                     for m in (mesh, mesh.with_points(points)))  # fmt: skip
-    assert after.mean() > before.mean() + 0.01

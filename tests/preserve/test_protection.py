@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 
 import gmsnet
 from gmsnet import InputError
-from gmsnet.generate import disturb
+from gmsnet.generate import disturb, layered_mesh
 from gmsnet.preserve.protection import LAYER, WALL
 from gmsnet.topology.topology import Topology
 
@@ -96,6 +96,47 @@ def test_layers_stay_when_cells_beside_them_are_mended(seed):
     result = gmsnet.smooth(tangled)
     assert result.before.inverted > 10
     assert result.after.inverted == 0
-    held = np.concatenate(list(result.held.values()))
-    assert result.held[LAYER].size > 200
-    assert not result.moved[held].any()
+    assert result.held[LAYER].size > 300
+    assert not result.moved[mesh.points[:, 1] < heights[11]].any()
+
+
+@pytest.mark.parametrize(("layers", "aspect", "around", "seed"), [(11, 627.3, 83, 105), (16, 276.2, 106, 81)])
+def test_rows_stay_where_all_outside_of_them_is_tangled(layers, aspect, around, seed):
+    """Thrown nodes that look like a layer's by chance are told from its own, whose rows are whole."""
+    mesh = layered_mesh(layers, aspect, around)
+    outside = Topology.of(mesh).free
+    outside = outside[outside >= (layers + 1) * around]
+    result = gmsnet.smooth(disturb(mesh, outside, 1.0, seed=seed, keep_valid=False))
+    assert result.before.inverted > 300
+    assert result.after.inverted == 0
+    assert not result.moved[: (layers + 1) * around].any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_layers_are_told_of_tangles(seed):
+    mesh = gmsnet.random_mesh(3000, seed=seed)
+    tangled = disturb(mesh, Topology.of(mesh).free, 2.0, seed=seed, keep_valid=False)
+    result = gmsnet.smooth(tangled)
+    assert result.before.inverted > 1000
+    assert result.after.inverted == 0
+    assert LAYER not in result.held
+
+
+def test_a_damaged_cell_frees_no_node_of_the_rows_beside_it(real_meshes):
+    """Quads of a C-grid, thrown about from the twentieth row on."""
+    mesh = gmsnet.read(real_meshes / "n0012_113-33.su2")
+    rows = Topology.of(mesh).free[nodes_beyond(mesh, 20)[Topology.of(mesh).free]]
+    result = gmsnet.smooth(disturb(mesh, rows, 0.5, seed=1, edge="shortest"))
+    assert len(rows) > 800
+    moved = np.flatnonzero(result.moved)
+    assert np.isin(moved, rows).all()
+
+
+def nodes_beyond(mesh, rows):
+    """(N,) bool: the nodes further than so many rows of quads from the airfoil."""
+    (quads,) = (block.nodes for block in mesh.cells if block.kind == "quad")
+    reached = np.zeros(len(mesh.points), dtype=bool)
+    reached[mesh.markers["airfoil"]] = True
+    for _ in range(rows):
+        reached[quads[reached[quads].any(axis=1)]] = True
+    return ~reached

@@ -16,12 +16,12 @@ from gmsnet.paper.cases import CASES
 from gmsnet.preserve.layers import stretched_layers
 from gmsnet.preserve.protection import WALL
 from gmsnet.preserve.survey import Survey
-from gmsnet.preserve.walls import NEAR, _walls, near_walls
+from gmsnet.preserve.walls import NEAR, WIDEST, _walls, near_walls
 from gmsnet.topology.topology import Topology
 
 
 def kept(mesh, held=None):
-    return near_walls(mesh, Topology.of(mesh, held))
+    return near_walls(mesh, Topology.of(mesh, held)).nodes
 
 
 def distances(points, wall):
@@ -74,21 +74,37 @@ def test_it_moves_turns_and_scales_with_the_mesh(ring):
     assert kept(ring.with_points(ring.points * [1.0, -1.0])).tolist() == kept(ring).tolist()
 
 
-@pytest.mark.parametrize("amount", [0.3, 0.5, 1.0])
-def test_not_where_all_has_been_disturbed(ring, amount):
-    assert not kept(disturb(ring, Topology.of(ring).free, amount, seed=0)).any()
+def test_the_more_a_mesh_is_disturbed_the_wider_are_its_bands(ring):
+    free = Topology.of(ring).free
+    found = [near_walls(disturb(ring, free, amount, seed=0), Topology.of(ring)) for amount in (0.05, 0.2, 0.3, 0.5)]
+    assert near_walls(ring, Topology.of(ring)).blend.max() < 0.1
+    means = [walls.blend[walls.nodes].mean() for walls in found]
+    assert means[0] < 0.02 < 0.1 < means[1] < 0.5 < means[2] < means[3] == 1.0
+    assert found[2].room.max() == 1.0 < found[3].room.max() < WIDEST
+    assert not near_walls(disturb(ring, free, 1.0, seed=0), Topology.of(ring)).nodes.any()
 
 
-@pytest.mark.parametrize("keep_valid", [True, False])
-def test_not_around_damaged_cells(ring, keep_valid):
+def test_the_bands_of_damaged_cells_are_wide(ring):
+    walls, topology = near_walls(ring, Topology.of(ring)), Topology.of(ring)
+    inner = np.flatnonzero(walls.nodes & np.isin(np.arange(len(walls.nodes)), topology.free))
+    chosen = inner[np.random.default_rng(0).permutation(len(inner))[:6]]
+    broken = disturb(ring, chosen, 3.0, seed=0, keep_valid=True)
+    found = near_walls(broken, topology)
+    shape = gmsnet.quality(broken).shape
+    near = walls.nodes[topology.triangles].all(axis=1)
+    bad = (shape < 0.3) & near & found.nodes[topology.triangles].all(axis=1)
+    assert bad.any()
+    assert (found.blend[topology.triangles[bad]] == 1.0).all()
+    assert np.mean(found.blend[walls.nodes] == 0.0) > 0.7
+    assert found.firm.nodes.sum() < found.nodes.sum()
+
+
+def test_inverted_cells_have_no_bands(ring):
     flags, topology = kept(ring), Topology.of(ring)
     inner = np.flatnonzero(flags & np.isin(np.arange(len(flags)), topology.free))
     chosen = inner[np.random.default_rng(0).permutation(len(inner))[:6]]
-    broken = disturb(ring, chosen, 3.0, seed=0, keep_valid=keep_valid)
-    shape = gmsnet.quality(broken).shape
-    middle = broken.points[topology.triangles].mean(axis=1)
-    near = distances(middle, ring.points[ring.markers["hole"]]) < 0.9 * NEAR
-    bad = (shape < 0.5) & near
+    broken = disturb(ring, chosen, 3.0, seed=0, keep_valid=False)
+    bad = (gmsnet.quality(broken).shape <= 0.0) & flags[topology.triangles].all(axis=1)
     assert bad.any()
     now = kept(broken)
     assert not now[topology.triangles[bad]].any()

@@ -47,6 +47,7 @@ ALWAYS = 10**9  # sweeps
 RELAXATION = 1.6  # of the Newton steps
 SLOW = 0.02  # in the mean of 1/q: so much to come, by the last two gains, is more than sweeps should be left to bring
 POOR = 0.5  # a mean of 1/q below this is not left to sweeps alone
+FAIR = 0.8  # nor is one below this where they end
 AHEAD = 50  # times the last gain are at most expected to come
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
@@ -216,6 +217,10 @@ class Auto(Smoother):
         creeps = self.creep.is_one(field.points)
         return (lasts and (ahead > SLOW or creeps)) or (self.mean < POOR and not self.whole)
 
+    def _is_caught(self) -> bool:
+        """Have sweeps ended where the mesh may be folded? Moves of single nodes do not unfold it."""
+        return self.creep is not None and not self.whole and self.mean < FAIR
+
     def _end_round(self, field: Field) -> None:
         """Makes the phase once more where that pays, else goes on to the next one, or settles."""
         phase = self.phases[self.at]
@@ -233,7 +238,7 @@ class Auto(Smoother):
                 goes_on = ahead > phase.gain and self.gained > phase.least
                 ahead = min(ahead, AHEAD * self.gained) if before < math.inf else 0.0
             self.mean = mean
-            self.slow = self._is_slow(field, ahead, lasts)
+            self.slow = self._is_slow(field, ahead, lasts) or (not goes_on and self._is_caught())
             goes_on = goes_on or self.slow
         target_reached = self.smoother.target_reached
         self.looks = self.rounds % phase.often == 0 if goes_on else phase.looks or target_reached

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import sized as kernels
-from gmsnet.kernels.methods.bands import Bands, no_bands
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Field, Method, StarSmoother, Tally
@@ -20,19 +19,18 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
 
 WEIGHT = 4.0
-BAND = 0.099  # a tenth, and room for the rounding of what is written
 
 
 class Sized(StarSmoother):
-    """Keeps the areas that the cells have when the first sweep begins. bands: areas that stay within hard bounds.
+    """Keeps the areas that the cells have when the first sweep begins.
 
     start: (N, 2) in memory order, points whose areas are kept instead.
     """
 
     start: NDArray[np.float64] | None = None
 
-    def __init__(self, weight: float = WEIGHT, bands: Bands | None = None) -> None:
-        self.weight, self.bands = weight, bands or no_bands()
+    def __init__(self, weight: float = WEIGHT) -> None:
+        self.weight = weight
         self.topology: Topology | None = None
         self.wanted = kernels.Wanted(np.empty(0, dtype=np.int64), np.empty(0))
 
@@ -41,7 +39,8 @@ class Sized(StarSmoother):
         if field.topology is not self.topology:
             self.topology = field.topology
             blocks = field.topology.stars.blocks
-            self.wanted = room_for(blocks)
+            first, count = places_of(blocks)
+            self.wanted = kernels.Wanted(first, np.empty(count))
             points = field.points if self.start is None else self.start
             kernels.targets(points, field.topology.near, blocks, self.wanted)
         return super().sweep(field, executor, test)
@@ -50,25 +49,17 @@ class Sized(StarSmoother):
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, self.wanted, self.weight, self.bands, first, last, guard, tally)
+        kernels.sweep(points, blocks, self.wanted, self.weight, first, last, guard, tally)
 
 
-def room_for(blocks: Blocks) -> kernels.Wanted:
-    """For the targets of all simplices of the stars."""
+def places_of(blocks: Blocks) -> tuple[NDArray[np.int64], int]:
+    """Where the simplices of each block of stars begin, [simplex][lane], and how many there are."""
     count = blocks.degree
     if blocks.patterns is not None and blocks.pattern is not None:
         count = np.diff(blocks.patterns.first)[blocks.pattern]
     first = np.zeros(len(count) + 1, dtype=np.int64)
     np.cumsum(LANES * count.astype(np.int64), out=first[1:])
-    return kernels.Wanted(first[:-1], np.empty(first[-1]))
-
-
-def banded(start: NDArray[np.float64], kept: NDArray[np.bool_]) -> Sized:
-    """For cells whose areas are to stay: shape alone, with each area within BAND of what it is in ``start``.
-
-    start: (N, 2) points in memory order. kept: (N,) bool, in memory order: cells all of whose corners are kept stay.
-    """
-    return Sized(0.0, Bands(np.ascontiguousarray(start), kept, BAND))
+    return first[:-1], int(first[-1])
 
 
 METHOD = Method(

@@ -43,6 +43,9 @@ EVEN = 0.2  # of the mean area of a star: the minimum of its areas where a layer
 NEXT = 3.0  # how many times the area of a cell's neighbour in a layer its own may be, or the other way round
 BYTES_PER_NODE = 600  # that the layers of a mesh that has some take to be told, measured where all cells are in one
 BROKEN = 0.05  # of the mean area around: a cell of less is damaged, and its nodes are not held
+CALM = (
+    1.35  # times the mean area around, or the other way round: where half of the cells are so, the node is not at fault
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +55,8 @@ class Layers:
     nodes: (N,) bool by node id, the corners of those cells, but for damaged places. cells: (T,) bool, which
     triangles and quads. median, largest: stretch of those cells, the ratio of the longer to the shorter axis of
     their Steiner ellipse (1 where there are none). damaged: how many of those cells are inverted, or have less than a
-    twentieth of the area of those around; their nodes are left out of ``nodes``, so that they can be untangled.
+    twentieth of the area of those around; their nodes are left out of ``nodes``, so that they can be untangled, but for
+    those of which half the cells are as large as those around: they are not what damaged them.
     """
 
     nodes: Flags
@@ -168,10 +172,12 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:
         if len(topology.quads):
             whole = _followed(topology, points, whole)
         chosen = whole[of_cell]
-    damaged = chosen & (cells[:, stretch.AREA] <= BROKEN * _area_around(triangles, cells, number))
-    nodes = np.zeros(len(layer), dtype=bool)
-    nodes[triangles[chosen]] = True
-    nodes[triangles[damaged]] = False
+    area, around = cells[:, stretch.AREA], _area_around(triangles, cells, number)
+    damaged = chosen & (area <= BROKEN * around)
+    calm = chosen & (area <= CALM * around) & (around <= CALM * area)
+    all_around, calm_around = (np.bincount(triangles[some].ravel(), minlength=len(layer)) for some in (chosen, calm))
+    nodes = all_around > 0
+    nodes[triangles[damaged]] &= 2 * calm_around[triangles[damaged]] >= all_around[triangles[damaged]]
     if not chosen.any():
         return None
     lengths = np.exp(cells[chosen, stretch.LENGTH])

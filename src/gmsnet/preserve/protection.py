@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.measure.report import SHAPE
+from gmsnet.measure.signs import exact_signs
 from gmsnet.measure.target import Target
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.methods.sized import BAND
+from gmsnet.methods.banded import BAND, Kept
 from gmsnet.preserve.anchored import split
 from gmsnet.preserve.layers import stretched_layers
 from gmsnet.preserve.survey import Survey
@@ -33,14 +34,19 @@ class Protection:
     """What of a mesh is there on purpose. notes: what to say about that.
 
     base: the topology without any. layers: (N,) bool by id, the nodes that are held on account of stretched layers.
-    kept: (N,) bool by id, the nodes next to walls that the mesh is refined towards, which move in a stage of their own
-    (wall_stage.py). None where there are none.
+    walls: by id, the nodes next to walls that the mesh is refined towards, which move in a stage of their own
+    (wall_stage.py), and how exactly their cells keep their areas. None where there are none.
     """
 
     base: Topology
     notes: list[str]
     layers: Flags | None = None
-    kept: Flags | None = None
+    walls: Kept | None = None
+
+    @property
+    def near_walls(self) -> Flags | None:
+        """(N,) bool by id, the nodes of ``walls``."""
+        return None if self.walls is None else self.walls.nodes
 
     @cached_property
     def outer(self) -> Topology:
@@ -50,25 +56,29 @@ class Protection:
     @cached_property
     def topology(self) -> Topology:
         """The topology with all of them held."""
-        return self.outer if self.kept is None else self.outer.holding(self.kept, WALL)
+        return self.outer if self.walls is None else self.outer.holding(self.walls.nodes, WALL)
 
-    def released(self, nodes: Flags) -> Protection | None:
-        """Without these nodes (N,) by id; None if none of them is protected."""
-        layers, kept = (None if held is None else held & ~nodes for held in (self.layers, self.kept))
+    def released(self, nodes: Flags) -> tuple[Protection, str] | None:
+        """Without these nodes (N,) by id, and what to say of that; None if none of them is protected."""
+        layers = None if self.layers is None else self.layers & ~nodes
+        walls = None if self.walls is None else self.walls._replace(nodes=self.walls.nodes & ~nodes)
         count = len(set(self.base.free[nodes[self.base.free]].tolist()) - set(self.topology.free.tolist()))
         if not count:
             return None
         note = f"{_amount(count)} let go again, for cells beside them were inverted"
-        return Protection(self.base, [*self.notes, note], layers, kept)
+        return Protection(self.base, self.notes, layers, walls), note
 
 
-def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, near: Floats) -> Protection:
+def protected(
+    mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, near: Floats, *, firm: bool = False
+) -> Protection:
     """What of a mesh is protected: stretched layers of walls, unless ``preserve`` is "none", and the areas of cells
     next to walls that the mesh is refined towards, if it is "shape". "metric" holds nothing: see run/metric_stage.py.
     fix_layers: all cells that are
     stretched alike, whatever ``preserve`` is.
 
-    near: ``near_points(mesh, topology)``.
+    near: ``near_points(mesh, topology)``. firm: only nodes that are certainly meant, near walls those of cells without
+    damage, in layers those that hang on nodes away from inverted cells.
     """
     notes: list[str] = []
     if not len(topology.free):
@@ -78,6 +88,8 @@ def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, n
     if found and not fix_layers:
         found, elsewhere = split(mesh, topology, survey, found)
     layers = found.nodes if found and (fix_layers or preserve not in (METRIC, NONE)) else None
+    if firm and layers is not None:
+        layers = _certain(layers, topology, near)
     protection = Protection(topology, notes, layers)
     if layers is not None:
         why = "fix_layers" if preserve in (METRIC, NONE) else f"preserve={preserve!r}"
@@ -92,19 +104,38 @@ def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, n
         notes.append("fix_layers: no stretched layers were found, so none are held")
     if preserve != SHAPE:
         return protection
-    kept = near_walls(mesh, protection.outer, survey)
-    walled = Protection(topology, notes, layers, kept)
-    return walled if kept.any() and WALL in walled.topology.held else protection
+    walls = near_walls(mesh, protection.outer, survey)
+    walls = walls.firm if firm else walls
+    walled = Protection(topology, notes, layers, walls)
+    return walled if walls.nodes.any() and WALL in walled.topology.held else protection
 
 
-def wall_note(nodes: int, moved: bool) -> str:
+def _certain(layers: Flags, topology: Topology, near: Floats) -> Flags:
+    """Of the nodes of layers (N,) by id, those without an inverted cell, and those that share a layer's cell with one.
+
+    Beside inverted cells others may look like a layer by chance, or have been thrown out of one.
+    """
+    inside, bad = layers[topology.memory], np.zeros(len(layers), dtype=bool)
+    positive = exact_signs(near, topology.near, topology.near_orientation) > 0
+    bad[topology.near[~positive]] = True
+    if not bad.any():
+        return layers
+    core = inside & ~bad
+    cells = topology.near[positive & inside[topology.near].all(axis=1)]
+    certain = core.copy()
+    certain[cells[core[cells].any(axis=1)]] = True
+    found = np.zeros_like(layers)
+    found[topology.memory[certain]] = True
+    return found
+
+
+def wall_note(walls: Kept, nodes: int, moved: bool) -> str:
     """What to say of so many nodes next to walls that the mesh is refined towards. moved: in a stage of their own."""
-    so = (
-        f"move only as far as the areas of their cells stay within {BAND:.0%} of the input's"
-        if moved
-        else "are held in this run"
-    )
+    so = f"move only as far as the areas of their cells stay within {BAND:.0%} of the input's" if moved else ""
+    if moved and walls.noisy:
+        so += ", or between those and the mean of the areas around where the input is disturbed"
     mend = "" if moved else "; preserve='none' lets them move"
+    so = so or "are held in this run"
     return f"the mesh is refined towards its walls: the {nodes:,} nodes next to them {so} (preserve={SHAPE!r}){mend}"
 
 

@@ -3,7 +3,11 @@
 A mesh that is refined towards a body is so on purpose: what happens there, in about a boundary layer's thickness, must
 be resolved as its maker wanted. In isotropic regions the connectivity carries the grading, so they are smoothed freely;
 but converged smoothing changes single areas by a factor of up to two. So cells near such a wall keep their areas
-within a band, unless they are damaged; their shapes are improved as far as the band lets them.
+within a band, and their shapes are improved as far as the bands let them.
+
+Where a mesh has been disturbed, areas are noise, and nobody's intent. There bands reach to the mean of the areas around
+each cell, and where the noise is larger still, further. This goes by degrees, with the median noise near a wall, and
+with that around single cells that are damaged. So a mesh that is a little worse is kept nearly as much.
 """
 
 from __future__ import annotations
@@ -15,34 +19,39 @@ from gmsnet.kernels.simplex import measures as quality
 from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL, Simplices
 from gmsnet.kernels.simplex.survey import BOUNDARY
 from gmsnet.kernels.topology.components import pieces
+from gmsnet.measure.signs import exact_signs
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.methods.banded import Kept
 from gmsnet.preserve.survey import Survey
 from gmsnet.topology.stars import Ints
 from gmsnet.topology.topology import Topology
 
-Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 
 NEAR = 0.02  # of a wall's diameter: how far from it a cell's middle may lie
 REFINED = 0.25  # cells there have edges of at most this share of those that cells of the mesh's mean area would have
 MOST = 0.5  # at least this share of the cells near a wall is refined, or it is not refined towards that wall
-# How far a cell's area may lie from the mean of its neighbours', in logarithms, averaged over the stars of its corners.
-CALM, ROUGH = 0.125, 0.4  # the median near a wall (more: all there has been disturbed); a cell (more: it is damaged)
-SOUND = 0.5  # the minimum 1/q of a cell
+# How far a cell's area lies from the mean of its neighbours', in logarithms, averaged over the stars of its corners:
+# the noise. Meshes as they are made have a median of 0.02 to 0.08 near a wall, random ones 0.4 to 0.5. From the first
+# to the second of these bands reach to the mean around; from there to the third they grow by the factor WIDEST.
+CALM, NOISY, RANDOM = 0.1, 0.2, 0.4
+WIDEST = 4.0
+ROUGH, BROKEN = 0.4, 0.5  # the same for single cells, whose band reaches to the mean from the second on
+SOUND, POOR = 0.5, 0.3  # the same by their 1/q
 CANDIDATES = 8  # edges of the wall, by their middles, among which the nearest is looked for
 
 
-def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> Flags:
-    """(N,) by node id: the corners of cells of a planar mesh that keep their areas.
+def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> Kept:
+    """The corners, by node id, of cells of a planar mesh that keep their areas, and how exactly.
 
-    topology: of this mesh, with what is stretched on purpose held: cells that cannot change are not looked at for
-    damage. The cells are those whose middle lies within NEAR of a wall's diameter from it (a wall is a piece of the
-    boundary that hangs together), provided that the mesh is refined towards that wall and has not been disturbed there;
-    but for the neighbours of damaged cells. Most cells near a refined wall are at most REFINED of the mesh's mean size,
-    and so small that at least one row of them is near. survey: of this mesh, where it is known.
+    topology: of this mesh, with what is stretched on purpose held. The cells are those whose middle lies within NEAR of
+    a wall's diameter from it (a wall is a piece of the boundary that hangs together), provided that the mesh is refined
+    towards that wall and is not all noise there; but for inverted cells. Most cells near a refined wall are at most
+    REFINED of the mesh's mean size, and so small that at least one row of them is near. survey: of this mesh, where it
+    is known.
     """
-    triangles = topology.near
-    kept = np.zeros(len(topology.memory), dtype=bool)
+    triangles, count = topology.near, len(topology.memory)
+    kept = Kept(np.zeros(count, dtype=bool), np.zeros(count), np.ones(count))
     if topology.plane is None or not len(triangles):
         return kept
     survey = survey or Survey.of(mesh, topology)
@@ -50,7 +59,7 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
     largest = REFINED * float(_edge(survey.double))
     if not (_edge(_double(points, triangles.take(survey.beside, axis=0))) <= largest).any():
         return kept  # so it is with most meshes
-    chosen, rough = np.zeros(len(triangles), dtype=bool), None
+    rough: Floats | None = None
     for wall, cells in _walls(topology.simplices, survey):
         size = _edge(_double(points, triangles[cells]))
         if (size <= largest).mean() < MOST:
@@ -63,16 +72,39 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
         if not rows.size or (_edge(_double(points, triangles[rows])) <= most).mean() < MOST:
             continue
         rough = _roughness(triangles, _double(points, triangles), len(points)) if rough is None else rough
-        if np.median(rough[rows]) <= CALM:
-            chosen[rows] = True
-    if rough is not None and chosen.any():
-        rows = np.flatnonzero(chosen)
-        corners, columns = triangles[rows], np.empty((4, len(rows)))
-        quality.per_cell(points, corners, topology.near_orientation[rows], columns)
-        damaged = (rough[rows] > ROUGH) | (columns[quality.SHAPE] < SOUND)
-        kept[topology.memory[corners]] = True
-        kept[topology.memory[corners[damaged & topology.near_free[corners].any(axis=1)]]] = False
+        if np.median(rough[rows]) < RANDOM:
+            _keep(kept, topology, points, rows, rough[rows])
+    if kept.nodes.any():
+        _leave_out_inverted(kept, topology, points)
     return kept
+
+
+def _keep(kept: Kept, topology: Topology, points: Floats, rows: NDArray[np.int64], rough: Floats) -> None:
+    """Marks the corners of the simplices near one wall. rows: of ``topology.near``; rough: (len(rows),) their noise."""
+    corners, columns = topology.near[rows], np.empty((4, len(rows)))
+    quality.per_cell(points, corners, topology.near_orientation[rows], columns)
+    shape, noise = columns[quality.SHAPE], float(np.median(rough))
+    blend = np.maximum(_ramp(rough, ROUGH, BROKEN), _ramp(-shape, -SOUND, -POOR))
+    blend = np.maximum(blend, _ramp(np.array(noise), CALM, NOISY))
+    nodes = topology.memory[corners]
+    kept.nodes[nodes] = True
+    np.maximum.at(kept.blend, nodes, blend[:, None])
+    wider = WIDEST ** float(_ramp(np.array(noise), NOISY, RANDOM))
+    kept.room[nodes] = np.maximum(kept.room[nodes], wider)
+
+
+def _leave_out_inverted(kept: Kept, topology: Topology, points: Floats) -> None:
+    """Takes the corners of inverted cells from those that are kept; but for cells that cannot move."""
+    inside = kept.nodes[topology.memory]
+    rows = np.flatnonzero(inside[topology.near].any(axis=1) & topology.near_free[topology.near].any(axis=1))
+    corners = topology.near[rows]
+    inverted = exact_signs(points, corners, topology.near_orientation[rows]) <= 0
+    kept.nodes[topology.memory[corners[inverted]]] = False
+
+
+def _ramp(value: Floats, low: float, high: float) -> Floats:
+    """0 up to low, 1 from high on, linear between."""
+    return np.asarray(np.clip((value - low) / (high - low), 0.0, 1.0))
 
 
 def _roughness(triangles: Ints, double: Floats, nodes: int) -> Floats:

@@ -71,7 +71,7 @@ class Journey:
         self.path = Path.of(prescribed, self.held, state.start, state.mesh.exponent)
         self.start = as_complex(state.points)
         kept = np.zeros(len(self.start), dtype=bool)
-        for nodes in (state.protection.layers, state.protection.kept):
+        for nodes in (state.protection.layers, state.protection.near_walls):
             if nodes is not None:
                 kept |= nodes[base.memory]
         self.follower = Follower.of(self.held, self.start, self.path.end != self.path.start, kept)
@@ -223,7 +223,7 @@ def _smoothed(state: State, journey: Journey, options: SmoothOptions, executor: 
     if isinstance(smoother, Sized):
         smoother.start = state.start
     done = sweep(replace(state, protection=within, smoother=smoother), options, executor)
-    near_walls = protection.kept is not None and (region & protection.kept).any()
+    near_walls = protection.near_walls is not None and (region & protection.near_walls).any()
     if near_walls and done.interruption is None:
         done = improve_near_walls(done, options, executor)
     return replace(done, protection=protection, released=False)

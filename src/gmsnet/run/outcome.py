@@ -18,7 +18,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.metric.conformity import Conformity, ConformityChange
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
-from gmsnet.preserve.protection import WALL, carried_note, wall_note
+from gmsnet.preserve.protection import WALL, Protection, carried_note, wall_note
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.state import Final, State
@@ -96,10 +96,9 @@ def _held(state: State) -> dict[str, NDArray[np.int64]]:
 
 def _notes(state: State) -> list[str]:
     protection, near_walls, of_order = state.protection, [], []
-    if protection.kept is not None:
-        count = len(protection.topology.held.get(WALL, ()))
-        told = carried_note(count) if state.motion else wall_note(count, moved=state.released)
-        near_walls.append(told)
+    if protection.walls is not None:
+        carried = carried_note(len(protection.topology.held.get(WALL, ())))
+        near_walls.append(carried if state.motion else _wall_note(protection, moved=state.released))
     slid = []
     if state.sliding is not None and state.final is not None:
         slid.append(state.sliding.note(planar_points(state.mesh.with_points(state.final.points)), state.final.moved))
@@ -107,9 +106,14 @@ def _notes(state: State) -> list[str]:
     if given is not None and given.sign is not None and state.final is not None:
         of_order.append(given.note(state.final.moved))
         of_order.extend(given.protection.notes)
-        if given.protection.kept is not None:
-            of_order.append(wall_note(len(given.protection.topology.held.get(WALL, ())), moved=False))
+        if given.protection.walls is not None:
+            of_order.append(_wall_note(given.protection, moved=False))
     return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks, *of_order]
+
+
+def _wall_note(protection: Protection, *, moved: bool) -> str:
+    assert protection.walls is not None
+    return wall_note(protection.walls, len(protection.topology.held.get(WALL, ())), moved)
 
 
 def outcome(

@@ -70,7 +70,7 @@ def second_order_of(mesh: Mesh, topology: Topology, options: SmoothOptions) -> S
     twin = straight(mesh)
     whole, near = Topology.and_points(twin, ~(may | first))
     corners = whole.holding(first, FIRST_ORDER)
-    return SecondOrder(table, kind, may, whole, protected(twin, corners, options.preserve, options.fix_layers, near))
+    return SecondOrder(table, kind, may, whole, protected(twin, corners, options.preserved, options.fix_layers, near))
 
 
 def straight(mesh: Mesh) -> Mesh:

@@ -78,7 +78,9 @@ def first_state(
 
     def looked_at(near: Floats) -> tuple[QualityReport, Protection]:
         before = measure(given, topology, near, executor.for_blocks(0), shapes=shapes)
-        return before, protected(given, topology, options.preserved, options.fix_layers, near)
+        firm = bool(target) or before.inverted > 0
+        found = protected(given, topology, options.preserved, options.fix_layers, near, firm=firm)
+        return before, found
 
     if threads == 1 or target or not isinstance(smoother, Auto | StarSmoother):
         before, protection = looked_at(start)

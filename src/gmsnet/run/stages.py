@@ -13,7 +13,7 @@ from gmsnet.run.outcome import write_back
 from gmsnet.run.second_order import make_room, smooth_corners, untangle_second_order
 from gmsnet.run.state import State
 from gmsnet.run.sweep_stage import sweep
-from gmsnet.run.untangle_stage import untangle_all, untangle_protected
+from gmsnet.run.untangle_stage import protect_untangled, untangle_all, untangle_protected
 from gmsnet.run.wall_stage import improve_near_walls
 
 
@@ -29,8 +29,8 @@ class Stage(Protocol):
 
 
 STAGES: tuple[Stage, ...] = (
-    untangle_all, untangle_protected, take_metric, sweep, improve_near_walls, untangle_second_order, smooth_corners,
-    make_room,
+    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_near_walls, untangle_second_order,
+    smooth_corners, make_room,
 )  # fmt: skip
 
 

@@ -98,8 +98,9 @@ class State:
     start: (N, 2) the nodes of the input, points: those of the best mesh so far, both in memory order (``near_points``).
     shapes: (T,) 1/q of the input's triangles in ``topology.near``; none without a target. remarks: what there is to say
     about the input. totals: of the points, where they are known. untangling: what was done about inverted cells,
-    reasons: why some are left, by the index of each cell. history: one Sweep for each look. stop_reason: one of
-    ``run.stop``, "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
+    untangled: the points after that, in which ``protection`` was found, None where nothing was done. reasons: why
+    some are left, by the index of each cell. history: one Sweep for each look. stop_reason: one of ``run.stop``,
+    "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
     sliding: the nodes that move along curves, if any. curved: while the corners of second-order cells move, those cells
     (``second_order``, which is all that is known of them). nodal: (N, 3) by id, the logarithms of a metric that is
     given at nodes. metric: what cells are to become, once it is known; conformity: of the input to it, and of the
@@ -119,6 +120,7 @@ class State:
     remarks: tuple[str, ...] = ()
     totals: Totals | None = None
     untangling: tuple[str, ...] = ()
+    untangled: Floats | None = None
     reasons: Mapping[int, str] = field(default_factory=dict)
     history: tuple[Sweep, ...] = ()
     stop_reason: str = ""

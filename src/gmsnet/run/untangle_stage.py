@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gmsnet.constraints.sliding import REASON
 from gmsnet.measure.report import QualityReport
 from gmsnet.parallel.executor import Executor
+from gmsnet.preserve.protection import protected
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.topology.topology import Topology
@@ -35,10 +36,25 @@ def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> St
 
 def untangle_protected(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Lets go of protected nodes beside cells that could not be untangled, and tries once more."""
-    freed = None
-    if state.reasons:
-        freed = state.protection.released(beside(state.reasons, state.topology))
-    return state if freed is None else _untangled(replace(state, protection=freed))
+    freed = state.protection.released(beside(state.reasons, state.topology)) if state.reasons else None
+    if freed is None:
+        return state
+    protection, note = freed
+    return _untangled(replace(state, protection=protection, untangling=(*state.untangling, note)))
+
+
+def protect_untangled(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """Protects what is there on purpose in the mesh as it is once it is untangled: tangles are no layers."""
+    if not state.untangling:
+        return state
+    mesh, base = state.mesh, state.protection.base
+    points = mesh.points.copy()
+    points[base.memory[:, None], list(mesh.plane or ())] = np.ldexp(state.points, mesh.exponent)
+    found = protected(
+        mesh.with_points(points), base, options.preserved, options.fix_layers, state.points,
+        firm=bool(options.target or state.reasons),
+    )  # fmt: skip
+    return replace(state, protection=found, untangled=state.points)
 
 
 def _untangled(state: State) -> State:

@@ -1,4 +1,4 @@
-"""A shift is shortened to where the first triangle reaches the end of its band, and no further."""
+"""Bands: their ends against a slow twin, and nodes that slide no further than to where a first cell leaves its band."""
 
 from __future__ import annotations
 
@@ -11,79 +11,97 @@ import gmsnet
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import bands
 from gmsnet.kernels.star import stars
+from gmsnet.methods.sized import places_of
 from gmsnet.topology.ordering import planar_points
 from gmsnet.topology.topology import Topology
 
 WIDTH = 0.1
 
 
-def doubles(points, topology):
-    a, b, c = (points[topology.near[:, k]] for k in range(3))
-    return (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+def doubles(points, triangles):
+    a, b, c = (points[triangles[..., k]] for k in range(3))
+    return (b - a)[..., 0] * (c - a)[..., 1] - (b - a)[..., 1] * (c - a)[..., 0]
 
 
-def shares_of(points, topology, kept, shifts):
-    """What is left of the shift (N, 2; over the stars' sizes) of each free node, all others where they are."""
+def limited(points, topology, kept, blend=0.0, room=1.0):
+    """The bands of all stars, and the logarithms of the mean areas around nodes."""
     blocks = topology.stars.blocks
-    given = bands.Bands(points.copy(), kept, WIDTH)
-    room = stars.workspace_for(blocks.most)
-    local, shift = np.empty(2 * blocks.most * LANES), np.empty(2 * LANES)
-    left, size = np.full((len(points), 2), np.nan), np.full(len(points), np.nan)
-    for block in range(len(blocks.degree)):
-        stars.fetch(points, blocks, block, room, local)
-        centre = blocks.centre[block * LANES : (block + 1) * LANES]
-        shift[:] = shifts[centre].T.ravel()
-        bands.shorten(given, None, blocks, block, room.star, room.work[:LANES], shift)
-        left[centre], size[centre] = shift.reshape(2, LANES).T, room.work[:LANES]
-    return left, size
+    first, count = places_of(blocks)
+    found, log_mean = bands.Bands(first, np.empty(count), np.empty(count)), np.empty(len(points))
+    bands.mean_areas(points, topology.near, log_mean)
+    same = np.ones(len(points))
+    bands.limit(points, kept, WIDTH, log_mean, blend * same, room * same, blocks, found)
+    return found, log_mean
+
+
+@pytest.mark.parametrize(("blend", "room"), [(0.0, 1.0), (0.5, 1.0), (1.0, 3.0)])
+def test_the_ends_of_bands_follow_from_areas(blend, room):
+    mesh = gmsnet.random_mesh(120, seed=3)
+    topology = Topology.of(mesh)
+    points = planar_points(mesh)[topology.memory]
+    kept = np.random.default_rng(0).random(len(points)) < 0.8
+    found, log_mean = limited(points, topology, kept, blend, room)
+    for node in range(len(points)):
+        around = np.abs(doubles(points, topology.near[(topology.near == node).any(axis=1)]))
+        assert log_mean[node] == pytest.approx(np.log(around.mean()))
+    blocks, seen = topology.stars.blocks, 0
+    for block, first in enumerate(found.first):
+        n = blocks.degree[block]
+        for k in range(n):
+            for lane in range(blocks.filled[block]):
+                ring = blocks.rings[blocks.offset[block] :]
+                i, j = (n - 1 if k == 0 else k - 1), k
+                corners = np.array(
+                    [blocks.centre[block * LANES + lane], ring[i * LANES + lane], ring[j * LANES + lane]]
+                )
+                low, high = found.low[first + k * LANES + lane], found.high[first + k * LANES + lane]
+                if not kept[corners].all():
+                    assert (low, high) == (-np.inf, np.inf)
+                    continue
+                own = doubles(points, corners)
+                goal = own * (np.exp(log_mean[corners].mean()) / own) ** blend
+                assert low == pytest.approx((1 - WIDTH) * min(own, goal) / room)
+                assert high == pytest.approx((1 + WIDTH) * max(own, goal) * room)
+                seen += 1
+    assert seen > 300
 
 
 @given(seed=st.integers(0, 2**32 - 1), reach=st.sampled_from([1e-3, 0.03, 0.3, 10.0]))
-def test_no_triangle_leaves_its_band_and_no_shift_is_shortened_for_nothing(seed, reach):
+def test_what_is_left_of_a_shift_ends_where_a_band_does_or_is_whole(seed, reach):
     rng = np.random.default_rng(seed)
-    mesh = gmsnet.random_mesh(60, seed=seed % 7)
-    topology = Topology.of(mesh)
-    points = planar_points(mesh)[topology.memory]
-    kept = rng.random(len(points)) < 0.8
-    shifts = reach * rng.normal(size=points.shape)
-    left, size = shares_of(points, topology, kept, shifts)
-    before = doubles(points, topology)
-    banded = kept[topology.near].all(axis=1)
-    for node in np.flatnonzero(~np.isnan(size)):
-        moved = points.copy()
-        moved[node] += size[node] * left[node]
-        ratio = (doubles(moved, topology) / before)[banded]
-        assert np.abs(ratio - 1.0).max(initial=0.0) <= WIDTH + 1e-9
-        whole = left[node].tolist() == shifts[node].tolist()
-        assert whole or np.abs(ratio - 1.0).max() == pytest.approx(WIDTH, abs=1e-9)
-        np.testing.assert_allclose(left[node, 0] * shifts[node, 1], left[node, 1] * shifts[node, 0], atol=1e-12 * reach)
+    p, q = rng.normal(size=(2, 2))
+    if p[0] * q[1] - p[1] * q[0] < 0:
+        p, q = q, p
+    d = p[0] * q[1] - p[1] * q[0]
+    low, high = d * rng.uniform(0.5, 1.0), d * rng.uniform(1.0, 2.0)
+    dx, dy = reach * rng.normal(size=2)
+    share = bands.share_inside(low, high, *p, *q, dx, dy)
+    there = (p[0] - share * dx) * (q[1] - share * dy) - (p[1] - share * dy) * (q[0] - share * dx)
+    assert 0.0 <= share <= 1.0
+    assert low - 1e-9 * d <= there <= high + 1e-9 * d
+    assert share == 1.0 or min(abs(there - low), abs(there - high)) <= 1e-9 * max(high, 1.0)
 
 
 def test_what_is_outside_of_its_band_may_go_back_only():
-    mesh = gmsnet.Mesh(
-        np.array([[0.1, 0.1], [1.0, 0.0], [0.0, 1.0], [-1.0, -1.0]]),
-        (gmsnet.CellBlock("triangle", [[0, 1, 2], [0, 2, 3], [0, 3, 1]], [0, 0, 0]),),
-    )
-    topology = Topology.of(mesh)
-    start = planar_points(mesh)[topology.memory]
-    place = int(np.flatnonzero(topology.memory == 0)[0])
-    blocks = topology.stars.blocks
-    room = stars.workspace_for(blocks.most)
-    local = np.empty(2 * blocks.most * LANES)
-    now = start.copy()
-    now[place] = [-0.2, -0.2]
-    stars.fetch(now, blocks, 0, room, local)
-    for direction, share in ((-0.01, 0.0), (0.01, 1.0)):
-        shift = np.full(2 * LANES, direction)
-        bands.shorten(
-            bands.Bands(start, np.ones(4, dtype=bool), WIDTH), None, blocks, 0, room.star, room.work[:LANES], shift
-        )
-        assert shift[0] == share * direction
+    for d, slope_to_band in ((0.5, 1.0), (2.0, -1.0)):  # D is p × q = d, and rises by dy·(…)
+        p, q = (1.0, 0.0), (0.0, d)
+        back, away = -0.1 * slope_to_band, 0.1 * slope_to_band
+        shares = [bands.share_inside(0.9, 1.1, *p, *q, dx, 0.0) for dx in (back, away)]
+        assert sorted(shares) == [0.0, 1.0]
 
 
-def test_shifts_that_are_not_finite_stay_so():
-    mesh = gmsnet.random_mesh(30, seed=0)
+def test_without_a_band_all_passes_and_so_does_what_is_not_finite():
+    assert bands.share_inside(-np.inf, np.inf, 1.0, 0.0, 0.0, 1.0, 50.0, 0.0) == 1.0
+    assert bands.share_inside(0.9, 1.1, 1.0, 0.0, 0.0, 1.0, np.nan, 0.0) == 1.0
+
+
+def test_nodes_that_do_not_slide_keep_their_shifts():
+    mesh = gmsnet.random_mesh(60, seed=0)
     topology = Topology.of(mesh)
     points = planar_points(mesh)[topology.memory]
-    left, _ = shares_of(points, topology, np.ones(len(points), dtype=bool), np.full(points.shape, np.nan))
-    assert np.isnan(left).all()
+    found, _ = limited(points, topology, np.ones(len(points), dtype=bool))
+    blocks = topology.stars.blocks
+    room, shift = stars.workspace_for(blocks.most), np.full(2 * LANES, 0.3)
+    stars.fetch(points, blocks, 0, room, np.empty(2 * blocks.most * LANES))
+    bands.shorten(found, None, blocks, 0, room.star, room.work[:LANES], shift)
+    assert (shift == 0.3).all()

@@ -27,7 +27,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
-from gmsnet.kernels.methods import bands
 from gmsnet.kernels.simplex.lanes import any_positive
 from gmsnet.kernels.simplex.objectives import aspect_squared, squares
 from gmsnet.kernels.star import stars
@@ -203,10 +202,10 @@ def take(local, n, pattern, state, shift):
 
 
 @kernel
-def sweep(points, blocks, wanted, weight, kept, first, last, guard, tally):
+def sweep(points, blocks, wanted, weight, first, last, guard, tally):
     """Visits the blocks first…last (of one colour) once. tally: (3,), added to.
 
-    wanted: as ``targets`` leaves it. kept: bands.Bands that no shift leaves.
+    wanted: as ``targets`` leaves it.
     """
     workspace = stars.workspace_for(blocks.most)
     local, goals = np.empty(2 * blocks.most * LANES), np.empty(blocks.most * LANES)
@@ -221,8 +220,6 @@ def sweep(points, blocks, wanted, weight, kept, first, last, guard, tally):
                 goals[k * LANES + lane] = wanted.double[low + k * LANES + lane] / (size * size)
         descend(local, n, pattern, goals, weight, state)
         take(local, n, pattern, state, shift)
-        if len(kept.kept):
-            bands.shorten(kept, guard.constraint, blocks, block, workspace.star, sizes, shift)
         stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)
     for k in range(len(tally)):
         tally[k] += workspace.counts[k]
