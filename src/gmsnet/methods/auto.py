@@ -27,19 +27,25 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.measures import mean_shape_of_sample
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import STAR
 from gmsnet.measure.target import Target
+from gmsnet.measure.totals import totals_of
 from gmsnet.methods.barrier import Barrier
-from gmsnet.methods.base import Field, Method, Smoother, Tally
+from gmsnet.methods.base import ALL_CELLS, Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.creep import Creep
 from gmsnet.methods.optimize import Newton
 from gmsnet.methods.whole_mesh import WholeMesh
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 SMALL = 5000  # free nodes
 SAMPLE = 32  # blocks of cells
@@ -104,6 +110,12 @@ QUADS_PLAN = (
     MEAN._replace(gain=0.0003, rounds=20),
 )
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
+# Of volumes; q there is the mean ratio to the power of 3/2.
+VOLUME_PLAN = (
+    Phase("Newton on q", lambda: Barrier("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False),
+    Phase("worst first", WorstFirst, 1, looks=False),
+    Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0005),
+)
 
 
 class Auto(Smoother):
@@ -135,10 +147,9 @@ class Auto(Smoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if self.at < 0:
-            large = LARGE_PLAN if field.topology.near_shapes is None else QUADS_PLAN
-            if not self.phases and field.level != STAR:
+            if not self.phases and field.level != STAR and isinstance(field.topology, Topology):
                 self.creep = Creep.of(field)
-            self.phases = self.phases or (SMALL_PLAN if len(field.topology.free) <= SMALL else large)
+            self.phases = self.phases or plan_for(field.topology)
             self._enter(0, field)
         if self.at == len(self.phases):
             return self._move_all_for_worst(field, executor, test)
@@ -188,7 +199,7 @@ class Auto(Smoother):
         """Is the worst cell to have another turn, once others have made room for it?"""
         self.passes += 1
         gains = smoother.least >= self.least + PASS_GAIN
-        if self.passes == 1 and self.phases is not SMALL_PLAN:
+        if self.passes == 1 and self.phases is not SMALL_PLAN and self.phases is not VOLUME_PLAN:
             gains = smoother.gained >= LAST_GAIN
         self.again = self.at if gains and self.passes < PASSES else -1
         self.least = smoother.least
@@ -227,16 +238,28 @@ class Auto(Smoother):
             goes_on = goes_on or self.slow
         target_reached = self.smoother.target_reached
         self.looks = self.rounds % phase.often == 0 if goes_on else phase.looks or target_reached
-        if isinstance(self.smoother, WorstFirst) and self.creep is not None:
+        if isinstance(self.smoother, WorstFirst) and (self.creep is not None or self.phases is VOLUME_PLAN):
             self._look_at_worst(self.smoother)
         if not goes_on:
             self._enter(len(self.phases) if target_reached else self.at + 1, field)
+
+
+def plan_for(topology: Topology | Volume) -> Sequence[Phase]:
+    """The phases for a mesh of this size and these cells."""
+    if isinstance(topology, Volume):
+        return VOLUME_PLAN
+    if len(topology.free) <= SMALL:
+        return SMALL_PLAN
+    return LARGE_PLAN if topology.near_shapes is None else QUADS_PLAN
 
 
 def mean_shape(field: Field) -> float:
     """The mean of 1/q over some of the cells, evenly taken."""
     simplices = field.topology.changeable
     stride = max(1, len(simplices.rows) // (SAMPLE * LANES))
+    if isinstance(simplices, Tetrahedra):
+        totals = totals_of(field.points, simplices.take(np.arange(0, len(simplices.rows), stride, dtype=np.int32)))
+        return math.nan if totals is None else totals.shape_mean
     return float(mean_shape_of_sample(field.points, simplices, stride))
 
 
@@ -271,4 +294,5 @@ METHOD = Method(
     source="this package; docs/auto.md",
     create=lambda options: Auto(),
     slides=True,
+    cells=ALL_CELLS,
 )

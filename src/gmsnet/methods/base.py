@@ -23,22 +23,29 @@ from gmsnet.kernels.star.guard import (
     plain_guard,
     star_floors,
 )
+from gmsnet.kernels.star.guard3 import star_floors3
+from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.stars import Stars
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 CELLS = ("triangle", "quad")  # the kinds of cells whose nodes may move
+ALL_CELLS = (*CELLS, "tetra")
 TRIANGLES = ("triangle",)
 Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.star.stars)
 
 
 @dataclass(eq=False)
 class Field:
-    """What is smoothed. points: (N, 2) in memory order, changed in place by the guard alone. level: of the guard."""
+    """What is smoothed. points: (N, 2) in memory order, changed in place by the guard alone; of volumes (N, 4).
+
+    level: of the guard.
+    """
 
     points: NDArray[np.float64]
-    topology: Topology
+    topology: Topology | Volume
     precision: Precision
     level: int = VALID
     floor: Floor = field(default_factory=Floor)
@@ -53,7 +60,8 @@ class Field:
         if self.level == STAR:
             floors = np.empty(len(self.points))
             ringed = self.topology.near_ringed
-            star_floors(self.points, self.topology.changeable, ringed, guard.unit, guard.grain, floors)
+            of_stars = star_floors3 if isinstance(self.topology, Volume) else star_floors
+            of_stars(self.points, self.topology.changeable, ringed, guard.unit, guard.grain, floors)
             return StarGuard(*guard, floors)
         return guard
 
@@ -87,7 +95,13 @@ class StarSmoother(Smoother):
 
     @abstractmethod
     def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
+        self,
+        points: NDArray[np.float64],
+        blocks: Blocks | SpaceBlocks,
+        first: int,
+        last: int,
+        guard: Guard,
+        tally: Tally,
     ) -> None:
         """Visits the stars of the blocks first…last, all of one colour, once; without the GIL. Adds to the tally."""
 

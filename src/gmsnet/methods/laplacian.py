@@ -22,9 +22,12 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.methods import laplacian as kernels
 from gmsnet.kernels.methods import laplacian_plain
+from gmsnet.kernels.methods.barrier3 import Power3
+from gmsnet.kernels.methods.laplacian3 import sweep3
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import Method, StarSmoother, Tally
+from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.methods.base import ALL_CELLS, CELLS, Method, StarSmoother, Tally
 
 VARIANTS = {  # None: the plain form, which has a kernel of its own
     "smart": kernels.SMART,
@@ -34,6 +37,9 @@ VARIANTS = {  # None: the plain form, which has a kernel of its own
 }
 
 
+IN_SPACE = Power3.of(-1)
+
+
 class Laplacian(StarSmoother):
     """One variant."""
 
@@ -41,10 +47,18 @@ class Laplacian(StarSmoother):
         self.variant = VARIANTS[variant]
 
     def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
+        self,
+        points: NDArray[np.float64],
+        blocks: Blocks | SpaceBlocks,
+        first: int,
+        last: int,
+        guard: Guard,
+        tally: Tally,
     ) -> None:
         """See StarSmoother."""
-        if self.variant is None:
+        if isinstance(blocks, SpaceBlocks):
+            sweep3(points, blocks, first, last, guard, IN_SPACE, self.variant is not None, tally)
+        elif self.variant is None:
             laplacian_plain.sweep(points, blocks, first, last, guard, tally)
         else:
             kernels.sweep(points, blocks, first, last, guard, self.variant, tally)
@@ -57,4 +71,6 @@ METHOD = Method(
     create=lambda options: Laplacian(options.variant),
     variants=tuple(VARIANTS),
     slides=True,
+    cells=ALL_CELLS,
+    limits=dict.fromkeys(("inverse-length", "area"), CELLS),
 )

@@ -25,6 +25,7 @@ from gmsnet.run.untangle_stage import still_inverted
 from gmsnet.topology.held import OF_SECOND_ORDER
 from gmsnet.topology.ordering import near_points, planar_points
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -104,7 +105,7 @@ def _notes(state: State) -> list[str]:
 
 
 def outcome(
-    mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
+    mesh: Mesh, topology: Topology | Volume, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
     start: Floats | None = None, executor: Executor = serial, totals: Totals | None = None,
 ) -> Final:  # fmt: skip
     """The best mesh as it is in the input's order; that of the input if the quick sums misjudged it.
@@ -112,14 +113,16 @@ def outcome(
     best: (N, 2) in memory order. All nodes that it does not move keep their very bits. rank: of two meshes that of the
     lesser rank is the better. start: ``near_points`` of the mesh, totals: of ``best``, where they are known.
     """
-    start = near_points(mesh, topology) if start is None else start
-    plane, factors = mesh.plane, _factors(mesh.exponent)
+    if start is None:
+        start = near_points(mesh, topology)
+    plane, factors = (0, 1, 2) if mesh.has_volumes else mesh.plane, _factors(mesh.exponent)
     assert plane is not None
     points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
     count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)
     if count:
         points.flags.writeable = False  # so that the mesh need not copy them
-        whole = totals if topology.near_shapes is None else None  # else they are of the cells with a free node alone
+        every = isinstance(topology, Topology) and topology.near_shapes is None
+        whole = totals if every else None  # else they are of the cells with a free node alone
         known = (best, executor, whole) if exact else (None, executor)
         after = measure(mesh.with_points(points), topology, *known)
         if rank(after) <= rank(before):

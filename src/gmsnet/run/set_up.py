@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -28,7 +29,9 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.second_order import second_order_of
 from gmsnet.run.state import State
 from gmsnet.topology.held import REASONS
+from gmsnet.topology.ordering import space_points, taken
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -46,10 +49,14 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
     given, restore = to_mesh(mesh)
     check_mesh(given, target)
     check_cells(given, options.method_name, options.objective)
+    if given.has_volumes:
+        check_volume(options)
     remarks = []
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
-    threads = options.thread_count if len(given.points) >= MANY else 1
     asked = fixed_mask(given, fixed)
+    if given.has_volumes:
+        return _first_of_volume(given, restore, asked, smoother, executor)
+    threads = options.thread_count if len(given.points) >= MANY else 1
     curves = curves_to_slide_on(given, options.slide, options.feature_angle, asked)
     topology, start = Topology.and_points(given, asked, threads, None if curves is None else curves.slides)
     sliding = None
@@ -93,16 +100,43 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
     )
 
 
+def _first_of_volume(
+    given: Mesh, restore: Callable[[Floats], Any], asked: NDArray[np.bool_], smoother: Smoother, executor: Executor
+) -> State:
+    """The same of a mesh of tetrahedra."""
+    topology = Volume.of(given, asked)
+    remarks = []
+    if unknown := unknown_cells(given):
+        remarks.append(f"the nodes of {unknown} are held: gmsnet does not know this type of cells")
+    if others := unmeasured(given):
+        remarks.append(f"not measured, and their nodes are held: {others}")
+    given = given.without_cells()
+    start = taken(space_points(given), topology.memory)
+    before = measure(given, topology, start, executor.for_blocks(0))
+    protection, nothing = Protection(topology, []), np.empty(0, dtype=np.float32)
+    return State(given, restore, smoother, before, protection, start, start, nothing, tuple(remarks))
+
+
+def check_volume(options: SmoothOptions) -> None:
+    """InputError for what cannot be asked of volumes yet."""
+    if options.target:
+        raise InputError("a target cannot be asked of volumes yet: leave out target_quality and target_angle")
+    if options.slides:
+        raise InputError("boundary nodes of volumes cannot slide yet: leave out slide")
+
+
 def check_mesh(mesh: Mesh, target: Target) -> None:
-    """InputError for volume meshes and curved surfaces, which cannot be smoothed yet, and targets of no triangle."""
+    """InputError for curved surfaces, which cannot be smoothed yet, and targets of no triangle."""
     others = unmeasured(mesh) if target else ""
     if others and not any(len(block.nodes) for block in mesh.cells if measured(mesh, block)):
         raise InputError(
             f"a target is asked of triangles and quads, and this mesh has none: {others} cannot be measured so far"
         )
-    volumes = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
-    if mesh.plane is None and volumes:
-        raise InputError(f"this is a volume mesh ({', '.join(volumes)}): only planar meshes can be smoothed so far")
+    if mesh.has_volumes:
+        if not any(block.kind == "tetra" and len(block.nodes) for block in mesh.cells):
+            kinds = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
+            raise InputError(f"this is a mesh of {', '.join(kinds)} cells: of volumes, only tetrahedra move so far")
+        return
     if mesh.plane is None and (unknown := unknown_cells(mesh)):
         raise InputError(
             f"the mesh varies in x, y and z and has cells of a type that gmsnet does not know ({unknown}): "

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.sliding import REASON
 from gmsnet.measure.report import QualityReport
+from gmsnet.mesh.display import amount
 from gmsnet.parallel.executor import Executor
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Reasons = Mapping[int, str]  # by the index of each cell among all cells of the mesh
 
@@ -30,15 +32,23 @@ def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> St
     """Moves the free nodes so that fewer cells are inverted; those of second-order cells have a stage of their own."""
     if state.second_order is not None and not len(state.topology.free):
         return state
+    if isinstance(state.topology, Volume):
+        return _left_alone(state) if options.untangle and state.before.inverted else state
     return _untangled(state) if options.untangle and state.before.inverted else state
 
 
 def untangle_protected(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Lets go of protected nodes beside cells that could not be untangled, and tries once more."""
     freed = None
-    if state.reasons:
+    if state.reasons and isinstance(state.topology, Topology):
         freed = state.protection.released(beside(state.reasons, state.topology))
     return state if freed is None else _untangled(replace(state, protection=freed))
+
+
+def _left_alone(state: State) -> State:
+    cells = state.before.cell[~state.before.valid].tolist()
+    note = f"untangling: {amount(len(cells), 'inverted cell')}; those of volumes cannot be untangled yet"
+    return replace(state, untangling=(note,), reasons=dict.fromkeys(cells, "volumes cannot be untangled yet"))
 
 
 def _untangled(state: State) -> State:
