@@ -19,7 +19,7 @@ def quality(
     plot: Annotated[str | None, typer.Option(metavar="FILE", help="Draw the mesh (.png, .svg or .pdf).")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
-    """Measure the triangles and quads, or the tetrahedra, of a mesh: angles, 1/q or η, inverted cells, the worst ones."""
+    """Measure the triangles and quads, or the tetrahedra, of a mesh: angles, 1/q or η, inverted, the worst."""
     from gmsnet.cli.destination import check_drawable, check_picture, shown
 
     if threshold is not None and not -1.0 <= threshold <= 1.0:

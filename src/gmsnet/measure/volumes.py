@@ -69,7 +69,7 @@ class MeasuredTetrahedra:
 
 
 def exact_signs3(points: Floats, corners: NDArray[np.int32], orientation: Signs) -> Signs:
-    """The exact sign of orientation × volume of each tetrahedron: float64 where its error bound decides, else fractions.
+    """The exact sign of orientation × volume of each: float64 where its error bound decides, else fractions.
 
     points: (N, 3 or more). corners: (T, 4).
     """

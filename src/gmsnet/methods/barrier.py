@@ -51,21 +51,19 @@ class Barrier(StarSmoother):
         self.sweeps = 0
 
     def visit(
-        self,
-        points: NDArray[np.float64],
-        blocks: Blocks | SpaceBlocks,
-        first: int,
-        last: int,
-        guard: Guard,
-        tally: Tally,
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
         relaxation = self.relaxation if self.sweeps < self.relaxed else 1.0
-        if isinstance(blocks, SpaceBlocks):
-            sweep3(points, blocks, first, last, guard, self.power3, min(relaxation, IN_SPACE_MOST), tally)
-            return
         stretch = STRETCH if self.sweeps < self.means else 0.0
         kernels.sweep(points, blocks, first, last, guard, self.power, relaxation, stretch, tally)
+
+    def visit_in_space(
+        self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        relaxation = min(self.relaxation, IN_SPACE_MOST) if self.sweeps < self.relaxed else 1.0
+        sweep3(points, blocks, first, last, guard, self.power3, relaxation, tally)
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""

@@ -57,7 +57,7 @@ class Floor:
     def of(
         self, points: NDArray[np.float64], topology: Topology | Volume, precision: Precision, executor: Executor
     ) -> float:
-        """An upper bound of the minimum D/L of the triangles with a free node, of tetrahedra D/S^(3/2), as they are now."""
+        """An upper bound of the minimum D/L of the cells with a free node as they are now, of tetrahedra D/S^(3/2)."""
         simplices = topology.changeable
         blocks = self.blocks
         if blocks is None or self.unhindered < self.looks >= self.enough:

@@ -47,21 +47,19 @@ class Laplacian(StarSmoother):
         self.variant = VARIANTS[variant]
 
     def visit(
-        self,
-        points: NDArray[np.float64],
-        blocks: Blocks | SpaceBlocks,
-        first: int,
-        last: int,
-        guard: Guard,
-        tally: Tally,
+        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        if isinstance(blocks, SpaceBlocks):
-            sweep3(points, blocks, first, last, guard, IN_SPACE, self.variant is not None, tally)
-        elif self.variant is None:
+        if self.variant is None:
             laplacian_plain.sweep(points, blocks, first, last, guard, tally)
         else:
             kernels.sweep(points, blocks, first, last, guard, self.variant, tally)
+
+    def visit_in_space(
+        self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        sweep3(points, blocks, first, last, guard, IN_SPACE, self.variant is not None, tally)
 
 
 METHOD = Method(

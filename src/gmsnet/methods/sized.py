@@ -34,8 +34,9 @@ class Sized(StarSmoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if field.topology is not self.topology:
-            self.topology = field.topology
-            blocks = field.topology.stars.blocks
+            self.topology = field.planar
+            blocks = field.planar.stars.blocks
+            assert isinstance(blocks, Blocks)
             self.wanted = room_for(blocks)
             kernels.targets(field.points, field.topology.near, blocks, self.wanted)
         return super().sweep(field, executor, test)

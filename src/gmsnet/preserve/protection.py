@@ -18,6 +18,7 @@ from gmsnet.preserve.layers import stretched_layers
 from gmsnet.preserve.survey import Survey
 from gmsnet.preserve.walls import near_walls
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 SIZE, NONE = "size", "none"
 PRESERVE = (SHAPE, SIZE, NONE)
@@ -37,18 +38,18 @@ class Protection:
     (wall_stage.py). None where there are none.
     """
 
-    base: Topology
+    base: Topology | Volume
     notes: list[str]
     layers: Flags | None = None
     kept: Flags | None = None
 
     @cached_property
-    def outer(self) -> Topology:
+    def outer(self) -> Topology | Volume:
         """The topology with the nodes of layers held."""
         return self.base if self.layers is None else self.base.holding(self.layers, LAYER)
 
     @cached_property
-    def topology(self) -> Topology:
+    def topology(self) -> Topology | Volume:
         """The topology with all of them held."""
         return self.outer if self.kept is None else self.outer.holding(self.kept, WALL)
 
@@ -91,7 +92,9 @@ def protected(mesh: Mesh, topology: Topology, preserve: str, fix_layers: bool, n
         notes.append("fix_layers: no stretched layers were found, so none are held")
     if preserve != SHAPE:
         return protection
-    kept = near_walls(mesh, protection.outer, survey)
+    outer = protection.outer
+    assert isinstance(outer, Topology)
+    kept = near_walls(mesh, outer, survey)
     walled = Protection(topology, notes, layers, kept)
     return walled if kept.any() and WALL in walled.topology.held else protection
 

@@ -62,7 +62,7 @@ def result_of(state: State, began: float) -> SmoothResult:
     )
 
 
-def _with_corners(state: State) -> Topology:
+def _with_corners(state: State) -> Topology | Volume:
     """The topology; of second-order cells with the corners free that were."""
     given = state.second_order
     if given is None:
@@ -71,7 +71,7 @@ def _with_corners(state: State) -> Topology:
     return given.whole.holding(~(free | _near_free_by_id(state.topology)), OF_SECOND_ORDER)
 
 
-def _near_free_by_id(topology: Topology) -> NDArray[np.bool_]:
+def _near_free_by_id(topology: Topology | Volume) -> NDArray[np.bool_]:
     free = np.zeros(len(topology.memory), dtype=bool)
     free[topology.free] = True
     return free

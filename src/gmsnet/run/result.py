@@ -16,6 +16,7 @@ from gmsnet.mesh.display import amount, html_table, plain, text_table
 from gmsnet.run.sweep import Sweep as Sweep
 from gmsnet.run.untangle_stage import StillInvertedCell
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ class SmoothResult:
     history: list[Sweep]
     notes: list[str]
     unmended: list[StillInvertedCell]
-    topology: Topology
+    topology: Topology | Volume
     seconds: float
     invalid_curved: int = 0
 

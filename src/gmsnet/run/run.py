@@ -27,6 +27,7 @@ from gmsnet.run.stop import CALLBACK, INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTH
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.ordering import near_points
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ class Start(NamedTuple):
     curved: the second-order cells whose corners move.
     """
 
-    topology: Topology
+    topology: Topology | Volume
     points: Floats
     precision: Precision
     score: Score | None = None

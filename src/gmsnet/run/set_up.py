@@ -48,7 +48,7 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
     target = options.target
     given, restore = to_mesh(mesh)
     check_mesh(given, target)
-    check_cells(given, options.method_name, options.objective)
+    check_cells(given, options.method_name, options.objective or options.variant)
     if given.has_volumes:
         check_volume(options)
     remarks = []

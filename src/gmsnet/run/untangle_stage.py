@@ -54,7 +54,7 @@ def _left_alone(state: State) -> State:
 def _untangled(state: State) -> State:
     from gmsnet.untangle import untangle  # what it needs of SciPy takes 0.15 s more to import
 
-    topology = state.topology
+    topology = state.planar
     if state.sliding is not None:
         topology = topology.holding(state.sliding.nodes, REASON)
     done = untangle(state.points, topology, state.precision)

@@ -21,7 +21,10 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Stars:
-    """The patches in blocks of 64 stars of one colour and degree, in space of 16 of one colour; those of colour c are first[c] … first[c + 1] − 1."""
+    """The stars in blocks of one colour; those of colour c are first[c] … first[c + 1] − 1.
+
+    In a plane a block has 64 stars of one degree, in space 16.
+    """
 
     blocks: Blocks | SpaceBlocks
     first: Ints

@@ -169,7 +169,7 @@ class Volume:
             np.empty(count, dtype=np.int32), np.empty(count * LANES3, dtype=np.int32), np.empty(count, dtype=np.int32),
             int(most_rings.max(initial=0)), int(most_cells.max(initial=0)),
         )  # fmt: skip
-        arrays = (made.centre, made.ring, made.degree, made.spoke, made.simplices, made.count, made.filled)
+        arrays = (made.centre, made.ring, made.degree, made.spoke, made.simplices, made.cells, made.filled)
         facets.fill_blocks3(order, self.ring_start, self.ring, self.start, self.local, first, rings, spokes, arrays)
         return Stars(made, of_colour.astype(np.int32))
 
@@ -235,4 +235,7 @@ def _part_volumes(
     """The signed volume of each part, and the sum of the absolute ones, six times."""
     a, b, c = (points[rows[:, k]] - points[rows[:, 0]] for k in (1, 2, 3))
     volume = orientation * np.einsum("ij,ij->i", a, np.cross(b, c))
-    return np.bincount(piece, volume, parts), np.bincount(piece, np.abs(volume), parts)
+    signed, absolute = np.zeros(parts), np.zeros(parts)
+    np.add.at(signed, piece, volume)
+    np.add.at(absolute, piece, np.abs(volume))
+    return signed, absolute

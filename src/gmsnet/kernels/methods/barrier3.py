@@ -40,7 +40,7 @@ FLAT = 1e-5  # of F: a node with less to gain stays, for float32 does not tell i
 
 
 class Power3(NamedTuple):
-    """number: k of p = 3·2^k, −1 for p = 3/2. constants: those of kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m."""
+    """number: k of p = 3·2^k, −1 for p = 3/2. constants: see kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m."""
 
     number: int
     constants: NDArray[np.float32]
@@ -116,13 +116,13 @@ def sweep3(points, blocks, first, last, guard, power, relaxation, tally):
         rows = np.int64(blocks.simplices[block])
         fetch3(points, blocks, block, workspace)
         derive(
-            workspace.local, blocks.spoke, blocks.at[block], rows, blocks.count, block, power.number, power.constants,
+            workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
             workspace.kept, workspace.sums,
         )  # fmt: skip
         propose3(workspace.sums, power, relaxation, workspace.step)
         for trial in range(TRIALS):
             judge(
-                workspace.kept, rows, blocks.count, block, power.number, power.constants, workspace.step, floor,
+                workspace.kept, rows, blocks.cells, block, power.number, power.constants, workspace.step, floor,
                 workspace.sums,
             )  # fmt: skip
             if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1) == 0:

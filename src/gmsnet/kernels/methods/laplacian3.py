@@ -13,7 +13,7 @@ from gmsnet.kernels.star.stars3 import certify3, fetch3, store3, workspace3_for
 @part
 def to_mean(blocks, block, workspace):
     """The step to the mean of the ring; a closed ball of F cells has F/2 + 2 nodes around it."""
-    step, count = workspace.step, blocks.count
+    step, count = workspace.step, blocks.cells
     for k in range(3 * LANES3):
         step[k] = 0.0
     for j in range(np.int64(blocks.degree[block])):
@@ -30,19 +30,19 @@ def to_mean(blocks, block, workspace):
 
 @kernel
 def sweep3(points, blocks, first, last, guard, power, smart, tally):
-    """Visits the blocks first…last (of one colour) once. smart: only where the sum of q^p of the star falls, p = 3/2."""
+    """Visits the blocks first…last (of one colour) once. smart: only where the sum of q^(3/2) of the star falls."""
     workspace = workspace3_for(blocks.most, blocks.most_simplices)
     floor = max(guard.floor, 0.0)
     for block in range(first, last):
         rows = np.int64(blocks.simplices[block])
         fetch3(points, blocks, block, workspace)
         derive(
-            workspace.local, blocks.spoke, blocks.at[block], rows, blocks.count, block, power.number, power.constants,
+            workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
             workspace.kept, workspace.sums,
         )  # fmt: skip
         to_mean(blocks, block, workspace)
         judge(
-            workspace.kept, rows, blocks.count, block, power.number, power.constants, workspace.step, floor,
+            workspace.kept, rows, blocks.cells, block, power.number, power.constants, workspace.step, floor,
             workspace.sums,
         )  # fmt: skip
         if smart:

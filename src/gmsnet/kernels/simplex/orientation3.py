@@ -44,7 +44,7 @@ def spokes_of(points, rows, t):
 
 @kernel
 def signs(points, rows, orientation, delta, out):
-    """Sign of each tetrahedron's volume times its orientation: ±1 where it is certain, 0 where the bound leaves a doubt.
+    """Sign of each volume times the cell's orientation: ±1 where it is certain, 0 where the bound leaves a doubt.
 
     points: (N, 3 or more) float64; rows: (T, 4); orientation: (T,) ±1; delta: see above; out: (T,) int8. Returns the
     doubts.

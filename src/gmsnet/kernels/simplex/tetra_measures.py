@@ -1,9 +1,9 @@
 """Measures of tetrahedra, LANES at a time and without branches.
 
-η = 12(3V)^(2/3)/Σl² and the volume carry the sign of V in the sense in which the cell is to be read. Dihedral angles are
-those of the geometric tetrahedron: at an edge e between the faces with the outward normals m and n (twice their areas
-long), the angle is atan2(|e|·6|V|, −m·n), for |m × n| = |e|·6|V|. The scaled Jacobian is Verdict's: √2·6V over the
-largest product of the three edges at a corner.
+η = 12(3V)^(2/3)/Σl² and the volume carry the sign of V in the sense in which the cell is to be read. Dihedral angles
+are those of the geometric tetrahedron: at an edge e between the faces with the outward normals m and n (twice their
+areas long), the angle is atan2(|e|·6|V|, −m·n), for |m × n| = |e|·6|V|. The scaled Jacobian is Verdict's: √2·6V over
+the largest product of the three edges at a corner.
 """
 
 from __future__ import annotations

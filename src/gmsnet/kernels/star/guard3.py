@@ -1,6 +1,6 @@
 """Which moves are allowed in space: the rule of kernels.star.guard for tetrahedra.
 
-With D = 6V and S = Σl², η = 12(3V)^(2/3)/Σl² is above φ just where D > c·S^(3/2), c = √(φ³/432). A floor is such a c. In
+With D = 6V and S = Σl², η = 12(3V)^(2/3)/Σl² is above φ just where D > c·S^(3/2), c = √(φ³/432). A floor is a c. In
 float64 the computed S = 4(|a|² + |b|² + |c|²) − |a + b + c|² of spokes with components up to m is off by at most
 32u·(4Σ|·|² + |s|²) + 160·mδ + 80δ², for each of the six squared edges changes by at most 24mδ + 12δ² with coordinates
 known up to ±δ, and no term of the sum is larger than what is in brackets. From an upper bound S' of S follows that of

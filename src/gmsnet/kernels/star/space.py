@@ -35,10 +35,10 @@ class SpaceBlocks(NamedTuple):
     """The free nodes in blocks of LANES3 of one colour.
 
     centre: (B·LANES3,) the free nodes. ring: by [block][row][lane], the nodes around; offset (B,) where a block begins,
-    degree (B,) its rows: those of a lane that has fewer repeat its first. spoke: uint8 by [block][simplex][3][lane], the
-    rows of the ring in which the spokes end; at (B,) where a block begins; simplices (B,) the most of a lane, count
-    (B·LANES3,) those of each. filled: (B,) how many lanes hold stars of their own; the others repeat the last. most: the
-    largest degree, most_simplices: of all blocks.
+    degree (B,) its rows: those of a lane that has fewer repeat its first. spoke: uint8 by [block][simplex][3][lane],
+    the rows of the ring in which the spokes end; at (B,) where a block begins; simplices (B,) the most of a lane,
+    cells (B·LANES3,) those of each. filled: (B,) how many lanes hold stars of their own; the others repeat the last.
+    most, most_simplices: the largest of all blocks.
     """
 
     centre: NDArray[np.int32]
@@ -48,7 +48,7 @@ class SpaceBlocks(NamedTuple):
     spoke: NDArray[np.uint8]
     at: NDArray[np.int64]
     simplices: NDArray[np.int32]
-    count: NDArray[np.int32]
+    cells: NDArray[np.int32]
     filled: NDArray[np.int32]
     most: int
     most_simplices: int
@@ -112,12 +112,14 @@ def _present(builder: Any, counts: Any, row: Any) -> Any:
 
 
 @intrinsic
-def derive(_context: Any, local: Any, spoke: Any, at: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any,
-           kept: Any, sums: Any) -> Any:  # fmt: skip
+def derive(
+    _context: Any, local: Any, spoke: Any, at: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any,
+    kept: Any, sums: Any,
+) -> Any:  # fmt: skip
     """Writes what is kept of each simplex, and the sums VALUE to LEAST over them.
 
-    local: as ``relate`` leaves it. spoke: from ``at`` on, so many rows; count: those of each lane, from block·LANES3 on.
-    power: k, constants: (SQUARED + 1,) float32, those named above.
+    local: as ``relate`` leaves it. spoke: from ``at`` on, so many rows; count: those of each lane, from block·LANES3
+    on. power: k, constants: (SQUARED + 1,) float32, those named above.
     """
     signature = types.void(
         local, spoke, types.int64, types.int64, count, types.int64, types.int64, constants, kept, sums
@@ -166,8 +168,10 @@ def derive(_context: Any, local: Any, spoke: Any, at: Any, rows: Any, count: Any
 
 
 @intrinsic
-def judge(_context: Any, kept: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any, step: Any, floor: Any,
-          sums: Any) -> Any:  # fmt: skip
+def judge(
+    _context: Any, kept: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any, step: Any, floor: Any,
+    sums: Any,
+) -> Any:  # fmt: skip
     """Writes the sums AFTER and MARGIN after a step (3·LANES3,), [axis][lane]. floor: c, of D/S^(3/2)."""
     signature = types.void(kept, types.int64, count, types.int64, types.int64, constants, step, types.float32, sums)
     moved = as_written(mean_ratio3.moved)

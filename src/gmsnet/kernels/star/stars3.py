@@ -1,4 +1,4 @@
-"""What every smoother in space shares: gather a block of stars, judge the proposed steps, commit what breaks nothing."""
+"""What every smoother in space shares: gather a block of stars, judge its steps, commit those that break nothing."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def allowed3(points, blocks, block, lane, x, y, z, guard):
     at, offset = blocks.at[block], blocks.offset[block]
     centre = blocks.centre[block * LANES3 + lane]
     reach = max(abs(x), max(abs(y), abs(z)))
-    for k in range(blocks.count[block * LANES3 + lane]):
+    for k in range(blocks.cells[block * LANES3 + lane]):
         row = at + 3 * k * LANES3 + lane
         a = np.uint32(blocks.ring[offset + blocks.spoke[row] * LANES3 + lane])
         b = np.uint32(blocks.ring[offset + blocks.spoke[row + LANES3] * LANES3 + lane])

@@ -1,7 +1,7 @@
-"""Which tetrahedra share which facets, how to read them all of a part alike, and the closed ball of cells at a node.
+"""Which tetrahedra share which facets, how to read all of a part alike, and the closed ball of cells at a node.
 
-Facet k of cell t has the number 4t + k and is opposite to the cell's node k. Its nodes in the order of OPPOSITE are seen
-counter-clockwise from outside in a cell of positive volume, and are spokes of positive volume from node k.
+Facet k of cell t has the number 4t + k and is opposite to the cell's node k. Its nodes in the order of OPPOSITE are
+seen counter-clockwise from outside in a cell of positive volume, and are spokes of positive volume from node k.
 """
 
 from __future__ import annotations
@@ -98,11 +98,11 @@ def join(facets, at, end, twin):
 @inlined
 def same_way(rows, one, other):
     """Do two cells see their common facet turn the same way? Then one of the two is to be read with the other sign."""
-    t, k, u, l = one >> 2, one & 3, other >> 2, other & 3
+    t, k, u, j = one >> 2, one & 3, other >> 2, other & 3
     a, b = rows[t, OPPOSITE[k, 0]], rows[t, OPPOSITE[k, 1]]
     for i in range(3):
-        if rows[u, OPPOSITE[l, i]] == a:
-            return rows[u, OPPOSITE[l, (i + 1) % 3]] == b
+        if rows[u, OPPOSITE[j, i]] == a:
+            return rows[u, OPPOSITE[j, (i + 1) % 3]] == b
     return False
 
 
@@ -233,7 +233,7 @@ def rings(start, spokes, ring_start, ring, local, most):
 
 @kernel
 def fill_blocks3(order, ring_start, ring, start, local, first, rings, spokes, arrays):
-    """Writes stars in blocks of LANES3. order: the free nodes by colour, those of one colour by how many cells they have.
+    """Writes stars in blocks of LANES3. order: the free nodes by colour, of one colour by how many cells they have.
 
     first: (B + 1,) where the stars of each block begin in ``order``. rings, spokes: (B + 1,) where each block begins in
     ring and spoke. arrays: centre, ring, degree, spoke, simplices, count and filled of kernels.star.space.SpaceBlocks.

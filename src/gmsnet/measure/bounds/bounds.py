@@ -124,7 +124,9 @@ class Limits:
 
 
 def limits(mesh: Mesh, topology: Topology | Volume, below: float = 0.9) -> Limits:
-    """The bounds less than ``below`` for a planar mesh; of volumes those of held cells alone. topology: of this mesh; which nodes it holds is what counts.
+    """The bounds less than ``below`` for a planar mesh; of volumes those of held cells alone.
+
+    topology: of this mesh; which nodes it holds is what counts.
 
     Where free nodes are has no influence.
     """
