@@ -1,7 +1,6 @@
 """The worst cells of a volume first: sweeps of Newton's method on high powers of q over the stars of their nodes alone.
 
-A cycle ranks the candidates, which are the worst of all when the list begins, takes a share of all cells, and makes
-blocks of the stars of their free nodes. The sweeps over these are those of the barrier (kernels/methods/barrier3.py),
+A cycle ranks all cells, takes a share of them, and makes blocks of the stars of their free nodes. The sweeps over these are those of the barrier (kernels/methods/barrier3.py),
 with q relative to the worst of all.
 """
 
@@ -12,6 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.tetra_measures import cubed_ratios
@@ -22,7 +22,7 @@ from gmsnet.topology.volume import Volume
 
 # The share of all cells, k of p = 3·2^k, and how many sweeps.
 CYCLES = ((0.004, 2, 4), (0.002, 4, 8), (0.001, 5, 12))
-CANDIDATES, FEWEST_CANDIDATES, FEWEST = 0.02, 100, 12
+FEWEST = 12  # cells
 
 
 class WorstInSpace(Smoother):
@@ -34,18 +34,15 @@ class WorstInSpace(Smoother):
         """See Smoother."""
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
         assert isinstance(topology, Volume)
-        guard, every = field.guard(executor), topology.changeable
-        ratios = _ratios(field.points, every)
-        wanted = min(max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * len(ratios))), len(ratios))
-        chosen = np.argpartition(ratios, len(ratios) - wanted)[len(ratios) - wanted :].astype(np.int32)
-        candidates, before = every.take(np.sort(chosen)), float(ratios.max(initial=1.0))
+        guard, cells = field.guard(executor), topology.changeable
+        ratios = _ratios(field.points, cells, executor)
+        before = after = float(ratios.max(initial=1.0))
         for share, number, sweeps in CYCLES:
-            ratios = _ratios(field.points, candidates)
-            count = min(max(FEWEST, math.ceil(share * len(every.rows))), wanted)
-            worst = np.argpartition(ratios, wanted - count)[wanted - count :]
-            nodes = np.unique(candidates.rows[worst])
+            count = min(max(FEWEST, math.ceil(share * len(ratios))), len(ratios))
+            worst = np.argpartition(ratios, len(ratios) - count)[len(ratios) - count :]
+            nodes = np.unique(cells.rows[worst])
             stars = topology.stars_of(nodes[topology.near_free[nodes]].astype(np.int64))
-            power = Power3.of(number, min(float(ratios.max(initial=1.0)) / K3, 1e30))
+            power = Power3.of(number, min(after / K3, 1e30))
 
             def visit(first: int, last: int, blocks=stars.blocks, power=power) -> Tally:  # type: ignore[no-untyped-def]
                 counts = np.zeros(3, dtype=np.int64)
@@ -55,15 +52,20 @@ class WorstInSpace(Smoother):
 
             for _ in range(sweeps):
                 tally += by_colour(executor, visit, stars, field.points)
-        after = float(_ratios(field.points, candidates).max(initial=1.0))
+            ratios = _ratios(field.points, cells, executor)  # of all: what is beside a mended cell can be the worst
+            after = float(ratios.max(initial=1.0))
         least = (K3 / after) ** (1.0 / 3.0)
         self.least, self.gained = least, least - (K3 / before) ** (1.0 / 3.0)
         field.floor.forget()
         return tally
 
 
-def _ratios(points: NDArray[np.float64], cells: Tetrahedra) -> NDArray[np.float64]:
+def _ratios(points: NDArray[np.float64], cells: Tetrahedra, executor: Executor) -> NDArray[np.float64]:
     """S³/D² of each; infinite where D is not positive."""
     out = np.empty(len(cells.rows))
-    cubed_ratios(points, cells.rows, cells.orientation, out)
+
+    def look(first: int, last: int) -> None:
+        cubed_ratios(points, cells.rows, cells.orientation, first * LANES, min(last * LANES, len(out)), out)
+
+    executor.map(look, 0, -(-len(out) // LANES))
     return out

@@ -120,9 +120,9 @@ def summarise_tetrahedra(points, simplices, first, last, coarse, fine):
 
 
 @kernel
-def cubed_ratios(points, rows, orientation, out):
-    """S³/D² of each cell, 432·η⁻³, into out (T,); infinite where the volume is not positive."""
-    for t in range(len(rows)):
+def cubed_ratios(points, rows, orientation, first, last, out):
+    """S³/D² of the cells first…last, 432·η⁻³, into out (T,); infinite where the volume is not positive."""
+    for t in range(first, last):
         ax, ay, az, bx, by, bz, cx, cy, cz = spokes_of(points, rows, t)
         double, lengths, _, _, _, _, _, _ = measured(ax, ay, az, bx, by, bz, cx, cy, cz)
         double *= orientation[t]
