@@ -30,6 +30,7 @@ Floats = NDArray[np.float64]
 
 SMOOTHED = ("tetra",)  # the kinds whose nodes may move
 MOST = 255  # nodes around a free node: they are numbered by one byte
+BITS = connectivity.BOUNDARY, connectivity.INTERFACE, connectivity.NON_MANIFOLD
 BYTES_PER_CELL = 190  # that the set-up takes at most
 
 
@@ -76,9 +77,9 @@ class Volume:
         memory, position = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
         keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
         layout.morton_order3(points, keys, other, memory, position)
-        rows = position[cells]
-        origin = np.argsort(rows.min(axis=1), kind="stable").astype(np.int32)
-        rows, region = rows[origin], region[origin] if len(region) else region
+        place, origin = np.empty_like(cells), np.empty(len(cells), dtype=np.int32)
+        facets.order_cells(cells, position, np.zeros(nodes + 2, dtype=np.int32), place, origin)
+        rows, region = place.take(origin, axis=0), region.take(origin) if len(region) else region
         marks = _known_marks(mesh, fixed, position)
         orientation = _wound(points[memory], rows, region, marks)
         marks[np.bincount(rows.ravel(), minlength=nodes) == 0] |= np.uint16(connectivity.UNUSED)
@@ -169,26 +170,25 @@ class Volume:
             np.empty(count, dtype=np.int32), np.empty(count * LANES3, dtype=np.int32), np.empty(count, dtype=np.int32),
             int(most_rings.max(initial=0)), int(most_cells.max(initial=0)),
         )  # fmt: skip
-        arrays = (made.centre, made.ring, made.degree, made.spoke, made.simplices, made.cells, made.filled)
-        facets.fill_blocks3(order, self.ring_start, self.ring, self.start, self.local, first, rings, spokes, arrays)
+        facets.fill_blocks3(order, self.ring_start, self.ring, self.start, self.local, first, rings, spokes, made)
         return Stars(made, of_colour.astype(np.int32))
 
 
 def _tetrahedra(mesh: Mesh) -> tuple[Ints, NDArray[np.int64], NDArray[np.int64]]:
     """The cells (T, 4), the index of each among all cells, and their regions, none (0,) where all are the same."""
-    cells, numbers, regions, before = [], [], [], 0
+    chosen, numbers, before = [], [], 0
     for block in mesh.cells:
-        if block.kind in SMOOTHED:
-            cells.append(block.nodes)
+        if block.kind in SMOOTHED and len(block.nodes):
+            chosen.append(block)
             numbers.append(np.arange(before, before + len(block.nodes)))
-            regions.append(block.regions)
         before += len(block.nodes)
-    if not cells:
+    if not chosen:
         return np.empty((0, 4), dtype=np.int32), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    region = np.concatenate(regions)
-    if (region == region[:1]).all():
-        region = region[:0]
-    return np.concatenate(cells).astype(np.int32), np.concatenate(numbers), region
+    cells = np.concatenate([block.nodes for block in chosen], dtype=np.int32, casting="same_kind")
+    first = chosen[0].regions[0]
+    same = all((block.regions == first).all() for block in chosen)
+    region = np.empty(0, dtype=np.int64) if same else np.concatenate([block.regions for block in chosen])
+    return cells, numbers[0] if len(numbers) == 1 else np.concatenate(numbers), region
 
 
 def _known_marks(mesh: Mesh, fixed: Flags | None, position: Ints) -> NDArray[np.uint16]:
@@ -206,19 +206,16 @@ def _known_marks(mesh: Mesh, fixed: Flags | None, position: Ints) -> NDArray[np.
 
 def _wound(points: Floats, rows: Ints, region: NDArray[np.int64], marks: NDArray[np.uint16]) -> NDArray[np.int8]:
     """The orientation of each cell; marks the nodes of the boundary, of interfaces and of what cannot be wound."""
-    nodes, count = len(marks), len(rows)
-    twin = np.empty(4 * count, dtype=np.int32)
-    keys, numbers = np.empty(4 * count, dtype=np.int64), np.empty(4 * count, dtype=np.int32)
-    facets.match(rows, np.zeros(nodes + 2, dtype=np.int64), keys, numbers, twin)
-    bits = connectivity.BOUNDARY, connectivity.INTERFACE, connectivity.NON_MANIFOLD
+    count = len(rows)
     positive, negative = orientation3.count_signs(points, rows)
     if count in (positive, negative):
         orientation = np.full(count, 1 if positive == count else -1, dtype=np.int8)
-        if facets.mark_facets(rows, twin, region, orientation, *bits, marks):
+        if _marked_alike(rows, region, marks):
             return orientation
+    twin, nothing = _matched(rows, len(marks)), np.empty(0, dtype=np.uint64)
     piece, orientation = np.full(count, -1, dtype=np.int32), np.ones(count, dtype=np.int8)
     consistent = facets.wind(rows, twin, piece, orientation)
-    facets.mark_facets(rows, twin, region, orientation, *bits, marks)
+    facets.mark_facets(rows, twin, region, orientation, nothing, *BITS, marks)
     volume, extent = _part_volumes(points, rows, piece, orientation, len(consistent))
     orientation[volume[piece] < 0.0] *= -1
     for parts, mark in (
@@ -227,6 +224,32 @@ def _wound(points: Floats, rows: Ints, region: NDArray[np.int64], marks: NDArray
     ):
         marks[rows[parts[piece]].ravel()] |= np.uint16(mark)
     return orientation
+
+
+def _marked_alike(rows: Ints, region: NDArray[np.int64], marks: NDArray[np.uint16]) -> bool:
+    """The same marks where all cells have one orientation; False if some see a facet from the same side.
+
+    Only the cells at nodes around which they do not close are looked at for facets.
+    """
+    nodes = len(marks)
+    places, area = np.empty((nodes, 2), dtype=np.uint64), np.zeros(nodes, dtype=np.uint64)
+    facets.scatter(places)
+    own = np.empty(nodes if len(region) else 0, dtype=np.int64)
+    facets.enclose(rows, region, places, area, own, marks, connectivity.INTERFACE)
+    outer = np.flatnonzero((area != 0)[rows].any(axis=1))
+    part, alike = rows[outer], np.ones(len(outer), dtype=np.int8)
+    if not facets.mark_facets(part, _matched(part, nodes), region[:0], alike, area, *BITS, marks):
+        return False
+    marks[(area != 0) & (marks == 0)] |= np.uint16(connectivity.NOT_A_DISK)
+    return True
+
+
+def _matched(rows: Ints, nodes: int) -> Ints:
+    """(4T,) the facet on the other side of each (kernels.topology.facets)."""
+    twin = np.empty(4 * len(rows), dtype=np.int32)
+    keys, numbers = np.empty(4 * len(rows), dtype=np.int64), np.empty(4 * len(rows), dtype=np.int32)
+    facets.match(rows, np.zeros(nodes + 2, dtype=np.int64), keys, numbers, twin)
+    return twin
 
 
 def _part_volumes(

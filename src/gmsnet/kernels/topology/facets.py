@@ -17,6 +17,76 @@ OPPOSITE = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], dtype=np.int32
 FEW = 24  # facets of a node: more are sorted
 
 
+@kernel
+def order_cells(cells, position, begin, place, order):
+    """Orders cells (T, 4), by node ids, by the lowest place of their nodes in memory, else as they are.
+
+    position: (N,). begin: (N + 2,) zeros. Writes place, the corners by their places in memory, and order (T,).
+    """
+    for t in range(len(cells)):
+        a, b = position[np.uint64(cells[t, 0])], position[np.uint64(cells[t, 1])]
+        c, d = position[np.uint64(cells[t, 2])], position[np.uint64(cells[t, 3])]
+        place[t, 0], place[t, 1], place[t, 2], place[t, 3] = a, b, c, d
+        begin[np.uint64(min(min(a, b), min(c, d)) + 2)] += 1
+    for k in range(2, len(begin)):
+        begin[k] += begin[k - 1]
+    for t in range(len(cells)):
+        low = np.uint64(min(min(place[t, 0], place[t, 1]), min(place[t, 2], place[t, 3])) + 1)
+        order[np.uint64(begin[low])] = t
+        begin[low] += 1
+
+
+@inlined
+def mixed(value):
+    """A number that looks random (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014)."""
+    value = (value ^ (value >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    value = (value ^ (value >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return value ^ (value >> np.uint64(31))
+
+
+@kernel
+def scatter(places):
+    """Fills places (N, 2) uint64, a place of each node in a plane that looks random."""
+    step = np.uint64(0x9E3779B97F4A7C15)
+    for v in range(len(places)):
+        places[v, 0] = mixed(np.uint64(2 * v + 1) * step)
+        places[v, 1] = mixed(np.uint64(2 * v + 2) * step)
+
+
+@inlined
+def signed_area(places, a, b, c):
+    """Twice the area of a triangle in that plane, modulo 2⁶⁴."""
+    ux, uy = places[b, 0] - places[a, 0], places[b, 1] - places[a, 1]
+    return ux * (places[c, 1] - places[a, 1]) - uy * (places[c, 0] - places[a, 0])
+
+
+@kernel
+def enclose(rows, region, places, area, own, marks, interface):
+    """Adds to area (N,) uint64, zeros before, so that it is 0 where the facets opposite to a node close around it.
+
+    They close where each of their edges is gone along in both directions. The signed areas of the triangles of a closed
+    surface in any plane add up to 0, and of another one whose nodes are scattered (``scatter``) by a chance of 2⁻⁶⁰.
+    All cells have the same orientation. region: (T,), or none (0,); own (N,): the region of a cell of each node, to be
+    written. Marks (N,) get the bit ``interface`` where cells of two regions meet.
+    """
+    for t in range(len(rows)):
+        a, b, c, d = np.uint64(rows[t, 0]), np.uint64(rows[t, 1]), np.uint64(rows[t, 2]), np.uint64(rows[t, 3])
+        at_b, at_c = signed_area(places, a, d, c), signed_area(places, a, b, d)
+        at_d = signed_area(places, a, c, b)
+        area[a] -= at_b + at_c + at_d  # a cell is closed
+        area[b] += at_b
+        area[c] += at_c
+        area[d] += at_d
+    if len(region):
+        for t in range(len(rows)):
+            for k in range(4):
+                own[rows[t, k]] = region[t]
+        for t in range(len(rows)):
+            for k in range(4):
+                if own[rows[t, k]] != region[t]:
+                    marks[rows[t, k]] |= np.uint16(interface)
+
+
 @inlined
 def sorted_facet(rows, t, k):
     """The nodes of a facet in rising order."""
@@ -143,11 +213,13 @@ def wind(rows, twin, piece, orientation):
 
 
 @kernel
-def mark_facets(rows, twin, region, orientation, boundary, interface, non_manifold, marks):
+def mark_facets(rows, twin, region, orientation, area, boundary, interface, non_manifold, marks):
     """Marks the nodes of facets on the boundary, between two regions, and of more than two cells.
 
-    region: (T,), or none (0,) where all are the same. orientation: (T,) ±1. The three are the bits to be set in marks
-    (N,). Returns whether all pairs of cells see their common facet from two sides.
+    region: (T,), or none (0,) where all are the same. orientation: (T,) ±1. area: as ``enclose`` leaves it, if only the
+    cells are given at which it is not 0; a facet may then have its other cell elsewhere. None (0,): all cells are. The
+    three are the bits to be set in marks (N,). Returns whether all pairs of cells see their common facet from two
+    sides.
     """
     agrees = True
     for t in range(len(rows)):
@@ -156,6 +228,10 @@ def mark_facets(rows, twin, region, orientation, boundary, interface, non_manifo
             other, mark = np.int64(twin[facet]), 0
             if other == ALONE:
                 mark = boundary
+                if len(area):
+                    for i in range(3):
+                        if area[rows[t, OPPOSITE[k, i]]] == 0:
+                            mark = 0
             elif other == NON_MANIFOLD:
                 mark = non_manifold
             elif other > facet:
@@ -232,27 +308,40 @@ def rings(start, spokes, ring_start, ring, local, most):
 
 
 @kernel
-def fill_blocks3(order, ring_start, ring, start, local, first, rings, spokes, arrays):
+def fill_blocks3(order, ring_start, ring, start, local, first, rings, spokes, blocks):
     """Writes stars in blocks of LANES3. order: the free nodes by colour, of one colour by how many cells they have.
 
     first: (B + 1,) where the stars of each block begin in ``order``. rings, spokes: (B + 1,) where each block begins in
-    ring and spoke. arrays: centre, ring, degree, spoke, simplices, count and filled of kernels.star.space.SpaceBlocks.
+    ring and spoke. blocks: a SpaceBlocks (kernels.star.space), whose other arrays are written.
     """
-    centre, to_ring, degree, to_spoke, simplices, count, filled = arrays
+    centre, to_ring, degree, to_spoke = blocks.centre, blocks.ring, blocks.degree, blocks.spoke
+    simplices, number, filled = blocks.simplices, blocks.cells, blocks.filled
     for b in range(len(filled)):
         stars = first[b + 1] - first[b]
         filled[b] = stars
-        degree[b] = (rings[b + 1] - rings[b]) // LANES3
-        simplices[b] = (spokes[b + 1] - spokes[b]) // (3 * LANES3)
+        rows, cells = (rings[b + 1] - rings[b]) // LANES3, (spokes[b + 1] - spokes[b]) // (3 * LANES3)
+        degree[b], simplices[b] = rows, cells
         for lane in range(LANES3):
             v = order[first[b] + min(lane, stars - 1)]
-            centre[b * LANES3 + lane] = v
-            low, high = ring_start[v], ring_start[v + 1]
-            for j in range(degree[b]):
-                to_ring[rings[b] + j * LANES3 + lane] = ring[low + j if low + j < high else low]
-            cells = start[v + 1] - start[v]
-            count[b * LANES3 + lane] = cells
-            for k in range(simplices[b]):
-                for i in range(3):
-                    value = local[start[v] + k, i] if k < cells else 0
-                    to_spoke[spokes[b] + (3 * k + i) * LANES3 + lane] = value
+            at = np.uint64(b * LANES3 + lane)
+            centre[at] = v
+            low, around = np.uint64(ring_start[v]), ring_start[v + 1] - ring_start[v]
+            to = np.uint64(rings[b] + lane)
+            for j in range(around):
+                to_ring[to] = ring[low + np.uint64(j)]
+                to += np.uint64(LANES3)
+            for _ in range(around, rows):
+                to_ring[to] = ring[low]
+                to += np.uint64(LANES3)
+            own, begin = start[v + 1] - start[v], np.uint64(start[v])
+            number[at] = own
+            to = np.uint64(spokes[b] + lane)
+            for k in range(own):
+                row = begin + np.uint64(k)
+                to_spoke[to] = local[row, 0]
+                to_spoke[to + np.uint64(LANES3)] = local[row, 1]
+                to_spoke[to + np.uint64(2 * LANES3)] = local[row, 2]
+                to += np.uint64(3 * LANES3)
+            for _ in range(own, cells):
+                to_spoke[to] = to_spoke[to + np.uint64(LANES3)] = to_spoke[to + np.uint64(2 * LANES3)] = 0
+                to += np.uint64(3 * LANES3)
