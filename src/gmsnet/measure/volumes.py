@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,14 +68,18 @@ class MeasuredTetrahedra:
 
 
 def exact_signs3(points: Floats, corners: NDArray[np.int32], orientation: Signs) -> Signs:
-    """The exact sign of orientation × volume of each: float64 where its error bound decides, else fractions.
+    """The exact sign of orientation × volume of each: float64 where its error bound decides, else whole numbers.
 
     points: (N, 3 or more). corners: (T, 4).
     """
     out = np.empty(len(corners), dtype=np.int8)
     if orientation3.signs(points, corners, orientation, 0.0, out):
-        for t in np.flatnonzero(out == 0).tolist():
-            d, a, b, c = ([Fraction(v) for v in points[i, :3].tolist()] for i in corners[t])
+        rows = np.flatnonzero(out == 0)
+        mantissa, exponent = np.frexp(points[corners[rows], :3])
+        whole = np.ldexp(mantissa, 53).astype(np.int64)  # a float is a whole number times a power of two
+        shift = np.where(whole == 0, 0, exponent - np.where(whole == 0, 2000, exponent).min(axis=(1, 2), keepdims=True))
+        for t, numbers, shifts in zip(rows.tolist(), whole.tolist(), shift.tolist(), strict=True):
+            d, a, b, c = ([n << s for n, s in zip(*each, strict=True)] for each in zip(numbers, shifts, strict=True))
             (ax, ay, az), (bx, by, bz), (cx, cy, cz) = ([p - q for p, q in zip(e, d, strict=True)] for e in (a, b, c))
             volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
             out[t] = int(orientation[t]) * ((volume > 0) - (volume < 0))

@@ -1,7 +1,7 @@
 """The worst cells of a volume first: sweeps of Newton's method on high powers of q over the stars of their nodes alone.
 
-A cycle ranks all cells, takes a share of them, and makes blocks of the stars of their free nodes. The sweeps over these are those of the barrier (kernels/methods/barrier3.py),
-with q relative to the worst of all.
+A cycle ranks all cells, takes a share of them, and makes blocks of the stars of their free nodes. The sweeps over these
+are those of the barrier (kernels/methods/barrier3.py), with q relative to the worst of all.
 """
 
 from __future__ import annotations

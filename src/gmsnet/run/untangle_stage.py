@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.sliding import REASON
 from gmsnet.measure.report import QualityReport
-from gmsnet.mesh.display import amount
 from gmsnet.parallel.executor import Executor
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
+from gmsnet.untangle.result import Untangled
 
 Reasons = Mapping[int, str]  # by the index of each cell among all cells of the mesh
 
@@ -32,9 +32,7 @@ def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> St
     """Moves the free nodes so that fewer cells are inverted; those of second-order cells have a stage of their own."""
     if state.second_order is not None and not len(state.topology.free):
         return state
-    if isinstance(state.topology, Volume):
-        return _left_alone(state) if options.untangle and state.before.inverted else state
-    return _untangled(state) if options.untangle and state.before.inverted else state
+    return _untangled(state, executor) if options.untangle and state.before.inverted else state
 
 
 def untangle_protected(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -42,22 +40,25 @@ def untangle_protected(state: State, options: SmoothOptions, executor: Executor)
     freed = None
     if state.reasons and isinstance(state.topology, Topology):
         freed = state.protection.released(beside(state.reasons, state.topology))
-    return state if freed is None else _untangled(replace(state, protection=freed))
+    return state if freed is None else _untangled(replace(state, protection=freed), executor)
 
 
-def _left_alone(state: State) -> State:
-    cells = state.before.cell[~state.before.valid].tolist()
-    note = f"untangling: {amount(len(cells), 'inverted cell')}; those of volumes cannot be untangled yet"
-    return replace(state, untangling=(note,), reasons=dict.fromkeys(cells, "volumes cannot be untangled yet"))
+def _untangled(state: State, executor: Executor) -> State:
+    if isinstance(state.topology, Volume):
+        from gmsnet.untangle.space import untangle_volume
 
-
-def _untangled(state: State) -> State:
+        done = untangle_volume(state.points, state.topology, state.precision, executor, state.before.inverted)
+        return _noted(state, done, state.topology)
     from gmsnet.untangle import untangle  # what it needs of SciPy takes 0.15 s more to import
 
     topology = state.planar
     if state.sliding is not None:
         topology = topology.holding(state.sliding.nodes, REASON)
-    done = untangle(state.points, topology, state.precision)
+    return _noted(state, untangle(state.points, topology, state.precision), topology)
+
+
+def _noted(state: State, done: Untangled, topology: Topology | Volume) -> State:
+    """The state with what untangling has made, and what there is to say about it."""
     steps = ", ".join(f"{step.name} ({step.sweeps})" for step in done.steps) or "nothing to try"
     left = f"{done.after:,} of {done.before:,} inverted cells are left" if done.after else f"all {done.before:,} mended"
     note = f"untangling: {left}; {steps}{f'; {done.why}' if done.why else ''}"

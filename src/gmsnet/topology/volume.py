@@ -127,6 +127,11 @@ class Volume:
         """(N,) by places in memory: which nodes have a star."""
         return np.diff(self.start) > 0
 
+    def cells_of(self, rows: NDArray[np.intp]) -> NDArray[np.int64]:
+        """The index among all cells of the mesh of the cell of each of some rows of ``near``."""
+        found: NDArray[np.int64] = self.cell[self.near_origin[rows]]
+        return found
+
     @cached_property
     def simplices(self) -> Tetrahedra:
         """All of them, in memory order."""
@@ -256,7 +261,7 @@ def _part_volumes(
     points: Floats, rows: Ints, piece: Ints, orientation: NDArray[np.int8], parts: int
 ) -> tuple[Floats, Floats]:
     """The signed volume of each part, and the sum of the absolute ones, six times."""
-    a, b, c = (points[rows[:, k]] - points[rows[:, 0]] for k in (1, 2, 3))
+    a, b, c = (points[rows[:, k], :3] - points[rows[:, 0], :3] for k in (1, 2, 3))
     volume = orientation * np.einsum("ij,ij->i", a, np.cross(b, c))
     signed, absolute = np.zeros(parts), np.zeros(parts)
     np.add.at(signed, piece, volume)

@@ -117,12 +117,12 @@ def sweep3(points, blocks, first, last, guard, power, relaxation, tally):
         fetch3(points, blocks, block, workspace)
         derive(
             workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
-            workspace.kept, workspace.sums,
+            None, workspace.kept, workspace.sums,
         )  # fmt: skip
         propose3(workspace.sums, power, relaxation, workspace.step)
         for trial in range(TRIALS):
             judge(
-                workspace.kept, rows, blocks.cells, block, power.number, power.constants, workspace.step, floor,
+                workspace.kept, rows, blocks.cells, block, power.number, power.constants, None, workspace.step, floor,
                 workspace.sums,
             )  # fmt: skip
             if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1) == 0:

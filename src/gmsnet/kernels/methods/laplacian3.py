@@ -38,11 +38,11 @@ def sweep3(points, blocks, first, last, guard, power, smart, tally):
         fetch3(points, blocks, block, workspace)
         derive(
             workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
-            workspace.kept, workspace.sums,
+            None, workspace.kept, workspace.sums,
         )  # fmt: skip
         to_mean(blocks, block, workspace)
         judge(
-            workspace.kept, rows, blocks.cells, block, power.number, power.constants, workspace.step, floor,
+            workspace.kept, rows, blocks.cells, block, power.number, power.constants, None, workspace.step, floor,
             workspace.sums,
         )  # fmt: skip
         if smart:

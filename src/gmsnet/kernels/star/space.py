@@ -99,6 +99,27 @@ def value_of(builder: Any, lengths: Vector, inverse: Vector, power: Any, constan
     return Vector(builder, builder.load(place)), high
 
 
+def _softness(context: Any, builder: Any, kind: Any, soft: Any) -> Vector | None:
+    """ε² of all lanes."""
+    if isinstance(kind, types.NoneType):
+        return None
+    softness = Vector(builder, vectors.load(builder, vectors.data_of(context, builder, kind, soft), index(0)))
+    return softness * softness
+
+
+def _inverses(double: Vector, softness: Vector | None) -> tuple[Vector, Vector]:
+    """1/χ, and what stands for 1/D in the derivatives: 1/√(ε² + D²). Both are 1/D where nothing is softened."""
+    if softness is None:
+        inverse = 1.0 / double
+        return inverse, inverse
+    wide = vectors.root(softness + double * double)
+    # For D < 0 the sum would lose its digits: χ = ½ε²/(√ − D).
+    plain, small = (double + wide) * 0.5, softness * 0.5 * (1.0 / (wide - double))
+    positive = small.builder.fcmp_ordered(">", double.value, vectors.constant(0.0))
+    chi = Vector(double.builder, double.builder.select(positive, plain.value, small.value))
+    return 1.0 / chi, 1.0 / wide
+
+
 def _constants(builder: Any, base: Any) -> list[Vector]:
     return [broadcast(builder, builder.load(builder.gep(base, [index(k)]))) for k in range(SQUARED + 1)]
 
@@ -114,20 +135,23 @@ def _present(builder: Any, counts: Any, row: Any) -> Any:
 @intrinsic
 def derive(
     _context: Any, local: Any, spoke: Any, at: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any,
-    kept: Any, sums: Any,
+    soft: Any, kept: Any, sums: Any,
 ) -> Any:  # fmt: skip
     """Writes what is kept of each simplex, and the sums VALUE to LEAST over them.
 
     local: as ``relate`` leaves it. spoke: from ``at`` on, so many rows; count: those of each lane, from block·LANES3
-    on. power: k, constants: (SQUARED + 1,) float32, those named above.
+    on. power: k, constants: (SQUARED + 1,) float32, those named above. soft: (LANES3,) ε of each lane, over the cube of
+    its size, or None: in f, D is then χ(D) = (D + √(ε² + D²))/2, which is positive for any D (Garanzha et al.:
+    Foldover-free maps in 50 lines of code, 2021), and the Hessian is that without the term of χ''.
     """
     signature = types.void(
-        local, spoke, types.int64, types.int64, count, types.int64, types.int64, constants, kept, sums
+        local, spoke, types.int64, types.int64, count, types.int64, types.int64, constants, soft, kept, sums
     )
     measured, derivatives = as_written(mean_ratio3.measured), as_written(mean_ratio3.derivatives)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 1, 4, 7, 8, 9)}
+        data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 1, 4, 7, 9, 10)}
+        softness = _softness(context, builder, signature.args[8], arguments[8])
         constants = _constants(builder, data[7])
         first = builder.mul(arguments[5], index(LANES3))
         counts = vectors.load(builder, data[4], first, vectors.NUMBERS)
@@ -149,9 +173,10 @@ def derive(
             wx, wy, wz = wx.where(on, 0.0), wy.where(on, 0.0), wz.where(on, 0.0)
             to = builder.mul(loop.index, index(KEPT * LANES3))
             for k, row in enumerate((wx, wy, wz, double, sx, sy, sz, lengths)):
-                vectors.store(builder, data[8], builder.add(to, index(k * LANES3)), row.value)
-            of_d, of_s = 1.0 / double, 1.0 / lengths
-            f, _ = value_of(builder, lengths, of_d, arguments[6], constants)
+                vectors.store(builder, data[9], builder.add(to, index(k * LANES3)), row.value)
+            inverse, of_d = _inverses(double, softness)
+            of_s = 1.0 / lengths
+            f, _ = value_of(builder, lengths, inverse, arguments[6], constants)
             f = f.where(on, 0.0)
             terms = derivatives(
                 f, of_s * constants[TWO_P], of_d * constants[M], wx, wy, wz, sx, sy, sz, constants[MIXED],
@@ -161,7 +186,7 @@ def derive(
                 found[k].add(term)
             found[LEAST].lower(double)
         for k, total in enumerate(found):
-            vectors.store(builder, data[9], index(k * LANES3), total.get(builder).value)
+            vectors.store(builder, data[10], index(k * LANES3), total.get(builder).value)
         return context.get_dummy_value()
 
     return signature, generate
@@ -169,19 +194,25 @@ def derive(
 
 @intrinsic
 def judge(
-    _context: Any, kept: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any, step: Any, floor: Any,
-    sums: Any,
+    _context: Any, kept: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any, soft: Any, step: Any,
+    floor: Any, sums: Any,
 ) -> Any:  # fmt: skip
-    """Writes the sums AFTER and MARGIN after a step (3·LANES3,), [axis][lane]. floor: c, of D/S^(3/2)."""
-    signature = types.void(kept, types.int64, count, types.int64, types.int64, constants, step, types.float32, sums)
+    """Writes the sums AFTER and MARGIN after a step (3·LANES3,), [axis][lane].
+
+    floor: c, of D/S^(3/2). soft: as in ``derive``.
+    """
+    signature = types.void(
+        kept, types.int64, count, types.int64, types.int64, constants, soft, step, types.float32, sums
+    )
     moved = as_written(mean_ratio3.moved)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 2, 5, 6, 8)}
+        data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 2, 5, 7, 9)}
+        softness = _softness(context, builder, signature.args[6], arguments[6])
         constants = _constants(builder, data[5])
         counts = vectors.load(builder, data[2], builder.mul(arguments[3], index(LANES3)), vectors.NUMBERS)
-        way = [Vector(builder, vectors.load(builder, data[6], index(k * LANES3))) for k in range(3)]
-        floor = broadcast(builder, arguments[7])
+        way = [Vector(builder, vectors.load(builder, data[7], index(k * LANES3))) for k in range(3)]
+        floor = broadcast(builder, arguments[8])
         after, margin = Sum(builder, 0.0), Sum(builder, FAR_ABOVE)
         with cgutils.for_range(builder, arguments[1]) as loop:
             at = builder.mul(loop.index, index(KEPT * LANES3))
@@ -190,11 +221,11 @@ def judge(
             ]
             double, lengths = moved(w[3], w[7], *w[:3], *w[4:7], *way)
             on = _present(builder, counts, loop.index)
-            f, high = value_of(builder, lengths, 1.0 / double, arguments[4], constants)
+            f, high = value_of(builder, lengths, _inverses(double, softness)[0], arguments[4], constants)
             after.add(f.where(on, 0.0))
             margin.lower((double - high * floor).where(on, FAR_ABOVE))
-        vectors.store(builder, data[8], index(AFTER * LANES3), after.get(builder).value)
-        vectors.store(builder, data[8], index(MARGIN * LANES3), margin.get(builder).value)
+        vectors.store(builder, data[9], index(AFTER * LANES3), after.get(builder).value)
+        vectors.store(builder, data[9], index(MARGIN * LANES3), margin.get(builder).value)
         return context.get_dummy_value()
 
     return signature, generate
