@@ -167,8 +167,8 @@ def untangle_volume(
     """
     attempt = Attempt(points, topology, precision, executor)
     steps: list[UntanglingStep] = []
-    for made, (rings, most) in enumerate(zip(RINGS, SWEEPS, strict=True)):
-        if not attempt.left or (made == EARLY and attempt.left > MANY * len(topology.near)):
+    for rounds, (rings, most) in enumerate(zip(RINGS, SWEEPS, strict=True)):
+        if not attempt.left or (rounds == EARLY and attempt.left > MANY * len(topology.near)):
             break
         steps.append(attempt.sweeps(rings, most))
     if attempt.left and len(topology.free):
