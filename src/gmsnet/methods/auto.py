@@ -57,6 +57,7 @@ AHEAD = 50  # times the last gain are at most expected to come
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
+IN_SPACE_GAIN = 0.005  # the same of volumes, whose passes cost more
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
 GOOD = 0.75  # a least 1/q that needs no more
@@ -198,7 +199,7 @@ class Auto(Smoother):
     def _look_at_worst(self, smoother: WorstFirst) -> None:
         """Is the worst cell to have another turn, once others have made room for it?"""
         self.passes += 1
-        gains = smoother.least >= self.least + PASS_GAIN
+        gains = smoother.least >= self.least + (IN_SPACE_GAIN if self.phases is VOLUME_PLAN else PASS_GAIN)
         if self.passes == 1 and self.phases is not SMALL_PLAN and self.phases is not VOLUME_PLAN:
             gains = smoother.gained >= LAST_GAIN
         self.again = self.at if gains and self.passes < PASSES else -1

@@ -22,7 +22,7 @@ from gmsnet.topology.volume import Volume
 
 # The share of all cells, k of p = 3·2^k, and how many sweeps.
 CYCLES = ((0.004, 2, 4), (0.002, 4, 8), (0.001, 5, 12))
-FEWEST = 12  # cells
+FEWEST, WATCHED = 12, 64  # cells
 
 
 class WorstInSpace(Smoother):
@@ -56,7 +56,8 @@ class WorstInSpace(Smoother):
             after = float(ratios.max(initial=1.0))
         least = (K3 / after) ** (1.0 / 3.0)
         self.least, self.gained = least, least - (K3 / before) ** (1.0 / 3.0)
-        field.floor.forget()
+        few = np.argpartition(ratios, -min(WATCHED, len(ratios)))[-min(WATCHED, len(ratios)) :].astype(np.int32)
+        field.floor.watch(few, 1.0 / ratios[few])
         return tally
 
 
