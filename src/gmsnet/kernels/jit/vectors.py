@@ -158,7 +158,8 @@ class Sum:
         self.set(self.get(value.builder) + value)
 
     def lower(self, value: Vector) -> None:
-        """Replaces it where the value is smaller, or where it is not a number."""
+        """Replaces it where the value is smaller, or is not a number; what is not a number stays so."""
         builder, old = value.builder, self.get(value.builder)
-        kept = builder.fcmp_ordered(">=", value.value, old.value)
+        lost = builder.fcmp_unordered("uno", old.value, old.value)
+        kept = builder.or_(builder.fcmp_ordered(">=", value.value, old.value), lost)
         self.set(Vector(builder, builder.select(kept, old.value, value.value)))
