@@ -36,7 +36,7 @@ def stars(rng, around, make=volumes.ball, size=1.0, away=0.0, **options):
     points, cells, before = [], [], 0
     for k, count in enumerate(around):
         at, own = make(rng, count, **options)
-        points.append(at + [3.0 * k, 0.0, 0.0])
+        points.append(at + np.array([3.0 * k, 0.0, 0.0]))
         cells.append(own + before)
         before += len(at)
     everything = size * np.vstack(points) + away

@@ -165,8 +165,10 @@ def facets_of(cells):
 
 
 def parts_of(cells):
-    """The part of each cell, its orientation to be read consistently (+1 for the first of a part), and, by part, whether
-    that is possible: a flood over the facets that exactly two cells share."""
+    """The part of each cell, its orientation to be read consistently, and, by part, whether that is possible.
+
+    A flood over the facets that exactly two cells share; the first cell of a part has +1.
+    """
     cells = np.asarray(cells)
     beside = defaultdict(list)
     for seen in facets_of(cells).values():

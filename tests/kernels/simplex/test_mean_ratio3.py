@@ -51,7 +51,7 @@ def test_a_regular_tetrahedron_has_one_and_nothing_has_more():
     assert kernels.shape_of(double, lengths) == pytest.approx(1.0, abs=1e-15)
     assert double / lengths**1.5 == pytest.approx(K3**-0.5, rel=1e-14)
     assert double / lengths**1.5 < LARGEST3 < 1.00001 * K3**-0.5
-    assert kernels.REGULAR == pytest.approx(12 * 0.5 ** (2 / 3), rel=1e-15)
+    assert pytest.approx(12 * 0.5 ** (2 / 3), rel=1e-15) == kernels.REGULAR
     assert kernels.shape_of(0.0, 0.0) == 0.0
     assert kernels.shape_of(0.0, 3.0) == 0.0
 

@@ -28,7 +28,10 @@ def lanes(topology):
 
 
 def twin(local, power, number):
-    """The sums of one star, and the sums of the absolute terms, in float64. local: (F, 9) spokes."""
+    """The sums of one star, and the sums of the absolute terms, in float64, of gradients and Hessians the largest.
+
+    local: (F, 9) spokes.
+    """
     _, root, two_p, m, mixed, squared = power.constants.astype(float)
     terms = []
     for row in local:
@@ -37,7 +40,9 @@ def twin(local, power, number):
         f = ratio if number < 0 else ratio ** (2.0 * 2.0**number)
         found = derivatives(f, two_p / lengths, m / double, wx, wy, wz, sx, sy, sz, mixed, squared)
         terms.append([f, *found, f / lengths])
-    return np.sum(terms, axis=0), np.abs(terms).sum(axis=0)
+    absolute = np.abs(terms).sum(axis=0)
+    absolute[1:4], absolute[4:10] = absolute[1:4].max(), absolute[4:10].max()
+    return np.sum(terms, axis=0), absolute
 
 
 def local_of(points, topology, block, lane, inverse):
