@@ -64,11 +64,11 @@ def certified(ax, ay, az, bx, by, bz, cx, cy, cz, delta, floor):
 
 @inlined
 def ratio_upper_bound3(ax, ay, az, bx, by, bz, cx, cy, cz, delta):
-    """The most that D/S^(3/2) can be in exact arithmetic; 0 for what is not certainly positive, as floors need it."""
+    """The most that D/S^(3/2) can be in exact arithmetic; 0 for what is certainly not positive, as floors need it."""
     value, bound = determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
     lengths, error = length_bounds(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
     least = lengths - error
-    if not value > bound:
+    if value + bound <= 0.0:
         return 0.0
     if not least > 0.0:
         return LARGEST3
