@@ -6,12 +6,12 @@ from fractions import Fraction
 
 import numba
 import numpy as np
-from support import volumes
 
 from gmsnet.kernels.star.space import LANES3, derive, judge
 from gmsnet.kernels.star.stars3 import certify3, fetch3, workspace3_for
 from gmsnet.topology.ordering import space_points
 from gmsnet.topology.volume import Volume
+from support import volumes
 
 
 @numba.njit(error_model="numpy")
