@@ -20,7 +20,7 @@ from gmsnet.kernels.star.space import LANES3, SpaceBlocks
 from gmsnet.kernels.topology import connectivity, facets, layout
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
-from gmsnet.topology.held import sorted_out
+from gmsnet.topology.held import reasons_in_space, sorted_out
 from gmsnet.topology.ordering import inverse, space_points
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.stars import Colouring, Stars
@@ -94,7 +94,7 @@ class Volume:
         marks[(marks == 0) & (around == 0)] |= np.uint16(connectivity.HIGH_VALENCE)
         ball = 2 * around == np.diff(start) + 4
         marks[(marks == 0) & ~ball] |= np.uint16(connectivity.NOT_A_DISK)
-        held, free, places = sorted_out(marks, position)
+        held, free, places = sorted_out(marks, position, reasons_in_space(MOST))
         of_cell = np.empty_like(orientation)
         of_cell[origin] = orientation
         padded = np.append(ring[:end], np.zeros(connectivity.WIDTH, dtype=np.int32))
