@@ -82,7 +82,9 @@ class Volume:
         rows, region = place.take(origin, axis=0), region.take(origin) if len(region) else region
         marks = _known_marks(mesh, fixed, position)
         orientation = _wound(points[memory], rows, region, marks)
-        marks[np.bincount(rows.ravel(), minlength=nodes) == 0] |= np.uint16(connectivity.UNUSED)
+        others = np.uint16(connectivity.LINE | connectivity.UNSUPPORTED_CELL)
+        unused = (np.bincount(rows.ravel(), minlength=nodes) == 0) & (marks & others == 0)
+        marks[unused] |= np.uint16(connectivity.UNUSED)
         start = np.zeros(nodes + 2, dtype=np.int64)
         facets.count_stars(rows, marks, start)
         spokes = np.empty((start[-1], 3), dtype=np.int32)
