@@ -21,12 +21,12 @@ def see(points, blocks, block, number, constants, step, floor, unit, grain):
     rows = np.int64(blocks.simplices[block])
     fetch3(points, blocks, block, workspace)
     derive(
-        workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, number, constants, workspace.kept,
-        workspace.sums,
+        workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, number, constants, None,
+        workspace.kept, workspace.sums,
     )  # fmt: skip
     for k in range(3 * LANES3):
         workspace.step[k] = step[k]
-    judge(workspace.kept, rows, blocks.cells, block, number, constants, workspace.step, floor, workspace.sums)
+    judge(workspace.kept, rows, blocks.cells, block, number, constants, None, workspace.step, floor, workspace.sums)
     certify3(workspace, unit, grain)
     return workspace
 

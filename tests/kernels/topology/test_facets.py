@@ -104,7 +104,7 @@ def test_marks_of_facets(seed, nodes, count, of):
     turn = rng.choice([1, -1], count).astype(np.int8)
     marks = np.zeros(nodes, dtype=np.uint16)
     agrees = kernels.mark_facets(
-        cells, matched(cells, nodes), region, turn, BOUNDARY, INTERFACE, NON_MANIFOLD, marks
+        cells, matched(cells, nodes), region, turn, np.empty(0, dtype=np.uint64), BOUNDARY, INTERFACE, NON_MANIFOLD, marks
     )  # fmt: skip
     expected, two_sides = [0] * nodes, True
     for facet, seen in volumes.facets_of(cells).items():
