@@ -57,7 +57,7 @@ AHEAD = 50  # times the last gain are at most expected to come
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
-IN_SPACE_GAIN = 0.005  # the same of volumes, whose passes cost more
+LARGE_VOLUME, LARGE_GAIN = 50_000, 0.005  # free nodes of a volume of which a pass must gain more
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
 GOOD = 0.75  # a least 1/q that needs no more
@@ -130,6 +130,7 @@ class Auto(Smoother):
         self.creep: Creep | None = None
         self.whole = 0  # how often all nodes have moved at once
         self.slow = self.last = False
+        self.pass_gain = PASS_GAIN
         self.passes, self.least = 0, -math.inf  # passes over the worst cells, and the least 1/q after the last one
         self.again = -1  # the phase to go back to in the end, if there is one
 
@@ -151,6 +152,8 @@ class Auto(Smoother):
             if not self.phases and field.level != STAR and isinstance(field.topology, Topology):
                 self.creep = Creep.of(field)
             self.phases = self.phases or plan_for(field.topology)
+            if self.phases is VOLUME_PLAN and len(field.topology.free) > LARGE_VOLUME:
+                self.pass_gain = LARGE_GAIN
             self._enter(0, field)
         if self.at == len(self.phases):
             return self._move_all_for_worst(field, executor, test)
@@ -199,7 +202,7 @@ class Auto(Smoother):
     def _look_at_worst(self, smoother: WorstFirst) -> None:
         """Is the worst cell to have another turn, once others have made room for it?"""
         self.passes += 1
-        gains = smoother.least >= self.least + (IN_SPACE_GAIN if self.phases is VOLUME_PLAN else PASS_GAIN)
+        gains = smoother.least >= self.least + self.pass_gain
         if self.passes == 1 and self.phases is not SMALL_PLAN and self.phases is not VOLUME_PLAN:
             gains = smoother.gained >= LAST_GAIN
         self.again = self.at if gains and self.passes < PASSES else -1
