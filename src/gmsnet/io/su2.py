@@ -230,10 +230,8 @@ def _whole(text: Text, rows: Rows, indexed: NDArray[np.bool_]) -> None:
 def write(mesh: Mesh) -> Written:
     """See Format. Cells of fewer dimensions than the mesh become markers."""
     convert.check_kinds(mesh, name, CODES.values())
-    if mesh.has_volumes:
-        dimension, points, lost = 3, convert.in_space(mesh), []
-    else:
-        dimension, (points, lost) = 2, convert.in_plane(mesh, name)
+    dimension = 3 if mesh.has_volumes else 2
+    points, lost = (convert.in_space(mesh), []) if mesh.has_volumes else convert.in_plane(mesh, name)
     lost = lost + convert.lost_regions(mesh, name, dimension) + convert.lost_data(mesh, name)
     return Written({".su2": Pieces(lambda: _text(mesh, points, dimension))}, lost)
 
