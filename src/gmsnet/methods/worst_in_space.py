@@ -35,8 +35,8 @@ class WorstInSpace(Smoother):
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
         assert isinstance(topology, Volume)
         guard, cells = field.guard(executor), topology.changeable
-        ratios = _ratios(field.points, cells, executor)
-        before = after = float(ratios.max(initial=1.0))
+        ratios = _ratios(field.points, cells, topology.near_free, executor)
+        before = after = float(ratios.max(initial=K3))
         for share, number, sweeps in CYCLES:
             count = min(max(FEWEST, math.ceil(share * len(ratios))), len(ratios))
             worst = np.argpartition(ratios, len(ratios) - count)[len(ratios) - count :]
@@ -52,21 +52,31 @@ class WorstInSpace(Smoother):
 
             for _ in range(sweeps):
                 tally += by_colour(executor, visit, stars, field.points)
-            ratios = _ratios(field.points, cells, executor)  # of all: what is beside a mended cell can be the worst
-            after = float(ratios.max(initial=1.0))
+            ratios = _ratios(field.points, cells, topology.near_free, executor)
+            after = float(ratios.max(initial=K3))
         least = (K3 / after) ** (1.0 / 3.0)
         self.least, self.gained = least, least - (K3 / before) ** (1.0 / 3.0)
         few = np.argpartition(ratios, -min(WATCHED, len(ratios)))[-min(WATCHED, len(ratios)) :].astype(np.int32)
-        field.floor.watch(few, 1.0 / ratios[few])
+        field.floor.watch(few, 1.0 / np.maximum(ratios[few], 1.0))
         return tally
 
 
-def _ratios(points: NDArray[np.float64], cells: Tetrahedra, executor: Executor) -> NDArray[np.float64]:
-    """S³/D² of each; infinite where D is not positive."""
+def _ratios(
+    points: NDArray[np.float64], cells: Tetrahedra, free: NDArray[np.bool_], executor: Executor
+) -> NDArray[np.float64]:
+    """S³/D² of each; 0, and so the last to be chosen, where no node moves: stars with an inverted cell stay.
+
+    free: (N,) which nodes are.
+    """
     out = np.empty(len(cells.rows))
 
     def look(first: int, last: int) -> None:
         cubed_ratios(points, cells.rows, cells.orientation, first * LANES, min(last * LANES, len(out)), out)
 
     executor.map(look, 0, -(-len(out) // LANES))
+    inverted = np.isinf(out)
+    if inverted.any():
+        movable = free.copy()
+        movable[cells.rows[inverted]] = False
+        out[~movable[cells.rows].any(axis=1)] = 0.0
     return out

@@ -55,18 +55,14 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     asked = fixed_mask(given, fixed)
     if given.has_volumes:
-        return _first_of_volume(given, restore, asked, smoother, executor)
+        return _first_of_volume(given, restore, asked, fixed, smoother, options, executor)
     threads = options.thread_count if len(given.points) >= MANY else 1
     curves = curves_to_slide_on(given, options.slide, options.feature_angle, asked)
     topology, start = Topology.and_points(given, asked, threads, None if curves is None else curves.slides)
     sliding = None
     if curves is not None:
         sliding = Sliding.of(given, curves, topology.memory, topology.free, options.geometry)
-    if asked.any() and REASONS[CHOSEN] not in topology.held:
-        count = np.count_nonzero(asked)
-        named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
-        where = " by the point data 'fixed' of the mesh" if fixed is None else ""
-        remarks.append(f"fixed: {named}{where}, and held for other reasons anyway")
+    remarks += held_anyway(asked, topology, fixed)
     second = second_order_of(given, topology, options)
     if target and (others := unmeasured(given)):
         remarks.append(f"the target is asked of triangles and quads alone, not of {others}")
@@ -100,12 +96,25 @@ def first_state(mesh: Any, fixed: Any, smoother: Smoother, options: SmoothOption
     )
 
 
+def held_anyway(asked: NDArray[np.bool_], topology: Topology | Volume, fixed: Any) -> list[str]:
+    """Says so where all nodes that are to be held are held for other reasons."""
+    if not asked.any() or REASONS[CHOSEN] in topology.held:
+        return []
+    count = np.count_nonzero(asked)
+    named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
+    where = " by the point data 'fixed' of the mesh" if fixed is None else ""
+    return [f"fixed: {named}{where}, and held for other reasons anyway"]
+
+
 def _first_of_volume(
-    given: Mesh, restore: Callable[[Floats], Any], asked: NDArray[np.bool_], smoother: Smoother, executor: Executor
-) -> State:
+    given: Mesh, restore: Callable[[Floats], Any], asked: NDArray[np.bool_], fixed: Any, smoother: Smoother,
+    options: SmoothOptions, executor: Executor,
+) -> State:  # fmt: skip
     """The same of a mesh of tetrahedra."""
     topology = Volume.of(given, asked)
-    remarks = []
+    remarks = held_anyway(asked, topology, fixed)
+    if options.fix_layers:
+        remarks.append("fix_layers: stretched layers of volumes are not looked for yet, so none are held")
     if unknown := unknown_cells(given):
         remarks.append(f"the nodes of {unknown} are held: gmsnet does not know this type of cells")
     if others := unmeasured(given):

@@ -103,8 +103,9 @@ def test_marks_of_facets(seed, nodes, count, of):
     region = rng.integers(2, size=count) if seed % 2 else np.empty(0, dtype=np.int64)
     turn = rng.choice([1, -1], count).astype(np.int8)
     marks = np.zeros(nodes, dtype=np.uint16)
+    nothing = np.empty(0, dtype=np.uint64)
     agrees = kernels.mark_facets(
-        cells, matched(cells, nodes), region, turn, np.empty(0, dtype=np.uint64), BOUNDARY, INTERFACE, NON_MANIFOLD, marks
+        cells, matched(cells, nodes), region, turn, nothing, BOUNDARY, INTERFACE, NON_MANIFOLD, marks
     )  # fmt: skip
     expected, two_sides = [0] * nodes, True
     for facet, seen in volumes.facets_of(cells).items():

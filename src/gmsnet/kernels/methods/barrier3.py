@@ -2,7 +2,8 @@
 
 Near a sliver F ~ h^(−m), m = 2p/3, for which Newton's step of F^(−1/m) is the right one: Newton's of F divided by
 1 − (1 + 1/m)·λ, λ = gᵀH⁻¹g/F, at most 50 times as long. Where neither F falls nor all simplices stay above the floor,
-the step is halved in SIMD lanes, for D and S after any step follow from what is kept.
+the step is halved in SIMD lanes, for D and S after any step follow from what is kept. So a step beyond the rim
+comes back to where F is less than before, not to where cells are only just positive.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from gmsnet.kernels.star.space import (
     ISO,
     LANES3,
     LEAST,
+    MARGIN,
     VALUE,
     XX,
     XY,
@@ -34,7 +36,7 @@ from gmsnet.kernels.star.space import (
 )
 from gmsnet.kernels.star.stars3 import certify3, fetch3, store3, workspace3_for
 
-TRIALS = 4
+TRIALS = 10
 K3 = 432.0  # S³/D² of a regular tetrahedron
 FLAT = 1e-5  # of F: a node with less to gain stays, for float32 does not tell it from nothing
 
@@ -96,7 +98,9 @@ def settle3(workspace, unit, grain, last):
     sums, step, refused = workspace.sums, workspace.step, 0
     for lane in range(LANES3):
         before, after = sums[VALUE * LANES3 + lane], sums[AFTER * LANES3 + lane]
-        falls = (after < before) and (sums[LEAST * LANES3 + lane] > np.float32(0.0))
+        # Beyond the rim, where D < 0, powers of q are small: that is no gain.
+        inside = min(sums[LEAST * LANES3 + lane], sums[MARGIN * LANES3 + lane]) > np.float32(0.0)
+        falls = (after < before) and inside
         still = step[lane] == 0.0 and step[LANES3 + lane] == 0.0 and step[2 * LANES3 + lane] == 0.0
         allowed = workspace.allowed[lane] and falls
         workspace.allowed[lane] = allowed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.jit.compile import kernel, part
-from gmsnet.kernels.methods.barrier3 import settle3
+from gmsnet.kernels.methods.barrier3 import TRIALS, settle3
 from gmsnet.kernels.star.space import LANES3, derive, judge
 from gmsnet.kernels.star.stars3 import certify3, fetch3, store3, workspace3_for
 
@@ -30,7 +30,7 @@ def to_mean(blocks, block, workspace):
 
 @kernel
 def sweep3(points, blocks, first, last, guard, power, smart, tally):
-    """Visits the blocks first…last (of one colour) once. smart: only where the sum of q^(3/2) of the star falls."""
+    """Visits the blocks first…last (of one colour) once. smart: only as far as the sum of q^(3/2) of the star falls."""
     workspace = workspace3_for(blocks.most, blocks.most_simplices)
     floor = max(guard.floor, 0.0)
     for block in range(first, last):
@@ -41,12 +41,14 @@ def sweep3(points, blocks, first, last, guard, power, smart, tally):
             None, workspace.kept, workspace.sums,
         )  # fmt: skip
         to_mean(blocks, block, workspace)
-        judge(
-            workspace.kept, rows, blocks.cells, block, power.number, power.constants, None, workspace.step, floor,
-            workspace.sums,
-        )  # fmt: skip
-        if smart:
-            settle3(workspace, guard.unit, guard.grain, True)
-        else:
-            certify3(workspace, guard.unit, guard.grain)
+        for trial in range(TRIALS):
+            judge(
+                workspace.kept, rows, blocks.cells, block, power.number, power.constants, None, workspace.step, floor,
+                workspace.sums,
+            )  # fmt: skip
+            if not smart:
+                certify3(workspace, guard.unit, guard.grain)
+                break
+            if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1) == 0:
+                break
         store3(points, blocks, block, workspace, guard, tally)

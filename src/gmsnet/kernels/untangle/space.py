@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.jit.compile import kernel, part
-from gmsnet.kernels.methods.barrier3 import TRIALS, propose3
+from gmsnet.kernels.methods.barrier3 import propose3
 from gmsnet.kernels.simplex.mean_ratio3 import measured
 from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, spokes_of
 from gmsnet.kernels.star.space import AFTER, LANES3, VALUE, derive, judge
 from gmsnet.kernels.star.stars3 import fetch3, workspace3_for
+
+TRIALS = 4
 
 
 @part
