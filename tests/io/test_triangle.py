@@ -152,7 +152,8 @@ def test_garbage_is_refused_in_words(data: bytes, suffix: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (b"4 2 1 1", b"4 3 1 1", r"line 1: the points have 3 coordinates"),
+        (b"4 2 1 1", b"4 4 1 1", r"line 1: the points have 4 coordinates: there can be 2 \(Triangle\) or 3 \(TetGen\)"),
+        (b"4 2 1 1", b"4 3 0 1", r"beside it: line 1: the cells have 3 nodes: .* 3 coordinates there can be 4 or 10"),
         (b"4 2 1 1", b"4 2 1", r"line 1: the first line must have 4 numbers, found 3"),
         (b"4 2 1 1", b"4 2 1 2", r"line 1: 2 boundary markers a point: there can be 0 or 1"),
         (b"4 2 1 1", b"3 2 1 1", r"line 5: the file goes on behind the 3 points"),
@@ -161,7 +162,11 @@ def test_garbage_is_refused_in_words(data: bytes, suffix: str) -> None:
         (b"4 2 1 1", b"-4 2 1 1", r"line 1: the number of points is negative"),
         (b"3 1.0 1.0", b"2 1.0 1.0", r"line 4: the point 2 is given twice"),
         (b"3 1.0 1.0", b"3 1.0 nan", r"line 4: a number was expected, found 'nan'"),
-        (b"2 3 2", b"2 4 2", r"^in the .ele file beside it: line 1: triangles with 4 nodes"),
+        (
+            b"2 3 2",
+            b"2 4 2",
+            r"^in the .ele file beside it: line 1: the cells have 4 nodes: .* 2 coordinates there can be 3 or 6",
+        ),
         (b"1 1 2 3", b"1 1 2 5", r"^in the .ele file beside it: line 2: a triangle names the node 5, .* 1 to 4"),
         (b"1 1 2 3", b"1 0 2 3", r"^in the .ele file beside it: line 2: a triangle names the node 0, .* 1 to 4"),
         (b"2 1 3 4 8 0.75\n", b"", r"^in the .ele file beside it: line 3: expected 1 more lines"),
@@ -198,7 +203,7 @@ def test_conversion_of_six_node_triangles() -> None:
     written = triangle.write(mesh)
     assert contents(written)[".ele"] == b"1 6 1\n1 1 2 3 5 6 4 0\n"  # the side opposite the first corner comes first
     assert cells_of(triangle.read(contents(written)), "triangle6") == [[0, 1, 2, 3, 4, 5]]
-    with pytest.raises(FormatError, match="three-node and six-node"):
+    with pytest.raises(FormatError, match="Triangle cannot hold triangle and triangle6 cells in one file"):
         triangle.write(Mesh(points, (*mesh.cells, CellBlock("triangle", [[0, 1, 2]], [0]))))
     with pytest.raises(FormatError, match="Triangle cannot hold cells of type 'quad'"):
         triangle.write(Mesh(points, (CellBlock("quad", [[0, 1, 4, 5]], [0]),)))

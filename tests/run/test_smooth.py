@@ -212,12 +212,9 @@ def test_what_cannot_be_used_is_refused(square, options, message):
         gmsnet.smooth(square, **options)
 
 
-def test_volumes_and_curved_surfaces_are_refused():
+def test_curved_surfaces_are_refused():
     rng = np.random.default_rng(0)
     points = rng.random((10, 3))
-    tetra = Mesh(points, (CellBlock("tetra", np.array([[0, 1, 2, 3]]), np.zeros(1, dtype=int)),))
-    with pytest.raises(InputError, match="volume mesh"):
-        gmsnet.smooth(tetra)
     with pytest.raises(InputError, match="curved surface"):
         gmsnet.smooth((points, np.array([[0, 1, 2], [1, 2, 3]])))
 

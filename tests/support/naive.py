@@ -88,6 +88,18 @@ def morton_order(points) -> list[int]:
     return sorted(range(len(points)), key=key)
 
 
+def morton_order3(points) -> list[int]:
+    """The same in space, over a grid of 2¹⁰ × 2¹⁰ × 2¹⁰: the bit of z before that of y before that of x."""
+    low, extent = points.min(axis=0), float(np.ptp(points, axis=0).max())
+    scale = 1023.0 / extent if extent > 0.0 else 0.0
+
+    def key(i):
+        x, y, z = (f"{int(c):010b}" for c in (points[i] - low) * scale)
+        return "".join(a + b + c for a, b, c in zip(z, y, x, strict=True)), i
+
+    return sorted(range(len(points)), key=key)
+
+
 def gmsnet_shift(centre, ring, tensors):
     """Equations 4 to 8 for one star, float64, loop by loop: the shift in the coordinates of the star."""
     t = {name: np.asarray(value, dtype=np.float64) for name, value in tensors.items()}

@@ -19,7 +19,7 @@ def quality(
     plot: Annotated[str | None, typer.Option(metavar="FILE", help="Draw the mesh (.png, .svg or .pdf).")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
-    """Measure the triangles and quads of a mesh: angles, 1/q, inverted cells, and where the worst ones are."""
+    """Measure the triangles and quads, or the tetrahedra, of a mesh: angles, 1/q or η, inverted, the worst."""
     from gmsnet.cli.destination import check_drawable, check_picture, shown
 
     if threshold is not None and not -1.0 <= threshold <= 1.0:
@@ -33,11 +33,6 @@ def quality(
     from gmsnet.run.api import quality as measure
 
     mesh = io.read(input, format)
-    volumes = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
-    if volumes:
-        raise InputError(
-            f"{input}: this is a volume mesh ({', '.join(volumes)}): only triangles can be measured so far"
-        )
     if plot is not None:
         check_drawable(mesh, input)
     found, others = measure(mesh), unmeasured(mesh)
@@ -69,7 +64,7 @@ def quality(
             console.print("there are no triangles or quads to measure")
         if others and len(found.cell):
             console.print(f"not measured: {others}")
-        if mesh.plane is None:
+        if mesh.plane is None and not mesh.has_volumes:
             console.print("the mesh is a surface in space: its cells have no sign, none counts as inverted")
         if plot is not None:
             console.print(f"picture: {plot}")

@@ -38,6 +38,12 @@ FIGURES = (  # of QualityReport.summary(): label, path, number of decimals
     ("min angle, mean", ("min_angle", "mean"), 2),
     ("max angle, greatest", ("max_angle", "max"), 2),
     ("max angle, mean", ("max_angle", "mean"), 2),
+    ("dihedral angle, least", ("min_dihedral", "min"), 2),
+    ("dihedral angle, mean of the least", ("min_dihedral", "mean"), 2),
+    ("cells with a dihedral angle < 5°", ("min_dihedral", "below_5"), 0),
+    ("cells with a dihedral angle < 10°", ("min_dihedral", "below_10"), 0),
+    ("dihedral angle, greatest", ("max_dihedral", "max"), 2),
+    ("cells with a dihedral angle > 165°", ("max_dihedral", "above_165"), 0),
     ("q-hat with 1/q", ("qhat",), 4),
     ("q-hat with 1/q_V", ("qhat_aspect",), 4),
 )
@@ -47,9 +53,15 @@ def figures(reports: Mapping[str, QualityReport]) -> Table:
     """One row for each figure of quality, one column for each report."""
     summaries = [report.summary() for report in reports.values()]
     rows = [
-        [label, *(_text(_at(summary, path), decimals) for summary in summaries)] for label, path, decimals in FIGURES
+        [_label(label, summaries), *(_text(_at(summary, path), decimals) for summary in summaries)]
+        for label, path, decimals in FIGURES
     ]
     return table(["", *reports], [row for row in rows if any(text != "-" for text in row[1:])])
+
+
+def _label(label: str, summaries: Sequence[Mapping[str, Any]]) -> str:
+    """Of tetrahedra, what stands for 1/q is η."""
+    return label.replace("1/q", "η") if "tetrahedra" in summaries[0] else label
 
 
 def counts(mesh: Mesh) -> str:
@@ -65,8 +77,7 @@ def worst_cells(mesh: Mesh, report: QualityReport, held: NDArray[np.bool_] | Non
         found: dict[str, Any] = {
             "cell": cell,
             "shape": float(report.shape[row]),
-            "min_angle": float(report.min_angle[row]),
-            "max_angle": float(report.max_angle[row]),
+            **{name: float(report.column(name)[row]) for name in report.angles},
             "inverted": not report.valid[row],
             "centre": report.centre[row].tolist(),
         }
@@ -79,13 +90,15 @@ def worst_cells(mesh: Mesh, report: QualityReport, held: NDArray[np.bool_] | Non
 
 def worst_table(cells: Sequence[Mapping[str, Any]]) -> Table:
     """The answer of ``worst_cells`` as a table."""
-    columns = ["cell", "1/q", "min angle", "max angle", "at"]
+    space = any("min_dihedral" in cell for cell in cells)
+    low, high = ("min_dihedral", "max_dihedral") if space else ("min_angle", "max_angle")
+    columns = ["cell", "η" if space else "1/q", low.replace("_", " "), high.replace("_", " "), "at"]
     rows = [
         [
             f"{cell['cell']}{' (inverted)' if cell['inverted'] else ''}",
             f"{cell['shape']:.4f}",
-            f"{cell['min_angle']:.2f}",
-            f"{cell['max_angle']:.2f}",
+            f"{cell[low]:.2f}",
+            f"{cell[high]:.2f}",
             " ".join(f"{value:.6g}" for value in cell["centre"]),
             *([f"{cell['held_corners']} of {cell['corners']}"] if "held_corners" in cell else []),
         ]

@@ -53,6 +53,8 @@ class Outcome:
     def missed(self) -> NDArray[np.int64]:
         """Rows of the cells that miss the target as they are now, if any was asked for, the worst first."""
         after = self.result.after
+        if not self.target:
+            return np.empty(0, dtype=np.int64)
         missed = np.flatnonzero(self.target.missed(after.shape, after.min_angle))
         return missed[np.argsort(after.shape[missed], kind="stable")]
 

@@ -1,4 +1,4 @@
-"""SU2 meshes (``.su2``): one zone in the plane, with named markers.
+"""SU2 meshes (``.su2``): one zone, in the plane or in space, with named markers.
 
 The file is a list of ``KEY= value`` lines, some of which announce how many rows follow. Rows of points and cells may
 end with an index. Lines of keywords that do not concern the mesh (AOA, the boxes of free-form deformation) are kept.
@@ -29,7 +29,10 @@ from gmsnet.mesh.mesh import Mesh
 name = "SU2"
 suffixes = (".su2",)
 
-CODES = {1: "vertex", 3: "line", 5: "triangle", 9: "quad"}
+FLAT = {1: "vertex", 3: "line", 5: "triangle", 9: "quad"}
+CODES = FLAT | {10: "tetra", 12: "hexahedron", 13: "wedge", 14: "pyramid"}
+ELEMENTS = {2: FLAT, 3: CODES}  # of NDIME dimensions
+MARKED = {2: {1: "vertex", 3: "line"}, 3: FLAT}
 SIZES = {code: nodes_of(kind) for code, kind in CODES.items()}
 COUNTS = {"NDIME": "dimensions", "NZONE": "zones", "NPOIN": "points", "NELEM": "elements", "NMARK": "markers",
           "MARKER_ELEMS": "marker elements", "NPERIODIC": "periodic transformations"}  # fmt: skip
@@ -63,7 +66,7 @@ class Contents:
 
 
 def read(files: Mapping[str, Data]) -> Parsed:
-    """See Format. Markers become line (or vertex) cells whose region is named; cells of the domain have region 0."""
+    """See Format. Markers become cells of fewer dimensions whose region is named; cells of the domain have region 0."""
     text = Text(files[".su2"], COMMENT)
     found = _collect(text)
     missing = [key for key in REQUIRED if key not in found.counts]
@@ -76,15 +79,16 @@ def read(files: Mapping[str, Data]) -> Parsed:
     if (announced := found.counts.get("NPERIODIC", found.periodic)) != found.periodic:
         raise FormatError(f"NPERIODIC announces {announced} transformations, but the file has {found.periodic}")
 
-    points, ends = text.spans(starts := _points(text, found.points))
-    cells = _cells(text, found.elements, len(points), 0, CODES)
+    dimension = found.counts["NDIME"]
+    points, ends = text.spans(starts := _points(text, found.points, dimension))
+    cells = _cells(text, found.elements, len(points), 0, ELEMENTS[dimension])
     numbers = numbered([marker.tag for marker in found.markers])
-    names = {(1, numbers[marker.tag]): marker.tag for marker in found.markers if marker.sent is None}
+    names = {(dimension - 1, numbers[marker.tag]): marker.tag for marker in found.markers if marker.sent is None}
     for marker in found.markers:
         if marker.rows is None:
             last = "MARKER_ELEMS" if marker.count is None else f"{marker.count} rows behind a SEND_TO"
             raise FormatError(f"the marker {marker.tag[:24]!r} has no {last}: the file is cut off")
-        kinds = {1: "vertex"} if marker.sent is not None else {1: "vertex", 3: "line"}
+        kinds = {1: "vertex"} if marker.sent is not None else MARKED[dimension]
         blocks = _cells(text, marker.rows, len(points), numbers[marker.tag], kinds, 1 + (marker.sent is not None))
         names |= {(b.cell.dimension, numbers[marker.tag]): marker.tag for b in blocks}
         cells += blocks
@@ -149,8 +153,8 @@ def _count(text: Text, section: Section, found: Contents) -> None:
     if not 1 <= len(section.value) <= 1 + (key == "NPOIN"):  # NPOIN may have the number without ghost points behind
         text.fail(at, f"one number was expected after {key}=, found {len(section.value)} words")
     count = text.count(section.value[0], COUNTS[key])
-    if key == "NDIME" and count != 2:
-        text.fail(at, f"NDIME= {count}: only meshes in the plane (NDIME= 2) can be smoothed")
+    if key == "NDIME" and count not in ELEMENTS:
+        text.fail(at, f"NDIME= {count}: a mesh has 2 dimensions, or 3")
     if key == "NZONE" and count != 1:
         text.fail(at, f"NZONE= {count}: a file with several zones cannot be read; split it into one file a zone")
     if key != "MARKER_ELEMS":
@@ -173,19 +177,19 @@ def _count(text: Text, section: Section, found: Contents) -> None:
             found.markers[-1].rows = rows
 
 
-def _points(text: Text, rows: Rows) -> Starts:
-    """The tokens (points × 2) of the coordinates; up to two indices may follow them."""
+def _points(text: Text, rows: Rows, dimension: int) -> Starts:
+    """The tokens (points × dimension) of the coordinates; up to two indices may follow them."""
     lengths = rows.lengths
-    bad = np.flatnonzero((lengths < 2) | (lengths > 4))
+    bad = np.flatnonzero((lengths < dimension) | (lengths > dimension + 2))
     if bad.size:
-        where = rows.where(int(bad[0]))
-        text.fail(where, f"two coordinates and an index were expected, found {lengths[bad[0]]} numbers")
-    _whole(text, rows, lengths > 2)
+        where, wanted = rows.where(int(bad[0])), {2: "two", 3: "three"}[dimension]
+        text.fail(where, f"{wanted} coordinates and an index were expected, found {lengths[bad[0]]} numbers")
+    _whole(text, rows, lengths > dimension)
     first = rows.first[:-1]
     for _, part in rows.parts():
-        text.integers(part.starts[part.first[:-1][part.lengths > 2] + 2])
-    text.integers(rows.starts[first[lengths > 3] + 3])
-    return rows.columns(0, 2)
+        text.integers(part.starts[part.first[:-1][part.lengths > dimension] + dimension])
+    text.integers(rows.starts[first[lengths > dimension + 1] + dimension + 1])
+    return rows.columns(0, dimension)
 
 
 def _cells(
@@ -224,27 +228,28 @@ def _whole(text: Text, rows: Rows, indexed: NDArray[np.bool_]) -> None:
 
 
 def write(mesh: Mesh) -> Written:
-    """See Format. Lines and vertices become markers."""
+    """See Format. Cells of fewer dimensions than the mesh become markers."""
     convert.check_kinds(mesh, name, CODES.values())
-    points, lost = convert.in_plane(mesh, name)
-    lost += convert.lost_regions(mesh, name) + convert.lost_data(mesh, name)
-    return Written({".su2": Pieces(lambda: _text(mesh, points))}, lost)
+    dimension = 3 if mesh.has_volumes else 2
+    points, lost = (convert.in_space(mesh), []) if mesh.has_volumes else convert.in_plane(mesh, name)
+    lost = lost + convert.lost_regions(mesh, name, dimension) + convert.lost_data(mesh, name)
+    return Written({".su2": Pieces(lambda: _text(mesh, points, dimension))}, lost)
 
 
-def _text(mesh: Mesh, points: NDArray[np.float64]) -> Iterator[Piece]:
+def _text(mesh: Mesh, points: NDArray[np.float64], dimension: int) -> Iterator[Piece]:
     code = {kind: number for number, kind in CODES.items()}
-    faces = [block for block in mesh.cells if block.dimension == 2]
-    yield b"NDIME= 2\nNELEM= %d\n" % sum(len(block.nodes) for block in faces)
+    elements = [block for block in mesh.cells if block.dimension == dimension]
+    yield b"NDIME= %d\nNELEM= %d\n" % (dimension, sum(len(block.nodes) for block in elements))
     index = 0
-    for block in faces:
+    for block in elements:
         numbers = np.arange(index, index := index + len(block.nodes))
         row = b"%d " % code[block.kind] + convert.row_of(block.nodes.shape[1] + 1)
         yield from convert.rows(row, block.nodes, numbers)
     yield b"NPOIN= %d\n" % len(points)
-    yield from convert.rows(b"% % %\n", points, np.arange(len(points)))
+    yield from convert.rows(convert.row_of(dimension + 1), points, np.arange(len(points)))
     markers: dict[str, list[tuple[int, NDArray[np.int64]]]] = {}
     for block in mesh.cells:
-        if block.cell.dimension < 2:
+        if block.cell.dimension < dimension:
             for region in distinct(block.regions):
                 tag = _tag(convert.marker_name(mesh, block.cell.dimension, region))
                 markers.setdefault(tag, []).append((code[block.kind], block.nodes[block.regions == region]))

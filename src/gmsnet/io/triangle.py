@@ -1,6 +1,8 @@
-"""The pair of files of Shewchuk's Triangle: ``.node`` holds the points, ``.ele`` the triangles.
+"""The pair of files of Shewchuk's Triangle and of TetGen: ``.node`` holds the points, ``.ele`` the cells.
 
-Points are numbered from 0 or from 1, as the first of them says. The first attribute of a triangle is its region.
+Points of two coordinates have triangles, those of three have tetrahedra. Points are numbered from 0 or from 1, as the
+first of them says. The first attribute of a cell is its region. Other files beside the two (``.face``, ``.edge``) name
+nodes by their numbers, so they fit the result as they are, and are not read.
 """
 
 from __future__ import annotations
@@ -30,14 +32,18 @@ ATTRIBUTE = "triangle:attribute"  # + its number: further attributes of points a
 MOST_ATTRIBUTES = 1000  # each is an array of its own
 
 # Triangle puts the node on the side opposite corner k into place 3 + k; the order elsewhere is by side 01, 12, 20.
-TO_SIDES, FROM_SIDES = [0, 1, 2, 5, 3, 4], [0, 1, 2, 4, 5, 3]
+# TetGen has the edges 23, 03, 01, 12, 13, 02 in places 4 to 9; the order elsewhere is 01, 12, 02, 03, 13, 23.
+ORDER = {"triangle6": [0, 1, 2, 5, 3, 4], "tetra10": [0, 1, 2, 3, 6, 7, 9, 5, 8, 4]}
+KINDS = {2: {3: "triangle", 6: "triangle6"}, 3: {4: "tetra", 10: "tetra10"}}  # dimension → nodes → kind
+TITLES = {2: name, 3: "TetGen"}
+MARKED = {2: ("line", "line3", "vertex"), 3: ("triangle", "triangle6", "line", "line3", "vertex")}
 
 
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format. Points with a boundary marker other than 0 become vertex cells with the marker as region."""
     points, ids, slots, data = _points(Text(files[".node"], b"#"))
     try:
-        cells, names, cell_data = _triangles(Text(files[".ele"], b"#"), ids)
+        cells, names, cell_data = _cells(Text(files[".ele"], b"#"), ids, points.shape[1])
     except FormatError as error:
         raise FormatError(f"in the .ele file beside it: {error}") from None
     markers = data.get(MARKER)
@@ -82,31 +88,35 @@ def _few(text: Text, attributes: int) -> int:
 def _points(text: Text) -> tuple[NDArray[np.float64], NDArray[np.int64], TextSlots, dict[str, NDArray[Any]]]:
     """Coordinates, numbers of the points, slots of the coordinates, point data."""
     (_, dimension, attributes, markers), rows = _header(text, 4, "points")
-    if dimension != 2:
-        text.fail(0, f"the points have {dimension} coordinates: only meshes in the plane (2) can be read")
+    if dimension not in KINDS:
+        text.fail(0, f"the points have {dimension} coordinates: there can be 2 (Triangle) or 3 (TetGen)")
+    width = int(dimension)
     if markers > 1:
         text.fail(0, f"{markers} boundary markers a point: there can be 0 or 1")
-    _width(text, rows, 3 + int(attributes) + int(markers), "a point")
+    _width(text, rows, 1 + width + int(attributes) + int(markers), "a point")
     attributes = _few(text, attributes) if len(rows) else 0  # nothing bounds it then
     ids = text.integers(rows.column(0))
     if (twice := first_repeated(ids)) >= 0:
         text.fail(rows.where(twice), f"the point {ids[twice]} is given twice")
     data: dict[str, NDArray[Any]] = {
-        f"{ATTRIBUTE}{k + 1}": text.floats(rows.column(3 + k)) for k in range(int(attributes))
+        f"{ATTRIBUTE}{k + 1}": text.floats(rows.column(1 + width + k)) for k in range(int(attributes))
     }
     if markers:
-        data[MARKER] = text.integers(rows.column(3 + int(attributes)))
-    points, ends = text.spans(starts := rows.columns(1, 2))
+        data[MARKER] = text.integers(rows.column(1 + width + int(attributes)))
+    points, ends = text.spans(starts := rows.columns(1, width))
     return points, ids, TextSlots(starts, ends), data
 
 
-def _triangles(
-    text: Text, ids: NDArray[np.int64]
+def _cells(
+    text: Text, ids: NDArray[np.int64], dimension: int
 ) -> tuple[list[CellBlock], dict[tuple[int, int], str], dict[str, tuple[NDArray[Any], ...]]]:
-    (_, size, attributes), rows = _header(text, 3, "triangles")
-    if size not in (3, 6):
-        text.fail(0, f"triangles with {size} nodes: there can be 3 or 6")
-    _width(text, rows, 1 + int(size) + int(attributes), "a triangle")
+    (_, size, attributes), rows = _header(text, 3, "cells")
+    cell = KINDS[dimension][min(KINDS[dimension])].replace("tetra", "tetrahedron")
+    if size not in KINDS[dimension]:
+        known = " or ".join(map(str, KINDS[dimension]))
+        points = f"a .node file of {dimension} coordinates"
+        text.fail(0, f"the cells have {size} nodes: beside {points} there can be {known}")
+    _width(text, rows, 1 + int(size) + int(attributes), f"a {cell}")
     attributes = _few(text, attributes) if len(rows) else 0  # nothing bounds it then
     text.integers(rows.column(0))
     starts = rows.columns(1, int(size))
@@ -115,11 +125,12 @@ def _triangles(
     if bad >= 0:
         known = f"{ids.min()} to {ids.max()}" if len(ids) else "none"
         where, found = int(starts.reshape(-1)[bad]), named.reshape(-1)[bad]
-        text.fail(where, f"a triangle names the node {found}, but the nodes are {known}")
+        text.fail(where, f"a {cell} names the node {found}, but the nodes are {known}")
     nodes = place.reshape(named.shape)
     values = [text.floats(rows.column(1 + int(size) + k)) for k in range(int(attributes))]
-    regions, names = _regions(values[0]) if values else (np.zeros(len(rows), dtype=np.int64), {})
-    kind, nodes = ("triangle", nodes) if size == 3 else ("triangle6", nodes[:, TO_SIDES])
+    regions, names = _regions(values[0], dimension) if values else (np.zeros(len(rows), dtype=np.int64), {})
+    kind = KINDS[dimension][int(size)]
+    nodes = nodes[:, ORDER[kind]] if kind in ORDER else nodes
     block = CellBlock(kind, sealed(nodes), sealed(regions))
     cell_data: dict[str, tuple[NDArray[Any], ...]] = {}
     for k, column in enumerate(values[1:], 2):
@@ -127,61 +138,68 @@ def _triangles(
     return [block], names, cell_data
 
 
-def _regions(values: NDArray[np.float64]) -> tuple[NDArray[np.int64], dict[tuple[int, int], str]]:
+def _regions(values: NDArray[np.float64], dimension: int) -> tuple[NDArray[np.int64], dict[tuple[int, int], str]]:
     """Whole numbers are regions as they are; if there are others, regions count from 1 and have them as names."""
     if (np.abs(values) < 2.0**53).all() and (values == np.rint(values)).all():
         return values.astype(np.int64), {}
     known, regions = np.unique(values, return_inverse=True)
-    return regions.reshape(-1) + 1, {(2, k + 1): repr(value) for k, value in enumerate(known.tolist())}
+    return regions.reshape(-1) + 1, {(dimension, k + 1): repr(value) for k, value in enumerate(known.tolist())}
 
 
 def write(mesh: Mesh) -> Written:
-    """See Format. Lines and vertices live on as boundary markers of their nodes."""
-    convert.check_kinds(mesh, name, ("triangle", "triangle6", "line", "line3", "vertex"))
-    faces = [block for block in mesh.cells if block.dimension == 2 and len(block.nodes)]
-    if len({block.kind for block in faces}) > 1:
-        raise FormatError("Triangle cannot hold three-node and six-node triangles in one file: write .vtu or .msh")
-    points, lost = convert.in_plane(mesh, name)
-    markers, words = _markers(mesh)
-    quadratic = bool(faces) and faces[0].kind == "triangle6"
-    nodes = np.concatenate([b.nodes[:, FROM_SIDES] if quadratic else b.nodes for b in faces] or [np.empty((0, 3), int)])
-    regions = np.concatenate([b.regions for b in faces] or [np.empty(0, int)])
+    """See Format. Cells of fewer dimensions than the mesh live on as boundary markers of their nodes."""
+    dimension = 3 if mesh.has_volumes else 2
+    title = TITLES[dimension]
+    convert.check_kinds(mesh, title, (*KINDS[dimension].values(), *MARKED[dimension]))
+    blocks = [block for block in mesh.cells if block.dimension == dimension and len(block.nodes)]
+    if len(kinds := {block.kind for block in blocks}) > 1:
+        raise FormatError(f"{title} cannot hold {' and '.join(sorted(kinds))} cells in one file: write .vtu or .msh")
+    points, lost = (convert.in_space(mesh), []) if mesh.has_volumes else convert.in_plane(mesh, title)
+    markers, words = _markers(mesh, dimension)
+    kind = blocks[0].kind if blocks else KINDS[dimension][min(KINDS[dimension])]
+    nodes = np.concatenate([b.nodes for b in blocks] or [np.empty((0, min(KINDS[dimension])), int)])
+    nodes = nodes[:, np.argsort(ORDER[kind])] if kind in ORDER else nodes
+    regions = np.concatenate([b.regions for b in blocks] or [np.empty(0, int)])
 
     def points_text() -> Iterator[Piece]:
-        yield b"%d 2 0 1\n" % len(points)
-        yield from convert.rows(b"% % % %\n", np.arange(1, len(points) + 1), points, markers)
+        yield b"%d %d 0 1\n" % points.shape
+        yield from convert.rows(convert.row_of(dimension + 2), np.arange(1, len(points) + 1), points, markers)
 
     def cells_text() -> Iterator[Piece]:
         yield b"%d %d 1\n" % nodes.shape
         template = convert.row_of(nodes.shape[1] + 2)
         yield from convert.rows(template, np.arange(1, len(nodes) + 1), nodes + 1, regions)
 
-    lost += words + convert.lost_names(mesh, name, (2,)) + convert.lost_data(mesh, name, kept=(MARKER,), regions=True)
+    lost = lost + words + convert.lost_names(mesh, title, (dimension,))
+    lost += convert.lost_data(mesh, title, kept=(MARKER,), regions=True)
     return Written({".node": Pieces(points_text), ".ele": Pieces(cells_text)}, lost)
 
 
-def _markers(mesh: Mesh) -> tuple[NDArray[np.int64], list[str]]:
-    """A boundary marker for each point, and what of the line and vertex cells is lost thereby."""
+def _markers(mesh: Mesh, dimension: int) -> tuple[NDArray[np.int64], list[str]]:
+    """A boundary marker for each point, and what of the cells of fewer dimensions is lost thereby."""
     markers = np.zeros(len(mesh.points), dtype=np.int64)
-    used = sorted({(b.cell.dimension, r) for b in mesh.cells if b.cell.dimension < 2 for r in distinct(b.regions)})
+    used = sorted(
+        {(b.cell.dimension, r) for b in mesh.cells if b.cell.dimension < dimension for r in distinct(b.regions)}
+    )
     plain = len({r for _, r in used}) == len(used) and all(r != 0 for _, r in used)
     number = {pair: pair[1] if plain else k for k, pair in enumerate(used, 1)}
-    lines = sum(len(block.nodes) for block in mesh.cells if block.dimension == 1)
     several = np.zeros(len(markers), dtype=bool)
     for block in mesh.cells:
-        if block.cell.dimension < 2:
+        if block.cell.dimension < dimension:
             for region in distinct(block.regions):
                 nodes = block.nodes[block.regions == region]
                 several[nodes] |= ~np.isin(markers[nodes], (0, number[block.cell.dimension, region]))
                 markers[nodes] = number[block.cell.dimension, region]
-    lost = []
-    if lines:
-        told = convert.listed([str(k) for (dim, _), k in number.items() if dim == 1])
-        turned = f"{lines} {convert.were(lines)} turned into markers of their nodes ({told})"
-        lost.append(f"{name} cannot hold line cells: {turned}")
+    title, lost = TITLES[dimension], []
+    for of, word in ((2, "surface"), (1, "line")):
+        count = sum(len(block.nodes) for block in mesh.cells if block.dimension == of < dimension)
+        if count:
+            told = convert.listed([str(k) for (dim, _), k in number.items() if dim == of])
+            turned = f"{count} {convert.were(count)} turned into markers of their nodes ({told})"
+            lost.append(f"{title} cannot hold {word} cells: {turned}")
     if count := int(np.count_nonzero(several)):
-        lost.append(f"{name} cannot hold several markers of a node: of those of {count} one each was kept")
+        lost.append(f"{title} cannot hold several markers of a node: of those of {count} one each was kept")
     named = [f"{mesh.region_names[pair]!r} ({k})" for pair, k in number.items() if pair in mesh.region_names]
     if named:
-        lost.append(f"{name} numbers its markers: {convert.left_out('name', named)}")
+        lost.append(f"{title} numbers its markers: {convert.left_out('name', named)}")
     return markers, lost

@@ -36,6 +36,14 @@ class MeasuredCells:
     quad_orientation: NDArray[np.int8]
     order: NDArray[np.intp] | None
 
+    names = ("min_angle", "max_angle", "shape", "aspect")  # of the columns
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many cells of which kind."""
+        quads = {} if self.order is None else {"quads": len(self.quads)}
+        return {"triangles": len(self.corners), **quads}
+
     @classmethod
     def of(cls, mesh: Mesh, topology: Topology) -> tuple[MeasuredCells, NDArray[np.int64]]:
         """Those of a mesh, and the index of each among all its cells."""

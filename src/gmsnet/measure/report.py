@@ -14,23 +14,29 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex import measures as kernels
 from gmsnet.measure.cells import MeasuredCells
 from gmsnet.measure.totals import NOWHERE, Totals, totals_of
+from gmsnet.measure.volumes import MeasuredTetrahedra
 from gmsnet.mesh.display import html_table, text_table
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
-from gmsnet.topology.ordering import near_points
+from gmsnet.topology.ordering import near_points, space_points, taken
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 SHAPE, ASPECT = "shape", "aspect"  # with which 1/q meshes on the way are compared: the loss's or Verdict's
 
 Floats = NDArray[np.float64]
 
-THRESHOLDS = {"min_angle": (5.0, 10.0, 20.0, 30.0), "max_angle": (120.0, 150.0, 170.0), "shape": (0.1, 0.2, 0.3, 0.5)}
+THRESHOLDS = {
+    "min_angle": (5.0, 10.0, 20.0, 30.0), "max_angle": (120.0, 150.0, 170.0), "shape": (0.1, 0.2, 0.3, 0.5),
+    "min_dihedral": (5.0, 10.0, 20.0, 30.0), "max_dihedral": (150.0, 165.0, 175.0),
+}  # fmt: skip
+BEST_IS_LOW = ("max_angle", "max_dihedral")
 
 
 @dataclass(frozen=True, eq=False)
 class QualityReport:
-    """Measures of the T triangles and quads of a mesh (six-node triangles by their corners).
+    """Measures of the T triangles and quads of a mesh (six-node triangles by their corners), or of its T tetrahedra.
 
     cell: (T,) index of each among all cells of the mesh, in file order. centre: (T, dim) where it is.
     min_angle, max_angle: (T,) degrees, of the geometric triangle. shape: (T,) 1/q = 4√3·S/(l² + m² + n²), the inverse
@@ -41,13 +47,17 @@ class QualityReport:
     D/(|e₁||e₂|) over the corners, of a triangle times 2/√3. sign: (T,) int8, the exact sign of S in float64: 1, 0 or
     −1. valid: (T,) bool, whether it is positive.
 
+    Of tetrahedra, shape is η = 12(3V)^(2/3)/Σl² with the sign of the volume V, which sign and valid are of, too.
+    min_dihedral, max_dihedral: (T,) degrees; volume: (T,); scaled_jacobian: (T,) √2·6V over the largest product of the
+    three edges at a corner (Verdict). They have no min_angle, max_angle, aspect and q̂.
+
     ``inverted`` and q̂ are known from the beginning, and so are the totals: means and extremes, None where there are no
     triangles. The columns are made when one of them is first asked for, of the triangles as they were measured.
     """
 
     cell: NDArray[np.int64]
     totals: Totals | None = field(repr=False)
-    cells: MeasuredCells = field(repr=False)
+    cells: MeasuredCells | MeasuredTetrahedra = field(repr=False)
     signs: NDArray[np.int8] | None = field(repr=False)  # None where all are certainly positive
 
     def __repr__(self) -> str:
@@ -63,6 +73,8 @@ class QualityReport:
         counts = [("cells", f"{len(self.cell):,}"), ("inverted", f"{self.inverted:,}")]
         if self.totals is None:
             return counts
+        if isinstance(self.cells, MeasuredTetrahedra):
+            return [*counts, *_of_tetrahedra(self)]
         known = [
             ("1/q, least", self.totals.shape_min, 4),
             ("1/q, mean", self.totals.shape_mean, 4),
@@ -105,25 +117,49 @@ class QualityReport:
     @property
     def min_angle(self) -> Floats:
         """(T,) in degrees."""
-        return self._column(kernels.LOW)
+        return self.column("min_angle")
 
     @property
     def max_angle(self) -> Floats:
         """(T,) in degrees."""
-        return self._column(kernels.HIGH)
+        return self.column("max_angle")
+
+    @property
+    def min_dihedral(self) -> Floats:
+        """(T,) in degrees."""
+        return self.column("min_dihedral")
+
+    @property
+    def max_dihedral(self) -> Floats:
+        """(T,) in degrees."""
+        return self.column("max_dihedral")
+
+    @property
+    def volume(self) -> Floats:
+        """(T,) signed."""
+        return self.column("volume")
 
     @property
     def shape(self) -> Floats:
-        """(T,) 1/q."""
-        return self._column(kernels.SHAPE)
+        """(T,) 1/q; η of tetrahedra."""
+        return self.column("shape")
 
     @property
     def aspect(self) -> Floats:
         """(T,) 1/q_V."""
-        return self._column(kernels.ASPECT)
+        return self.column("aspect")
 
-    def _column(self, which: int) -> Floats:
-        column: Floats = self._columns[which]
+    @property
+    def angles(self) -> tuple[str, str]:
+        """The names of the columns of the smallest and the largest angle."""
+        low, high = self.cells.names[:2]
+        return low, high
+
+    def column(self, name: str) -> Floats:
+        """(T,) by its name. Raises AttributeError for what cells of these kinds do not have."""
+        if name not in self.cells.names:
+            raise AttributeError(f"these cells have no {name}: they have {', '.join(self.cells.names)}")
+        column: Floats = self._columns[self.cells.names.index(name)]
         return column
 
     @cached_property
@@ -133,6 +169,8 @@ class QualityReport:
     @cached_property
     def scaled_jacobian(self) -> Floats:
         """(T,) of each cell's worst corner."""
+        if isinstance(self.cells, MeasuredTetrahedra):
+            return self.column("scaled_jacobian")
         return self.cells.scaled_jacobian()
 
     def worst(self, count: int) -> NDArray[np.int64]:
@@ -144,21 +182,19 @@ class QualityReport:
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers, ready for JSON: min, mean, max, 1st percentile (p1) and counts beyond thresholds."""
-        document: dict[str, Any] = {"triangles": len(self.cells.corners), "inverted": self.inverted}
-        if self.cells.order is not None:
-            document["quads"] = len(self.cells.quads)
+        document: dict[str, Any] = {**self.cells.counts, "inverted": self.inverted}
         if self.totals is None:
             return document
-        means = {
-            "min_angle": self.totals.low_mean, "max_angle": self.totals.high_mean, "shape": self.totals.shape_mean,
-            "aspect": self.totals.aspect_mean,
-        }  # fmt: skip
-        if self.cells.order is not None:
-            del means["aspect"]  # which quads do not have
-            means["scaled_jacobian"] = math.nan
-        for name, mean in means.items():
-            values = getattr(self, name)
-            best_is_low = name == "max_angle"
+        planar = isinstance(self.cells, MeasuredCells) and self.cells.order is None
+        known = {"shape": self.totals.shape_mean}
+        if planar:
+            known |= {"min_angle": self.totals.low_mean, "max_angle": self.totals.high_mean}
+            known["aspect"] = self.totals.aspect_mean
+        names = [name for name in self.cells.names if planar or name != "aspect"]
+        names += [] if planar or "scaled_jacobian" in names else ["scaled_jacobian"]
+        for name in names:
+            values, mean = getattr(self, name), known.get(name, math.nan)
+            best_is_low = name in BEST_IS_LOW
             document[name] = {
                 "min": float(values.min()),
                 "mean": float(values.mean()) if math.isnan(mean) else mean,
@@ -168,9 +204,19 @@ class QualityReport:
             for limit in THRESHOLDS.get(name, ()):
                 beyond = values > limit if best_is_low else values < limit
                 document[name][f"{'above' if best_is_low else 'below'}_{limit:g}"] = int(np.count_nonzero(beyond))
-        if self.cells.order is not None:
-            return document
-        return {**document, "qhat": self.qhat, "qhat_aspect": self.qhat_aspect}
+        return {**document, "qhat": self.qhat, "qhat_aspect": self.qhat_aspect} if planar else document
+
+
+def _of_tetrahedra(report: QualityReport) -> list[tuple[str, str]]:
+    """The same as ``figures``, after the counts."""
+    totals = report.totals
+    assert totals is not None
+    return [
+        ("η, least", f"{totals.shape_min:.4f}"),
+        ("η, mean", f"{totals.shape_mean:.4f}"),
+        ("dihedral angle, least", f"{report.min_dihedral.min():.2f}"),
+        ("dihedral angle, greatest", f"{report.max_dihedral.max():.2f}"),
+    ]
 
 
 def percentile(values: Floats, percent: int) -> float:
@@ -183,7 +229,7 @@ def percentile(values: Floats, percent: int) -> float:
 
 
 def measure(
-    mesh: Mesh, topology: Topology | None = None, near: Floats | None = None, executor: Executor = serial,
+    mesh: Mesh, topology: Topology | Volume | None = None, near: Floats | None = None, executor: Executor = serial,
     totals: Totals | None = None, shapes: NDArray[np.float32] = NOWHERE,
 ) -> QualityReport:  # fmt: skip
     """The measures of a mesh; ``topology`` saves building it again (it must belong to the same connectivity).
@@ -192,7 +238,9 @@ def measure(
     ``near_points(mesh, topology)``, where they are known; totals: of a planar mesh, where they are. shapes: see
     ``totals_of``.
     """
-    topology = topology or Topology.of(mesh)
+    topology = topology or connectivity_of(mesh)
+    if isinstance(topology, Volume):
+        return _of_volume(mesh, topology, near, executor, totals)
     cells, cell = MeasuredCells.of(mesh, topology)
     if not len(cell):
         return QualityReport(cell, None, cells, None)
@@ -205,5 +253,24 @@ def measure(
         near = near_points(mesh, topology) if near is None else near
         executor = executor.for_blocks(-(-len(topology.near) // LANES))
         totals = totals_of(near, topology.simplices, executor, shapes)
+    assert totals is not None
+    return QualityReport(cell, totals, cells, cells.signs() if totals.uncertain else None)
+
+
+def connectivity_of(mesh: Mesh, fixed: NDArray[np.bool_] | None = None) -> Topology | Volume:
+    """What follows from the connectivity of a mesh, of its volumes where it has any."""
+    return Volume.of(mesh, fixed) if mesh.has_volumes else Topology.of(mesh, fixed)
+
+
+def _of_volume(
+    mesh: Mesh, topology: Volume, near: Floats | None, executor: Executor, totals: Totals | None
+) -> QualityReport:
+    """``measure`` of a mesh of tetrahedra."""
+    cells, cell = MeasuredTetrahedra.of(mesh, topology)
+    if not len(cell):
+        return QualityReport(cell, None, cells, None)
+    near = taken(space_points(mesh), topology.memory) if near is None else near
+    executor = executor.for_blocks(-(-len(topology.near) // LANES))
+    totals = totals or totals_of(near, topology.simplices, executor)
     assert totals is not None
     return QualityReport(cell, totals, cells, cells.signs() if totals.uncertain else None)

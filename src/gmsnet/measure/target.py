@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.methods.below import missed
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
+from gmsnet.measure.cells import MeasuredCells
 from gmsnet.measure.report import QualityReport
 from gmsnet.topology.ordering import planar_points
 
@@ -54,6 +55,7 @@ class Target:
     def _missed_in(self, report: QualityReport) -> tuple[NDArray[np.int32], Floats]:
         """And their 1/q."""
         triangles = report.cells
+        assert isinstance(triangles, MeasuredCells)
         if triangles.order is not None:
             low, _, shape, _ = triangles.columns()
             every = np.flatnonzero(self.missed(shape, low)).astype(np.int32)

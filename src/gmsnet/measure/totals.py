@@ -13,6 +13,8 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex import cell_measures as cells
 from gmsnet.kernels.simplex import measures as kernels
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
+from gmsnet.kernels.simplex.tetra_measures import summarise_tetrahedra
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 
@@ -97,9 +99,12 @@ class Totals:
 
 
 def totals_of(
-    points: Floats, simplices: Simplices, executor: Executor = serial, shapes: NDArray[np.float32] = NOWHERE
+    points: Floats,
+    simplices: Simplices | Tetrahedra,
+    executor: Executor = serial,
+    shapes: NDArray[np.float32] = NOWHERE,
 ) -> Totals | None:
-    """Means and extremes over the cells of some corner simplices of planar points; None where there are none.
+    """Means and extremes over the cells of some corner simplices; None where there are none.
 
     executor: takes blocks of LANES simplices. shapes: (T,), for 1/q of each triangle, if it is wanted and all are
     triangles.
@@ -108,6 +113,13 @@ def totals_of(
     if not count:
         return None
     grids = kernels.grids(count)
+    if isinstance(simplices, Tetrahedra):
+
+        def part_of_volume(first: int, last: int) -> Floats:
+            figures: Floats = summarise_tetrahedra(points, simplices, first, last, *grids)
+            return figures
+
+        return Totals.of_cells(executor.map(part_of_volume, 0, blocks), executor)
     if simplices.shapes is not None:
 
         def part_of_cells(first: int, last: int) -> Floats:

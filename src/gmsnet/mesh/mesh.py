@@ -130,7 +130,7 @@ class Mesh:
             self.points, self.cells, dict(self.region_names), dict(self.point_data), dict(self.cell_data), self.single,
             self.source, dict(self.node_sets),
         )  # fmt: skip
-        return Mesh, fields, None if self.cells else {"plane": self.plane}
+        return Mesh, fields, None if self.cells else {"plane": self.plane, "has_volumes": self.has_volumes}
 
     def _twin(self) -> Mesh:
         """Another mesh that shares everything with this one."""
@@ -156,7 +156,7 @@ class Mesh:
         nothing: dict[str, Any] = {"cells": (), "point_data": {}, "cell_data": {}, "node_sets": {}, "source": None}
         for name, value in nothing.items():
             object.__setattr__(made, name, value)
-        made.__dict__["plane"] = self.plane
+        made.__dict__["plane"], made.__dict__["has_volumes"] = self.plane, self.has_volumes
         return made
 
     @cached_property
@@ -179,6 +179,11 @@ class Mesh:
             if extent[flat] <= 1e-9 * extent.max():
                 return {2: (0, 1), 1: (0, 2), 0: (1, 2)}[flat]
         return None
+
+    @cached_property
+    def has_volumes(self) -> bool:
+        """Whether cells fill space; faces, lines and vertices are then marks on them."""
+        return any(block.dimension == 3 and len(block.nodes) for block in self.cells)
 
     @cached_property
     def exponent(self) -> int:
@@ -206,15 +211,18 @@ class Mesh:
 def unmeasured(mesh: Mesh) -> str:
     """How many cells of which kind are no triangles and no plane quads, in words: no quality is known of them.
 
-    "" if there are none. Those of a kind that is not known count among them, as they may be faces; vertices, lines and
-    volumes do not.
+    Where there are volumes, of these those that are no tetrahedra. "" if there are none. Those of a kind that is not
+    known count among them, as they may be faces, or volumes; vertices and lines do not.
     """
-    return _counted(block for block in mesh.cells if block.dimension in (2, None) and not measured(mesh, block))
+    dimension = 3 if mesh.has_volumes else 2
+    return _counted(block for block in mesh.cells if block.dimension in (dimension, None) and not measured(mesh, block))
 
 
 def measured(mesh: Mesh, block: CellBlock) -> bool:
     """Is the quality of these cells known: are they triangles, or quads in a plane? Second-order ones by their
-    corners."""
+    corners. Where there are volumes: are they tetrahedra of first order?"""
+    if mesh.has_volumes:
+        return block.kind == "tetra"
     return block.triangular or (block.dimension == 2 and block.corners == 4 and mesh.plane is not None)
 
 

@@ -13,12 +13,12 @@ def in_plane(points: NDArray[np.float64], plane: tuple[int, int] | None) -> NDAr
 
 
 def exponent_of(points: NDArray[np.float64], plane: tuple[int, int] | None, single: bool) -> int:
-    """The power of two that brings the largest coordinate in the plane near 1.
+    """The power of two that brings the largest coordinate in the plane, or in space, near 1.
 
     0 in single precision, where no product of coordinates can under- or overflow.
     """
     if single:
         return 0
-    coordinates = in_plane(points, plane)
+    coordinates = points if plane is None else in_plane(points, plane)
     largest = max(-float(coordinates.min(initial=0.0)), float(coordinates.max(initial=0.0)))
     return int(np.frexp(largest)[1])

@@ -73,7 +73,7 @@ class Problem:
     @classmethod
     def of(cls, field: Field, metric: Metric, free: NDArray[np.bool_]) -> Problem:
         """Of the nodes (N,) that are free and have no simplex that is not certified positive."""
-        simplices, free = field.topology.changeable, free.copy()
+        simplices, free = field.planar.changeable, free.copy()
         precision, count = field.precision, len(simplices.rows)
         bad, every = np.empty(count, dtype=bool), np.ones(count, dtype=bool)
         if find_bad(field.points, field.points, simplices, every, precision.unit, precision.grain, bad):
@@ -181,7 +181,7 @@ class Adapt(Smoother):
         """A round of a power of E, for the worst cells: taken for what they gain, if the others do not lose more."""
         self.phase = WORST_PHASE
         before = self._standing(field.points, field)
-        moved, problem = 0, Problem.of(field, self.metric, field.topology.near_free)
+        moved, problem = 0, Problem.of(field, self.metric, field.planar.near_free)
         least = problem.least(field.points)
         if len(problem.moved) and least > 0.0:
             problem.doublings, problem.top = DOUBLINGS, 1.0 / least
@@ -204,7 +204,7 @@ class Adapt(Smoother):
 
     def _round(self, field: Field, before: tuple[float, float], floor: float) -> int:
         """Minimises ΣE with a barrier at a share ``floor`` of the least 1/E; how many nodes move."""
-        free = field.topology.near_free
+        free = field.planar.near_free
         for _ in range(REPAIRS):
             problem = Problem.of(field, self.metric, free)
             if not len(problem.moved):
@@ -215,7 +215,7 @@ class Adapt(Smoother):
                 return 0
             if field.level == VALID or self._standing(found, field)[0] >= before[0]:
                 return self._take(found, field) if self._standing(found, field)[1] > before[1] else 0
-            scored = field.topology.scored
+            scored = field.planar.scored
             below = cell_qualities(found, scored, self.metric.at(found)) < before[0]
             rows = below if scored.cells is None else below[np.unique(scored.cells, return_inverse=True)[1]]
             free, floor = free.copy(), BELOW
@@ -224,7 +224,7 @@ class Adapt(Smoother):
 
     def _standing(self, points: Floats, field: Field) -> tuple[float, float]:
         """The least and the mean 1/E of the cells that are compared."""
-        values = cell_qualities(points, field.topology.scored, self.metric.at(points))
+        values = cell_qualities(points, field.planar.scored, self.metric.at(points))
         return float(values.min(initial=1.0)), float(values.mean()) if len(values) else 1.0
 
     def _written(self, points: Floats, field: Field) -> Floats:
@@ -234,7 +234,7 @@ class Adapt(Smoother):
     def _certified(self, points: Floats, field: Field) -> bool:
         """Does the guard allow all nodes to go there at once?"""
         unit, grain = field.precision.unit, field.precision.grain
-        return not steps.count_below(points, field.points, field.topology.changeable, 0.0, unit, grain)
+        return not steps.count_below(points, field.points, field.planar.changeable, 0.0, unit, grain)
 
     def _take(self, points: Floats, field: Field) -> int:
         moved = int((points != field.points).any(axis=1).sum())

@@ -27,19 +27,25 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.measures import mean_shape_of_sample
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import STAR
 from gmsnet.measure.target import Target
+from gmsnet.measure.totals import totals_of
 from gmsnet.methods.barrier import Barrier
-from gmsnet.methods.base import Field, Method, Smoother, Tally
+from gmsnet.methods.base import ALL_CELLS, Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.creep import Creep
 from gmsnet.methods.optimize import Newton
 from gmsnet.methods.whole_mesh import CLOSEST, SETTLED, WholeMesh
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 SMALL = 5000  # free nodes
 SAMPLE = 32  # blocks of cells
@@ -52,6 +58,7 @@ AHEAD = 50  # times the last gain are at most expected to come
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
+LARGE_VOLUME, LARGE_GAIN = 50_000, 0.005  # free nodes of a volume of which a pass must gain more
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
 GOOD = 0.75  # a least 1/q that needs no more
@@ -113,6 +120,12 @@ QUADS_PLAN = (
     MEAN._replace(gain=0.0003, least=0.0002, lasting=math.inf, rounds=20),
 )
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
+# Of volumes; q there is the mean ratio to the power of 3/2.
+VOLUME_PLAN = (
+    Phase("Newton on q", lambda: Barrier("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False),
+    Phase("worst first", WorstFirst, 1, looks=False),
+    Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0005),
+)
 
 
 class Auto(Smoother):
@@ -126,6 +139,7 @@ class Auto(Smoother):
         self.creep: Creep | None = None
         self.whole = 0  # how often all nodes have moved at once
         self.slow = self.last = self.ideal = False
+        self.pass_gain = PASS_GAIN
         self.passes, self.least = 0, -math.inf  # passes over the worst cells, and the least 1/q after the last one
         self.again = -1  # the phase to go back to in the end, if there is one
 
@@ -144,10 +158,11 @@ class Auto(Smoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if self.at < 0:
-            large = LARGE_PLAN if field.topology.near_shapes is None else QUADS_PLAN
-            if not self.phases and field.level != STAR:
+            if not self.phases and field.level != STAR and isinstance(field.topology, Topology):
                 self.creep = Creep.of(field)
-            self.phases = self.phases or (SMALL_PLAN if len(field.topology.free) <= SMALL else large)
+            self.phases = self.phases or plan_for(field.topology)
+            if self.phases is VOLUME_PLAN and len(field.topology.free) > LARGE_VOLUME:
+                self.pass_gain = LARGE_GAIN
             self._enter(0, field)
         if self.at == len(self.phases):
             return (self._move_all if self.ideal else self._move_all_for_worst)(field, executor, test)
@@ -197,8 +212,8 @@ class Auto(Smoother):
     def _look_at_worst(self, smoother: WorstFirst) -> None:
         """Is the worst cell to have another turn, once others have made room for it?"""
         self.passes += 1
-        gains = smoother.least >= self.least + PASS_GAIN
-        if self.passes == 1 and self.phases is not SMALL_PLAN:
+        gains = smoother.least >= self.least + self.pass_gain
+        if self.passes == 1 and self.phases is not SMALL_PLAN and self.phases is not VOLUME_PLAN:
             gains = smoother.gained >= LAST_GAIN
         self.again = self.at if gains and self.passes < PASSES else -1
         self.least = smoother.least
@@ -242,7 +257,7 @@ class Auto(Smoother):
             goes_on = goes_on or self.slow
         target_reached = self.smoother.target_reached
         self.looks = self.rounds % phase.often == 0 if goes_on else phase.looks or target_reached
-        if isinstance(self.smoother, WorstFirst) and self.creep is not None:
+        if isinstance(self.smoother, WorstFirst) and (self.creep is not None or self.phases is VOLUME_PLAN):
             self._look_at_worst(self.smoother)
         if not goes_on:
             is_ideal = self.smoother.converged and isinstance(self.smoother, WorstFirst)
@@ -251,10 +266,22 @@ class Auto(Smoother):
             self._enter(len(self.phases) if target_reached or is_ideal else self.at + 1, field)
 
 
+def plan_for(topology: Topology | Volume) -> Sequence[Phase]:
+    """The phases for a mesh of this size and these cells."""
+    if isinstance(topology, Volume):
+        return VOLUME_PLAN
+    if len(topology.free) <= SMALL:
+        return SMALL_PLAN
+    return LARGE_PLAN if topology.near_shapes is None else QUADS_PLAN
+
+
 def mean_shape(field: Field) -> float:
     """The mean of 1/q over some of the cells, evenly taken."""
     simplices = field.topology.changeable
     stride = max(1, len(simplices.rows) // (SAMPLE * LANES))
+    if isinstance(simplices, Tetrahedra):
+        totals = totals_of(field.points, simplices.take(np.arange(0, len(simplices.rows), stride, dtype=np.int32)))
+        return math.nan if totals is None else totals.shape_mean
     return float(mean_shape_of_sample(field.points, simplices, stride))
 
 
@@ -289,4 +316,5 @@ METHOD = Method(
     source="this package; docs/auto.md",
     create=lambda options: Auto(),
     slides=True,
+    cells=ALL_CELLS,
 )

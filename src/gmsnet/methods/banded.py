@@ -77,8 +77,8 @@ class Banded(StarSmoother):
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
-        if field.topology is not self.topology:
-            self._begin(field.topology)
+        if field.planar is not self.topology:
+            self._begin(field.planar)
         self.at += 1
         self.inverse = max(least_shape(field, executor), 0.0)
         tally = np.zeros(3, dtype=np.int64)
@@ -89,6 +89,7 @@ class Banded(StarSmoother):
 
     def _begin(self, topology: Topology) -> None:
         self.topology, blocks = topology, topology.stars.blocks
+        assert isinstance(blocks, Blocks)
         first, count = places_of(blocks)
         self.bands = bands.Bands(first, np.empty(count), np.empty(count))
         log_mean, (nodes, blend, room) = np.empty(len(self.start)), self.kept
@@ -105,7 +106,7 @@ class Banded(StarSmoother):
 
 def least_shape(field: Field, executor: Executor) -> float:
     """The minimum 1/q of the cells with a free node."""
-    simplices = field.topology.changeable
+    simplices = field.planar.changeable
     shape = np.empty(len(simplices.rows), dtype=np.float32)
 
     def look(first: int, last: int) -> None:

@@ -23,26 +23,39 @@ from gmsnet.kernels.star.guard import (
     plain_guard,
     star_floors,
 )
+from gmsnet.kernels.star.guard3 import star_floors3
+from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.stars import Stars
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 CELLS = ("triangle", "quad")  # the kinds of cells whose nodes may move
+ALL_CELLS = (*CELLS, "tetra")
 TRIANGLES = ("triangle",)
 Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.star.stars)
 
 
 @dataclass(eq=False)
 class Field:
-    """What is smoothed. points: (N, 2) in memory order, changed in place by the guard alone. level: of the guard."""
+    """What is smoothed. points: (N, 2) in memory order, changed in place by the guard alone; of volumes (N, 4).
+
+    level: of the guard.
+    """
 
     points: NDArray[np.float64]
-    topology: Topology
+    topology: Topology | Volume
     precision: Precision
     level: int = VALID
     floor: Floor = field(default_factory=Floor)
     constraint: Constraint | None = None
+
+    @property
+    def planar(self) -> Topology:
+        """The topology of a mesh in a plane, for what is done in a plane alone."""
+        assert isinstance(self.topology, Topology)
+        return self.topology
 
     def guard(self, executor: Executor) -> Guard:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
@@ -53,7 +66,8 @@ class Field:
         if self.level == STAR:
             floors = np.empty(len(self.points))
             ringed = self.topology.near_ringed
-            star_floors(self.points, self.topology.changeable, ringed, guard.unit, guard.grain, floors)
+            of_stars = star_floors3 if isinstance(self.topology, Volume) else star_floors
+            of_stars(self.points, self.topology.changeable, ringed, guard.unit, guard.grain, floors)
             return StarGuard(*guard, floors)
         return guard
 
@@ -91,13 +105,23 @@ class StarSmoother(Smoother):
     ) -> None:
         """Visits the stars of the blocks first…last, all of one colour, once; without the GIL. Adds to the tally."""
 
+    def visit_in_space(
+        self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
+    ) -> None:
+        """The same of stars in space, of methods that have "tetra" among their cells."""
+        raise NotImplementedError
+
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         stars, guard = field.topology.stars, field.guard(executor)
+        blocks = stars.blocks
 
         def visit(first: int, last: int) -> Tally:
             counts = np.zeros(3, dtype=np.int64)
-            self.visit(field.points, stars.blocks, first, last, guard, counts)
+            if isinstance(blocks, SpaceBlocks):
+                self.visit_in_space(field.points, blocks, first, last, guard, counts)
+            else:
+                self.visit(field.points, blocks, first, last, guard, counts)
             return counts
 
         tally = by_colour(executor, visit, stars, field.points)
@@ -137,8 +161,8 @@ class Method:
     """A row of the table of methods.
 
     variants, objectives: the names that may be chosen from, the default first. weighted: it takes weights. cells: the
-    kinds of cells whose nodes it moves; limits: of objectives with which it moves fewer kinds, those. slides:
-    it can let nodes slide along curves.
+    kinds of cells whose nodes it moves; limits: of objectives or variants with which it moves fewer kinds, those.
+    slides: it can let nodes slide along curves.
     """
 
     name: str
@@ -152,7 +176,7 @@ class Method:
     cells: tuple[str, ...] = CELLS
     limits: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
 
-    def moves(self, kind: str, objective: str | None = None) -> bool:
-        """Does it move the nodes of cells of this kind, with this objective (None: the default one)?"""
-        chosen = objective or (self.objectives[0] if self.objectives else "")
+    def moves(self, kind: str, choice: str | None = None) -> bool:
+        """Does it move the nodes of cells of this kind, with this objective or variant (None: the default one)?"""
+        chosen = choice or (self.objectives[0] if self.objectives else "")
         return kind in self.limits.get(chosen, self.cells)

@@ -47,7 +47,7 @@ class Below(Smoother):
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother. The visits depend on each other, so that they are made on one thread."""
-        topology, tally = field.topology, np.zeros(3, dtype=np.int64)
+        topology, tally = field.planar, np.zeros(3, dtype=np.int64)
         simplices = topology.changeable
         self.converged = True
         rows: NDArray[np.int32] = kernels.missed(field.points, simplices, *self.limits)

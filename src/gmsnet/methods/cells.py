@@ -5,23 +5,30 @@ from __future__ import annotations
 from gmsnet.errors import InputError
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import METHODS, method_named
+from gmsnet.methods.base import TRIANGLES
+
+NAMES = {"quad": ("quad", "quads"), "tetra": ("tetrahedron", "tetrahedra")}
 
 
-def check_cells(mesh: Mesh, name: str, objective: str | None = None) -> None:
-    """InputError if the mesh has quads and the method, with this objective, moves triangles alone.
+def check_cells(mesh: Mesh, name: str, choice: str | None = None) -> None:
+    """InputError if the mesh has quads or tetrahedra and the method, with this objective or variant, leaves them.
 
     Such a mesh it does not smooth at all: nodes of triangles alone would be moved as if there were no quads.
     """
     method = method_named(name)
-    count = sum(len(block.nodes) for block in mesh.cells if block.kind == "quad")
-    if not count or method.moves("quad", objective):
+    kind = "tetra" if mesh.has_volumes else "quad"
+    count = sum(len(block.nodes) for block in mesh.cells if block.kind == kind)
+    if not count or method.moves(kind, choice):
         return
-    quads = "1 quad" if count == 1 else f"{count:,} quads"
-    others = ", ".join(each.name for each in METHODS.values() if each.moves("quad") and each is not method)
-    able = ", ".join(each for each in method.objectives if method.moves("quad", each))
-    if able:
+    one, many = NAMES[kind]
+    moves = "moves triangles alone" if method.cells == TRIANGLES or kind == "quad" else "moves cells in a plane alone"
+    cells = f"1 {one}" if count == 1 else f"{count:,} {many}"
+    others = ", ".join(each.name for each in METHODS.values() if each.moves(kind) and each is not method)
+    what = "objective" if choice in method.objectives or not choice else "variant"
+    able = ", ".join(each for each in (*method.objectives, *method.variants) if method.moves(kind, each))
+    if able and kind in method.cells:
         raise InputError(
-            f"the objective {objective} of {name} moves triangles alone, and this mesh has {quads}: "
-            f"choose one of its objectives {able}, or another method: {others}"
+            f"the {what} {choice} of {name} {moves}, and this mesh has {cells}: "
+            f"choose one of its {what}s {able}, or another method: {others}"
         )
-    raise InputError(f"{name} moves triangles alone, and this mesh has {quads}: choose {others}")
+    raise InputError(f"{name} {moves}, and this mesh has {cells}: choose {others}")

@@ -48,7 +48,7 @@ class Corners(Smoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if self.straight is None:
-            self.straight, self.order = replace(field, points=field.points.copy()), visited(field.topology)
+            self.straight, self.order = replace(field, points=field.points.copy()), visited(field.planar)
         places = self.straight.points
         guard = replace(field, floor=Floor()).guard(executor)
         tally = np.zeros(3, dtype=np.int64)

@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.block import DROPPED, TRUNCATED
 from gmsnet.kernels.star.guard import Precision, ratio_upper_bounds
+from gmsnet.kernels.star.guard3 import ratio_upper_bounds3
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 
 class Floor:
@@ -51,8 +54,10 @@ class Floor:
         """Takes note of what happened to the shifts of a whole sweep."""
         self.unhindered += not (tally[TRUNCATED] or tally[DROPPED])
 
-    def of(self, points: NDArray[np.float64], topology: Topology, precision: Precision, executor: Executor) -> float:
-        """An upper bound of the minimum D/L of the triangles with a free node, as the points are now."""
+    def of(
+        self, points: NDArray[np.float64], topology: Topology | Volume, precision: Precision, executor: Executor
+    ) -> float:
+        """An upper bound of the minimum D/L of the cells with a free node as they are now, of tetrahedra D/S^(3/2)."""
         simplices = topology.changeable
         blocks = self.blocks
         if blocks is None or self.unhindered < self.looks >= self.enough:
@@ -75,7 +80,7 @@ class Floor:
 
 def _least(
     points: NDArray[np.float64],
-    simplices: Simplices,
+    simplices: Simplices | Tetrahedra,
     blocks: NDArray[np.int32],
     precision: Precision,
     executor: Executor,
@@ -83,8 +88,10 @@ def _least(
     """An upper bound of the minimum D/L in each of these blocks of simplices."""
     least = np.empty(len(blocks))
 
+    bounds = ratio_upper_bounds3 if isinstance(simplices, Tetrahedra) else ratio_upper_bounds
+
     def look(first: int, last: int) -> None:
-        ratio_upper_bounds(points, simplices, blocks, precision.unit, precision.grain, first, last, least)
+        bounds(points, simplices, blocks, precision.unit, precision.grain, first, last, least)
 
     executor.map(look, 0, len(blocks))
     return least

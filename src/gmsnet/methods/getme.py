@@ -62,7 +62,7 @@ class SequentialGetme(Smoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother. The steps depend on each other, so that they are made on one thread."""
         if self.state is None:
-            elements = elements_of(field.topology)
+            elements = elements_of(field.planar)
             self.state = elements, queue_of(field.points, elements)
         elements, queue = self.state
         nodes, tally = len(field.topology.free), np.zeros(3, dtype=np.int64)

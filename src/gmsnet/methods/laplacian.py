@@ -22,9 +22,12 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.methods import laplacian as kernels
 from gmsnet.kernels.methods import laplacian_plain
+from gmsnet.kernels.methods.barrier3 import Power3
+from gmsnet.kernels.methods.laplacian3 import sweep3
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import Method, StarSmoother, Tally
+from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.methods.base import ALL_CELLS, CELLS, Method, StarSmoother, Tally
 
 VARIANTS = {  # None: the plain form, which has a kernel of its own
     "smart": kernels.SMART,
@@ -32,6 +35,9 @@ VARIANTS = {  # None: the plain form, which has a kernel of its own
     "inverse-length": kernels.INVERSE_LENGTH,
     "area": kernels.AREA,
 }
+
+
+IN_SPACE = Power3.of(-1)
 
 
 class Laplacian(StarSmoother):
@@ -49,6 +55,12 @@ class Laplacian(StarSmoother):
         else:
             kernels.sweep(points, blocks, first, last, guard, self.variant, tally)
 
+    def visit_in_space(
+        self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        sweep3(points, blocks, first, last, guard, IN_SPACE, self.variant is not None, tally)
+
 
 METHOD = Method(
     name="laplacian",
@@ -57,4 +69,6 @@ METHOD = Method(
     create=lambda options: Laplacian(options.variant),
     variants=tuple(VARIANTS),
     slides=True,
+    cells=ALL_CELLS,
+    limits=dict.fromkeys(("inverse-length", "area"), CELLS),
 )

@@ -37,12 +37,13 @@ class Sized(StarSmoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if field.topology is not self.topology:
-            self.topology = field.topology
-            blocks = field.topology.stars.blocks
+            self.topology = field.planar
+            blocks = field.planar.stars.blocks
+            assert isinstance(blocks, Blocks)
             first, count = places_of(blocks)
             self.wanted = kernels.Wanted(first, np.empty(count))
             points = field.points if self.start is None else self.start
-            kernels.targets(points, field.topology.near, blocks, self.wanted)
+            kernels.targets(points, field.planar.near, blocks, self.wanted)
         return super().sweep(field, executor, test)
 
     def visit(

@@ -66,7 +66,7 @@ class Problem:
     @classmethod
     def of(cls, field: Field, doublings: int = 0) -> Problem:
         """Of the free nodes that do not slide and have no cell that is not certified positive."""
-        topology, precision = field.topology, field.precision
+        topology, precision = field.planar, field.precision
         simplices, free = topology.changeable, topology.near_free.copy()
         if field.constraint is not None:
             free[field.constraint.row >= 0] = False

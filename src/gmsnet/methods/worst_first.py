@@ -20,8 +20,11 @@ from numpy.typing import NDArray
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import ranking
 from gmsnet.kernels.methods import worst_first_cycles as kernels
-from gmsnet.methods.base import Field, Method, MethodOptions, Smoother, Tally
+from gmsnet.kernels.simplex.mean_ratio2 import Simplices
+from gmsnet.methods.base import ALL_CELLS, Field, Method, MethodOptions, Smoother, Tally
+from gmsnet.methods.worst_in_space import WorstInSpace
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.volume import Volume
 
 
 class Cycle(NamedTuple):
@@ -65,8 +68,10 @@ class WorstFirst(Smoother):
         self.next = 0
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
-        """See Smoother. The visits depend on each other, so that they are made on one thread."""
+        """See Smoother. The visits depend on each other, so that they are made on one thread; but in space."""
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
+        if isinstance(topology, Volume):
+            return self._in_space(field, executor, test)
         simplices = topology.changeable
         if self.cells is None or self.next >= len(self.cycles):
             self.cells, self.least = candidates(field, executor)
@@ -86,6 +91,12 @@ class WorstFirst(Smoother):
         self.least, self.gained = after, after - late
         return tally
 
+    def _in_space(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
+        inner = WorstInSpace()
+        tally = inner.sweep(field, executor, test)
+        self.least, self.gained, self.converged = inner.least, inner.gained, inner.gained < GAIN
+        return tally
+
 
 def candidates(field: Field, executor: Executor) -> tuple[NDArray[np.int32], float]:
     """The worst cells, by their place among those that can change: at least the share CANDIDATES of them; and the
@@ -94,6 +105,7 @@ def candidates(field: Field, executor: Executor) -> tuple[NDArray[np.int32], flo
     The floor of the guard is told of the worst of these.
     """
     simplices = field.topology.changeable
+    assert isinstance(simplices, Simplices)
     shape = np.empty(len(simplices.rows), dtype=np.float32)
 
     def look(first: int, last: int) -> None:
@@ -117,4 +129,5 @@ METHOD = Method(
     source="Freitag, Plassmann: Local optimization-based simplicial mesh untangling and improvement (2000), its aim",
     create=create,
     slides=True,
+    cells=ALL_CELLS,
 )

@@ -19,6 +19,7 @@ from gmsnet.preserve.layers import stretched_layers
 from gmsnet.preserve.survey import Survey
 from gmsnet.preserve.walls import near_walls
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 SIZE, METRIC, NONE = "size", "metric", "none"
 PRESERVE = (SHAPE, SIZE, METRIC, NONE)
@@ -38,7 +39,7 @@ class Protection:
     (wall_stage.py), and how exactly their cells keep their areas. None where there are none.
     """
 
-    base: Topology
+    base: Topology | Volume
     notes: list[str]
     layers: Flags | None = None
     walls: Kept | None = None
@@ -49,12 +50,12 @@ class Protection:
         return None if self.walls is None else self.walls.nodes
 
     @cached_property
-    def outer(self) -> Topology:
+    def outer(self) -> Topology | Volume:
         """The topology with the nodes of layers held."""
         return self.base if self.layers is None else self.base.holding(self.layers, LAYER)
 
     @cached_property
-    def topology(self) -> Topology:
+    def topology(self) -> Topology | Volume:
         """The topology with all of them held."""
         return self.outer if self.walls is None else self.outer.holding(self.walls.nodes, WALL)
 
@@ -104,7 +105,9 @@ def protected(
         notes.append("fix_layers: no stretched layers were found, so none are held")
     if preserve != SHAPE:
         return protection
-    walls = near_walls(mesh, protection.outer, survey)
+    outer = protection.outer
+    assert isinstance(outer, Topology)
+    walls = near_walls(mesh, outer, survey)
     walls = walls.firm if firm else walls
     walled = Protection(topology, notes, layers, walls)
     return walled if walls.nodes.any() and WALL in walled.topology.held else protection

@@ -125,6 +125,8 @@ def deform_with(mesh: Any, options: SmoothOptions, prescribed: Prescribed, fixed
 def check_deformable(mesh: Mesh) -> None:
     """InputError for meshes that cannot be deformed: volumes, curved surfaces, second-order cells."""
     check_mesh(mesh, Target(None, None))
+    if mesh.has_volumes:
+        raise InputError("boundaries of volumes cannot be moved yet: deform takes meshes in a plane")
     kinds = sorted({block.kind for block in mesh.cells if block.kind in NAMES and len(block.nodes)})
     if kinds:
         raise InputError(

@@ -65,6 +65,7 @@ class Journey:
 
     def __init__(self, state: State, prescribed: Prescribed) -> None:
         base = state.protection.base
+        assert isinstance(base, Topology)
         self.slides = None if state.sliding is None else state.sliding.nodes
         self.held = base if self.slides is None else base.holding(self.slides, REASON)
         refuse_unless_free(BYTES_PER_NODE * len(base.free), f"moving the nodes around {len(base.free):,}")
@@ -123,6 +124,7 @@ class Journey:
         if self.slides is not None:
             levels = [topology.holding(self.slides, REASON) for topology in levels]
         for topology in dict.fromkeys(levels):
+            assert isinstance(topology, Topology)
             done = untangle(step.points, topology, state.precision)
             rest = self.inverted(done.points) & ~self.wrong
             if not rest.any():

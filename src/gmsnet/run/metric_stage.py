@@ -33,9 +33,9 @@ def check_given(options: SmoothOptions, count: int) -> Floats | None:
 
 def take_metric(state: State, options: SmoothOptions, executor: Executor) -> State:
     """With the metric, with the method that leads to it, and with how the input conforms to it."""
-    topology, mesh = state.topology, state.mesh
-    if not options.adapts or not len(topology.near):
+    if not options.adapts or not len(state.topology.near):
         return state
+    topology, mesh = state.planar, state.mesh
     function, check = _given(options)
     if state.nodal is not None:
         metric = Metric.at_nodes(topology, state.start, state.nodal[topology.memory], mesh.exponent)

@@ -26,6 +26,7 @@ from gmsnet.run.untangle_stage import still_inverted
 from gmsnet.topology.held import OF_SECOND_ORDER
 from gmsnet.topology.ordering import near_points, planar_points
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
     final = outcome(state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals)
     if state.metric is not None:
         near = near_points(state.mesh.with_points(final.points), state.topology)
-        state = replace(state, conformity=(*state.conformity, Conformity.of(near, state.topology, state.metric)))
+        state = replace(state, conformity=(*state.conformity, Conformity.of(near, state.planar, state.metric)))
     nothing = np.empty((0, 2))
     return replace(state, start=nothing, points=nothing, shapes=np.empty(0, dtype=np.float32), final=final)
 
@@ -68,7 +69,7 @@ def result_of(state: State, began: float) -> SmoothResult:
     )
 
 
-def _with_corners(state: State) -> Topology:
+def _with_corners(state: State) -> Topology | Volume:
     """The topology; of second-order cells with the corners free that were."""
     given = state.second_order
     if given is None:
@@ -77,7 +78,7 @@ def _with_corners(state: State) -> Topology:
     return given.whole.holding(~(free | _near_free_by_id(state.topology)), OF_SECOND_ORDER)
 
 
-def _near_free_by_id(topology: Topology) -> NDArray[np.bool_]:
+def _near_free_by_id(topology: Topology | Volume) -> NDArray[np.bool_]:
     free = np.zeros(len(topology.memory), dtype=bool)
     free[topology.free] = True
     return free
@@ -117,7 +118,7 @@ def _wall_note(protection: Protection, *, moved: bool) -> str:
 
 
 def outcome(
-    mesh: Mesh, topology: Topology, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
+    mesh: Mesh, topology: Topology | Volume, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
     start: Floats | None = None, executor: Executor = serial, totals: Totals | None = None,
 ) -> Final:  # fmt: skip
     """The best mesh as it is in the input's order; that of the input if the quick sums misjudged it.
@@ -125,8 +126,9 @@ def outcome(
     best: (N, 2) in memory order. All nodes that it does not move keep their very bits. rank: of two meshes that of the
     lesser rank is the better. start: ``near_points`` of the mesh, totals: of ``best``, where they are known.
     """
-    start = near_points(mesh, topology) if start is None else start
-    plane, factors = mesh.plane, _factors(mesh.exponent)
+    if start is None:
+        start = near_points(mesh, topology)
+    plane, factors = (0, 1, 2) if mesh.has_volumes else mesh.plane, _factors(mesh.exponent)
     assert plane is not None
     points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
     count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)

@@ -17,6 +17,7 @@ from gmsnet.metric.conformity import ConformityChange
 from gmsnet.run.sweep import Sweep as Sweep
 from gmsnet.run.untangle_stage import StillInvertedCell
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +56,7 @@ class SmoothResult:
     history: list[Sweep]
     notes: list[str]
     unmended: list[StillInvertedCell]
-    topology: Topology
+    topology: Topology | Volume
     seconds: float
     invalid_curved: int = 0
     conformity: ConformityChange | None = None

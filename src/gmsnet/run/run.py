@@ -28,6 +28,7 @@ from gmsnet.run.stop import CALLBACK, INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTH
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.ordering import near_points
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ class Start(NamedTuple):
     curved: the second-order cells whose corners move. metric: in which meshes are compared, if not in the plain one.
     """
 
-    topology: Topology
+    topology: Topology | Volume
     points: Floats
     precision: Precision
     score: Score | None = None
@@ -157,7 +158,7 @@ class Run:
         points = self.field.points
         totals = totals_of(points, self.topology.scored, self.executor)
         if self.metric is not None and totals is not None:
-            totals = in_metric(totals, points, self.topology.scored, self.metric)
+            totals = in_metric(totals, points, self.field.planar.scored, self.metric)
         return Score.of(totals, self.options.best_by, self.missing(points) if self.missing else NONE)
 
     def _stalled(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -29,7 +30,9 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.second_order import second_order_of
 from gmsnet.run.state import State
 from gmsnet.topology.held import REASONS
+from gmsnet.topology.ordering import space_points, taken
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -49,22 +52,22 @@ def first_state(
     target = options.target
     given, restore = to_mesh(mesh)
     check_mesh(given, target)
-    check_cells(given, options.method_name, options.objective)
+    check_cells(given, options.method_name, options.objective or options.variant)
+    if given.has_volumes:
+        check_volume(options)
     remarks = []
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
-    threads = options.thread_count if len(given.points) >= MANY else 1
     asked = fixed_mask(given, fixed)
+    if given.has_volumes:
+        return _first_of_volume(given, restore, asked, fixed, smoother, options, executor)
+    threads = options.thread_count if len(given.points) >= MANY else 1
     still = asked if moved is None else asked | moved
     curves = curves_to_slide_on(given, options.slide, options.feature_angle, still)
     topology, start = Topology.and_points(given, still, threads, None if curves is None else curves.slides)
     sliding = None
     if curves is not None:
         sliding = Sliding.of(given, curves, topology.memory, topology.free, options.geometry)
-    if asked.any() and REASONS[CHOSEN] not in topology.held:
-        count = np.count_nonzero(asked)
-        named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
-        where = " by the point data 'fixed' of the mesh" if fixed is None else ""
-        remarks.append(f"fixed: {named}{where}, and held for other reasons anyway")
+    remarks += held_anyway(asked, topology, fixed)
     second = second_order_of(given, topology, options)
     if options.adapts and second is not None:
         raise InputError("a metric for second-order cells cannot be had so far: leave out metric, size and preserve")
@@ -111,16 +114,58 @@ def first_state(
     )
 
 
+def held_anyway(asked: NDArray[np.bool_], topology: Topology | Volume, fixed: Any) -> list[str]:
+    """Says so where all nodes that are to be held are held for other reasons."""
+    if not asked.any() or REASONS[CHOSEN] in topology.held:
+        return []
+    count = np.count_nonzero(asked)
+    named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
+    where = " by the point data 'fixed' of the mesh" if fixed is None else ""
+    return [f"fixed: {named}{where}, and held for other reasons anyway"]
+
+
+def _first_of_volume(
+    given: Mesh, restore: Callable[[Floats], Any], asked: NDArray[np.bool_], fixed: Any, smoother: Smoother,
+    options: SmoothOptions, executor: Executor,
+) -> State:  # fmt: skip
+    """The same of a mesh of tetrahedra."""
+    topology = Volume.of(given, asked)
+    remarks = held_anyway(asked, topology, fixed)
+    if options.fix_layers:
+        remarks.append("fix_layers: stretched layers of volumes are not looked for yet, so none are held")
+    if unknown := unknown_cells(given):
+        remarks.append(f"the nodes of {unknown} are held: gmsnet does not know this type of cells")
+    if others := unmeasured(given):
+        remarks.append(f"not measured, and their nodes are held: {others}")
+    given = given.without_cells()
+    start = taken(space_points(given), topology.memory)
+    before = measure(given, topology, start, executor.for_blocks(0))
+    protection, nothing = Protection(topology, []), np.empty(0, dtype=np.float32)
+    return State(given, restore, smoother, before, protection, start, start, nothing, tuple(remarks))
+
+
+def check_volume(options: SmoothOptions) -> None:
+    """InputError for what cannot be asked of volumes yet."""
+    if options.target:
+        raise InputError("a target cannot be asked of volumes yet: leave out target_quality and target_angle")
+    if options.slides:
+        raise InputError("boundary nodes of volumes cannot slide yet: leave out slide")
+    if options.adapts:
+        raise InputError("volumes cannot be smoothed towards a metric yet: leave out metric and size")
+
+
 def check_mesh(mesh: Mesh, target: Target) -> None:
-    """InputError for volume meshes and curved surfaces, which cannot be smoothed yet, and targets of no triangle."""
+    """InputError for curved surfaces, which cannot be smoothed yet, and targets of no triangle."""
     others = unmeasured(mesh) if target else ""
     if others and not any(len(block.nodes) for block in mesh.cells if measured(mesh, block)):
         raise InputError(
             f"a target is asked of triangles and quads, and this mesh has none: {others} cannot be measured so far"
         )
-    volumes = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
-    if mesh.plane is None and volumes:
-        raise InputError(f"this is a volume mesh ({', '.join(volumes)}): only planar meshes can be smoothed so far")
+    if mesh.has_volumes:
+        if not any(block.kind == "tetra" and len(block.nodes) for block in mesh.cells):
+            kinds = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
+            raise InputError(f"this is a mesh of {', '.join(kinds)} cells: of volumes, only tetrahedra move so far")
+        return
     if mesh.plane is None and (unknown := unknown_cells(mesh)):
         raise InputError(
             f"the mesh varies in x, y and z and has cells of a type that gmsnet does not know ({unknown}): "

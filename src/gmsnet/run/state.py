@@ -26,6 +26,7 @@ from gmsnet.run.score import Score
 from gmsnet.run.stop import INTERRUPTED
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -136,9 +137,15 @@ class State:
     conformity: tuple[Conformity, ...] = ()
 
     @property
-    def topology(self) -> Topology:
+    def topology(self) -> Topology | Volume:
         """With the nodes that are held now."""
         return self.protection.outer if self.released else self.protection.topology
+
+    @property
+    def planar(self) -> Topology:
+        """The same of a mesh in a plane, for stages that know no other."""
+        assert isinstance(self.topology, Topology)
+        return self.topology
 
     @property
     def precision(self) -> Precision:

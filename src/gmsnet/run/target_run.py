@@ -54,7 +54,7 @@ def reach_target(state: State, options: SmoothOptions, executor: Executor) -> St
 
 def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterator[State]:
     """The state after each set of patches; the last one has a reason to stop."""
-    target, topology, own_plan = options.target, state.topology, isinstance(state.smoother, Auto)
+    target, topology, own_plan = options.target, state.planar, isinstance(state.smoother, Auto)
     corners, clear = cells_missing(state, target)
     if not len(corners):
         yield state.ended(TARGET_REACHED)
@@ -106,7 +106,7 @@ def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterato
 
 def cells_missing(state: State, target: Target) -> tuple[NDArray[np.int32], bool]:
     """The corners (K, 3) of the cells that miss the target, and whether all of them do however they are measured."""
-    topology, points, before = state.topology, state.points, state.before
+    topology, points, before = state.planar, state.points, state.before
     rows = rows_missing(points, topology, target, state.shapes if points is state.start else None)
     corners = topology.near.take(rows, axis=0)
     if (

@@ -16,6 +16,8 @@ from gmsnet.preserve.protection import protected
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
+from gmsnet.untangle.result import Untangled
 
 Reasons = Mapping[int, str]  # by the index of each cell among all cells of the mesh
 
@@ -31,23 +33,25 @@ def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> St
     """Moves the free nodes so that fewer cells are inverted; those of second-order cells have a stage of their own."""
     if state.second_order is not None and not len(state.topology.free):
         return state
-    return _untangled(state) if options.untangle and state.before.inverted else state
+    return _untangled(state, executor) if options.untangle and state.before.inverted else state
 
 
 def untangle_protected(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Lets go of protected nodes beside cells that could not be untangled, and tries once more."""
-    freed = state.protection.released(beside(state.reasons, state.topology)) if state.reasons else None
+    freed = None
+    if state.reasons and isinstance(state.topology, Topology):
+        freed = state.protection.released(beside(state.reasons, state.topology))
     if freed is None:
         return state
     protection, note = freed
-    return _untangled(replace(state, protection=protection, untangling=(*state.untangling, note)))
+    return _untangled(replace(state, protection=protection, untangling=(*state.untangling, note)), executor)
 
 
 def protect_untangled(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Protects what is there on purpose in the mesh as it is once it is untangled: tangles are no layers."""
-    if not state.untangling:
-        return state
     mesh, base = state.mesh, state.protection.base
+    if not state.untangling or isinstance(base, Volume):
+        return state
     points = mesh.points.copy()
     points[base.memory[:, None], list(mesh.plane or ())] = np.ldexp(state.points, mesh.exponent)
     found = protected(
@@ -57,13 +61,22 @@ def protect_untangled(state: State, options: SmoothOptions, executor: Executor) 
     return replace(state, protection=found, untangled=state.points)
 
 
-def _untangled(state: State) -> State:
+def _untangled(state: State, executor: Executor) -> State:
+    if isinstance(state.topology, Volume):
+        from gmsnet.untangle.space import untangle_volume
+
+        done = untangle_volume(state.points, state.topology, state.precision, executor, state.before.inverted)
+        return _noted(state, done, state.topology)
     from gmsnet.untangle import untangle  # what it needs of SciPy takes 0.15 s more to import
 
-    topology = state.topology
+    topology = state.planar
     if state.sliding is not None:
         topology = topology.holding(state.sliding.nodes, REASON)
-    done = untangle(state.points, topology, state.precision)
+    return _noted(state, untangle(state.points, topology, state.precision), topology)
+
+
+def _noted(state: State, done: Untangled, topology: Topology | Volume) -> State:
+    """The state with what untangling has made, and what there is to say about it."""
     steps = ", ".join(f"{step.name} ({step.sweeps})" for step in done.steps) or "nothing to try"
     left = f"{done.after:,} of {done.before:,} inverted cells are left" if done.after else f"all {done.before:,} mended"
     note = f"untangling: {left}; {steps}{f'; {done.why}' if done.why else ''}"

@@ -29,7 +29,7 @@ def improve_near_walls(state: State, options: SmoothOptions, executor: Executor)
     if walls is None or options.target or state.stop_reason not in (NO_PROGRESS, NOTHING_TO_MOVE):
         return state
     state = replace(state, released=True, totals=None)
-    zone = state.topology.holding(~with_rings(walls.nodes, state.topology), ELSEWHERE)
+    zone = state.planar.holding(~with_rings(walls.nodes, state.planar), ELSEWHERE)
     smoother = Banded(state.start if state.untangled is None else state.untangled, walls.taken(zone.memory))
     smoother.phase = PHASE
     run = Run(state.run_start(options.best_by)._replace(topology=zone), smoother, options, executor)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,17 @@ REASONS = {  # mark → text, in the order in which they count
     marks_of.HIGH_VALENCE: f"more than {MOST_NEIGHBOURS} neighbours",
     marks_of.SECOND_ORDER: OF_SECOND_ORDER,
 }
+
+
+def reasons_in_space(most: int) -> dict[int, str]:
+    """The same of nodes of tetrahedra, of which a free one has at most so many neighbours."""
+    return {
+        **REASONS,
+        marks_of.NON_MANIFOLD: "non-manifold facet",
+        marks_of.ZERO_AREA: "part of zero volume, which has no positive side",
+        marks_of.NOT_A_DISK: "star is not one closed ball",
+        marks_of.HIGH_VALENCE: f"more than {most} neighbours",
+    }
 
 
 def known_marks(mesh: Mesh, fixed: NDArray[np.bool_] | None, position: Ints) -> Marks:
@@ -75,11 +87,13 @@ def released(
     return freed, reasons
 
 
-def sorted_out(marks: Marks, position: Ints) -> tuple[dict[str, NDArray[np.int64]], Ints, Ints]:
+def sorted_out(
+    marks: Marks, position: Ints, reasons: Mapping[int, str] = REASONS
+) -> tuple[dict[str, NDArray[np.int64]], Ints, Ints]:
     """Reason → ids, each node under the first that applies to it; the ids of the free nodes, and their places."""
     by_id = marks.take(position)
     first = by_id & (~by_id + np.uint16(1))
     found = int(np.bitwise_or.reduce(first))
-    held = {text: np.flatnonzero(first == mark) for mark, text in REASONS.items() if found & mark}
+    held = {text: np.flatnonzero(first == mark) for mark, text in reasons.items() if found & mark}
     free = np.flatnonzero(first == 0).astype(np.int32)
     return held, free, position.take(free)

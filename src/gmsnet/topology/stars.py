@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.kernels.topology import connectivity
 from gmsnet.topology.polygons import Offsets
 
@@ -20,9 +21,12 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Stars:
-    """The patches in blocks of 64 stars of one colour and degree; those of colour c are first[c] … first[c + 1] − 1."""
+    """The stars in blocks of one colour; those of colour c are first[c] … first[c + 1] − 1.
 
-    blocks: Blocks
+    In a plane a block has 64 stars of one degree, in space 16.
+    """
+
+    blocks: Blocks | SpaceBlocks
     first: Ints
 
     @property

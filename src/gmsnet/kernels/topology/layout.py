@@ -35,17 +35,64 @@ def morton_order(points, keys, other, memory, position):
         bottom, top = min(bottom, points[i, 1]), max(top, points[i, 1])
     extent = max(right - left, top - bottom)
     scale = 65535.0 / extent if extent > 0.0 else 0.0
-    mask = (1 << BITS) - 1
-    at = np.empty(3 << BITS, dtype=np.int64)  # by digit, the last one first: where the next key goes
-    for k in range(len(at)):
-        at[k] = 0
+    at = no_counts()
     for i in range(n):
         x, y = np.int64((points[i, 0] - left) * scale), np.int64((points[i, 1] - bottom) * scale)
-        code = spread(x) | spread(y) << 1
-        keys[i] = code << 31 | i
-        at[code & mask] += 1
-        at[(1 << BITS) + (code >> BITS & mask)] += 1
-        at[(2 << BITS) + (code >> 2 * BITS)] += 1
+        keys[i] = counted(spread(x) | spread(y) << 1, i, at)
+    sort_keys(keys, other, at, memory, position)
+
+
+@kernel
+def morton_order3(points, keys, other, memory, position):
+    """The same of points (N, 3 or more) in space, over a grid of 2¹⁰ × 2¹⁰ × 2¹⁰."""
+    low, extent = np.empty(3), 0.0
+    for axis in range(3):
+        low[axis], high = np.inf, -np.inf
+        for i in range(len(points)):
+            low[axis], high = min(low[axis], points[i, axis]), max(high, points[i, axis])
+        extent = max(extent, high - low[axis])
+    scale = 1023.0 / extent if extent > 0.0 else 0.0
+    at = no_counts()
+    for i in range(len(points)):
+        code = np.int64(0)
+        for axis in range(3):
+            code |= spread3(np.int64((points[i, axis] - low[axis]) * scale)) << axis
+        keys[i] = counted(code, i, at)
+    sort_keys(keys, other, at, memory, position)
+
+
+@part
+def spread3(x):
+    """The lower 10 bits of x with two zeros between any two."""
+    x = (x | (x << 16)) & 0x030000FF
+    x = (x | (x << 8)) & 0x0300F00F
+    x = (x | (x << 4)) & 0x030C30C3
+    return (x | (x << 2)) & 0x09249249
+
+
+@part
+def no_counts():
+    """For ``counted``: by digit, the last one first, how many keys have each."""
+    at = np.empty(3 << BITS, dtype=np.int64)
+    for k in range(len(at)):
+        at[k] = 0
+    return at
+
+
+@inlined
+def counted(code, i, at):
+    """The key of node i with this code of up to 32 bits, its digits counted."""
+    mask = (1 << BITS) - 1
+    at[code & mask] += 1
+    at[(1 << BITS) + (code >> BITS & mask)] += 1
+    at[(2 << BITS) + (code >> 2 * BITS)] += 1
+    return code << 31 | i
+
+
+@part
+def sort_keys(keys, other, at, memory, position):
+    """Sorts keys that have been ``counted``, and writes the order. other: as long as keys, to work with."""
+    n, mask = len(keys), (1 << BITS) - 1
     for digit in range(3):
         end, begin = 0, digit << BITS
         for k in range(begin, begin + mask + 1):

@@ -36,12 +36,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.simplex.tetra_measures import SHAPE
 from gmsnet.measure.bounds import groups, links
 from gmsnet.measure.cells import MeasuredCells
+from gmsnet.measure.volumes import MeasuredTetrahedra
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import planar_points
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -120,14 +123,19 @@ class Limits:
         return "all its nodes are held, so it stays as it is" if self.held[row] else "no bound known"
 
 
-def limits(mesh: Mesh, topology: Topology, below: float = 0.9) -> Limits:
-    """The bounds less than ``below`` for a planar mesh. topology: of this mesh; which nodes it holds is what counts.
+def limits(mesh: Mesh, topology: Topology | Volume, below: float = 0.9) -> Limits:
+    """The bounds less than ``below`` for a planar mesh; of volumes those of held cells alone.
+
+    topology: of this mesh; which nodes it holds is what counts.
 
     Where free nodes are has no influence.
     """
     free = np.zeros(len(topology.memory), dtype=bool)
     free[topology.free] = True
-    if topology.patterns is not None:
+    if isinstance(topology, Volume):
+        cell, held = topology.cell, np.all(~free[topology.cells], axis=1)
+        found = _held_in_space(mesh, topology, np.flatnonzero(held), below)
+    elif topology.patterns is not None:
         cells, cell = MeasuredCells.of(mesh, topology)
         found, held = links.collect(cells, topology, free, below)
     else:
@@ -144,3 +152,12 @@ def limits(mesh: Mesh, topology: Topology, below: float = 0.9) -> Limits:
         held=held,
         points=mesh.points,
     )
+
+
+def _held_in_space(mesh: Mesh, topology: Volume, rows: Ints, below: float) -> groups.Groups:
+    """The tetrahedra of these rows that are worse than ``below``."""
+    shape = MeasuredTetrahedra.of(mesh, topology)[0].columns(rows.astype(np.int32))[SHAPE]
+    rows, shape = rows[shape < below], shape[shape < below]
+    nowhere, one = np.full(len(rows), groups.NOWHERE), np.ones(len(rows), dtype=np.intp)
+    made = groups.Groups.of(groups.HELD, nowhere, np.zeros(len(rows)), shape, one, rows)
+    return groups.Groups.joined([made])

@@ -1,0 +1,134 @@
+"""Newton's method on Σq^p over a star in space, one step a visit. The formulas stand in kernels.simplex.mean_ratio3.
+
+Near a sliver F ~ h^(−m), m = 2p/3, for which Newton's step of F^(−1/m) is the right one: Newton's of F divided by
+1 − (1 + 1/m)·λ, λ = gᵀH⁻¹g/F, at most 50 times as long. Where neither F falls nor all simplices stay above the floor,
+the step is halved in SIMD lanes, for D and S after any step follow from what is kept. So a step beyond the rim
+comes back to where F is less than before, not to where cells are only just positive.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.star.space import (
+    AFTER,
+    GX,
+    GY,
+    GZ,
+    ISO,
+    LANES3,
+    LEAST,
+    MARGIN,
+    VALUE,
+    XX,
+    XY,
+    XZ,
+    YY,
+    YZ,
+    ZZ,
+    derive,
+    judge,
+)
+from gmsnet.kernels.star.stars3 import certify3, fetch3, store3, workspace3_for
+
+TRIALS = 10
+K3 = 432.0  # S³/D² of a regular tetrahedron
+FLAT = 1e-5  # of F: a node with less to gain stays, for float32 does not tell it from nothing
+
+
+class Power3(NamedTuple):
+    """number: k of p = 3·2^k, −1 for p = 3/2. constants: see kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m."""
+
+    number: int
+    constants: NDArray[np.float32]
+    isotropic: float
+    ratio: float
+
+    @classmethod
+    def of(cls, number: int, worst: float = 1.0) -> Power3:
+        """Of a power, of (q/q_worst)^p. worst: q_worst³, so that high powers stay within float32."""
+        p = 1.5 if number < 0 else 3.0 * 2.0**number
+        scale, m = 1.0 / (K3 * worst), 2.0 * p / 3.0
+        constants = (scale, math.sqrt(scale), 2.0 * p, m, 0.5 * (1.0 + 1.0 / m), 1.0 - 1.0 / p)
+        return cls(number, np.array(constants, dtype=np.float32), 6.0 * p, 1.0 + 1.0 / m)
+
+
+@part
+def propose3(sums, power, relaxation, step):
+    """Newton's step of all lanes, by LDLᵀ, lengthened."""
+    one, two, most, flat = np.float32(1.0), np.float32(2.0), np.float32(0.02), np.float32(FLAT)
+    ratio, isotropic, longest = np.float32(power.ratio), np.float32(power.isotropic), np.float32(relaxation)
+    for lane in range(LANES3):
+        iso = isotropic * sums[ISO * LANES3 + lane]
+        xx, yy = two * sums[XX * LANES3 + lane] + iso, two * sums[YY * LANES3 + lane] + iso
+        zz = two * sums[ZZ * LANES3 + lane] + iso
+        xy, xz, yz = sums[XY * LANES3 + lane], sums[XZ * LANES3 + lane], sums[YZ * LANES3 + lane]
+        gx, gy, gz = sums[GX * LANES3 + lane], sums[GY * LANES3 + lane], sums[GZ * LANES3 + lane]
+        first = one / xx
+        lower, lowest = xy * first, xz * first
+        second = yy - lower * xy
+        mixed = yz - lower * xz
+        inverse = one / second
+        last = mixed * inverse
+        third = (zz - lowest * xz) - last * mixed
+        ey = gy - lower * gx
+        ez = (gz - lowest * gx) - last * ey
+        z = ez / third
+        y = ey * inverse - last * z
+        x = (gx * first - lower * y) - lowest * z
+        gain = ((gx * x + gy * y) + gz * z) / sums[VALUE * LANES3 + lane]
+        longer = max(one / max(one - ratio * gain, most), longest)
+        longer = longer if gain > flat else np.float32(0.0)
+        step[lane], step[LANES3 + lane], step[2 * LANES3 + lane] = longer * x, longer * y, longer * z
+
+
+@part
+def settle3(workspace, unit, grain, last):
+    """Which lanes may go as they are: certified, and F falls. Returns how many may not; their steps are halved.
+
+    last: there is no further trial. Steps by which F does not fall become zero; what is not certified may be so in
+    float64.
+    """
+    certify3(workspace, unit, grain)
+    sums, step, refused = workspace.sums, workspace.step, 0
+    for lane in range(LANES3):
+        before, after = sums[VALUE * LANES3 + lane], sums[AFTER * LANES3 + lane]
+        # Beyond the rim, where D < 0, powers of q are small: that is no gain.
+        inside = min(sums[LEAST * LANES3 + lane], sums[MARGIN * LANES3 + lane]) > np.float32(0.0)
+        falls = (after < before) and inside
+        still = step[lane] == 0.0 and step[LANES3 + lane] == 0.0 and step[2 * LANES3 + lane] == 0.0
+        allowed = workspace.allowed[lane] and falls
+        workspace.allowed[lane] = allowed
+        refused += not (allowed or still)
+        factor = np.float32(1.0) if allowed or (last and falls) else np.float32(0.0 if last else 0.5)
+        for k in range(3):
+            step[k * LANES3 + lane] *= factor
+    return refused
+
+
+@kernel
+def sweep3(points, blocks, first, last, guard, power, relaxation, tally):
+    """Visits the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
+    workspace = workspace3_for(blocks.most, blocks.most_simplices)
+    floor = max(guard.floor, 0.0)
+    for block in range(first, last):
+        rows = np.int64(blocks.simplices[block])
+        fetch3(points, blocks, block, workspace)
+        derive(
+            workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
+            None, workspace.kept, workspace.sums,
+        )  # fmt: skip
+        propose3(workspace.sums, power, relaxation, workspace.step)
+        for trial in range(TRIALS):
+            judge(
+                workspace.kept, rows, blocks.cells, block, power.number, power.constants, None, workspace.step, floor,
+                workspace.sums,
+            )  # fmt: skip
+            if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1) == 0:
+                break
+        store3(points, blocks, block, workspace, guard, tally)

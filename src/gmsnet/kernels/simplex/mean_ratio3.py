@@ -1,0 +1,120 @@
+"""The mean ratio of a corner simplex in space: the one place that knows its formula.
+
+With the spokes a, b, c from a vertex v, in the order in which D = a·(b × c) is positive in a valid cell, and the ideal
+corner W, let S be ‖A W⁻¹‖²_F, A = (a b c), times a constant: a sum of *weighted squared edges*, whichever vertex is v:
+
+    S = w_a |a|² + w_b |b|² + w_c |c|² + w_ab |b − a|² + w_bc |c − b|² + w_ca |a − c|².
+
+The weights are 1 throughout where W is the corner of a regular tetrahedron, and 1, 1, 1, 0, 0, 0 at the corner of a
+cube. Then
+
+    η = 1/q = K·D^(2/3)/S,   K = 6·2^(1/3) for tetrahedra, 3 for the corners of hexahedra,
+
+which is 12·(3V)^(2/3)/Σl² of a tetrahedron of volume V = D/6 (Liu, Joe: On the shape of tetrahedra from bisection,
+Mathematics of Computation 63, 1994). Seen from v, which moves, with the spokes to fixed places,
+
+    w = (b − a) × (c − a),  D = a·w,  ∇D = −w,  ∇²D = 0,
+    s = w_a a + w_b b + w_c c,  σ = w_a + w_b + w_c,  ∇S = −2s,  ∇²S = 2σI.
+
+So f = S^α/D^m has, with s' = (2α/S)s, w' = (m/D)w and v' = ½(1 + 1/m)w' − s',
+
+    −∇f = f·(s' − w'),   ∇²f = f·[(1 − 1/α) s's'ᵀ + w'v'ᵀ + v'w'ᵀ + (2ασ/S) I].
+
+For α = p and m = 2p/3 it is (K q)^p, a convex function of v where D > 0 for p ≥ 1: S is a sum of squares of what is
+affine in v, D is affine, and y²/t^(2/3) is convex for t > 0.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.jit.compile import inlined
+
+TINY = 1e-300  # stands in for a length of zero: the quotient is then zero, not a division by zero
+REGULAR = 6.0 * 2.0 ** (1.0 / 3.0)  # K of a tetrahedron
+THIRD = 1.0 / 3.0
+
+
+class Tetrahedra(NamedTuple):
+    """Corner simplices of cells in space.
+
+    rows: (S, 4) nodes. orientation: (S,) ±1, −1 where D is to be taken with the other sign.
+    """
+
+    rows: NDArray[np.int32]
+    orientation: NDArray[np.int8]
+
+    @property
+    def cell_count(self) -> int:
+        """How many cells they belong to."""
+        return len(self.rows)
+
+    def take(self, rows: NDArray[np.int32]) -> Tetrahedra:
+        """Some of them."""
+        return Tetrahedra(self.rows.take(rows, axis=0), self.orientation.take(rows))
+
+
+@inlined
+def normal(ax, ay, az, bx, by, bz, cx, cy, cz):
+    """w = (b − a) × (c − a): the gradient of D with the other sign."""
+    ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+    return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+
+
+@inlined
+def determinant(ax, ay, az, bx, by, bz, cx, cy, cz):
+    """D = a·(b × c), six times the volume of the simplex."""
+    return az * (bx * cy - cx * by) + bz * (cx * ay - ax * cy) + cz * (ax * by - bx * ay)
+
+
+@inlined
+def square(x, y, z):
+    """The squared length."""
+    return (x * x + y * y) + z * z
+
+
+@inlined
+def shape_of(double, lengths):
+    """η of a tetrahedron, with the sign of D. lengths: the sum of its squared edges."""
+    size = np.cbrt(abs(double))
+    return math.copysign(REGULAR * size * size / max(lengths, TINY), double)
+
+
+@inlined
+def measured(ax, ay, az, bx, by, bz, cx, cy, cz):
+    """D, S, w and s of a corner of a tetrahedron, written for floats and for vectors of them alike."""
+    wx, wy, wz = normal(ax, ay, az, bx, by, bz, cx, cy, cz)
+    double = (ax * wx + ay * wy) + az * wz
+    sx, sy, sz = (ax + bx) + cx, (ay + by) + cy, (az + bz) + cz
+    lengths = ((square(ax, ay, az) + square(bx, by, bz)) + square(cx, cy, cz)) * 4.0 - square(sx, sy, sz)
+    return double, lengths, wx, wy, wz, sx, sy, sz
+
+
+@inlined
+def derivatives(f, of_s, of_w, wx, wy, wz, sx, sy, sz, mixed, squared):
+    """−∇f and the Hessian of f without its part along I, from f, 2α/S, m/D, w and s, for floats and vectors alike.
+
+    mixed: ½(1 + 1/m). squared: 1 − 1/α. Returns x, y, z, half of xx, yy, zz, and xy, xz, yz.
+    """
+    sx, sy, sz, wx, wy, wz = sx * of_s, sy * of_s, sz * of_s, wx * of_w, wy * of_w, wz * of_w
+    vx, vy, vz = wx * mixed - sx, wy * mixed - sy, wz * mixed - sz
+    fx, fy, fz = f * wx, f * wy, f * wz
+    g = f * squared
+    hx, hy, hz = g * sx, g * sy, g * sz
+    return (
+        f * sx - fx, f * sy - fy, f * sz - fz,
+        fx * vx + hx * sx * 0.5, fy * vy + hy * sy * 0.5, fz * vz + hz * sz * 0.5,
+        (fx * vy + fy * vx) + hx * sy, (fx * vz + fz * vx) + hx * sz, (fy * vz + fz * vy) + hy * sz,
+    )  # fmt: skip
+
+
+@inlined
+def moved(double, lengths, wx, wy, wz, sx, sy, sz, tx, ty, tz):
+    """D and S once the vertex has made the step t."""
+    after = double - ((tx * wx + ty * wy) + tz * wz)
+    way = ((tx * tx + ty * ty) + tz * tz) * 3.0
+    return after, (lengths + way) - ((tx * sx + ty * sy) + tz * sz) * 2.0

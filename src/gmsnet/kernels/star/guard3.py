@@ -1,0 +1,113 @@
+"""Which moves are allowed in space: the rule of kernels.star.guard for tetrahedra.
+
+With D = 6V and S = Σl², η = 12(3V)^(2/3)/Σl² is above φ just where D > c·S^(3/2), c = √(φ³/432). A floor is a c. In
+float64 the computed S = 4(|a|² + |b|² + |c|²) − |a + b + c|² of spokes with components up to m is off by at most
+32u·(4Σ|·|² + |s|²) + 160·mδ + 80δ², for each of the six squared edges changes by at most 24mδ + 12δ² with coordinates
+known up to ±δ, and no term of the sum is larger than what is in brackets. From an upper bound S' of S follows that of
+S^(3/2), S'·√S'·(1 + 8u).
+
+A tetrahedron is *certified above* a floor c if D exceeds its own error bound and c times that bound. What is proven of
+the levels in the plane holds in space word for word: their proofs use the rule and nothing of the plane.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gmsnet.kernels.jit.compile import LANES, inlined, kernel
+from gmsnet.kernels.simplex.mean_ratio3 import square
+from gmsnet.kernels.simplex.orientation3 import determinant_and_bound
+from gmsnet.kernels.simplex.predicates import UNIT
+
+LARGEST3 = 0.0481126  # above D/S^(3/2) of a regular tetrahedron, 1/√432
+COARSE3 = 2.0**-24
+
+
+@inlined
+def error_bound3(m, delta):
+    """By how much the minimum D − c·S^(3/2) of a star, computed in float32 from what is kept of it, may be off.
+
+    m: no component of the ring or of the step is larger, over the star's size; delta: by how much a coordinate may be
+    off, over it, too. u = 2⁻²⁴. A spoke, from the free node, is off by e = 2u·m + 2δ, the step by u·m + δ. So are w by
+    16m·e + 32u·m², D by 72m²·e + 160u·m³, t·w by 48m²·e + 184u·m³ + 24m²·δ, and D − t·w by 632u·m³ + 264m²·δ in all;
+    S − 2t·s + 3|t|² by 895u·m² + 324m·δ; it is at most 72m², and c at most 1/√432, so that c·S^(3/2) is off by
+    551m²(u·m + δ) and 88u·m³ for its own rounding. With the difference this is less than 1400m²(u·m + δ), and what is
+    of second order in e is less than the rest, or the bound is more than any margin.
+    """
+    return 2048.0 * m * m * (COARSE3 * m + delta)
+
+
+@inlined
+def length_bounds(ax, ay, az, bx, by, bz, cx, cy, cz, delta):
+    """S, and by how much it may be off."""
+    sx, sy, sz = (ax + bx) + cx, (ay + by) + cy, (az + bz) + cz
+    around = ((square(ax, ay, az) + square(bx, by, bz)) + square(cx, cy, cz)) * 4.0
+    whole = square(sx, sy, sz)
+    m = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
+    m = max(m, max(max(abs(cx), abs(cy)), abs(cz)))
+    return around - whole, 32.0 * UNIT * (around + whole) + delta * (160.0 * m + 80.0 * delta)
+
+
+@inlined
+def certified(ax, ay, az, bx, by, bz, cx, cy, cz, delta, floor):
+    """Is the tetrahedron with these spokes certified above a floor that is not negative?"""
+    value, bound = determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
+    value -= bound
+    if floor > 0.0:
+        lengths, error = length_bounds(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
+        most = lengths + error
+        value -= floor * (most * math.sqrt(most)) * (1.0 + 8.0 * UNIT) * (1.0 + 4.0 * UNIT)
+    return value > 0.0
+
+
+@inlined
+def ratio_upper_bound3(ax, ay, az, bx, by, bz, cx, cy, cz, delta):
+    """The most that D/S^(3/2) can be in exact arithmetic; 0 for what is certainly not positive, as floors need it."""
+    value, bound = determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
+    lengths, error = length_bounds(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
+    least = lengths - error
+    if value + bound <= 0.0:
+        return 0.0
+    if not least > 0.0:
+        return LARGEST3
+    return min((value + bound) / (least * math.sqrt(least)) * (1.0 + 16.0 * UNIT), LARGEST3)
+
+
+@inlined
+def ratio_of_row3(points, simplices, t, unit, grain):
+    """The same of row t, read in its orientation."""
+    rows, forth = simplices.rows, simplices.orientation[t] > 0
+    v, a, b, c = rows[t, 0], rows[t, 1], rows[t, 2 if forth else 3], rows[t, 3 if forth else 2]
+    x, y, z = points[v, 0], points[v, 1], points[v, 2]
+    ax, ay, az = points[a, 0] - x, points[a, 1] - y, points[a, 2] - z
+    bx, by, bz = points[b, 0] - x, points[b, 1] - y, points[b, 2] - z
+    cx, cy, cz = points[c, 0] - x, points[c, 1] - y, points[c, 2] - z
+    reach = max(max(abs(x), abs(y)), abs(z))
+    m = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
+    m = max(m, max(max(abs(cx), abs(cy)), abs(cz)))
+    return ratio_upper_bound3(ax, ay, az, bx, by, bz, cx, cy, cz, unit * (reach + m) + grain)
+
+
+@kernel
+def ratio_upper_bounds3(points, simplices, blocks, unit, grain, first, last, least):
+    """As guard.ratio_upper_bounds: the minimum over each of the blocks of LANES simplices, into ``least``."""
+    for number in range(first, last):
+        start = blocks[number] * LANES
+        ratio = np.inf
+        for t in range(start, min(start + LANES, len(simplices.rows))):
+            ratio = min(ratio, ratio_of_row3(points, simplices, t, unit, grain))
+        least[number] = ratio
+
+
+@kernel
+def star_floors3(points, simplices, ringed, unit, grain, floors):
+    """As guard.star_floors."""
+    rows = simplices.rows
+    for i in range(len(floors)):
+        floors[i] = np.inf if ringed[i] else -np.inf
+    for t in range(len(rows)):
+        ratio = ratio_of_row3(points, simplices, t, unit, grain)
+        for corner in range(4):
+            floors[rows[t, corner]] = min(floors[rows[t, corner]], ratio)

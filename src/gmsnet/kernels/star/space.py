@@ -1,0 +1,231 @@
+"""Blocks of stars in space: LANES3 of one colour, and the SIMD parts that look at all their simplices.
+
+A star is a free node with the corner simplices of its cells, three spokes each, which end in the nodes around it (its
+ring, in no order). Coordinates stand as [ring node][lane][x y z ·] in float32, over the size of the star and from its
+free node; each lane reads the three rows of a simplex of its own. What follows of a simplex, w, D, s and S
+(kernels.simplex.mean_ratio3), is kept, for D and S after any step follow from it in a few operations.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from gmsnet.kernels.jit import vectors
+from gmsnet.kernels.jit.vectors import INDEX, NUMBER, REAL, Sum, Vector, as_written, broadcast, index
+from gmsnet.kernels.simplex import mean_ratio3
+
+LANES3 = vectors.WIDTH
+KEPT = 8  # rows of each simplex: w, D, s, S
+# Rows of sums. The Hessian without its part along I, its diagonal halved; ISO: the sum of f/S. LEAST: the minimum D.
+# AFTER, MARGIN: the sum of f and the minimum D − c·S^(3/2) after a step.
+VALUE, GX, GY, GZ, XX, YY, ZZ, XY, XZ, YZ, ISO, LEAST, AFTER, MARGIN = range(14)
+SUMS = 14
+FAR_ABOVE = 1e30  # for simplices that a lane does not have
+# Constants of a power: of r = (S³/D²)·scale, f = r^(p/3), p = 3·2^k, or √r for k = −1 (p = 3/2).
+SCALE, ROOT_OF_SCALE, TWO_P, M, MIXED, SQUARED = range(6)
+
+
+class SpaceBlocks(NamedTuple):
+    """The free nodes in blocks of LANES3 of one colour.
+
+    centre: (B·LANES3,) the free nodes. ring: by [block][row][lane], the nodes around; offset (B,) where a block begins,
+    degree (B,) its rows: those of a lane that has fewer repeat its first. spoke: uint8 by [block][simplex][3][lane],
+    the rows of the ring in which the spokes end; at (B,) where a block begins; simplices (B,) the most of a lane,
+    cells (B·LANES3,) those of each. filled: (B,) how many lanes hold stars of their own; the others repeat the last.
+    most, most_simplices: the largest of all blocks.
+    """
+
+    centre: NDArray[np.int32]
+    ring: NDArray[np.int32]
+    offset: NDArray[np.int64]
+    degree: NDArray[np.int32]
+    spoke: NDArray[np.uint8]
+    at: NDArray[np.int64]
+    simplices: NDArray[np.int32]
+    cells: NDArray[np.int32]
+    filled: NDArray[np.int32]
+    most: int
+    most_simplices: int
+
+
+@intrinsic
+def relate(_context: Any, points: Any, ring: Any, offset: Any, rows: Any, star: Any, inverse: Any, local: Any) -> Any:
+    """Writes local[row][lane] = (point of the ring − centre)·inverse in float32.
+
+    points: (N, 4) float64. ring: from ``offset`` on. star: (LANES3·4,) the centres. inverse: (LANES3,) float32.
+    """
+    signature = types.void(points, ring, types.int64, types.int64, star, inverse, local)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        at = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 1, 4, 5, 6)}
+        four, double = ir.VectorType(REAL, 4), ir.VectorType(vectors.DOUBLE, 4)
+        with cgutils.for_range(builder, arguments[3]) as loop:
+            first = builder.mul(loop.index, index(LANES3))
+            for lane in range(LANES3):
+                here = builder.add(first, index(lane))
+                node = builder.zext(builder.load(builder.gep(at[1], [builder.add(arguments[2], here)])), INDEX)
+                place = vectors.load(builder, at[0], builder.shl(node, index(2)), double, 8)
+                centre = vectors.load(builder, at[4], index(4 * lane), double, 8)
+                away = builder.fptrunc(builder.fsub(place, centre), four)
+                factor = builder.load(builder.gep(at[5], [index(lane)]))
+                factors = builder.insert_element(ir.Constant(four, ir.Undefined), factor, ir.Constant(NUMBER, 0))
+                factors = builder.shuffle_vector(factors, factors, vectors.mask_of(0, 0, 0, 0))
+                vectors.store(builder, at[6], builder.shl(here, index(2)), builder.fmul(away, factors))
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+def value_of(builder: Any, lengths: Vector, inverse: Vector, power: Any, constants: Any) -> tuple[Vector, Vector]:
+    """f of simplices, and S^(3/2). inverse: 1/D. power: k."""
+    high = lengths * vectors.root(lengths)
+    ratio = high * inverse
+    place = cgutils.alloca_once(builder, vectors.REALS)
+    plain = builder.icmp_signed("<", power, index(0))
+    with builder.if_else(plain) as (then, other):
+        with then:
+            builder.store((ratio * constants[ROOT_OF_SCALE]).value, place)
+        with other:
+            builder.store(((ratio * ratio) * constants[SCALE]).value, place)
+            with cgutils.for_range(builder, power):
+                f = Vector(builder, builder.load(place))
+                builder.store((f * f).value, place)
+    return Vector(builder, builder.load(place)), high
+
+
+def _softness(context: Any, builder: Any, kind: Any, soft: Any) -> Vector | None:
+    """ε² of all lanes."""
+    if isinstance(kind, types.NoneType):
+        return None
+    softness = Vector(builder, vectors.load(builder, vectors.data_of(context, builder, kind, soft), index(0)))
+    return softness * softness
+
+
+def _inverses(double: Vector, softness: Vector | None) -> tuple[Vector, Vector]:
+    """1/χ, and what stands for 1/D in the derivatives: 1/√(ε² + D²). Both are 1/D where nothing is softened."""
+    if softness is None:
+        inverse = 1.0 / double
+        return inverse, inverse
+    wide = vectors.root(softness + double * double)
+    # For D < 0 the sum would lose its digits: χ = ½ε²/(√ − D).
+    plain, small = (double + wide) * 0.5, softness * 0.5 * (1.0 / (wide - double))
+    positive = small.builder.fcmp_ordered(">", double.value, vectors.constant(0.0))
+    chi = Vector(double.builder, double.builder.select(positive, plain.value, small.value))
+    return 1.0 / chi, 1.0 / wide
+
+
+def _constants(builder: Any, base: Any) -> list[Vector]:
+    return [broadcast(builder, builder.load(builder.gep(base, [index(k)]))) for k in range(SQUARED + 1)]
+
+
+def _present(builder: Any, counts: Any, row: Any) -> Any:
+    """A mask of the lanes that have a simplex of this number."""
+    number = builder.trunc(row, NUMBER)
+    one = builder.insert_element(ir.Constant(vectors.NUMBERS, ir.Undefined), number, ir.Constant(NUMBER, 0))
+    each = builder.shuffle_vector(one, one, ir.Constant(vectors.NUMBERS, [ir.Constant(NUMBER, 0)] * LANES3))
+    return builder.icmp_signed("<", each, counts)
+
+
+@intrinsic
+def derive(
+    _context: Any, local: Any, spoke: Any, at: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any,
+    soft: Any, kept: Any, sums: Any,
+) -> Any:  # fmt: skip
+    """Writes what is kept of each simplex, and the sums VALUE to LEAST over them.
+
+    local: as ``relate`` leaves it. spoke: from ``at`` on, so many rows; count: those of each lane, from block·LANES3
+    on. power: k, constants: (SQUARED + 1,) float32, those named above. soft: (LANES3,) ε of each lane, over the cube of
+    its size, or None: in f, D is then χ(D) = (D + √(ε² + D²))/2, which is positive for any D (Garanzha et al.:
+    Foldover-free maps in 50 lines of code, 2021), and the Hessian is that without the term of χ''.
+    """
+    signature = types.void(
+        local, spoke, types.int64, types.int64, count, types.int64, types.int64, constants, soft, kept, sums
+    )
+    measured, derivatives = as_written(mean_ratio3.measured), as_written(mean_ratio3.derivatives)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 1, 4, 7, 9, 10)}
+        softness = _softness(context, builder, signature.args[8], arguments[8])
+        constants = _constants(builder, data[7])
+        first = builder.mul(arguments[5], index(LANES3))
+        counts = vectors.load(builder, data[4], first, vectors.NUMBERS)
+        four = ir.VectorType(REAL, 4)
+        found = [Sum(builder, FAR_ABOVE if k == LEAST else 0.0) for k in range(LEAST + 1)]
+        with cgutils.for_range(builder, arguments[3]) as loop:
+            begin = builder.add(arguments[2], builder.mul(loop.index, index(3 * LANES3)))
+            spokes = list[Vector]()
+            for k in range(3):
+                ends = []
+                for lane in range(LANES3):
+                    row = builder.load(builder.gep(data[1], [builder.add(begin, index(k * LANES3 + lane))]))
+                    there = builder.add(builder.mul(builder.zext(row, INDEX), index(LANES3)), index(lane))
+                    ends.append(vectors.load(builder, data[0], builder.shl(there, index(2)), four))
+                spokes += vectors.transposed(builder, ends)
+            on = _present(builder, counts, loop.index)
+            double, lengths, wx, wy, wz, sx, sy, sz = measured(*spokes)
+            double = double.where(on, FAR_ABOVE)
+            wx, wy, wz = wx.where(on, 0.0), wy.where(on, 0.0), wz.where(on, 0.0)
+            to = builder.mul(loop.index, index(KEPT * LANES3))
+            for k, row in enumerate((wx, wy, wz, double, sx, sy, sz, lengths)):
+                vectors.store(builder, data[9], builder.add(to, index(k * LANES3)), row.value)
+            inverse, of_d = _inverses(double, softness)
+            of_s = 1.0 / lengths
+            f, _ = value_of(builder, lengths, inverse, arguments[6], constants)
+            f = f.where(on, 0.0)
+            terms = derivatives(
+                f, of_s * constants[TWO_P], of_d * constants[M], wx, wy, wz, sx, sy, sz, constants[MIXED],
+                constants[SQUARED],
+            )  # fmt: skip
+            for k, term in enumerate((f, *terms, f * of_s)):
+                found[k].add(term)
+            found[LEAST].lower(double)
+        for k, total in enumerate(found):
+            vectors.store(builder, data[10], index(k * LANES3), total.get(builder).value)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@intrinsic
+def judge(
+    _context: Any, kept: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any, soft: Any, step: Any,
+    floor: Any, sums: Any,
+) -> Any:  # fmt: skip
+    """Writes the sums AFTER and MARGIN after a step (3·LANES3,), [axis][lane].
+
+    floor: c, of D/S^(3/2). soft: as in ``derive``.
+    """
+    signature = types.void(
+        kept, types.int64, count, types.int64, types.int64, constants, soft, step, types.float32, sums
+    )
+    moved = as_written(mean_ratio3.moved)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 2, 5, 7, 9)}
+        softness = _softness(context, builder, signature.args[6], arguments[6])
+        constants = _constants(builder, data[5])
+        counts = vectors.load(builder, data[2], builder.mul(arguments[3], index(LANES3)), vectors.NUMBERS)
+        way = [Vector(builder, vectors.load(builder, data[7], index(k * LANES3))) for k in range(3)]
+        floor = broadcast(builder, arguments[8])
+        after, margin = Sum(builder, 0.0), Sum(builder, FAR_ABOVE)
+        with cgutils.for_range(builder, arguments[1]) as loop:
+            at = builder.mul(loop.index, index(KEPT * LANES3))
+            w = [
+                Vector(builder, vectors.load(builder, data[0], builder.add(at, index(k * LANES3)))) for k in range(KEPT)
+            ]
+            double, lengths = moved(w[3], w[7], *w[:3], *w[4:7], *way)
+            on = _present(builder, counts, loop.index)
+            f, high = value_of(builder, lengths, _inverses(double, softness)[0], arguments[4], constants)
+            after.add(f.where(on, 0.0))
+            margin.lower((double - high * floor).where(on, FAR_ABOVE))
+        vectors.store(builder, data[9], index(AFTER * LANES3), after.get(builder).value)
+        vectors.store(builder, data[9], index(MARGIN * LANES3), margin.get(builder).value)
+        return context.get_dummy_value()
+
+    return signature, generate

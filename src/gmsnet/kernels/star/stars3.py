@@ -1,0 +1,150 @@
+"""What every smoother in space shares: gather a block of stars, judge its steps, commit those that break nothing."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.jit.compile import part
+from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
+from gmsnet.kernels.star.guard import WITH_FLOORS
+from gmsnet.kernels.star.guard3 import certified, error_bound3
+from gmsnet.kernels.star.space import KEPT, LANES3, MARGIN, SUMS, relate
+
+WIDER = 1.0 + 2.0**-20
+HALVINGS = 12  # of a step that is not allowed
+
+
+class Workspace3(NamedTuple):
+    """The arrays that a sweep works in. star: the centres. size: of each star, inverse: 1/size in float32. width: the
+    largest component of each star, over its size. allowed: which lanes may be moved as they are.
+    """
+
+    star: NDArray[np.float64]
+    size: NDArray[np.float64]
+    inverse: NDArray[np.float32]
+    local: NDArray[np.float32]
+    kept: NDArray[np.float32]
+    sums: NDArray[np.float32]
+    step: NDArray[np.float32]
+    wide: NDArray[np.float32]
+    width: NDArray[np.float32]
+    allowed: NDArray[np.bool_]
+
+
+@part
+def workspace3_for(most, most_simplices):
+    """For stars of up to so many nodes around and simplices."""
+    return Workspace3(
+        np.empty(4 * LANES3), np.empty(LANES3), np.empty(LANES3, dtype=np.float32),
+        np.empty(4 * most * LANES3, dtype=np.float32), np.empty(KEPT * most_simplices * LANES3, dtype=np.float32),
+        np.empty(SUMS * LANES3, dtype=np.float32), np.empty(3 * LANES3, dtype=np.float32),
+        np.empty(4 * LANES3, dtype=np.float32), np.empty(LANES3, dtype=np.float32), np.empty(LANES3, dtype=np.bool_),
+    )  # fmt: skip
+
+
+@part
+def fetch3(points, blocks, block, workspace):
+    """Gathers a block, over the size of each star: the first of its ring is at a distance of 1 in the sum of axes."""
+    star, wide = workspace.star, workspace.wide
+    n, offset = np.int64(blocks.degree[block]), blocks.offset[block]
+    for lane in range(LANES3):
+        i, j = np.uint32(blocks.centre[block * LANES3 + lane]), np.uint32(blocks.ring[offset + lane])
+        for k in range(4):
+            star[4 * lane + k] = points[i, k]
+        size = abs(points[j, 0] - points[i, 0]) + abs(points[j, 1] - points[i, 1]) + abs(points[j, 2] - points[i, 2])
+        size = size if size > 0.0 else 1.0
+        workspace.size[lane] = size
+        workspace.inverse[lane] = np.float32(1.0 / size)
+    relate(points, blocks.ring, offset, n, star, workspace.inverse, workspace.local)
+    for k in range(4 * LANES3):
+        wide[k] = 0.0
+    for j in range(n):
+        row = workspace.local[4 * j * LANES3 : 4 * (j + 1) * LANES3]
+        for k in range(4 * LANES3):
+            wide[k] = max(wide[k], abs(row[k]))
+    for lane in range(LANES3):
+        workspace.width[lane] = max(wide[4 * lane], max(wide[4 * lane + 1], wide[4 * lane + 2]))
+
+
+@part
+def certify3(workspace, unit, grain):
+    """``allowed``: which lanes are certified above the floor that their row MARGIN was made with, after their step."""
+    star, step = workspace.star, workspace.step
+    for lane in range(LANES3):
+        far = max(abs(step[lane]), max(abs(step[LANES3 + lane]), abs(step[2 * LANES3 + lane])))
+        m = np.float64(max(workspace.width[lane], far))
+        size = workspace.size[lane]
+        reach = max(abs(star[4 * lane]), max(abs(star[4 * lane + 1]), abs(star[4 * lane + 2]))) + size * m
+        delta = WIDER * (unit * reach + grain) / size
+        workspace.allowed[lane] = workspace.sums[MARGIN * LANES3 + lane] > WIDER * error_bound3(m, delta)
+
+
+@part
+def store3(points, blocks, block, workspace, guard, tally):
+    """Moves the free nodes of the lanes that are allowed, and tries the others one by one."""
+    star, step, count = workspace.star, workspace.step, blocks.filled[block]
+    for lane in range(count):
+        i = np.uint32(blocks.centre[block * LANES3 + lane])
+        # 1/size in float32 is not quite 1/size: the step is of what was gathered
+        size = 1.0 / np.float64(workspace.inverse[lane])
+        dx, dy, dz = size * step[lane], size * step[LANES3 + lane], size * step[2 * LANES3 + lane]
+        if len(guard) != WITH_FLOORS and workspace.allowed[lane]:
+            x, y, z = star[4 * lane] + dx, star[4 * lane + 1] + dy, star[4 * lane + 2] + dz
+            if guard.single:
+                x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
+            tally[MOVED] += (x != points[i, 0]) | (y != points[i, 1]) | (z != points[i, 2])
+            points[i, 0], points[i, 1], points[i, 2] = x, y, z
+        elif dx != 0.0 or dy != 0.0 or dz != 0.0:
+            truncate3(points, blocks, block, lane, dx, dy, dz, guard, tally)
+
+
+@part
+def truncate3(points, blocks, block, lane, dx, dy, dz, guard, tally):
+    """Halves the step of one lane until it is allowed, or drops it."""
+    i = np.uint32(blocks.centre[block * LANES3 + lane])
+    x, y, z = points[i, 0], points[i, 1], points[i, 2]
+    if not (np.isfinite(dx) and np.isfinite(dy) and np.isfinite(dz)):
+        tally[DROPPED] += 1
+        return
+    for halving in range(HALVINGS):
+        tx, ty, tz = x + dx, y + dy, z + dz
+        if guard.single:
+            tx, ty, tz = np.float64(np.float32(tx)), np.float64(np.float32(ty)), np.float64(np.float32(tz))
+        if tx == x and ty == y and tz == z:
+            break
+        if allowed3(points, blocks, block, lane, tx, ty, tz, guard):
+            points[i, 0], points[i, 1], points[i, 2] = tx, ty, tz
+            tally[MOVED] += 1
+            tally[TRUNCATED] += halving > 0
+            return
+        dx, dy, dz = 0.5 * dx, 0.5 * dy, 0.5 * dz
+    tally[DROPPED] += 1
+
+
+@part
+def allowed3(points, blocks, block, lane, x, y, z, guard):
+    """May the free node of one lane go to (x, y, z)? Are all its simplices certified above their floors there?"""
+    at, offset = blocks.at[block], blocks.offset[block]
+    centre = blocks.centre[block * LANES3 + lane]
+    reach = max(abs(x), max(abs(y), abs(z)))
+    for k in range(blocks.cells[block * LANES3 + lane]):
+        row = at + 3 * k * LANES3 + lane
+        a = np.uint32(blocks.ring[offset + blocks.spoke[row] * LANES3 + lane])
+        b = np.uint32(blocks.ring[offset + blocks.spoke[row + LANES3] * LANES3 + lane])
+        c = np.uint32(blocks.ring[offset + blocks.spoke[row + 2 * LANES3] * LANES3 + lane])
+        floor = max(guard.floor, 0.0)
+        if len(guard) == WITH_FLOORS:
+            floors = guard.floors
+            floor = max(max(floor, max(floors[a], floors[b])), max(floors[c], floors[centre]))
+        ax, ay, az = points[a, 0] - x, points[a, 1] - y, points[a, 2] - z
+        bx, by, bz = points[b, 0] - x, points[b, 1] - y, points[b, 2] - z
+        cx, cy, cz = points[c, 0] - x, points[c, 1] - y, points[c, 2] - z
+        m = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
+        m = max(m, max(max(abs(cx), abs(cy)), abs(cz)))
+        delta = guard.unit * (reach + m) + guard.grain
+        if not certified(ax, ay, az, bx, by, bz, cx, cy, cz, delta, floor):
+            return False
+    return True

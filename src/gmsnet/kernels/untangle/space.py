@@ -1,0 +1,83 @@
+"""Untangling in space: sweeps of Newton's method on Σq^(3/2) with softened determinants (kernels.star.space.derive)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.methods.barrier3 import propose3
+from gmsnet.kernels.simplex.mean_ratio3 import measured
+from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, spokes_of
+from gmsnet.kernels.star.space import AFTER, LANES3, VALUE, derive, judge
+from gmsnet.kernels.star.stars3 import fetch3, workspace3_for
+
+TRIALS = 4
+
+
+@part
+def fallen(workspace, last):
+    """How many lanes have not: their steps are halved, or dropped where there is no further trial."""
+    sums, step, refused = workspace.sums, workspace.step, 0
+    for lane in range(LANES3):
+        falls = sums[AFTER * LANES3 + lane] < sums[VALUE * LANES3 + lane]
+        still = step[lane] == 0.0 and step[LANES3 + lane] == 0.0 and step[2 * LANES3 + lane] == 0.0
+        refused += not (falls or still)
+        factor = np.float32(1.0 if falls else (0.0 if last else 0.5))
+        for k in range(3):
+            step[k * LANES3 + lane] *= factor
+    return refused
+
+
+@kernel
+def soften(points, blocks, first, last, softness, single, power):
+    """Visits the blocks first…last (of one colour) once. softness: ε, in the units of six times a volume.
+
+    No cell is guarded: what is positive may be inverted on the way. single: round every coordinate to float32.
+    """
+    workspace, soft = workspace3_for(blocks.most, blocks.most_simplices), np.empty(LANES3, dtype=np.float32)
+    for block in range(first, last):
+        rows, floor = np.int64(blocks.simplices[block]), np.float32(0.0)
+        fetch3(points, blocks, block, workspace)
+        for lane in range(LANES3):
+            inverse = np.float64(workspace.inverse[lane])
+            soft[lane] = np.float32(max(softness * inverse * inverse * inverse, 1e-12))
+        derive(
+            workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
+            soft, workspace.kept, workspace.sums,
+        )  # fmt: skip
+        propose3(workspace.sums, power, 1.0, workspace.step)
+        for trial in range(TRIALS):
+            judge(
+                workspace.kept, rows, blocks.cells, block, power.number, power.constants, soft, workspace.step, floor,
+                workspace.sums,
+            )  # fmt: skip
+            if fallen(workspace, trial == TRIALS - 1) == 0:
+                break
+        for lane in range(blocks.filled[block]):
+            i, size = np.uint32(blocks.centre[block * LANES3 + lane]), 1.0 / np.float64(workspace.inverse[lane])
+            for axis in range(3):
+                value = points[i, axis] + size * workspace.step[axis * LANES3 + lane]
+                if np.isfinite(value):
+                    points[i, axis] = np.float64(np.float32(value)) if single else value
+
+
+@kernel
+def find_bad(points, rows, orientation, unit, grain, bad, ratio):
+    """Writes which cells (T, bool) are not certified positive as they will be written, and D/S^(3/2) of each (T,).
+
+    Returns how many are bad.
+    """
+    count = 0
+    for t in range(len(rows)):
+        ax, ay, az, bx, by, bz, cx, cy, cz = spokes_of(points, rows, t)
+        d = rows[t, 0]
+        reach = max(max(abs(points[d, 0]), abs(points[d, 1])), abs(points[d, 2]))
+        far = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
+        far = max(far, max(max(abs(cx), abs(cy)), abs(cz)))
+        value, bound = determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, unit * (reach + far) + grain)
+        value *= orientation[t]
+        bad[t] = not value > bound
+        count += bad[t]
+        _, lengths, _, _, _, _, _, _ = measured(ax, ay, az, bx, by, bz, cx, cy, cz)
+        ratio[t] = value / max(lengths * np.sqrt(max(lengths, 0.0)), 1e-300)
+    return count

@@ -1,0 +1,196 @@
+"""Untangling meshes of tetrahedra, as a transaction.
+
+Around the inverted cells, within as many rings of free nodes as it takes, sweeps with softened determinants bring all
+cells to positive volumes. What is taken in the end keeps two promises: no cell that was positive is not so afterwards,
+and none that stays inverted is worse than the worst was. Nodes of cells that break one go back to where they were.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse
+import scipy.sparse.linalg
+from numpy.typing import NDArray
+
+from gmsnet.kernels.methods.barrier3 import Power3
+from gmsnet.kernels.star.guard import Precision
+from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.untangle.space import find_bad, soften
+from gmsnet.measure.volumes import exact_signs3
+from gmsnet.parallel.executor import Executor
+from gmsnet.topology.volume import Volume
+from gmsnet.untangle.result import ALL, NOTHING, PART, StillInverted, Untangled, UntanglingStep
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+RINGS = (2, 6, 10**9)  # around the cells that are bad
+SWEEPS = (30, 40, 60)  # at most
+EARLY, MANY = 2, 0.1  # after so many rounds, with so many of the cells bad still, another start is taken
+SHRINK, FINEST = 0.6, 1e-4  # of ε from sweep to sweep, and of the median of |D| at last
+HARMONIC, ITERATIONS = 1e-6, 2000
+HELD = "all its nodes are held"
+
+
+class Attempt:
+    """A mesh on its way. points: as they are now; start: as they were. bad, ratio: of each cell, see ``find_bad``."""
+
+    def __init__(self, points: Floats, topology: Volume, precision: Precision, executor: Executor) -> None:
+        self.start, self.points, self.topology, self.precision = points, points.copy(), topology, precision
+        self.executor = executor
+        count = len(topology.near)
+        self.bad, self.ratio = np.empty(count, dtype=bool), np.empty(count)
+        self.left = self.look()
+        self.was_bad, self.was = self.bad.copy(), self.ratio.copy()
+
+    def look(self) -> int:
+        """Measures all cells; how many are bad."""
+        near, orientation = self.topology.near, self.topology.near_orientation
+        unit, grain = self.precision.unit, self.precision.grain
+        self.left = int(find_bad(self.points, near, orientation, unit, grain, self.bad, self.ratio))
+        return self.left
+
+    @property
+    def moved(self) -> Flags:
+        """(N,) which nodes are elsewhere than at first."""
+        elsewhere: Flags = (self.points != self.start).any(axis=1)
+        return elsewhere
+
+    def around(self, rings: int) -> NDArray[np.int64]:
+        """The free nodes within so many rings of the bad cells."""
+        near, free = self.topology.near, self.topology.near_free
+        chosen = np.zeros(len(free), dtype=bool)
+        chosen[near[self.bad]] = True
+        for _ in range(rings):
+            before = np.count_nonzero(chosen)
+            chosen[near[rows_at(near, chosen)]] = True
+            if np.count_nonzero(chosen) == before:
+                break
+        return np.flatnonzero(chosen & free)
+
+    def sweeps(self, rings: int, most: int) -> UntanglingStep:
+        """Softened sweeps over the nodes around until no cell is bad, or ``most`` are made."""
+        nodes = self.around(rings)
+        stars, made = self.topology.stars_of(nodes), 0
+        if not len(nodes):
+            return UntanglingStep("softened sweeps", 0, 0, self.left)
+        blocks, power = stars.blocks, Power3.of(-1)._replace(ratio=0.0)  # steps are not lengthened
+        assert isinstance(blocks, SpaceBlocks)
+        chosen = np.zeros(len(self.points), dtype=bool)
+        chosen[nodes] = True
+        rows = rows_at(self.topology.near, chosen)
+        first = softness = float(np.median(np.abs(self._determinants(rows)))) or 1e-30
+
+        def visit(begin: int, end: int) -> NDArray[np.int64]:
+            soften(self.points, blocks, begin, end, softness, self.precision.single, power)
+            return np.zeros(3, dtype=np.int64)
+
+        while made < most and self.left:
+            for colour in range(stars.colours):
+                self.executor.map(visit, int(stars.first[colour]), int(stars.first[colour + 1]))
+                self.executor.after_colour(colour, self.points)
+            made += 1
+            softness = max(SHRINK * softness, FINEST * first)
+            self.look()
+        return UntanglingStep("softened sweeps", len(nodes), made, self.left)
+
+    def begin_anew(self) -> UntanglingStep:
+        """Puts all free nodes to the mean of their neighbours, all at once: long folds are gone then.
+
+        Conjugate gradients on the Laplacian of the edges, with the held nodes as they are.
+        """
+        topology = self.topology
+        free = np.flatnonzero(topology.near_free)
+        number = np.full(len(self.points), -1)
+        number[free] = np.arange(len(free))
+        count = np.diff(topology.ring_start)[free]
+        row = np.repeat(np.arange(len(free)), count)
+        begin = np.repeat(topology.ring_start[free] - np.append(0, np.cumsum(count)[:-1]), count)
+        other = topology.ring[begin + np.arange(len(row))]
+        inner = number[other] >= 0
+        laplacian = scipy.sparse.diags_array(count.astype(np.float64)) - scipy.sparse.csr_array(
+            (np.ones(int(inner.sum())), (row[inner], number[other[inner]])), shape=(len(free), len(free))
+        )
+        jacobi = scipy.sparse.diags_array(1.0 / count)
+        for axis in range(3):
+            held = np.bincount(row[~inner], self.points[other[~inner], axis], minlength=len(free))
+            found, _ = scipy.sparse.linalg.cg(laplacian, held, rtol=HARMONIC, maxiter=ITERATIONS, M=jacobi)
+            self.points[free, axis] = np.float32(found) if self.precision.single else found
+        self.look()
+        return UntanglingStep("all nodes to the means of their neighbours", len(free), 1, self.left)
+
+    def _determinants(self, rows: NDArray[np.int32]) -> Floats:
+        near = self.topology.near[rows]
+        a, b, c = (self.points[near[:, k], :3] - self.points[near[:, 0], :3] for k in (1, 2, 3))
+        found: Floats = np.einsum("ij,ij->i", a, np.cross(b, c))
+        return found
+
+    def give_back(self) -> int:
+        """Takes nodes back until both promises are kept; returns how many cells broke one at first."""
+        worst, first = float(self.was.min(initial=np.inf)), 0
+        while True:
+            broken = self.bad & (~self.was_bad | (self.ratio < np.minimum(self.was, worst)))
+            back = np.zeros(len(self.points), dtype=bool)
+            back[self.topology.near[broken]] = True
+            back &= self.moved
+            if not back.any():
+                return first
+            first = first or int(np.count_nonzero(broken))
+            self.points[back] = self.start[back]
+            self.look()
+
+
+def rows_at(near: NDArray[np.int32], chosen: Flags) -> NDArray[np.int32]:
+    """The rows of the cells (T, 4) that have a chosen node."""
+    return np.flatnonzero(chosen[near].any(axis=1)).astype(np.int32)
+
+
+def _from_the_means(attempt: Attempt) -> list[UntanglingStep]:
+    """Once more from another start, for folds as long as the mesh; what was there stays where this does not help."""
+    before, left = attempt.points.copy(), attempt.left
+    steps = [attempt.begin_anew()]
+    for rings, most in zip(RINGS, SWEEPS, strict=True):
+        if attempt.left:
+            steps.append(attempt.sweeps(rings, most))
+    if attempt.left >= left:
+        attempt.points[:] = before
+        attempt.look()
+    return steps
+
+
+def untangle_volume(
+    points: Floats, topology: Volume, precision: Precision, executor: Executor, before: int
+) -> Untangled:
+    """Moves free nodes until no cell is inverted, or as few as can be; held nodes and what is far off keep their bits.
+
+    points: (N, 4) by places in memory; not changed. before: how many are inverted. As ``untangle`` of cells in a plane.
+    """
+    attempt = Attempt(points, topology, precision, executor)
+    steps: list[UntanglingStep] = []
+    for rounds, (rings, most) in enumerate(zip(RINGS, SWEEPS, strict=True)):
+        if not attempt.left or (rounds == EARLY and attempt.left > MANY * len(topology.near)):
+            break
+        steps.append(attempt.sweeps(rings, most))
+    if attempt.left and len(topology.free):
+        steps += _from_the_means(attempt)
+    broken = attempt.give_back()
+    tried, moved = any(step.nodes for step in steps), attempt.moved.any()
+    why = f"{broken} cells that were positive, or better, would have been inverted" if broken else ""
+    if not tried:
+        why = "no inverted cell has a node that may move"
+    elif not moved and not why:
+        why = "no cell was untangled"
+    taken = NOTHING if not moved else PART if attempt.left else ALL
+    left = np.flatnonzero(attempt.bad)
+    held: list[bool] = np.all(~topology.near_free[topology.near[left]], axis=1).tolist()
+    sweeps = sum(step.sweeps for step in steps)
+    unmended = tuple(
+        StillInverted(int(row), HELD if alone else f"not untangled within {sweeps} sweeps", (float(x), float(y)))
+        for row, alone, (x, y) in zip(
+            left, held,
+            attempt.points[topology.near[left]].mean(axis=1)[:, :2], strict=True,
+        )
+    )  # fmt: skip
+    made = tuple(step for step in steps if step.nodes)
+    signs = exact_signs3(attempt.points, topology.near[left], topology.near_orientation[left])
+    return Untangled(attempt.points, before, int((signs <= 0).sum()), taken, why, made, unmended)
