@@ -30,8 +30,8 @@ THROWN = 0.5  # edges
 MOST = 1.6  # a factor of areas: the end of the colours
 CHOICES: dict[str, tuple[str, dict[str, Any]]] = {
     "shape": (
-        '`preserve="shape"`, the default, holds the nodes of layers of walls, lets areas near refined walls change by '
-        "a tenth at most, and smooths all else as far as it goes.",
+        '`preserve="shape"`, the default, holds the nodes of layers of walls, lets areas near refined walls change '
+        "by a tenth at most, and smooths all else as far as it goes.",
         {},
     ),
     "size": (

@@ -230,3 +230,11 @@ def test_where_sweeps_end_in_folds_all_nodes_move():
     assert any("whole mesh" in sweep.stage for sweep in result.history)
     assert result.after.shape.min() > 0.75
     assert gmsnet.smooth(result.mesh).after.qhat < result.after.qhat + 0.001
+
+
+def test_worst_cells_of_small_meshes_have_a_turn_even_where_they_are_good():
+    """Around a hole that moved, cells of 0.77 can come to more than 0.8 together."""
+    result = gmsnet.smooth(moved_hole_mesh(0.0183, shift=0.904, turn=1.82))
+    assert any(sweep.stage == WHOLE_WORST for sweep in result.history)
+    assert result.after.shape.min() > 0.8
+    assert result.after.qhat > 0.37

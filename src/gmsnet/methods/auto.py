@@ -61,7 +61,7 @@ PASS_GAIN, LAST_GAIN = 0.002, 0.003
 LARGE_VOLUME, LARGE_GAIN = 50_000, 0.005  # free nodes of a volume of which a pass must gain more
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
-GOOD = 0.75  # a least 1/q that needs no more
+GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
 IDEAL = 0.99  # a least 1/q at which the worst cells have no turn, nor what follows
 EXACT = 20_000  # free nodes: up to so many, all nodes of such a mesh go to the minimum of Σq, which is near
 NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
@@ -220,9 +220,9 @@ class Auto(Smoother):
 
     def _is_even(self, field: Field) -> bool:
         """Is the worst cell one of many like it, which one star at a time cannot better?"""
-        if self.creep is None or self.least >= GOOD:
-            return False
         small, moved = self.phases is SMALL_PLAN, self.whole > 0
+        if self.creep is None or self.least >= (GOOD_MOVED if small and moved else GOOD):
+            return False
         return (small and moved) or ((small or moved) and self.least > mean_shape(field) - NEAR_MEAN)
 
     def _is_slow(self, field: Field, ahead: float, lasts: bool) -> bool:

@@ -1,0 +1,169 @@
+"""What the default does near refined walls, beside other choices of ``preserve``, and what bands of 10 % allow.
+
+    GMSNET_MESHES=FOLDER python benchmarks/walls.py [--thrown 0 0.05 …] [--ceiling ROUNDS]
+
+On the NACA 0012 and two plates refined towards a hole, as they are and with all nodes thrown by so many edges: q̂ and
+the minimum 1/q after each call, and how much areas of protected cells change, at most and in 95 % of them.
+
+``--ceiling``: how good the worst cell near the airfoil can be if each protected area stays within 10 %, by linear
+programs with a trust region one after the other, from the mesh as it is. A lower bound of what is possible.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse
+from machine import describe
+from scipy.optimize import linprog
+
+import gmsnet
+from gmsnet.generate import Curve, disturb, good_mesh
+from gmsnet.preserve.walls import near_walls
+from gmsnet.topology.topology import Topology
+
+THROWN = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
+CHOICES = ("shape", "size", "none")
+RINGS, BAND = 3, 0.1
+LOW = 0.25  # of 1/q: cells this much better than the worst are not looked at in a round
+PENALTY = 5.0  # of an area's way out of its band, beside 1/q
+FIRST, LONGEST, SHORTEST = 0.1, 0.3, 1e-4  # of the mean length of a node's edges: trust region
+
+
+def plate(radius, finest, growth, side):
+    """A square with a round hole, refined towards it."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 400)
+    hole = Curve(radius * np.column_stack([np.cos(turn), np.sin(turn)]), "hole")
+    square = Curve(side * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]), "square")
+    return good_mesh([[square], [hole]], lambda x: finest + growth * np.abs(np.linalg.norm(x, axis=1) - radius))
+
+
+def doubles(points, triangles):
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    return (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+
+
+def compare(name, mesh):
+    """Prints a row."""
+    topology, text = Topology.of(mesh), ""
+    cells = near_walls(mesh, topology).nodes[topology.triangles].all(axis=1)
+    before = doubles(mesh.points[:, :2], topology.triangles)[cells]
+    for choice in CHOICES:
+        result = gmsnet.smooth(mesh, threads=1, preserve=choice)
+        change = np.abs(doubles(result.points[:, :2], topology.triangles)[cells] / before - 1.0)
+        most = (change.max(), np.quantile(change, 0.95)) if cells.any() else (0.0, 0.0)
+        text += f"{result.after.qhat:8.4f}{result.after.shape.min():7.3f}{most[0]:8.1%}{most[1]:8.1%} |"
+    print(f"{name:20}{cells.sum():6}|{text}", flush=True)
+
+
+class Program:
+    """The linear programs of ``ceiling``."""
+
+    def __init__(self, mesh):
+        topology = Topology.of(mesh)
+        self.points, triangles = mesh.points[:, :2].copy(), topology.triangles.copy()
+        turned = topology.orientation < 0
+        triangles[turned] = triangles[turned][:, [0, 2, 1]]
+        kept = near_walls(mesh, topology).nodes
+        zone = kept.copy()
+        for _ in range(RINGS):
+            zone[triangles[zone[triangles].any(axis=1)]] = True
+        self.nodes = topology.free[zone[topology.free]]
+        self.number = np.full(len(kept), -1)
+        self.number[self.nodes] = np.arange(len(self.nodes))
+        self.cells = triangles[(self.number[triangles] >= 0).any(axis=1)]
+        self.banded = np.flatnonzero(kept[self.cells].all(axis=1))
+        self.start = doubles(self.points, self.cells)
+        ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        length = np.linalg.norm(self.points[ends[:, 0]] - self.points[ends[:, 1]], axis=1)
+        weight = np.bincount(ends.ravel(), np.repeat(length, 2), len(kept))
+        self.size = (weight / np.bincount(ends.ravel(), minlength=len(kept)))[self.nodes]
+
+    def derivatives(self, points):
+        """D and 1/q of each cell, and their gradients (C, 3, 2) by its corners."""
+        i, j, k = self.cells.T
+        a, b = points[j] - points[i], points[k] - points[i]
+        d, square = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * a + b * b - a * b).sum(axis=1) / np.sqrt(3.0)
+        of_d = np.stack([np.column_stack([b[:, 1], -b[:, 0]]), np.column_stack([-a[:, 1], a[:, 0]])], axis=1)
+        of_square = np.stack([2.0 * a - b, 2.0 * b - a], axis=1) / np.sqrt(3.0)
+        of_d, of_square = (np.concatenate([-g.sum(axis=1, keepdims=True), g], axis=1) for g in (of_d, of_square))
+        shape = d / square
+        return d, shape, of_d, (of_d - shape[:, None, None] * of_square) / square[:, None, None]
+
+    def matrix(self, gradient, rows, factor):
+        """Of some cells, by the shifts of nodes over their sizes."""
+        node = self.number[self.cells[rows]]
+        row, corner = np.nonzero(node >= 0)
+        value = gradient[rows][row, corner] * (factor[row] * self.size[node[row, corner]])[:, None]
+        column = 2 * node[row, corner][:, None] + np.arange(2)
+        shape = len(rows), 2 * len(self.nodes)
+        return scipy.sparse.csr_matrix((value.ravel(), (np.repeat(row, 2), column.ravel())), shape=shape)
+
+    def merit(self, points):
+        """What is maximised, the minimum 1/q, and the largest change of an area."""
+        d, shape, _, _ = self.derivatives(points)
+        change = np.abs(d / self.start - 1.0)[self.banded]
+        return shape.min() - PENALTY * np.maximum(change - BAND, 0.0).sum(), shape.min(), change.max()
+
+    def step(self, points, trust):
+        """Where the linear program leads from the points."""
+        d, shape, of_d, of_shape = self.derivatives(points)
+        low, count, all_nodes = np.flatnonzero(shape < shape.min() + LOW), len(self.banded), 2 * len(self.nodes)
+        gains = self.matrix(of_shape, low, np.ones(len(low)))
+        changes = self.matrix(of_d, self.banded, 1.0 / self.start[self.banded])
+        now, one = d[self.banded] / self.start[self.banded], scipy.sparse.identity(count)
+        none, column = scipy.sparse.csr_matrix((count, 1)), scipy.sparse.csr_matrix(np.ones((len(low), 1)))
+        limits = scipy.sparse.vstack([
+            scipy.sparse.hstack([-gains, column, scipy.sparse.csr_matrix((len(low), count))]),
+            scipy.sparse.hstack([changes, none, -one]), scipy.sparse.hstack([-changes, none, -one]),
+        ])  # fmt: skip
+        found = linprog(
+            np.concatenate([np.zeros(all_nodes), [-1.0], np.full(count, PENALTY)]), A_ub=limits.tocsr(),
+            b_ub=np.concatenate([shape[low], 1.0 + BAND - now, now - 1.0 + BAND]),
+            bounds=[(-trust, trust)] * all_nodes + [(None, None)] + [(0.0, None)] * count, method="highs-ipm",
+        )  # fmt: skip
+        there = points.copy()
+        there[self.nodes] += self.size[:, None] * found.x[:all_nodes].reshape(-1, 2)
+        return there
+
+
+def ceiling(mesh, rounds):
+    """Prints how far the worst cell near walls comes."""
+    program, trust = Program(mesh), FIRST
+    points = program.points
+    best = program.merit(points)
+    for _ in range(rounds):
+        there = program.step(points, trust)
+        merit = program.merit(there)
+        if merit[0] > best[0]:
+            points, best, trust = there, merit, min(LONGEST, 1.5 * trust)
+        else:
+            trust *= 0.4
+        if trust < SHORTEST:
+            break
+    print(f"near walls: a minimum 1/q of {best[1]:.4f}, areas within {best[2]:.2%}, {len(program.nodes):,} nodes")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--thrown", nargs="+", type=float, default=list(THROWN))
+    parser.add_argument("--ceiling", type=int, default=0, metavar="ROUNDS")
+    options = parser.parse_args()
+    print(describe())
+    naca = gmsnet.read(Path(os.environ["GMSNET_MESHES"]) / "mesh_NACA0012_inv.su2")
+    meshes = {"NACA 0012": naca, "plate": plate(0.5, 0.01, 0.25, 4.0), "finer hole": plate(0.15, 0.003, 0.2, 0.5)}
+    heads = "".join(f"{choice + ': q̂':>8}{'least':>7}{'most':>8}{'95 %':>8} |" for choice in CHOICES)
+    print(f"{'':20}{'cells':>6}|{heads}")
+    for name, mesh in meshes.items():
+        for amount in options.thrown:
+            thrown = disturb(mesh, Topology.of(mesh).free, amount, seed=0) if amount else mesh
+            compare(f"{name}, {amount:g}", thrown)
+    if options.ceiling:
+        ceiling(naca, options.ceiling)
+
+
+if __name__ == "__main__":
+    main()
