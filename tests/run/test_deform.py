@@ -44,7 +44,7 @@ def check(mesh, result, ids, places):
     assert all((one.nodes == other.nodes).all() for one, other in zip(mesh.cells, result.mesh.cells, strict=True))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     st.integers(0, 5), st.sampled_from(["triangle", "quad"]), st.floats(0.0, 0.4), st.floats(-1.0, 1.0),
     st.sampled_from(["top", "every"]), st.booleans(),
@@ -152,6 +152,37 @@ def test_an_interruption_brings_the_last_valid_mesh(plate):
     assert (result.fraction, result.stop_reason, result.after.inverted) == (1.0, stop.INTERRUPTED, 0)
     ids = plate.markers["hole"]
     assert (result.points[ids, :2] == plate.points[ids, :2] + [0.2, 0.0]).all()
+
+
+def test_stopped_half_way_the_report_says_so(plate):
+    def interrupt(sweep):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        gmsnet.deform(plate, (0.5, 0.0), "hole", callback=interrupt)
+    stopped = gmsnet.deform(plate, (0.5, 0.0), "hole", callback=lambda sweep: True)
+    for result, reason in ((caught.value.result, stop.INTERRUPTED), (stopped, stop.CALLBACK)):
+        assert (result.fraction, result.reason, result.stop_reason) == (0.5, reason, reason)
+        assert result.after.inverted == 0
+        assert f"the boundary has come 50 % of its way (in 1 step): {reason}" in repr(result)
+
+
+def test_a_mesh_without_free_nodes():
+    mesh = structured_mesh(1, 1)
+    result = gmsnet.deform(mesh, (0.25, 1.0), "top")
+    assert result.fraction == 1.0
+    assert (result.points[mesh.markers["top"], :2] == mesh.points[mesh.markers["top"], :2] + [0.25, 1.0]).all()
+    folded = gmsnet.deform(mesh, (0.0, -2.0), "top")
+    assert 0.4 < folded.fraction < 0.5
+    assert "would be inverted" in folded.reason
+
+
+def test_nodes_in_one_place_are_parted():
+    mesh = structured_mesh(4, 4)
+    points = mesh.points.copy()
+    points[[6, 7]] = points[12]
+    result = gmsnet.deform(mesh.with_points(points), (0.1, 0.2), "top")
+    assert (result.fraction, result.after.inverted) == (1.0, 0)
 
 
 def test_boundaries_that_are_not_moved_slide_if_they_may(plate):

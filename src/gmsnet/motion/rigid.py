@@ -22,7 +22,7 @@ from gmsnet.topology.topology import Topology
 from gmsnet.untangle.harmonic import solver_of
 
 ITERATIONS, SMALL_TURN = 12, 1e-3  # radians
-TINY = 1e-300
+TINY, FLAT = 1e-300, 1e-28  # FLAT: of the longest edge's square; shorter edges count as that long
 IN_LAYERS = 10.0  # times as stiff
 REACH = 0.5  # of the extent of what moves: at this distance from it edges are 1/√2 times as stiff
 
@@ -65,7 +65,10 @@ class Follower:
         """
         a, b = self.edges.T
         count, free = len(points), self.free
-        weight = self.stiffness / np.maximum(unturned.real**2 + unturned.imag**2, TINY)
+        if not free.any():
+            return places, turns
+        square = unturned.real**2 + unturned.imag**2
+        weight = self.stiffness / np.maximum(square, max(FLAT * float(square.max()), TINY))
         matrix = scipy.sparse.csr_array((weight, (a, b)), shape=(count, count))
         matrix = matrix + matrix.T
         rows = np.flatnonzero(free)

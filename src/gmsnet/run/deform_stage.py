@@ -42,7 +42,7 @@ RINGS = 6  # around such cells
 BETWEEN = 30  # sweeps after a step that is not the last
 CARRIED = "carried along, its shape kept"
 FARTHEST = 2.0**100  # from the origin, in units of the run: products of coordinates must not overflow
-BYTES_PER_NODE = 1500  # of factors and edges, measured
+BYTES_PER_NODE = 2500  # of factors and edges, measured
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +174,7 @@ def move_boundary(state: State, options: SmoothOptions, executor: Executor, pres
     journey = Journey(state, prescribed)
     turned, motion, length = np.zeros(len(state.points)), Motion(), 1.0
     try:
-        while motion.fraction < 1.0 and length >= SHORTEST:
+        while motion.fraction < 1.0 and length >= SHORTEST and state.stop_reason not in (CALLBACK, INTERRUPTED):
             share = min(1.0, motion.fraction + length)
             step = journey.step(state, turned, share, untangling=options.untangle)
             if step.why:
@@ -184,17 +184,16 @@ def move_boundary(state: State, options: SmoothOptions, executor: Executor, pres
             motion = Motion(share, motion.steps + 1, motion.reason if share < 1.0 else "")
             state = _looked_at(state, step, motion, options, executor)
             if options.callback is not None and options.callback(state.history[-1]):
-                return replace(state, motion=replace(motion, reason=CALLBACK)).ended(CALLBACK)
+                state = state.ended(CALLBACK)
+                break
             most = options.max_sweeps if share == 1.0 else min(BETWEEN, options.max_sweeps)
             state = _smoothed(state, journey, replace(options, max_sweeps=state.history[-1].index + most), executor)
-            if state.stop_reason in (CALLBACK, INTERRUPTED):
-                break
     except KeyboardInterrupt as interruption:
-        state = replace(state, motion=replace(motion, reason=INTERRUPTED))
-        return state.interrupted(interruption)
+        state = state.interrupted(interruption)
     if motion.fraction < 1.0:
-        state = replace(state, motion=motion)
-        return state if state.stop_reason in (CALLBACK, INTERRUPTED) else state.ended(NOT_IN_PLACE)
+        stopped = state.stop_reason in (CALLBACK, INTERRUPTED)
+        state = replace(state, motion=replace(motion, reason=state.stop_reason) if stopped else motion)
+        return state if stopped else state.ended(NOT_IN_PLACE)
     return state
 
 
