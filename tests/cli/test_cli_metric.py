@@ -50,9 +50,9 @@ def test_a_metric_of_a_file_is_that_of_an_array(run, square, tmp_path):
 def test_the_metric_of_the_mesh_itself_is_told(run, square, tmp_path):
     done = run("smooth", square, tmp_path / "out.su2", "--preserve", "metric")
     assert done.code == 0
-    assert "kept as a smooth metric (preserve='metric'); if they are not meant, use preserve='none'" in " ".join(
-        done.out.split()
-    )
+    told = " ".join(done.out.split())
+    assert "kept as a smooth metric (preserve='metric'): around " in told
+    assert "if this is not meant, use preserve='none'" in told
     plain = json.loads(run("smooth", square, tmp_path / "out.su2", "--json").out)
     assert plain["conformity"] is None
 

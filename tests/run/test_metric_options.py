@@ -76,7 +76,9 @@ def test_second_order_cells_are_refused():
 
 def test_what_was_taken_for_meant_is_said():
     mesh = structured_mesh(8, 8)
-    assert any("preserve='none'" in note for note in gmsnet.smooth(mesh, preserve="metric").notes)
+    assert any("around 0 of 81 nodes" in note for note in gmsnet.smooth(mesh, preserve="metric").notes)
+    thin = mesh.with_points(mesh.points * [3.0, 1.0])
+    assert any("around 81 of 81 nodes" in note for note in gmsnet.smooth(thin, preserve="metric").notes)
     for h, words in ((1 / 8, "about as many"), (1 / 16, "too few"), (1 / 4, "too many")):
         notes = gmsnet.smooth(mesh, size=lambda p, h=h: np.full(len(p), h)).notes
         assert any(words in note for note in notes)

@@ -96,6 +96,13 @@ class Metric:
         wanted = 0.5 * EQUILATERAL_AREA * len(topology.triangles) + SQUARE_AREA * len(topology.quads)
         return replace(self, unit=math.log(wanted / total) - largest) if total > 0.0 and wanted > 0.0 else self
 
+    def stretched(self, ratio: float) -> int:
+        """How many nodes of the input have a metric whose unit cells are so many times as long as wide, or more."""
+        if self.given is None:
+            return 0
+        logs = self.given.logs
+        return int((np.hypot(logs[:, 1], logs[:, 2]) >= math.log(ratio)).sum())
+
     @property
     def reachable(self) -> float:
         """How long edges become, in the metric as it is given, if the mesh conforms to it as its cells allow."""

@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 
 ALLOWED = 0.05  # of the lengths asked for: so much longer or shorter edges are as many as the metric asks for
 
+STRETCHED = 2.0  # times as long as wide
+
 
 def check_given(options: SmoothOptions, count: int) -> Floats | None:
     """The logarithms (N, 3) by id of a metric, or of sizes, at the ``count`` nodes of a mesh; None if none is given so.
@@ -50,7 +52,7 @@ def take_metric(state: State, options: SmoothOptions, executor: Executor) -> Sta
 
         metric = Metric.at_nodes(topology, state.points, recovered(topology, state.points), own=True)
     before = Conformity.of(state.start, topology, metric)
-    remarks = (*state.remarks, _remark(metric, options))
+    remarks = (*state.remarks, _remark(metric, state, options))
     return replace(
         state, metric=metric, smoother=Adapt(metric), conformity=(before,), remarks=remarks, totals=None, nodal=None
     )
@@ -62,11 +64,12 @@ def _given(options: SmoothOptions) -> tuple[Any, Callable[[Any, int, str], Float
     return options.metric, checked_metric
 
 
-def _remark(metric: Metric, options: SmoothOptions) -> str:
+def _remark(metric: Metric, state: State, options: SmoothOptions) -> str:
     if metric.own:
         return (
-            "the stretch and the sizes of cells were taken for meant, and kept as a smooth metric (preserve='metric'); "
-            "if they are not meant, use preserve='none'"
+            "the stretch and the sizes of cells were taken for meant, and kept as a smooth metric (preserve='metric'): "
+            f"around {metric.stretched(STRETCHED):,} of {len(state.start):,} nodes cells are stretched by "
+            f"{STRETCHED:g} or more; if this is not meant, use preserve='none'"
         )
     what, times = "metric" if options.size is None else "size", metric.reachable
     if abs(times - 1.0) <= ALLOWED:
