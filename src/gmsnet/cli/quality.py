@@ -35,7 +35,10 @@ def quality(
     mesh = io.read(input, format)
     if plot is not None:
         check_drawable(mesh, input)
-    found, others = measure(mesh), unmeasured(mesh)
+    try:
+        found, others = measure(mesh), unmeasured(mesh)
+    except InputError as error:
+        raise InputError(f"{shown(input)}: {error}") from error
     if threshold is not None and others and not len(found.cell):
         raise InputError(
             f"{shown(input)}: a threshold is asked of triangles and quads, and this mesh has none: "

@@ -32,7 +32,7 @@ from gmsnet.run.state import State
 from gmsnet.topology.held import REASONS
 from gmsnet.topology.ordering import space_points, taken
 from gmsnet.topology.topology import Topology
-from gmsnet.topology.volume import Volume
+from gmsnet.topology.volume import Volume, refuse_flat
 
 Floats = NDArray[np.float64]
 
@@ -165,6 +165,7 @@ def check_mesh(mesh: Mesh, target: Target) -> None:
         if not any(block.kind == "tetra" and len(block.nodes) for block in mesh.cells):
             kinds = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
             raise InputError(f"this is a mesh of {', '.join(kinds)} cells: of volumes, only tetrahedra move so far")
+        refuse_flat(mesh)
         return
     if mesh.plane is None and (unknown := unknown_cells(mesh)):
         raise InputError(

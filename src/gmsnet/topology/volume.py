@@ -68,8 +68,7 @@ class Volume:
 
         Raises InputError for a mesh that lies in a plane, and where memory does not suffice.
         """
-        if mesh.plane is not None:
-            raise InputError("the mesh has volumes, but all its nodes lie in one plane: check the file's coordinates")
+        refuse_flat(mesh)
         cells, cell, region = _tetrahedra(mesh)
         nodes = len(mesh.points)
         refuse_unless_free(len(cells) * BYTES_PER_CELL, f"the connectivity of {len(cells):,} tetrahedra")
@@ -179,6 +178,12 @@ class Volume:
         )  # fmt: skip
         facets.fill_blocks3(order, self.ring_start, self.ring, self.start, self.local, first, rings, spokes, made)
         return Stars(made, of_colour.astype(np.int32))
+
+
+def refuse_flat(mesh: Mesh) -> None:
+    """InputError for volumes that lie in a plane."""
+    if mesh.plane is not None:
+        raise InputError("the mesh has volumes, but all its nodes lie in one plane: check the file's coordinates")
 
 
 def _tetrahedra(mesh: Mesh) -> tuple[Ints, NDArray[np.int64], NDArray[np.int64]]:
