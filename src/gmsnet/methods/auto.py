@@ -260,7 +260,7 @@ class Auto(Smoother):
         if isinstance(self.smoother, WorstFirst) and (self.creep is not None or self.phases is VOLUME_PLAN):
             self._look_at_worst(self.smoother)
         if not goes_on:
-            is_ideal = self.smoother.converged and isinstance(self.smoother, WorstFirst)
+            is_ideal = isinstance(self.smoother, WorstFirst) and self.smoother.least >= self.smoother.enough
             few = self.creep is not None and not self.whole and len(field.topology.free) <= EXACT
             self.ideal = is_ideal and few
             self._enter(len(self.phases) if target_reached or is_ideal else self.at + 1, field)
