@@ -1,4 +1,4 @@
-"""Test meshes: random triangles and quads, good and curved ones, layers, grids, deformed ones, thrown nodes."""
+"""Test meshes: random, good, curved, layered, structured and deformed ones, tetrahedra, thrown nodes."""
 
 from gmsnet.generate.curved import disc_of_quads, on_circle, second_order, throw, waved
 from gmsnet.generate.curves import Curve
@@ -14,6 +14,7 @@ from gmsnet.generate.recombine import random_quad_mesh, recombine, split_into_qu
 from gmsnet.generate.settle import settle
 from gmsnet.generate.split import split_edges
 from gmsnet.generate.structured import kershaw_mesh, structured_mesh
+from gmsnet.generate.volumes import lattice_volume, part_volume, random_volume
 
 __all__ = [
     "SHAPES",
@@ -24,11 +25,14 @@ __all__ = [
     "graded_mesh",
     "hybrid_mesh",
     "kershaw_mesh",
+    "lattice_volume",
     "layered_mesh",
     "moved_hole_mesh",
     "on_circle",
+    "part_volume",
     "random_mesh",
     "random_quad_mesh",
+    "random_volume",
     "recombine",
     "second_order",
     "settle",
