@@ -1,4 +1,4 @@
-"""`gmsnet generate` with patterns of quads: the same meshes as the functions make, contradictions refused."""
+"""`gmsnet generate` with patterns: the same meshes as the functions make, contradictions refused."""
 
 from __future__ import annotations
 
@@ -17,15 +17,26 @@ from gmsnet.generate import (
     disturb,
     hybrid_mesh,
     kershaw_mesh,
+    lattice_volume,
     layered_mesh,
+    part_volume,
     random_mesh,
     random_quad_mesh,
+    random_volume,
     settle,
 )
 from gmsnet.generate import structured_mesh as grid
 
 app = typer.Typer()
 app.command()(generate)
+
+
+def inner_nodes(mesh):
+    return np.setdiff1d(np.arange(len(mesh.points)), mesh.cells[-1].nodes)
+
+
+def cells_of(mesh):
+    return sorted(nodes for block in mesh.cells if block.dimension >= 2 for nodes in np.sort(block.nodes).tolist())
 
 
 def run(*arguments):
@@ -41,6 +52,12 @@ def run(*arguments):
         ("--cells mixed --nodes 90 --settle 2 --boundary random --size 3",
          lambda: random_quad_mesh(90, cells="mixed", settled=2, boundary="random", size=3.0)),
         ("--pattern structured --nodes 82", lambda: grid(10)),
+        ("--cells tetra --nodes 30 --seed 2 --size 3", lambda: random_volume(30, size=3.0, seed=2)),
+        ("--pattern structured --cells tetra --nodes 35", lambda: lattice_volume(3)),
+        ("--pattern structured --cells tetra --columns 2", lambda: lattice_volume(2)),
+        ("--pattern part --columns 9", lambda: part_volume(9)),
+        ("--pattern structured --cells tetra --columns 3 --jitter 2 --tangled",
+         lambda: disturb(m := lattice_volume(3), inner_nodes(m), 2.0, keep_valid=False)),
         ("--pattern structured --columns 3 --rows 5 --size 2", lambda: grid(3, 5, size=2.0)),
         ("--pattern structured --rows 4", lambda: grid(4)),
         ("--pattern structured --cells quad --columns 9 --jitter 0.4 --jitter-edge shortest --seed 4",
@@ -64,8 +81,8 @@ def test_command_makes_what_the_functions_make(tmp_path, options, expected):
     result = run(path, *options.split())
     assert result.exit_code == 0, result.output
     mesh = gmsnet.read(path)
-    assert np.array_equal(mesh.points[:, :2], wanted.points)
-    assert sorted(map(sorted, twin.faces(mesh))) == sorted(map(sorted, twin.faces(wanted)))
+    assert np.array_equal(mesh.points[:, : wanted.points.shape[1]], wanted.points)
+    assert cells_of(mesh) == cells_of(wanted)
     assert set(mesh.markers) == set(wanted.markers)
     for block in wanted.cells[:-1]:
         assert f"{len(block.nodes):,} {block.kind}s" in result.stdout
@@ -74,11 +91,17 @@ def test_command_makes_what_the_functions_make(tmp_path, options, expected):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--pattern zigzag", "unknown pattern 'zigzag'; there are random, structured, o-grid, adapted, kershaw"),
-        ("--cells hex", "--pattern random makes --cells triangle or quad or mixed, not 'hex'"),
+        ("--pattern zigzag", "unknown pattern 'zigzag'; there are random, structured, o-grid, adapted, kershaw, part"),
+        ("--cells hex", "--pattern random makes --cells triangle or quad or mixed or tetra, not 'hex'"),
         ("--pattern kershaw --cells mixed", "--pattern kershaw makes --cells quad, not 'mixed'"),
-        ("--pattern structured --cells triangle", "--pattern structured makes --cells quad or mixed, not 'triangle'"),
-        ("--columns 3", "--columns is an option for structured quad, kershaw quad, not for random triangle"),
+        (
+            "--pattern structured --cells triangle",
+            "--pattern structured makes --cells quad or mixed or tetra",
+        ),
+        (
+            "--columns 3",
+            "--columns is an option for structured quad, structured tetra, kershaw quad, part tetra",
+        ),
         ("--pattern kershaw --share 0.5", "--share is an option for structured mixed, not for kershaw quad"),
         ("--pattern structured --interface", "--interface is an option for structured mixed"),
         ("--pattern structured --cells mixed --rows 3", "--rows is an option for structured quad, kershaw quad"),

@@ -17,14 +17,15 @@ def generate(
     pattern: Annotated[
         str,
         typer.Option(
-            help="random, structured (rows and columns), o-grid (layers around a body), adapted (to a front inside) or "
-            "kershaw (zigzag)."
+            help="random, structured (rows and columns, or a body-centred lattice), o-grid (layers around a body), "
+            "adapted (to a front inside), kershaw (zigzag) or part (a cube of tetrahedra with two holes)."
         ),
     ] = "random",
     cells: Annotated[
         str | None,
         typer.Option(
-            help="triangle, quad or mixed.", show_default="triangle if random or adapted, mixed if o-grid, else quad"
+            help="triangle, quad, mixed or tetra.",
+            show_default="triangle if random or adapted, mixed if o-grid, tetra if part, else quad",
         ),
     ] = None,
     shape: Annotated[
@@ -36,7 +37,8 @@ def generate(
         typer.Option(help="Instead of --shape: a JSON file [[[x, y], …], …], the outer ring first, then its holes."),
     ] = None,
     nodes: Annotated[
-        int | None, typer.Option(help="Random nodes inside; of quads and grids about so many.", show_default="1000")
+        int | None,
+        typer.Option(help="Random nodes inside; of quads, grids and lattices about so many.", show_default="1000"),
     ] = None,
     size: Annotated[
         float, typer.Option(help="Side of the square around the shape; chord of the body; factor for --rings.")
@@ -47,7 +49,9 @@ def generate(
     settle: Annotated[
         int | None, typer.Option(help="Of random: sweeps of Laplacian smoothing of the triangles.", show_default="0")
     ] = None,
-    columns: Annotated[int | None, typer.Option(help="Of structured and kershaw: columns of quads.")] = None,
+    columns: Annotated[
+        int | None, typer.Option(help="Of structured, kershaw and part: columns of quads, or of the lattice.")
+    ] = None,
     rows: Annotated[int | None, typer.Option(help="Of structured and kershaw: rows of quads.")] = None,
     flatness: Annotated[
         float | None, typer.Option(help="Of kershaw: height of the flattest quads over the mean.", show_default="0.3")
@@ -75,7 +79,7 @@ def generate(
     tangled: Annotated[bool, typer.Option("--tangled", help="With --jitter: let cells be inverted by it.")] = False,
     format: Annotated[str | None, typer.Option(help="The format, where the suffix does not tell it.")] = None,
 ) -> None:
-    """Make a mesh for tests and write it to OUT: random Delaunay triangles, or quads and mixed cells by a pattern.
+    """Make a mesh for tests and write it to OUT: random Delaunay triangles or tetrahedra, or other cells by a pattern.
 
     Nodes are uniform in the shape; the boundary is held by markers (bottom, right, circle, hole, …).
     """
@@ -102,18 +106,19 @@ def generate(
     if rings is not None:
         given["rings"] = _read_rings(rings)
     mesh = generator.make(given, size, seed)
-    lines = mesh.cells[-1]
+    border = mesh.cells[-1]
     if jitter:
         inner = np.ones(len(mesh.points), dtype=bool)
-        inner[lines.nodes] = False
+        inner[border.nodes] = False
         mesh = disturb(mesh, inner, jitter, seed=seed, keep_valid=not tangled, edge=jitter_edge or "mean")
     aside = is_standard_output(out)  # where the mesh itself goes; a file is another one once it is replaced
     lost = write(mesh, out, format)
     what = f"{pattern} {kind}" if pattern != "random" else str(rings or shape or "square")
+    sort = f"{'marked' if interface else 'boundary'} {'faces' if mesh.has_volumes else 'edges'}"
     counts = ", ".join(f"{len(block.nodes):,} {block.kind}s" for block in mesh.cells[:-1])
     typer.echo(
         f"{'standard output' if out == '-' else out}: {what} with {len(mesh.points):,} nodes, {counts} and "
-        f"{len(lines.nodes):,} {'marked' if interface else 'boundary'} edges (seed {seed})",
+        f"{len(border.nodes):,} {sort} (seed {seed})",
         err=aside,
     )
     for loss in lost:

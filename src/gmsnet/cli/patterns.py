@@ -82,6 +82,29 @@ def _adapted(given: Given, size: float, seed: int) -> Mesh:
     return mesh.with_points(mesh.points * size)
 
 
+def _random_volume(given: Given, size: float, seed: int) -> Mesh:
+    from gmsnet.generate import random_volume
+
+    return random_volume(given.get("nodes", NODES), size=size, seed=seed)
+
+
+def _lattice(name: str) -> Callable[[Given, float, int], Mesh]:
+    def make(given: Given, size: float, seed: int) -> Mesh:
+        from gmsnet import generate
+
+        nodes = given.get("nodes", NODES)
+        if nodes < 1:
+            raise InputError(f"a mesh needs at least 1 node inside, got --nodes {nodes}")
+        return getattr(generate, name)(given.get("columns", _cells_of(nodes)), size=size)  # type: ignore[no-any-return]
+
+    return make
+
+
+def _cells_of(nodes: int) -> int:
+    """Cells on each side of a body-centred lattice with about so many nodes inside: n³ + (n − 1)³."""
+    return min(range(1, 2 + int(nodes ** (1 / 3))), key=lambda n: abs(n**3 + (n - 1) ** 3 - nodes))
+
+
 RANDOM = frozenset({"nodes", "shape", "rings", "boundary", "settle"})
 GRID = frozenset({"nodes", "columns", "rows"})
 LAYERS = frozenset({"layers", "aspect", "around", "body"})
@@ -91,10 +114,12 @@ PATTERNS: dict[str, dict[str, Generator]] = {  # pattern → its cells, the defa
         "triangle": Generator(_random, RANDOM),
         "quad": Generator(_random_quads("quad"), RANDOM),
         "mixed": Generator(_random_quads("mixed"), RANDOM),
+        "tetra": Generator(_random_volume, frozenset({"nodes"})),
     },
     "structured": {
         "quad": Generator(_structured, GRID),
         "mixed": Generator(_hybrid, frozenset({"nodes", "share", "interface"})),
+        "tetra": Generator(_lattice("lattice_volume"), frozenset({"nodes", "columns"})),
     },
     "o-grid": {
         "mixed": Generator(_o_grid("mixed"), LAYERS),
@@ -103,6 +128,7 @@ PATTERNS: dict[str, dict[str, Generator]] = {  # pattern → its cells, the defa
     },
     "adapted": {"triangle": Generator(_adapted, frozenset({"nodes", "aspect"}))},
     "kershaw": {"quad": Generator(_kershaw, GRID | {"flatness"})},
+    "part": {"tetra": Generator(_lattice("part_volume"), frozenset({"nodes", "columns"}))},
 }
 
 

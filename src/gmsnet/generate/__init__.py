@@ -1,4 +1,4 @@
-"""Test meshes: random triangles and quads, good, curved, adapted ones, layers, grids, deformed, thrown nodes."""
+"""Test meshes: random triangles and quads, good, curved, adapted ones, layers, grids, deformed, tetrahedra, thrown nodes."""
 
 from gmsnet.generate.adapted import Front, adapted_mesh
 from gmsnet.generate.curved import disc_of_quads, on_circle, second_order, throw, waved
@@ -15,6 +15,7 @@ from gmsnet.generate.recombine import random_quad_mesh, recombine, split_into_qu
 from gmsnet.generate.settle import settle
 from gmsnet.generate.split import split_edges
 from gmsnet.generate.structured import kershaw_mesh, structured_mesh
+from gmsnet.generate.volumes import lattice_volume, part_volume, random_volume
 
 __all__ = [
     "SHAPES",
@@ -27,11 +28,14 @@ __all__ = [
     "graded_mesh",
     "hybrid_mesh",
     "kershaw_mesh",
+    "lattice_volume",
     "layered_mesh",
     "moved_hole_mesh",
     "on_circle",
+    "part_volume",
     "random_mesh",
     "random_quad_mesh",
+    "random_volume",
     "recombine",
     "second_order",
     "settle",

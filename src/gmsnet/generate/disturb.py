@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from gmsnet.errors import InputError
 from gmsnet.generate.arguments import one_of
 from gmsnet.generate.random import generator
+from gmsnet.kernels.simplex import orientation3
 from gmsnet.kernels.simplex.predicates import signs
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -24,31 +26,43 @@ def disturb(
 ) -> Mesh:
     """The mesh with each free node thrown to a random place around it.
 
-    free: mask (N,) or ids of the nodes that may move. amount: radius of the disc in which they land, in lengths of the
-    node's edges. edge: which length, the "mean" of the node's edges or that of the "shortest". keep_valid: halve the
-    throws until no corner of a face changes its orientation (a corner whose orientation is not certain stands still);
-    otherwise inverted cells are to be expected.
+    free: mask (N,) or ids of the nodes that may move. amount: radius of the disc, or ball, in which they land, in
+    lengths of the node's edges. edge: which length, the "mean" of the node's edges or that of the "shortest".
+    keep_valid: halve the throws until no corner of a cell changes its orientation (a corner whose orientation is not
+    certain stands still); otherwise inverted cells are to be expected.
 
-    Raises InputError if the mesh is not planar, for nodes that do not exist, for a negative amount, and for
+    Raises InputError for a surface in space, for nodes that do not exist, for a negative amount, and for
     another ``edge``.
     """
     if not (np.isfinite(amount) and amount >= 0):
         raise InputError(f"the amount of a disturbance must be 0 or more, got {amount!r}")
     one_of(edge, "edge", EDGES)
-    if mesh.plane is None:
-        raise InputError("only planar meshes can be disturbed; this one varies along all three axes")
-    axes = list(mesh.plane)
+    if mesh.plane is None and not mesh.has_volumes:
+        raise InputError("only planar meshes and volumes can be disturbed; this is a surface in space")
+    dimension = 3 if mesh.has_volumes else 2
+    axes = [0, 1, 2] if mesh.has_volumes else list(mesh.plane or ())
     old = np.ascontiguousarray(mesh.points[:, axes])
-    rings = [block.nodes[:, : block.corners] for block in mesh.cells if block.dimension == 2]
-    rng = generator(seed)
-    radius, angle = np.sqrt(rng.random(len(old))), 2 * np.pi * rng.random(len(old))
-    throw = radius * _edge_lengths(old, rings, edge) * amount * _mask(free, len(old))
-    shift = throw[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    blocks = [block for block in mesh.cells if block.dimension == dimension]
+    edges = np.concatenate([np.empty((0, 2), dtype=np.int64), *map(_edges, blocks)])
+    throw = _directions(len(old), dimension, generator(seed))
+    shift = throw * (_edge_lengths(old, edges, edge) * amount * _mask(free, len(old)))[:, None]
     if keep_valid:
-        keep_orientation(old, shift, corner_triangles(rings), single=mesh.single)
+        keep_orientation(old, shift, _corners(blocks), single=mesh.single)
     points = mesh.points.copy()
     points[:, axes] = _landed(old, shift, single=mesh.single)
     return mesh.with_points(points)
+
+
+def _directions(count: int, dimension: int, rng: np.random.Generator) -> Floats:
+    """(count × dimension) random points in the unit disc or ball."""
+    share = rng.random(count)
+    radius, angle = np.cbrt(share) if dimension == 3 else np.sqrt(share), 2 * np.pi * rng.random(count)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    if dimension == 3:
+        height = 2.0 * rng.random(count) - 1.0
+        circle = np.column_stack([circle * np.sqrt(1.0 - height**2)[:, None], height])
+    found: Floats = radius[:, None] * circle
+    return found
 
 
 def _mask(free: ArrayLike, nodes: int) -> NDArray[np.bool_]:
@@ -73,7 +87,7 @@ def _landed(old: Floats, shift: Floats, *, single: bool) -> Floats:
 
 
 def keep_orientation(old: Floats, shift: Floats, corners: Ints, *, single: bool) -> None:
-    """Halves shifts (N × 2, in place) until every corner (T × 3) has its old orientation."""
+    """Halves shifts (N × D, in place) until every corner simplex (T × (D + 1)) has its old orientation."""
     sign = orientations(old, corners)
     shift[np.unique(corners[sign == 0])] = 0.0
     halvings = 0
@@ -91,11 +105,24 @@ def corner_triangles(rings: Sequence[Ints]) -> Ints:
     return np.concatenate(triangles)
 
 
-def _edge_lengths(points: Floats, rings: Sequence[Ints], which: str) -> Floats:
+def _corners(blocks: Sequence[CellBlock]) -> Ints:
+    """(T × (D + 1)) the simplices at the corners of faces, or of volumes."""
+    if not blocks or blocks[0].dimension == 2:
+        return corner_triangles([block.nodes[:, : block.corners] for block in blocks])
+    return np.concatenate([block.nodes[:, block.cell.simplices].reshape(-1, 4) for block in blocks])
+
+
+def _edges(block: CellBlock) -> Ints:
+    """(E × 2) the edges of all cells, those between two of them twice."""
+    ring = block.nodes[:, : block.corners]
+    if block.dimension == 3:
+        return ring[:, [edge[:2] for edge in block.cell.edges]].reshape(-1, 2)
+    return np.stack([ring, np.roll(ring, -1, axis=1)], axis=2).reshape(-1, 2)
+
+
+def _edge_lengths(points: Floats, edges: Ints, which: str) -> Floats:
     """(N,) mean or shortest length of the edges at each node; 0 where it has none."""
-    pairs = [np.empty((0, 2), dtype=np.int64)]
-    pairs += [np.stack([ring, np.roll(ring, -1, axis=1)], axis=2).reshape(-1, 2) for ring in rings]
-    edges = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
+    edges = np.unique(np.sort(edges, axis=1), axis=0)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
     if which == "shortest":
         shortest = np.full(len(points), np.inf)
@@ -106,8 +133,11 @@ def _edge_lengths(points: Floats, rings: Sequence[Ints], which: str) -> Floats:
     return np.asarray(total / np.maximum(count, 1))
 
 
-def orientations(points: Floats, triangles: Ints) -> NDArray[np.int8]:
-    """(T,) +1 counter-clockwise, −1 clockwise, 0 where float64 cannot tell for certain."""
-    sign = np.empty(len(triangles), dtype=np.int8)
-    signs(points, triangles, np.ones(len(triangles), dtype=np.int8), 0.0, sign)
+def orientations(points: Floats, simplices: Ints) -> NDArray[np.int8]:
+    """(T,) +1 counter-clockwise or of positive volume, −1 the opposite, 0 where float64 cannot tell for certain."""
+    sign, ones = np.empty(len(simplices), dtype=np.int8), np.ones(len(simplices), dtype=np.int8)
+    if simplices.shape[1] == 4:
+        orientation3.signs(points, simplices.astype(np.int32), ones, 0.0, sign)
+    else:
+        signs(points, simplices, ones, 0.0, sign)
     return sign

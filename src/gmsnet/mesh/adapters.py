@@ -214,7 +214,7 @@ def _refill(copied: Callable[[], Any], points: Any) -> Restore:
 def _even(kind: str, data: Any) -> Iterator[tuple[str, NDArray[np.int64]]]:
     """A block of meshio, cut where the number of nodes changes (its polygons may be lists of different lengths)."""
     if kind.startswith("polyhedron"):
-        raise InputError("the mesh has polyhedra, which are volumes: gmsnet smooths planar meshes")
+        raise InputError("the mesh has polyhedra: of volumes, gmsnet smooths tetrahedra alone")
     if isinstance(data, np.ndarray):
         yield face(kind, indices(data, f"{kind} cells"))
         return
