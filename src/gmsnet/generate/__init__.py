@@ -1,4 +1,4 @@
-"""Test meshes: random triangles and quads, good, curved, adapted ones, layers, grids, deformed, tetrahedra, thrown nodes."""
+"""Test meshes: random, good, curved, adapted ones, layers, grids, deformed, tetrahedra, thrown nodes."""
 
 from gmsnet.generate.adapted import Front, adapted_mesh
 from gmsnet.generate.curved import disc_of_quads, on_circle, second_order, throw, waved

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,9 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
-from gmsnet.untangle.result import Untangled
+
+if TYPE_CHECKING:  # what untangling needs of SciPy takes 0.15 s more to import
+    from gmsnet.untangle.result import Untangled
 
 Reasons = Mapping[int, str]  # by the index of each cell among all cells of the mesh
 
