@@ -23,12 +23,15 @@ import test_ply
 import test_stl
 import test_su2
 import test_su2_periodic
+import test_tetgen
 import test_triangle
+import test_volumes
 import test_vtk
 import test_vtu
 from support import gmsh_variants
 from support.damage import triangle_grid
 from support.vtk_variants import grid_of, legacy_variants, mixed_mesh, polydata_of, vtu_variants
+from test_su2_volumes import VOLUMES
 
 SU2 = b"""% made up
 NDIME= 2 % plane
@@ -107,7 +110,8 @@ ENTITIES = '<FieldData><Array type="String" Name="who" format="ascii">65 0</Arra
 def seeds() -> Iterator[tuple[str, bytes]]:
     """(key of the format, file) of every seed."""
     yield from (
-        ("su2", data) for data in (test_su2.PLAIN, SU2, SU2.replace(b"\n", b"\r\n"), test_su2_periodic.PERIODIC)
+        ("su2", data)
+        for data in (test_su2.PLAIN, SU2, SU2.replace(b"\n", b"\r\n"), test_su2_periodic.PERIODIC, VOLUMES)
     )
     yield from (("medit", data) for data in (test_medit.PLAIN, MEDIT))
     yield from (("gmsh", data) for data in gmsh_variants.VARIANTS.values())
@@ -127,6 +131,8 @@ def seeds() -> Iterator[tuple[str, bytes]]:
     corners = np.array([[[0, 0, 1], [1, 0, 1], [1, 1, 1]], [[0, 0, 1], [1, 1, 1], [-0.0, 1, 1]]], dtype=np.float32)
     yield "stl", test_stl.binary_stl(corners)
     yield "triangle", PAIR.join((test_triangle.NODE, test_triangle.ELE))
+    yield "triangle", PAIR.join((test_tetgen.NODE, test_tetgen.ELE))
+    yield "triangle", PAIR.join((test_tetgen.NODE, b"1 10 0\n0 0 1 2 3 4 4 4 4 4 4\n"))
     yield "triangle", PAIR.join((test_triangle.NODE, b"1 6 0\n1 1 2 3 4 1 2\n"))
     for form in test_ply.ORDERS:
         for kind in ("float", "double"):
@@ -148,7 +154,7 @@ def seeds() -> Iterator[tuple[str, bytes]]:
 
 
 def _written() -> Iterator[tuple[str, bytes]]:
-    for mesh in (triangle_grid(1), triangle_grid(2, 3), mixed_mesh(1)):
+    for mesh in (triangle_grid(1), triangle_grid(2, 3), mixed_mesh(1), test_volumes.sample(1)):
         for key, entry in FORMATS.items():
             try:
                 written = entry.load().write(mesh)

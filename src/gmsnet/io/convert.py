@@ -72,8 +72,9 @@ def _says_regions(mesh: Mesh, name: str) -> bool:
 
 
 def lost_order(mesh: Mesh, title: str) -> list[str]:
-    """That faces get other numbers in a format that keeps them by their regions, where that is so."""
-    regions = [block.regions for block in mesh.cells if block.dimension == 2]
+    """That cells get other numbers in a format that keeps them by their regions, where that is so."""
+    dimension = 3 if mesh.has_volumes else 2
+    regions = [block.regions for block in mesh.cells if block.dimension == dimension]
     if not regions or (np.diff(np.concatenate(regions)) >= 0).all():
         return []
     return [f"{title} keeps cells region by region: they were put in another order"]
