@@ -103,10 +103,10 @@ class Outcome:
 
     def nearness(self) -> str:
         """How near the minimum 1/q is to the most that it can be, as far as a bound is known."""
-        bounds = self.result.limits
+        bounds, symbol = self.result.limits, self.result.after.symbol
         if not len(bounds.bound):
-            return "no bound is known for the minimum 1/q"
-        return f"the minimum 1/q is {self.least:.4g} and cannot exceed {bounds.ceiling:.4g}: {bounds.describe(0)}"
+            return f"no bound is known for the minimum {symbol}"
+        return f"the minimum {symbol} is {self.least:.4g} and cannot exceed {bounds.ceiling:.4g}: {bounds.describe(0)}"
 
     def tangle(self) -> str:
         """Which cells are inverted still, where, and why as far as that is known."""
@@ -144,7 +144,7 @@ class Outcome:
             console.print(report.worst_table(self.worst))
             console.print()
         if stages := self.stages():
-            of = "quality" if self.result.conformity is not None else "1/q"
+            of = "quality" if self.result.conformity is not None else self.result.after.symbol
             console.print(report.stage_table(stages, bool(self.target), of))
             console.print()
         console.print(self.verdict())

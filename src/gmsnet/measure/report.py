@@ -150,6 +150,11 @@ class QualityReport:
         return self.column("aspect")
 
     @property
+    def symbol(self) -> str:
+        """How the column ``shape`` is called."""
+        return "η" if isinstance(self.cells, MeasuredTetrahedra) else "1/q"
+
+    @property
     def angles(self) -> tuple[str, str]:
         """The names of the columns of the smallest and the largest angle."""
         low, high = self.cells.names[:2]

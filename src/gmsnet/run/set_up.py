@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gmsnet.constraints.sliding import Sliding, curves_to_slide_on
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology.connectivity import CHOSEN
-from gmsnet.measure.report import QualityReport, measure
+from gmsnet.measure.report import ASPECT, QualityReport, measure
 from gmsnet.measure.target import Target
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.display import plain
@@ -133,8 +133,6 @@ def _first_of_volume(
     remarks = held_anyway(asked, topology, fixed)
     if options.fix_layers:
         remarks.append("fix_layers: stretched layers of volumes are not looked for yet, so none are held")
-    if unknown := unknown_cells(given):
-        remarks.append(f"the nodes of {unknown} are held: gmsnet does not know this type of cells")
     if others := unmeasured(given):
         remarks.append(f"not measured, and their nodes are held: {others}")
     given = given.without_cells()
@@ -152,6 +150,8 @@ def check_volume(options: SmoothOptions) -> None:
         raise InputError("boundary nodes of volumes cannot slide yet: leave out slide")
     if options.adapts:
         raise InputError("volumes cannot be smoothed towards a metric yet: leave out metric and size")
+    if options.best_by == ASPECT:
+        raise InputError("volumes have no aspect ratio by which meshes could be compared: leave out best_by")
 
 
 def check_mesh(mesh: Mesh, target: Target) -> None:

@@ -59,7 +59,7 @@ class Limits:
     bound: (G,) of 1/q. kind: (G,) one of the kinds in groups.py. node: (G,) id of the node where it is, −1 for
     held cells. angle: (G,) of a corner, in degrees. first, rows: group g has the rows rows[first[g] : first[g + 1]] of
     the report. cell: (T,) the index of each row among all cells of the mesh. held: (T,) bool, whose nodes
-    are all held. points: (N, dim).
+    are all held. points: (N, dim). symbol: how the quality is called.
     """
 
     bound: Floats
@@ -71,6 +71,7 @@ class Limits:
     cell: Ints
     held: NDArray[np.bool_]
     points: Floats
+    symbol: str = "1/q"
 
     def __repr__(self) -> str:
         """One line: the ceiling, and how many groups there are."""
@@ -117,7 +118,7 @@ class Limits:
         return {row: reason or self._otherwise(row) for row, reason in told.items()}
 
     def _held(self, group: int) -> str:
-        return f"all its nodes are held, so its 1/q stays {self.bound[group]:.3g}"
+        return f"all its nodes are held, so its {self.symbol} stays {self.bound[group]:.3g}"
 
     def _otherwise(self, row: int) -> str:
         return "all its nodes are held, so it stays as it is" if self.held[row] else "no bound known"
@@ -151,6 +152,7 @@ def limits(mesh: Mesh, topology: Topology | Volume, below: float = 0.9) -> Limit
         cell=cell,
         held=held,
         points=mesh.points,
+        symbol="η" if isinstance(topology, Volume) else "1/q",
     )
 
 
