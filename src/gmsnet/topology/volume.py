@@ -17,7 +17,7 @@ from gmsnet.errors import InputError
 from gmsnet.kernels.simplex import orientation3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.space import LANES3, SpaceBlocks
-from gmsnet.kernels.topology import connectivity, facets, layout
+from gmsnet.kernels.topology import balls, connectivity, facets, layout
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.topology.held import reasons_in_space, sorted_out
@@ -85,12 +85,12 @@ class Volume:
         unused = (np.bincount(rows.ravel(), minlength=nodes) == 0) & (marks & others == 0)
         marks[unused] |= np.uint16(connectivity.UNUSED)
         start = np.zeros(nodes + 2, dtype=np.int64)
-        facets.count_stars(rows, marks, start)
+        balls.count_stars(rows, marks, start)
         spokes = np.empty((start[-1], 3), dtype=np.int32)
-        facets.list_stars(rows, orientation, marks, start, spokes)
+        balls.list_stars(rows, orientation, marks, start, spokes)
         ring_start, ring = np.empty(nodes + 1, dtype=np.int64), np.empty(3 * len(spokes) // 2 + nodes, dtype=np.int32)
         local = np.empty((len(spokes), 3), dtype=np.uint8)
-        end = facets.rings(start, spokes, ring_start, ring, local, MOST)
+        end = balls.rings(start, spokes, ring_start, ring, local, MOST)
         start, around = start[:-1], np.diff(ring_start)
         marks[(marks == 0) & (around == 0)] |= np.uint16(connectivity.HIGH_VALENCE)
         ball = 2 * around == np.diff(start) + 4
@@ -176,7 +176,7 @@ class Volume:
             np.empty(count, dtype=np.int32), np.empty(count * LANES3, dtype=np.int32), np.empty(count, dtype=np.int32),
             int(most_rings.max(initial=0)), int(most_cells.max(initial=0)),
         )  # fmt: skip
-        facets.fill_blocks3(order, self.ring_start, self.ring, self.start, self.local, first, rings, spokes, made)
+        balls.fill_blocks3(order, self.ring_start, self.ring, self.start, self.local, first, rings, spokes, made)
         return Stars(made, of_colour.astype(np.int32))
 
 

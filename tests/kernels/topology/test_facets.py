@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import naive, volumes
 
+from gmsnet.kernels.topology import balls
 from gmsnet.kernels.topology import facets as kernels
 from gmsnet.kernels.topology.layout import morton_order3
 
@@ -129,13 +130,13 @@ def test_stars_and_rings(seed, nodes, count, of):
     turn = rng.choice([1, -1], count).astype(np.int8)
     marks = (rng.random(nodes) < 0.3).astype(np.uint16)
     start = np.zeros(nodes + 2, dtype=np.int64)
-    kernels.count_stars(cells, marks, start)
+    balls.count_stars(cells, marks, start)
     spokes = np.empty((start[-1], 3), dtype=np.int32)
-    kernels.list_stars(cells, turn, marks, start, spokes)
+    balls.list_stars(cells, turn, marks, start, spokes)
     most = int(rng.integers(3, 12))
     ring_start, local = np.empty(nodes + 1, dtype=np.int64), np.empty((len(spokes), 3), dtype=np.uint8)
     ring = np.empty(3 * len(spokes) + nodes, dtype=np.int32)
-    end = kernels.rings(start, spokes, ring_start, ring, local, most)
+    end = balls.rings(start, spokes, ring_start, ring, local, most)
     assert end == ring_start[-1]
     for v in range(nodes):
         rows = spokes[start[v] : start[v + 1]].tolist()
