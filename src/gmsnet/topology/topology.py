@@ -22,10 +22,11 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
+from gmsnet.topology.connectivity import Connectivity
 from gmsnet.topology.fans import closed_fans
 from gmsnet.topology.held import MOST_NEIGHBOURS, known_marks, released, sorted_out
 from gmsnet.topology.links import Links
-from gmsnet.topology.ordering import inverse, memory_order, planar_points, taken
+from gmsnet.topology.ordering import memory_order, planar_points, taken
 from gmsnet.topology.polygons import Faces, Offsets, check_size
 from gmsnet.topology.stars import Colouring, Flags, Ints, Stars
 
@@ -33,17 +34,15 @@ PER_NODE, PER_CORNER = 90, 22  # bytes that the set-up takes at most, measured; 
 
 
 @dataclass(frozen=True, eq=False)
-class Topology:
+class Topology(Connectivity):
     """The connectivity of a mesh, seen from its nodes.
 
     plane: the two axes of a planar mesh, else None. triangles: (T, 3) corner nodes of all cells with three corners, in
     file order (six-node triangles by their corners); cell: (T,) the index of each among all cells of the mesh;
     orientation: (T,) int8, −1 where it has to be read backwards for all of its part to be wound alike with positive
-    area. held: reason → node ids, the first reason that applies.
-    free: (F,) ids of the nodes that may move, ascending.
-    memory: (N,) node ids in memory order. In that order, by places in memory: near (T, 3) and near_orientation (T,),
-    the triangles; rings, each from its smallest id on, and their CSR start (N + 1); near_free (N,), which nodes may
-    move. colouring: of all nodes that were free at first, in the order of the ids, so that colours follow from the
+    area. held, free, memory, near_free: see Connectivity. In memory order, by places in memory: near (T, 3) and
+    near_orientation (T,), the triangles; rings, each from its smallest id on, and their CSR start (N + 1).
+    colouring: of all nodes that were free at first, in the order of the ids, so that colours follow from the
     connectivity alone. face_cell: (F,) the index among all cells of the mesh of each face in file order; near_origin:
     the place there of each triangle of ``near``, of each face if not all cells are triangles (``cells_of``).
     sliding: reason → the ids of the nodes that would be held for it if they did not slide.
@@ -53,14 +52,10 @@ class Topology:
     triangles: Ints
     cell: NDArray[np.int64]
     orientation: NDArray[np.int8]
-    held: dict[str, NDArray[np.int64]]
-    free: Ints
-    memory: Ints
     near: Ints
     near_orientation: NDArray[np.int8]
     near_start: Offsets
     near_ring: Ints
-    near_free: Flags
     colouring: Colouring
     near_shapes: NDArray[np.uint8] | None = None
     near_cells: Ints | None = None
@@ -152,15 +147,6 @@ class Topology:
             colouring=Colouring(self.colouring.places, stars.start, stars.around),
         )
 
-    def holding(self, chosen: Flags, reason: str) -> Topology:
-        """The same, with the free nodes among the chosen (N,) by id held for this reason."""
-        newly = self.free[chosen[self.free]]
-        if not len(newly):
-            return self
-        held = {**self.held, reason: newly.astype(np.int64)}
-        free = self.near_free & ~chosen[self.memory]
-        return replace(self, held=held, free=self.free[~chosen[self.free]], near_free=free)
-
     def restricted(self, active: Flags) -> Topology:
         """The same with the active nodes (N,) by places in memory alone free, and only the triangles around them.
 
@@ -221,11 +207,6 @@ class Topology:
         np.cumsum(degree, out=start[1:])
         within = np.arange(start[-1]) - np.repeat(start[:-1], degree)
         return start, self.memory[self.near_ring[np.repeat(self.near_start[place], degree) + within]]
-
-    @cached_property
-    def places(self) -> Ints:
-        """(N,) the place in memory of each node by id."""
-        return inverse(self.memory)
 
     @cached_property
     def near_colours(self) -> Ints:

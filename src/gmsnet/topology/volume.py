@@ -7,7 +7,7 @@ by ids at the doors, and by places in memory inside.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -20,8 +20,9 @@ from gmsnet.kernels.star.space import LANES3, SpaceBlocks
 from gmsnet.kernels.topology import balls, connectivity, facets, layout
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
+from gmsnet.topology.connectivity import Connectivity
 from gmsnet.topology.held import reasons_in_space, sorted_out
-from gmsnet.topology.ordering import inverse, space_points
+from gmsnet.topology.ordering import space_points
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.stars import Colouring, Stars
 
@@ -35,13 +36,13 @@ BYTES_PER_CELL = 190  # that the set-up takes at most
 
 
 @dataclass(frozen=True, eq=False)
-class Volume:
+class Volume(Connectivity):
     """See the module.
 
     cell: (T,) the index of each tetrahedron among all cells of the mesh; cells: (T, 4) their nodes in file order, and
     orientation: (T,) int8, −1 where the volume is to be taken with the other sign, for all of a part to be alike and
-    mostly positive. held, free, memory: as in Topology. near (T, 4), near_orientation, near_free: by places in memory;
-    near_origin: the place in file order of each row of near. The cells at node v that is free, or was before others
+    mostly positive. held, free, memory, near_free: see Connectivity. near (T, 4), near_orientation: by places in
+    memory; near_origin: the place in file order of each row of near. The cells at node v that is free, or was before others
     were held, are start[v] … start[v + 1] − 1 of local (M, 3), which nodes of its ring their spokes end in: ring_start
     (N + 1,), ring.
     """
@@ -49,13 +50,9 @@ class Volume:
     cell: NDArray[np.int64]
     cells: Ints
     orientation: NDArray[np.int8]
-    held: dict[str, NDArray[np.int64]]
-    free: Ints
-    memory: Ints
     near: Ints
     near_orientation: NDArray[np.int8]
     near_origin: Ints
-    near_free: Flags
     start: NDArray[np.int64]
     local: NDArray[np.uint8]
     ring_start: NDArray[np.int64]
@@ -100,23 +97,9 @@ class Volume:
         of_cell[origin] = orientation
         padded = np.append(ring[:end], np.zeros(connectivity.WIDTH, dtype=np.int32))
         return cls(
-            cell, cells, of_cell, held, free, memory, rows, orientation, origin, marks == 0, start, local, ring_start,
-            ring[:end], Colouring(places, ring_start, padded),
+            cell, cells, of_cell, rows, orientation, origin, start, local, ring_start, ring[:end],
+            Colouring(places, ring_start, padded), held=held, free=free, memory=memory, near_free=marks == 0,
         )  # fmt: skip
-
-    def holding(self, chosen: Flags, reason: str) -> Volume:
-        """The same, with the free nodes among the chosen (N,) by id held for this reason."""
-        newly = self.free[chosen[self.free]]
-        if not len(newly):
-            return self
-        held = {**self.held, reason: newly.astype(np.int64)}
-        free = self.near_free & ~chosen[self.memory]
-        return replace(self, held=held, free=self.free[~chosen[self.free]], near_free=free)
-
-    @cached_property
-    def places(self) -> Ints:
-        """(N,) the place in memory of each node by id."""
-        return inverse(self.memory)
 
     @cached_property
     def near_colours(self) -> Ints:
