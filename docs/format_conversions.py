@@ -106,6 +106,8 @@ ITEMS: dict[str, Callable[[Mesh], Items]] = {
     "cell data": _cell_data,
     "quads": _kind("quad"),
     "curved": _kind("triangle6"),
+    "tetrahedra": _kind("tetra"),
+    "hexahedra": _kind("hexahedron"),
     "node sets": lambda mesh: {(name, tuple(nodes.tolist())) for name, nodes in mesh.node_sets.items()},
 }
 SAMPLE = {"numbers of regions": "regions"}  # facts that are another side of one that the samples have
@@ -114,8 +116,8 @@ SAMPLE = {"numbers of regions": "regions"}  # facts that are another side of one
 def outcome(less: Mesh, more: Mesh, fact: str, target: str, folder: Path) -> str:
     """What becomes of a fact that only ``more`` has when it is converted."""
     path = folder / f"converted{FORMATS[target].suffixes[0]}"
-    usual = gmsnet.write(less, path)
     try:
+        usual = gmsnet.write(less, path)
         said = gmsnet.write(more, path) != usual
     except FormatError:
         return "refused"

@@ -18,11 +18,15 @@ Files = dict[str, bytes]  # suffix → bytes
 
 # Two squares side by side with a free node in each, further on a quadrilateral; as decimals, some spelled oddly.
 POINTS = ("0 -0.0", "1e0 0", "+1.0 1.00", "0 1.25", ".3 .6", "2 0", "2. 1.1", "1.7 0.4")
-OTHERS = {"quads": ("3.5 0", "4.5 0", "4.5 1", "3.5 1"), "curved": ("5 0", "6 0", "5 1", "5.5 0", "5.5 .5", "5 .5"),
+OTHERS = {"tetrahedra": ("10 -0.0 0", "11. 0 0", "10 1e0 0", "10 0 +1", "10.2 .2 .3"),
+          "hexahedra": ("13 0 0", "14 0 0", "14 1 0", "13 1 0", "13 0 1", "14 0 1", "14 1 1", "13 1 1"),
+          "quads": ("3.5 0", "4.5 0", "4.5 1", "3.5 1"), "curved": ("5 0", "6 0", "5 1", "5.5 0", "5.5 .5", "5 .5"),
           "unused node": ("9 9",)}  # fmt: skip
 TRIANGLES = ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4), (1, 5, 7), (5, 6, 7), (6, 2, 7), (2, 1, 7))
 LINES = ((0, 1), (1, 5), (3, 2), (2, 6))
 VERTICES = ((0,), (5,))
+TETRAHEDRA = ((0, 1, 2, 4), (0, 3, 1, 4), (1, 3, 2, 4), (0, 2, 3, 4))
+VOLUMES = ("tetra", "hexahedron")
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,12 @@ class Sample:
         regions = (3, 7) if self.has("regions") else (1, 1)
         found = [("triangle", nodes, regions[k // 4]) for k, nodes in enumerate(TRIANGLES)]
         at = len(POINTS)
+        if self.has("tetrahedra"):
+            found += [("tetra", tuple(at + k for k in nodes), regions[1]) for nodes in TETRAHEDRA]
+            at += 5
+        if self.has("hexahedra"):
+            found.append(("hexahedron", tuple(range(at, at + 8)), regions[1]))
+            at += 8
         if self.has("quads"):
             found.append(("quad", tuple(range(at, at + 4)), regions[1]))
             at += 4
@@ -68,7 +78,9 @@ class Sample:
 
     def names(self) -> dict[tuple[int, int], str]:
         """(dimension, region) → name."""
-        found = {(2, 3): "steel", (2, 7): "dry air"} if self.has("names of regions") else {}
+        dimensions = (2, 3) if self.has("tetrahedra") else (2,)
+        found = {(d, k): name for d in dimensions for k, name in ((3, "steel"), (7, "dry air"))}
+        found = found if self.has("names of regions") else {}
         return found | ({(1, 5): "wall", (1, 6): "outlet"} if self.has("names of markers") else {})
 
     def faces(self) -> list[Cell]:
@@ -79,7 +91,7 @@ class Sample:
 
     def space(self, k: int) -> list[str]:
         """The decimals of a point in space."""
-        return [*self.points[k], "5.0" if self.has("other plane") else "0"]
+        return [*self.points[k], "5.0" if self.has("other plane") else "0"][:3]
 
     def line(self, text: str = "", always: bool = True) -> None:
         self.bytes += (text + self.end).encode() if always else b""
@@ -107,18 +119,18 @@ class Sample:
         self.line(text, bool(text))
 
 
-def su2(out: Sample) -> Files:
-    codes = {"line": 3, "vertex": 1, "triangle": 5, "quad": 9}
+def su2(out: Sample, dimension: int) -> Files:
+    codes = {"line": 3, "vertex": 1, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12}
     out.line("% a comment", out.has("comments"))
-    out.line("NDIME= 2" + " % plane" * out.has("comments"))
+    out.line(f"NDIME= {dimension}" + " % axes" * out.has("comments"))
     out.line("AOA= 5.0", out.has("more"))
-    faces = out.of("triangle", "quad")
+    faces = out.of("triangle", "quad", *VOLUMES[: 2 * (dimension - 2)])
     out.line(f"NELEM= {len(faces)}")
     for cell in faces:
         out.row(("i", [codes[cell.kind], *cell.nodes, cell.number - 1]))
     out.line(f"NPOIN= {len(out.points)}")
-    for k, point in enumerate(out.points):
-        out.row(("d", point), ("i", [out.tags[k]]))
+    for k in range(len(out.points)):
+        out.row(("d", out.space(k)[:dimension]), ("i", [out.tags[k]]))
     names = out.names()
     groups: dict[str, list[Cell]] = {}
     for cell in out.of("line", "vertex"):
@@ -135,8 +147,8 @@ def su2(out: Sample) -> Files:
     return {".su2": bytes(out.bytes)}
 
 
-GMSH = {"line": 1, "triangle": 2, "quad": 3, "triangle6": 9, "vertex": 15}
-DIMENSION = {"line": 1, "vertex": 0}
+GMSH = {"line": 1, "triangle": 2, "quad": 3, "tetra": 4, "hexahedron": 5, "triangle6": 9, "vertex": 15}
+DIMENSION = {"line": 1, "vertex": 0, "tetra": 3, "hexahedron": 3}
 
 
 def gmsh(out: Sample, version: str) -> Files:
@@ -230,7 +242,8 @@ def _gmsh_new(out: Sample) -> None:
     out.close("$EndElements")
 
 
-MEDIT = {"line": "Edges", "triangle": "Triangles", "quad": "Quadrilaterals", "triangle6": "TrianglesP2"}
+MEDIT = {"line": "Edges", "triangle": "Triangles", "quad": "Quadrilaterals", "triangle6": "TrianglesP2",
+         "tetra": "Tetrahedra", "hexahedron": "Hexahedra"}  # fmt: skip
 
 
 def medit(out: Sample, dimension: int) -> Files:
@@ -239,10 +252,11 @@ def medit(out: Sample, dimension: int) -> Files:
     out.line(f"Dimension {dimension}" + " # a comment" * out.has("comments"))
     out.line("Vertices")
     out.line(str(len(out.points)))
-    for k, point in enumerate(out.points):
-        out.row(("d", point if dimension == 2 else out.space(k)), ("i", [k if out.has("point data") else 0]))
+    for k in range(len(out.points)):
+        out.row(("d", out.space(k)[:dimension]), ("i", [k if out.has("point data") else 0]))
     for kind, title in MEDIT.items():
-        if cells := out.of(kind):
+        cells = out.of(kind)
+        if cells and (dimension == 3 or kind not in VOLUMES):
             out.line(title)
             out.line(str(len(cells)))
             for cell in cells:
@@ -258,18 +272,18 @@ def medit(out: Sample, dimension: int) -> Files:
     return {".mesh": bytes(out.bytes)}
 
 
-def triangle(out: Sample) -> Files:
+def triangle(out: Sample, dimension: int) -> Files:
     markers = {k: cell.region for cell in out.of("vertex") for k in cell.nodes}
     numbered = len(out.points) * out.has("node numbers")  # from 1 or from elsewhere
     out.line("# a comment", out.has("comments"))
-    out.row(("i", [len(out.points), 2, int(out.has("point data")), 1]))
-    for k, point in enumerate(out.points):
+    out.row(("i", [len(out.points), dimension, int(out.has("point data")), 1]))
+    for k in range(len(out.points)):
         data = [k / 4] if out.has("point data") else []
-        out.row(("i", [k + 1 + numbered]), ("d", point), ("d", data), ("i", [markers.get(k, 0)]))
+        out.row(("i", [k + 1 + numbered]), ("d", out.space(k)[:dimension]), ("d", data), ("i", [markers.get(k, 0)]))
     nodes, out.bytes = bytes(out.bytes), bytearray()
-    cells = out.of("triangle")
+    cells = out.of({2: "triangle", 3: "tetra"}[dimension])
     regions, data = out.has("regions") or out.has("cell data"), out.has("cell data")
-    out.row(("i", [len(cells), 3, regions + data]))
+    out.row(("i", [len(cells), dimension + 1, regions + data]))
     for cell in cells:
         more = [cell.region] * regions + [cell.number / 4] * data
         out.row(("i", [cell.number, *(k + 1 + numbered for k in cell.nodes)]), ("d", more))
@@ -285,7 +299,7 @@ def obj(out: Sample) -> Files:
         out.row(("s", ["v"]), ("d", out.space(k)), ("d", colour))
     out.line("vn 0 0 1", out.has("more"))
     names, group = out.names(), 0
-    for cell in [cell for cell in out.cells if cell.kind != "triangle6"]:
+    for cell in [cell for cell in out.cells if cell.kind not in ("triangle6", *VOLUMES)]:
         if cell.region != group and (out.has("regions") or out.has("markers")):
             group = cell.region
             dim = DIMENSION.get(cell.kind, 2)
@@ -362,7 +376,7 @@ def ply(out: Sample) -> Files:
     return {".ply": bytes(out.bytes)}
 
 
-VTK = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "triangle6": 22}
+VTK = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "triangle6": 22}
 
 
 def vtk(out: Sample, version: str, polygonal: bool = False) -> Files:
@@ -511,13 +525,14 @@ def _encoded(data: bytes, order: str, encoding: str, compressed: bool) -> bytes:
 
 @dataclass(frozen=True)
 class Variant:
-    """A format and a variant of it. key: of the format; order, single: see Sample."""
+    """A format and a variant of it. key: of the format; order, single: see Sample; base: facts it always has."""
 
     key: str
     title: str
     build: Callable[[Sample], Files]
     order: str = ""
     single: bool = False
+    base: frozenset[str] = frozenset()
 
     def make(self, facts: Iterable[str], points: Sequence[Row]) -> Files:
         """The files (suffix → bytes) of the sample with these facts."""
@@ -533,7 +548,8 @@ def points_of(facts: Iterable[str], plain: bool = False) -> list[Row]:
 
 _LITTLE, _BIG = "little endian", "big endian"
 VARIANTS = [
-    Variant("su2", "SU2", su2),
+    Variant("su2", "SU2", partial(su2, dimension=2)),
+    Variant("su2", "SU2, 3D", partial(su2, dimension=3)),
     *(Variant("gmsh", f"Gmsh {version}, {how}", partial(gmsh, version=version), order)
       for version in ("2.2", "4.1") for how, order in (("text", ""), (_LITTLE, "<"), (_BIG, ">"))),
     *(Variant("vtk", f"VTK {version}, {what}{how}", partial(vtk, version=version, polygonal=polygonal), order)
@@ -548,7 +564,8 @@ VARIANTS = [
     Variant("vtu", "VTU, appended raw, single", partial(vtu, encoding="raw"), "<", True),
     Variant("medit", "Medit, 2D", partial(medit, dimension=2)),
     Variant("medit", "Medit, 3D", partial(medit, dimension=3)),
-    Variant("triangle", "Triangle", triangle),
+    Variant("triangle", "Triangle", partial(triangle, dimension=2)),
+    Variant("triangle", "TetGen", partial(triangle, dimension=3), base=frozenset({"tetrahedra"})),
     Variant("stl", "STL, text", stl_text),
     Variant("stl", "STL, binary", stl_binary, "<", True),
     Variant("obj", "OBJ", obj),

@@ -19,6 +19,7 @@ from format_samples import VARIANTS, Files, Variant, points_of
 
 import gmsnet
 from gmsnet.errors import FormatError
+from gmsnet.io.convert import in_space
 from gmsnet.mesh.mesh import Mesh
 
 TARGET = Path(__file__).with_name("formats.md")
@@ -26,10 +27,10 @@ TARGET = Path(__file__).with_name("formats.md")
 FORM = ("comments", "line ends", "blanks", "node numbers", "cell numbers", "cell order", "entities", "unused node",
         "more")  # fmt: skip
 CONTENT = ("regions", "names of regions", "lines", "vertices", "markers", "names of markers", "point data",
-           "cell data", "quads", "curved", "other plane")  # fmt: skip
+           "cell data", "quads", "curved", "tetrahedra", "hexahedra", "other plane")  # fmt: skip
 NEEDS = {  # what a fact is about must be there as well
     "names of regions": ("regions",), "markers": ("lines",), "names of markers": ("lines", "markers"),
-    "more": ("lines",),
+    "more": ("lines",), "hexahedra": ("tetrahedra",),
 }  # fmt: skip
 
 
@@ -79,10 +80,14 @@ def _saved_as(stem: Path, files: Files) -> Files:
 def _moved(points: Sequence[Sequence[str]], old: Mesh, new: Mesh) -> list[list[str]]:
     """The decimals of the sample's points, other ones where a coordinate has changed."""
     kind = np.float32 if old.single else np.float64
-    places = {tuple(point): k for k, point in enumerate(old.points[:, :2].astype(kind).tolist())}
+    places = {tuple(point): k for k, point in enumerate(in_space(old).astype(kind).tolist())}
+    (height,) = set(old.points[:8, 2:].ravel().tolist()) or {0.0}  # of the points of which two coordinates are given
     found = []
     for texts in points:
-        at = places.get(tuple(float(kind(text)) for text in texts))
+        flat = old.points.shape[1] == 2
+        at = places.get(
+            (*(float(kind(text)) for text in texts[: 2 if flat else 3]), *[height] * (flat or len(texts) < 3))
+        )
         if at is None:  # in no cell, in a format that has no such nodes
             found.append(list(texts))
             continue
@@ -103,9 +108,10 @@ def facts_of(mesh: Mesh) -> tuple[object, ...]:
 
 def entry(variant: Variant, fact: str, folder: Path) -> str:
     """What becomes of a fact that a file of this variant has: a word of the table."""
-    less, more = frozenset(NEEDS.get(fact, ())), frozenset((fact, *NEEDS.get(fact, ())))
+    less = frozenset(NEEDS.get(fact, ())) | variant.base
+    more = less | {fact}
     points = points_of(less if fact == "unused node" else more)
-    if variant.make(less, points) == variant.make(more, points_of(more)):
+    if less != more and variant.make(less, points) == variant.make(more, points_of(more)):
         return "–"
     try:
         found = smoothed(variant, more, folder)
@@ -115,6 +121,8 @@ def entry(variant: Variant, fact: str, folder: Path) -> str:
         return "**changed**"
     if facts_of(found.again) != facts_of(found.mesh) or not np.array_equal(found.again.points, found.result.points):
         return "**reads differently**"
+    if less == more:
+        return "used"
     files = variant.make(less, points_of(less))
     without = gmsnet.read(saved(files, folder / "without"))
     used = (facts_of(found.mesh), found.mesh.points.tolist()) != (facts_of(without), without.points.tolist())
@@ -136,6 +144,7 @@ What the names of facts mean that do not say it themselves:
   of the whole grid; Medit: ridges; OBJ: normals, a library of materials; PLY: another element.
 - *point data*, *cell data* of OBJ and OFF: colours; of binary STL: attributes. *comments* of VTK: the title.
 - *markers*: lines in two groups. *curved*: triangles of six nodes. *other plane*: z = 5.
+  *tetrahedra*: beside the faces; these are marks then.
 
 SU2's markers `SEND_RECEIVE` (periodic boundaries, parts of a partitioned mesh) are vertices, so their nodes are held;
 `NPERIODIC` and `PERIODIC_INDEX` are kept.
