@@ -39,6 +39,11 @@ CHOICES: dict[str, tuple[str, dict[str, Any]]] = {
         "without a bound.",
         {"preserve": "size"},
     ),
+    "metric": (
+        '`preserve="metric"` takes the stretch and the sizes of the cells for a smooth field, and smooths all cells '
+        "towards it, layers too.",
+        {"preserve": "metric"},
+    ),
     "none": ('`preserve="none"` smooths all free nodes for shape alone.', {"preserve": "none"}),
     "fix-layers": (
         "`fix_layers=True` holds all cells that are stretched alike with their neighbours, layers of a wall or not, "

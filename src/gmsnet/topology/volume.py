@@ -42,9 +42,9 @@ class Volume(Connectivity):
     cell: (T,) the index of each tetrahedron among all cells of the mesh; cells: (T, 4) their nodes in file order, and
     orientation: (T,) int8, −1 where the volume is to be taken with the other sign, for all of a part to be alike and
     mostly positive. held, free, memory, near_free: see Connectivity. near (T, 4), near_orientation: by places in
-    memory; near_origin: the place in file order of each row of near. The cells at node v that is free, or was before others
-    were held, are start[v] … start[v + 1] − 1 of local (M, 3), which nodes of its ring their spokes end in: ring_start
-    (N + 1,), ring.
+    memory; near_origin: the place in file order of each row of near. The cells at node v that is free, or was before
+    others were held, are start[v] … start[v + 1] − 1 of local (M, 3), which nodes of its ring their spokes end in:
+    ring_start (N + 1,), ring.
     """
 
     cell: NDArray[np.int64]
