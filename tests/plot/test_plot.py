@@ -148,7 +148,8 @@ def test_other_cells_are_shown_too(tmp_path):
 
 def test_the_mesh_after_is_wound_as_the_mesh_before(tmp_path, monkeypatch):
     drawn = []
-    monkeypatch.setattr(smoothing, "_save", lambda views, path: drawn.extend(views))
+    monkeypatch.setattr(smoothing, "_figure", drawn.extend)
+    monkeypatch.setattr(smoothing, "_save", lambda figure, path: None)
     points = np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]])
     before = Mesh(points, (CellBlock("triangle", np.array([[0, 1, 2], [1, 3, 2]]), np.zeros(2)),))
     plot.plot_smoothing(before, before.with_points(points * [-1, 1]), tmp_path / "p.png")
@@ -179,7 +180,7 @@ def test_a_hundred_thousand_cells(tmp_path):
                 (CellBlock("triangle", np.array([[0, 1, 2], [1, 3, 2]]), np.zeros(2)),),
             ),
             "p.png",
-            "planar meshes only",
+            "planar meshes and volumes, and this is a surface",
         ),
     ],
 )

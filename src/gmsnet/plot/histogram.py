@@ -3,25 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from gmsnet.plot.view import View
+from gmsnet.measure.report import QualityReport
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def histogram(axes: Axes, views: Sequence[View], name: str, label: str) -> None:
-    """The share of cells by a measure (an array of QualityReport, by name), and a mark at the minimum value.
+ENDS = {"min_dihedral": (0.0, np.degrees(np.arccos(1 / 3))), "max_dihedral": (60.0, 180.0)}
 
-    The axis goes to the best value there is: for ``min_angle`` 60 degrees, or 90 where there are quads, and 1 else.
-    Below 0 if cells are inverted.
+
+class Shown(Protocol):
+    """One mesh of a picture: what its histograms are made of."""
+
+    @property
+    def title(self) -> str:
+        """Before or after."""
+        ...
+
+    @property
+    def colour(self) -> str:
+        """Of its histograms."""
+        ...
+
+    @property
+    def corners(self) -> NDArray[Any]:
+        """(T, corners of a cell)."""
+        ...
+
+    @property
+    def report(self) -> QualityReport:
+        """Its measures."""
+        ...
+
+
+def histogram(axes: Axes, views: Sequence[Shown], name: str, label: str) -> None:
+    """The share of cells by a measure (an array of QualityReport, by name), and a mark at the worst value.
+
+    The axis goes to the best value there is: for ``min_angle`` 60 degrees, or 90 where there are quads, for
+    ``min_dihedral`` that of the regular tetrahedron, and 1 else. Below 0 if cells are inverted. For ``max_dihedral`` it
+    goes from 60 to 180 degrees.
     """
-    values = [getattr(view.report, name) for view in views]
-    low = min([0.0, *(float(v.min()) for v in values)])
-    best = 1.0
+    values, worst = [view.report.column(name) for view in views], np.max if name == "max_dihedral" else np.min
+    low, best = ENDS.get(name, (0.0, 1.0))
+    low = min([low, *(float(v.min()) for v in values)])
     if name == "min_angle":
         best = 90.0 if any(view.corners.shape[1] == 4 for view in views) else 60.0
     bins = np.linspace(low, best, 61).tolist()
@@ -29,10 +58,10 @@ def histogram(axes: Axes, views: Sequence[View], name: str, label: str) -> None:
         share = np.full(len(each), 100.0 / len(each))
         axes.hist(each, bins, weights=share, color=view.colour, alpha=0.35, edgecolor="none")
         axes.hist(each, bins, weights=share, color=view.colour, histtype="step", linewidth=1.4, label=view.title)
-        axes.plot(each.min(), 0.0, marker="v", color=view.colour, markersize=7, clip_on=False, zorder=3)
-    axes.set_xlabel(f"{label}; ▾ the minimum")
+        axes.plot(worst(each), 0.0, marker="v", color=view.colour, markersize=7, clip_on=False, zorder=3)
+    axes.set_xlabel(f"{label}; ▾ the {'greatest' if name == 'max_dihedral' else 'minimum'}")
     axes.set_ylabel("share of cells (%)")
     axes.set_xlim(bins[0], bins[-1])
     axes.spines[["top", "right"]].set_visible(False)
     if len(views) > 1:
-        axes.legend(loc="upper left", frameon=False)
+        axes.legend(loc="upper right" if name == "max_dihedral" else "upper left", frameon=False)

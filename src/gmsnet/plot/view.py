@@ -29,11 +29,13 @@ POINTS = 345.6  # across a picture, in printer's points: 4.8 inches
 
 
 def check_mesh(mesh: Mesh) -> None:
-    """Raise what plotting this mesh would raise, before any work: InputError unless it is planar and has measured
-    cells."""
-    if mesh.plane is None:
-        raise InputError("a picture shows planar meshes only, and this one varies in x, y and z")
+    """Raise what plotting this mesh would raise, before any work: InputError unless it is planar, or has volumes, and
+    has measured cells."""
+    if mesh.plane is None and not mesh.has_volumes:
+        raise InputError("a picture shows planar meshes and volumes, and this is a surface in space")
     if not any(measured(mesh, block) and len(block.nodes) for block in mesh.cells):
+        if mesh.has_volumes:
+            raise InputError("a picture of volumes shows the quality of tetrahedra, and this mesh has none")
         raise InputError("a picture shows the quality of triangles and quads, and this mesh has none")
 
 
@@ -89,14 +91,21 @@ class View:
         return f"{self.title}:  {text}" if self.title else text
 
 
+def bad_to_good() -> ScalarMappable:
+    """The colours of the qualities 0 to 1."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+    return ScalarMappable(Normalize(0.0, 1.0), LinearSegmentedColormap.from_list("bad to good", BAD_TO_GOOD))
+
+
 def draw(axes: Axes, view: View, box: NDArray[np.float64] | None = None) -> ScalarMappable:
     """The cells that lie in the box (default: all), and the lines; good cells first, so that the worst lie on top.
 
     Returns what a colour bar needs.
     """
-    from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection, PolyCollection
-    from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgba
+    from matplotlib.colors import to_rgba
 
     box = view.box if box is None else box
     span = box[1] - box[0]
@@ -107,7 +116,7 @@ def draw(axes: Axes, view: View, box: NDArray[np.float64] | None = None) -> Scal
     axes.set_xticks([])
     axes.set_yticks([])
     axes.spines[:].set_visible(False)
-    mappable = ScalarMappable(Normalize(0.0, 1.0), LinearSegmentedColormap.from_list("bad to good", BAD_TO_GOOD))
+    mappable = bad_to_good()
 
     def seen(nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
         corners = view.points[nodes]
