@@ -113,11 +113,8 @@ def generate(
         mesh = disturb(mesh, inner, jitter, seed=seed, keep_valid=not tangled, edge=jitter_edge or "mean")
     aside = is_standard_output(out)  # where the mesh itself goes; a file is another one once it is replaced
     lost = write(mesh, out, format)
-    what = (
-        f"{pattern} {kind}"
-        if pattern != "random"
-        else str(rings or shape or ("cube" if mesh.has_volumes else "square"))
-    )
+    domain = "cube" if mesh.has_volumes else "square"
+    what = f"{pattern} {kind}" if pattern != "random" else str(rings or shape or domain)
     sort = f"{'marked' if interface else 'boundary'} {'faces' if mesh.has_volumes else 'edges'}"
     counts = ", ".join(f"{len(block.nodes):,} {block.kind}s" for block in mesh.cells[:-1])
     typer.echo(
