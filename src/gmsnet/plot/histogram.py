@@ -59,7 +59,7 @@ def histogram(axes: Axes, views: Sequence[Shown], name: str, label: str) -> None
         axes.hist(each, bins, weights=share, color=view.colour, alpha=0.35, edgecolor="none")
         axes.hist(each, bins, weights=share, color=view.colour, histtype="step", linewidth=1.4, label=view.title)
         axes.plot(worst(each), 0.0, marker="v", color=view.colour, markersize=7, clip_on=False, zorder=3)
-    axes.set_xlabel(f"{label}; ▾ the {'greatest' if name == 'max_dihedral' else 'minimum'}")
+    axes.set_xlabel(f"{label}; ▾ {'max' if name == 'max_dihedral' else 'min'}")
     axes.set_ylabel("share of cells (%)")
     axes.set_xlim(bins[0], bins[-1])
     axes.spines[["top", "right"]].set_visible(False)

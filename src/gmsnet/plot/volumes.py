@@ -25,8 +25,8 @@ WORST = 60  # cells that are shown
 MOST_FACES = 5000  # of the boundary that are drawn
 HISTOGRAMS = (
     ("shape", "η"),
-    ("min_dihedral", "smallest dihedral angle (degrees)"),
-    ("max_dihedral", "greatest dihedral angle (degrees)"),
+    ("min_dihedral", "smallest dihedral angle (°)"),
+    ("max_dihedral", "greatest dihedral angle (°)"),
 )
 
 
