@@ -237,7 +237,7 @@ def test_what_cannot_be_used_is_refused(plate):
         gmsnet.deform(second_order(structured_mesh(3, 3)), (0.1, 0.0), "top")
     points = np.random.default_rng(1).random((4, 3))
     tet = Mesh(points, (CellBlock("tetra", np.array([[0, 1, 2, 3]]), np.zeros(1, dtype=int)),))
-    with pytest.raises(InputError, match="volume mesh"):
+    with pytest.raises(InputError, match="boundaries of volumes cannot be moved yet"):
         gmsnet.deform(tet, (0.1, 0.0, 0.0), [0])
     with pytest.raises(InputError, match="max_sweeps"):
         gmsnet.deform(plate, (0.1, 0.0), "hole", max_sweeps=-1)

@@ -25,7 +25,7 @@ def check_cells(mesh: Mesh, name: str, choice: str | None = None) -> None:
     cells = f"1 {one}" if count == 1 else f"{count:,} {many}"
     others = ", ".join(each.name for each in METHODS.values() if each.moves(kind) and each is not method)
     what = "objective" if choice in method.objectives or not choice else "variant"
-    able = ", ".join(each for each in (*method.objectives, *method.variants) if method.moves(kind, each))
+    able = ", ".join(each for each in getattr(method, f"{what}s") if method.moves(kind, each))
     if able and kind in method.cells:
         raise InputError(
             f"the {what} {choice} of {name} {moves}, and this mesh has {cells}: "

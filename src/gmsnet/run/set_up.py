@@ -37,7 +37,7 @@ from gmsnet.topology.volume import Volume, refuse_flat
 Floats = NDArray[np.float64]
 
 MANY = 20_000  # nodes: for the set-up of fewer a second thread is not worth starting
-# That a call takes at most on a mesh of triangles, copies of them included; ``auto`` takes 250, all nodes at once 550.
+# That a call takes at most on a mesh of triangles, copies of them included; ``auto`` takes 251, all nodes at once 550.
 BYTES_PER_NODE = 600
 
 
