@@ -46,7 +46,7 @@ def test_the_worst_cells_stand_where_they_are():
         assert f"min {gmsnet.quality(mesh).shape.min():.3f}" in axes.get_title()
     labels = [axes.get_xlabel() for axes in figure.axes if axes.get_ylabel() == "share of cells (%)"]
     assert [label.split(";")[0] for label in labels] == [
-        "η", "smallest dihedral angle (degrees)", "greatest dihedral angle (degrees)",
+        "η", "smallest dihedral angle (°)", "greatest dihedral angle (°)",
     ]  # fmt: skip
 
 
