@@ -136,6 +136,8 @@ def test_so_does_the_whole_from_input_to_output_at_any_stop(level, seed, kind, n
     if not len(changed):
         return
     stars = [np.flatnonzero((cells[changed] == node).any(axis=1)) for node in topology.free]
+    if result.before.inverted:  # untangling, which comes before the sweeps, keeps no floors of stars
+        stars = []
     of_mesh = partial(volumes.exact_shapes, cells=cells[changed], orientation=orientation[changed])
     for reading in [Fraction] if single else [Fraction, volumes.as_written]:
         before, after = (of_mesh(m.points, number=reading) for m in (mesh, result.mesh))
