@@ -33,21 +33,25 @@ HELD = "all its nodes are held"
 
 
 class Attempt:
-    """A mesh on its way. points: as they are now; start: as they were. bad, ratio: of each cell, see ``find_bad``."""
+    """A mesh on its way.
+
+    points: as they are now; start: as they were. bad, inverted, ratio: of each cell, see ``find_bad``.
+    """
 
     def __init__(self, points: Floats, topology: Volume, precision: Precision, executor: Executor) -> None:
         self.start, self.points, self.topology, self.precision = points, points.copy(), topology, precision
         self.executor = executor
         count = len(topology.near)
-        self.bad, self.ratio = np.empty(count, dtype=bool), np.empty(count)
+        self.bad, self.inverted = np.empty((2, count), dtype=bool)
+        self.ratio = np.empty(count)
         self.left = self.look()
-        self.was_bad, self.was = self.bad.copy(), self.ratio.copy()
+        self.was_inverted, self.was = self.inverted.copy(), self.ratio.copy()
 
     def look(self) -> int:
         """Measures all cells; how many are bad."""
         near, orientation = self.topology.near, self.topology.near_orientation
         unit, grain = self.precision.unit, self.precision.grain
-        self.left = int(find_bad(self.points, near, orientation, unit, grain, self.bad, self.ratio))
+        self.left = int(find_bad(self.points, near, orientation, unit, grain, self.bad, self.inverted, self.ratio))
         return self.left
 
     @property
@@ -126,10 +130,13 @@ class Attempt:
         return found
 
     def give_back(self) -> int:
-        """Takes nodes back until both promises are kept; returns how many cells broke one at first."""
+        """Takes nodes back until both promises are kept; returns how many cells broke one at first.
+
+        What was not certainly inverted counts as positive: it is to be certified, or to stay as it was.
+        """
         worst, first = float(self.was.min(initial=np.inf)), 0
         while True:
-            broken = self.bad & (~self.was_bad | (self.ratio < np.minimum(self.was, worst)))
+            broken = self.bad & (~self.was_inverted | (self.ratio < np.minimum(self.was, worst)))
             back = np.zeros(len(self.points), dtype=bool)
             back[self.topology.near[broken]] = True
             back &= self.moved

@@ -62,8 +62,9 @@ def soften(points, blocks, first, last, softness, single, power):
 
 
 @kernel
-def find_bad(points, rows, orientation, unit, grain, bad, ratio):
-    """Writes which cells (T, bool) are not certified positive as they will be written, and D/S^(3/2) of each (T,).
+def find_bad(points, rows, orientation, unit, grain, bad, inverted, ratio):
+    """Writes of each cell (T,) whether it is not certified positive as it will be written, whether it is certainly
+    inverted, and D/S^(3/2).
 
     Returns how many are bad.
     """
@@ -76,7 +77,7 @@ def find_bad(points, rows, orientation, unit, grain, bad, ratio):
         far = max(far, max(max(abs(cx), abs(cy)), abs(cz)))
         value, bound = determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, unit * (reach + far) + grain)
         value *= orientation[t]
-        bad[t] = not value > bound
+        bad[t], inverted[t] = not value > bound, value < -bound
         count += bad[t]
         _, lengths, _, _, _, _, _, _ = measured(ax, ay, az, bx, by, bz, cx, cy, cz)
         ratio[t] = value / max(lengths * np.sqrt(max(lengths, 0.0)), 1e-300)
