@@ -33,7 +33,8 @@ from sweeps import averaging_matrix
 import gmsnet
 from gmsnet.measure.report import measure
 from gmsnet.methods import smoother
-from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, Auto
+from gmsnet.methods.auto import Auto
+from gmsnet.methods.phases import LARGE_PLAN, SMALL, SMALL_PLAN
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import outcome, rank_by
 from gmsnet.run.run import Run, Start

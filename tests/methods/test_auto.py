@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.methods.auto import LARGE_PLAN, SMALL, SMALL_PLAN, WHOLE, Auto, to_come
+from gmsnet.methods.auto import WHOLE, Auto, to_come
+from gmsnet.methods.phases import LARGE_PLAN, SMALL, SMALL_PLAN
 from gmsnet.paper.cases import CASES
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run, Start

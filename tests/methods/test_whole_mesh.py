@@ -22,8 +22,9 @@ from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import VALID, WORST, Precision
 from gmsnet.kernels.whole.powers import shapes
 from gmsnet.methods import Field
-from gmsnet.methods.auto import EXACT, SMALL, WHOLE, WHOLE_WORST
+from gmsnet.methods.auto import EXACT, WHOLE, WHOLE_WORST
 from gmsnet.methods.creep import Creep
+from gmsnet.methods.phases import SMALL
 from gmsnet.methods.whole_mesh import TRADE, Problem, WholeMesh
 from gmsnet.parallel.threads import serial
 from gmsnet.run.run import precision_of

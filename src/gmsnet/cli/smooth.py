@@ -121,7 +121,7 @@ def smooth(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Smooth a mesh: move its free nodes so that its triangles become better, and change nothing else.
+    """Smooth a mesh: move its free nodes so that its cells become better, and change nothing else.
 
     Boundary, interfaces between regions and the nodes of markers stay where they are, and no cell that is valid
     becomes invalid. Inverted cells are untangled first. The worst cell never gets worse, and the result is never worse

@@ -37,6 +37,7 @@ class MeasuredCells:
     order: NDArray[np.intp] | None
 
     names = ("min_angle", "max_angle", "shape", "aspect")  # of the columns
+    symbol = "1/q"  # of the shape
 
     @property
     def counts(self) -> dict[str, int]:

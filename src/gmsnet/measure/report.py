@@ -152,7 +152,7 @@ class QualityReport:
     @property
     def symbol(self) -> str:
         """How the column ``shape`` is called."""
-        return "η" if isinstance(self.cells, MeasuredTetrahedra) else "1/q"
+        return self.cells.symbol
 
     @property
     def angles(self) -> tuple[str, str]:

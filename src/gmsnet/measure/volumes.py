@@ -31,6 +31,7 @@ class MeasuredTetrahedra:
     orientation: Signs
 
     names = ("min_dihedral", "max_dihedral", "shape", "scaled_jacobian", "volume")  # of the columns
+    symbol = "η"  # of the shape
     plane = None
 
     @classmethod

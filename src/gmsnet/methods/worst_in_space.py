@@ -15,10 +15,14 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.tetra_measures import cubed_ratios
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.methods.base import Field, Smoother, Tally, by_colour
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.stars import Stars
 from gmsnet.topology.volume import Volume
+
+Floats = NDArray[np.float64]
 
 # The share of all cells, k of p = 3·2^k, and how many sweeps.
 CYCLES = ((0.004, 2, 4), (0.002, 4, 8), (0.001, 5, 12))
@@ -38,32 +42,40 @@ class WorstInSpace(Smoother):
         ratios = _ratios(field.points, cells, topology.near_free, executor)
         before = after = float(ratios.max(initial=K3))
         for share, number, sweeps in CYCLES:
-            count = min(max(FEWEST, math.ceil(share * len(ratios))), len(ratios))
-            worst = np.argpartition(ratios, len(ratios) - count)[len(ratios) - count :]
-            nodes = np.unique(cells.rows[worst])
+            nodes = np.unique(cells.rows[_largest(ratios, max(FEWEST, math.ceil(share * len(ratios))))])
             stars = topology.stars_of(nodes[topology.near_free[nodes]].astype(np.int64))
             power = Power3.of(number, min(after / K3, 1e30))
-
-            def visit(first: int, last: int, blocks=stars.blocks, power=power) -> Tally:  # type: ignore[no-untyped-def]
-                counts = np.zeros(3, dtype=np.int64)
-                assert isinstance(blocks, SpaceBlocks)
-                sweep3(field.points, blocks, first, last, guard, power, 1.0, counts)
-                return counts
-
             for _ in range(sweeps):
-                tally += by_colour(executor, visit, stars, field.points)
+                tally += _sweep(field.points, stars, power, guard, executor)
             ratios = _ratios(field.points, cells, topology.near_free, executor)
             after = float(ratios.max(initial=K3))
         least = (K3 / after) ** (1.0 / 3.0)
         self.least, self.gained = least, least - (K3 / before) ** (1.0 / 3.0)
-        few = np.argpartition(ratios, -min(WATCHED, len(ratios)))[-min(WATCHED, len(ratios)) :].astype(np.int32)
+        few = _largest(ratios, WATCHED)
         field.floor.watch(few, 1.0 / np.maximum(ratios[few], 1.0))
         return tally
 
 
-def _ratios(
-    points: NDArray[np.float64], cells: Tetrahedra, free: NDArray[np.bool_], executor: Executor
-) -> NDArray[np.float64]:
+def _sweep(points: Floats, stars: Stars, power: Power3, guard: Guard, executor: Executor) -> Tally:
+    """One sweep over some stars."""
+    blocks = stars.blocks
+    assert isinstance(blocks, SpaceBlocks)
+
+    def visit(first: int, last: int) -> Tally:
+        counts = np.zeros(3, dtype=np.int64)
+        sweep3(points, blocks, first, last, guard, power, 1.0, counts)
+        return counts
+
+    return by_colour(executor, visit, stars, points)
+
+
+def _largest(values: Floats, count: int) -> NDArray[np.int32]:
+    """Where so many of the largest values stand, or all, if they are fewer."""
+    rest = max(len(values) - count, 0)
+    return np.argpartition(values, rest)[rest:].astype(np.int32)
+
+
+def _ratios(points: Floats, cells: Tetrahedra, free: NDArray[np.bool_], executor: Executor) -> Floats:
     """S³/D² of each; 0, and so the last to be chosen, where no node moves: stars with an inverted cell stay.
 
     free: (N,) which nodes are.

@@ -11,11 +11,13 @@ from gmsnet.measure.report import QualityReport, measure
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import workers
+from gmsnet.run.call import ended
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import result_of
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.set_up import first_state
 from gmsnet.run.stages import carry_out
+from gmsnet.run.state import State
 from gmsnet.run.sweep import Sweep
 
 
@@ -44,7 +46,7 @@ def smooth(
     metric: Any = None,
     size: Any = None,
 ) -> SmoothResult:
-    """Moves the free nodes of a planar triangle mesh so that its elements become better; changes nothing else.
+    """Moves the free nodes of a mesh so that its elements become better; changes nothing else.
 
     No cell that is valid becomes invalid, the worst cell does not get worse (``guard``), and of all meshes on the way
     the best is returned: the one with the fewest inverted cells, then with the largest q̂ (for a target: with the fewest
@@ -89,25 +91,17 @@ def smooth(
 
 def smooth_with(mesh: Any, options: SmoothOptions, fixed: Any = None) -> SmoothResult:
     """``smooth`` with options that have been checked already. mesh, fixed, errors: see there."""
-    began, result = time.perf_counter(), None
-    try:
+    began = time.perf_counter()
+
+    def work() -> State:
         smoother = options.smoother()
         with interruptible(), workers(options.thread_count) as executor:
-            state = carry_out(first_state(mesh, fixed, smoother, options, executor), options, executor)
-        try:
-            result = result_of(state, began)
-        except KeyboardInterrupt as interruption:
-            state = state.interrupted(interruption)
-            result = result_of(state, began)
-        if state.interruption is not None:
-            raise state.interruption
-    except KeyboardInterrupt as interruption:
-        interruption.result = result  # type: ignore[attr-defined]
-        raise
-    return result
+            return carry_out(first_state(mesh, fixed, smoother, options, executor), options, executor)
+
+    return ended(work, lambda state: result_of(state, began))
 
 
 @interruptible()
 def quality(mesh: Any) -> QualityReport:
-    """The measures of a mesh's triangles and quads: arrays, or any object that ``smooth`` takes."""
+    """The measures of a mesh's triangles and quads, or tetrahedra: arrays, or any object that ``smooth`` takes."""
     return measure(to_mesh(mesh)[0])

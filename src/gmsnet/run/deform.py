@@ -17,6 +17,7 @@ from gmsnet.mesh.selection import chosen_nodes
 from gmsnet.motion.prescribed import Prescribed
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import workers
+from gmsnet.run.call import ended
 from gmsnet.run.deform_stage import move_boundary
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import result_of
@@ -99,27 +100,18 @@ def deform(
 
 
 def deform_with(mesh: Any, options: SmoothOptions, prescribed: Prescribed, fixed: Any = None) -> DeformResult:
-    """``deform`` with options and places that have been checked already. The rest: see there."""
-    began, result = time.perf_counter(), None
-    try:
-        smoother, given = options.smoother(), to_mesh(mesh)[0]
-        check_deformable(given)
-        _check_fixed(given, fixed, prescribed)
+    """``deform`` with a mesh, options and places that have been checked already. The rest: see there."""
+    began = time.perf_counter()
+
+    def work() -> State:
+        smoother = options.smoother()
+        _check_fixed(to_mesh(mesh)[0], fixed, prescribed)
         with interruptible(), workers(options.thread_count) as executor:
             state = first_state(mesh, fixed, smoother, options, executor, prescribed.moved)
             move = partial(move_boundary, prescribed=prescribed)
-            state = carry_out(state, options, executor, (untangle_all, move))
-        try:
-            result = _result(state, began)
-        except KeyboardInterrupt as interruption:
-            state = state.interrupted(interruption)
-            result = _result(state, began)
-        if state.interruption is not None:
-            raise state.interruption
-    except KeyboardInterrupt as interruption:
-        interruption.result = result  # type: ignore[attr-defined]
-        raise
-    return result
+            return carry_out(state, options, executor, (untangle_all, move))
+
+    return ended(work, lambda state: _result(state, began))
 
 
 def check_deformable(mesh: Mesh) -> None:

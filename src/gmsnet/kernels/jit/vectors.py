@@ -74,9 +74,9 @@ def root(x: Vector) -> Vector:
     return Vector(x.builder, x.builder.call(function, [x.value]))
 
 
-def as_written(function: Callable[..., Any]) -> Callable[..., Any]:
+def as_written(function: Any) -> Callable[..., Any]:
     """The formula of a part for vectors: what it calls is taken as it is written, too."""
-    code = getattr(function, "py_func")  # noqa: B009 (a Part)
+    code = function.py_func
     names = {
         name: as_written(value) if isinstance(value, Part) else value for name, value in code.__globals__.items()
         if name in code.__code__.co_names

@@ -31,10 +31,8 @@ from gmsnet.kernels.star.space import (
     YY,
     YZ,
     ZZ,
-    derive,
-    judge,
 )
-from gmsnet.kernels.star.stars3 import certify3, fetch3, store3, workspace3_for
+from gmsnet.kernels.star.stars3 import certify3, derive3, fetch3, judge3, store3, workspace3_for
 
 TRIALS = 10
 K3 = 432.0  # S³/D² of a regular tetrahedron
@@ -117,18 +115,11 @@ def sweep3(points, blocks, first, last, guard, power, relaxation, tally):
     workspace = workspace3_for(blocks.most, blocks.most_simplices)
     floor = max(guard.floor, 0.0)
     for block in range(first, last):
-        rows = np.int64(blocks.simplices[block])
         fetch3(points, blocks, block, workspace)
-        derive(
-            workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
-            None, workspace.kept, workspace.sums,
-        )  # fmt: skip
+        derive3(blocks, block, power, None, workspace)
         propose3(workspace.sums, power, relaxation, workspace.step)
         for trial in range(TRIALS):
-            judge(
-                workspace.kept, rows, blocks.cells, block, power.number, power.constants, None, workspace.step, floor,
-                workspace.sums,
-            )  # fmt: skip
+            judge3(blocks, block, power, None, floor, workspace)
             if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1) == 0:
                 break
         store3(points, blocks, block, workspace, guard, tally)

@@ -6,8 +6,8 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import kernel, part
 from gmsnet.kernels.methods.barrier3 import TRIALS, settle3
-from gmsnet.kernels.star.space import LANES3, derive, judge
-from gmsnet.kernels.star.stars3 import certify3, fetch3, store3, workspace3_for
+from gmsnet.kernels.star.space import LANES3
+from gmsnet.kernels.star.stars3 import certify3, derive3, fetch3, judge3, store3, workspace3_for
 
 
 @part
@@ -34,18 +34,11 @@ def sweep3(points, blocks, first, last, guard, power, smart, tally):
     workspace = workspace3_for(blocks.most, blocks.most_simplices)
     floor = max(guard.floor, 0.0)
     for block in range(first, last):
-        rows = np.int64(blocks.simplices[block])
         fetch3(points, blocks, block, workspace)
-        derive(
-            workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
-            None, workspace.kept, workspace.sums,
-        )  # fmt: skip
+        derive3(blocks, block, power, None, workspace)
         to_mean(blocks, block, workspace)
         for trial in range(TRIALS):
-            judge(
-                workspace.kept, rows, blocks.cells, block, power.number, power.constants, None, workspace.step, floor,
-                workspace.sums,
-            )  # fmt: skip
+            judge3(blocks, block, power, None, floor, workspace)
             if not smart:
                 certify3(workspace, guard.unit, guard.grain)
                 break

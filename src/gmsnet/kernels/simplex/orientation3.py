@@ -20,13 +20,19 @@ SHEWCHUK = (7.0 + 56.0 * UNIT) * UNIT
 
 
 @inlined
+def largest_component(ax, ay, az, bx, by, bz, cx, cy, cz):
+    """Of three spokes, without its sign."""
+    m = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
+    return max(m, max(max(abs(cx), abs(cy)), abs(cz)))
+
+
+@inlined
 def determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, delta):
     """D of the spokes a, b, c, and how far it may be from the true one if coordinates are known up to ±delta."""
     bc, cb, ca, ac, ab, ba = bx * cy, cx * by, cx * ay, ax * cy, ax * by, bx * ay
     value = az * (bc - cb) + bz * (ca - ac) + cz * (ab - ba)  # as mean_ratio3.determinant
     permanent = abs(az) * (abs(bc) + abs(cb)) + abs(bz) * (abs(ca) + abs(ac)) + abs(cz) * (abs(ab) + abs(ba))
-    m = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
-    m = max(m, max(max(abs(cx), abs(cy)), abs(cz)))
+    m = largest_component(ax, ay, az, bx, by, bz, cx, cy, cz)
     return value, SHEWCHUK * permanent + UNDERFLOW + delta * (72.0 * m * m + delta * (144.0 * m + 96.0 * delta))
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel
 from gmsnet.kernels.simplex.mean_ratio3 import square
-from gmsnet.kernels.simplex.orientation3 import determinant_and_bound
+from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, largest_component
 from gmsnet.kernels.simplex.predicates import UNIT
 
 LARGEST3 = 0.0481126  # above D/S^(3/2) of a regular tetrahedron, 1/√432
@@ -45,8 +45,7 @@ def length_bounds(ax, ay, az, bx, by, bz, cx, cy, cz, delta):
     sx, sy, sz = (ax + bx) + cx, (ay + by) + cy, (az + bz) + cz
     around = ((square(ax, ay, az) + square(bx, by, bz)) + square(cx, cy, cz)) * 4.0
     whole = square(sx, sy, sz)
-    m = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
-    m = max(m, max(max(abs(cx), abs(cy)), abs(cz)))
+    m = largest_component(ax, ay, az, bx, by, bz, cx, cy, cz)
     return around - whole, 32.0 * UNIT * (around + whole) + delta * (160.0 * m + 80.0 * delta)
 
 
@@ -85,8 +84,7 @@ def ratio_of_row3(points, simplices, t, unit, grain):
     bx, by, bz = points[b, 0] - x, points[b, 1] - y, points[b, 2] - z
     cx, cy, cz = points[c, 0] - x, points[c, 1] - y, points[c, 2] - z
     reach = max(max(abs(x), abs(y)), abs(z))
-    m = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
-    m = max(m, max(max(abs(cx), abs(cy)), abs(cz)))
+    m = largest_component(ax, ay, az, bx, by, bz, cx, cy, cz)
     return ratio_upper_bound3(ax, ay, az, bx, by, bz, cx, cy, cz, unit * (reach + m) + grain)
 
 

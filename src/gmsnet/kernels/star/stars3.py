@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import part
+from gmsnet.kernels.simplex.orientation3 import largest_component
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.guard3 import certified, error_bound3
-from gmsnet.kernels.star.space import KEPT, LANES3, MARGIN, SUMS, relate
+from gmsnet.kernels.star.space import KEPT, LANES3, MARGIN, SUMS, derive, judge, relate
 
 WIDER = 1.0 + 2.0**-20
 HALVINGS = 12  # of a step that is not allowed
@@ -67,6 +68,26 @@ def fetch3(points, blocks, block, workspace):
             wide[k] = max(wide[k], abs(row[k]))
     for lane in range(LANES3):
         workspace.width[lane] = max(wide[4 * lane], max(wide[4 * lane + 1], wide[4 * lane + 2]))
+
+
+@part
+def derive3(blocks, block, power, soft, workspace):
+    """The sums of a block that has been fetched. power: a Power3; soft: see ``derive``."""
+    rows = np.int64(blocks.simplices[block])
+    derive(
+        workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants, soft,
+        workspace.kept, workspace.sums,
+    )  # fmt: skip
+
+
+@part
+def judge3(blocks, block, power, soft, floor, workspace):
+    """What follows of them after the step. floor: c, of D/S^(3/2)."""
+    rows = np.int64(blocks.simplices[block])
+    judge(
+        workspace.kept, rows, blocks.cells, block, power.number, power.constants, soft, workspace.step, floor,
+        workspace.sums,
+    )  # fmt: skip
 
 
 @part
@@ -142,8 +163,7 @@ def allowed3(points, blocks, block, lane, x, y, z, guard):
         ax, ay, az = points[a, 0] - x, points[a, 1] - y, points[a, 2] - z
         bx, by, bz = points[b, 0] - x, points[b, 1] - y, points[b, 2] - z
         cx, cy, cz = points[c, 0] - x, points[c, 1] - y, points[c, 2] - z
-        m = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
-        m = max(m, max(max(abs(cx), abs(cy)), abs(cz)))
+        m = largest_component(ax, ay, az, bx, by, bz, cx, cy, cz)
         delta = guard.unit * (reach + m) + guard.grain
         if not certified(ax, ay, az, bx, by, bz, cx, cy, cz, delta, floor):
             return False

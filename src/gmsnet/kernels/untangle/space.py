@@ -7,9 +7,9 @@ import numpy as np
 from gmsnet.kernels.jit.compile import kernel, part
 from gmsnet.kernels.methods.barrier3 import propose3
 from gmsnet.kernels.simplex.mean_ratio3 import measured
-from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, spokes_of
-from gmsnet.kernels.star.space import AFTER, LANES3, VALUE, derive, judge
-from gmsnet.kernels.star.stars3 import fetch3, workspace3_for
+from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, largest_component, spokes_of
+from gmsnet.kernels.star.space import AFTER, LANES3, VALUE
+from gmsnet.kernels.star.stars3 import derive3, fetch3, judge3, workspace3_for
 
 TRIALS = 4
 
@@ -36,21 +36,14 @@ def soften(points, blocks, first, last, softness, single, power):
     """
     workspace, soft = workspace3_for(blocks.most, blocks.most_simplices), np.empty(LANES3, dtype=np.float32)
     for block in range(first, last):
-        rows, floor = np.int64(blocks.simplices[block]), np.float32(0.0)
         fetch3(points, blocks, block, workspace)
         for lane in range(LANES3):
             inverse = np.float64(workspace.inverse[lane])
             soft[lane] = np.float32(max(softness * inverse * inverse * inverse, 1e-12))
-        derive(
-            workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
-            soft, workspace.kept, workspace.sums,
-        )  # fmt: skip
+        derive3(blocks, block, power, soft, workspace)
         propose3(workspace.sums, power, 1.0, workspace.step)
         for trial in range(TRIALS):
-            judge(
-                workspace.kept, rows, blocks.cells, block, power.number, power.constants, soft, workspace.step, floor,
-                workspace.sums,
-            )  # fmt: skip
+            judge3(blocks, block, power, soft, 0.0, workspace)
             if fallen(workspace, trial == TRIALS - 1) == 0:
                 break
         for lane in range(blocks.filled[block]):
@@ -73,8 +66,7 @@ def find_bad(points, rows, orientation, unit, grain, bad, inverted, ratio):
         ax, ay, az, bx, by, bz, cx, cy, cz = spokes_of(points, rows, t)
         d = rows[t, 0]
         reach = max(max(abs(points[d, 0]), abs(points[d, 1])), abs(points[d, 2]))
-        far = max(max(max(abs(ax), abs(ay)), abs(az)), max(max(abs(bx), abs(by)), abs(bz)))
-        far = max(far, max(max(abs(cx), abs(cy)), abs(cz)))
+        far = largest_component(ax, ay, az, bx, by, bz, cx, cy, cz)
         value, bound = determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, unit * (reach + far) + grain)
         value *= orientation[t]
         bad[t], inverted[t] = not value > bound, value < -bound

@@ -1,0 +1,89 @@
+"""The phases of the default method, and in which order meshes of a kind go through them (methods/auto.py)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from gmsnet.methods.barrier import Barrier
+from gmsnet.methods.base import Smoother
+from gmsnet.methods.optimize import Newton
+from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
+from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
+
+SMALL = 5000  # free nodes
+ALWAYS = 10**9  # sweeps
+RELAXATION = 1.6  # of the Newton steps
+IDEAL = 0.99  # a least 1/q at which the worst cells have no turn, nor what follows
+
+
+class Phase(NamedTuple):
+    """name: for the record. create: its smoother. sweeps: how many, unless it has settled before.
+
+    first: how many for the first time, if others. rounds: how often it is made at most. gain: what must be to come, in
+    the mean of 1/q, for it to be made once more; least: what the last round must have gained for that. lasting: with
+    less than this share of the gain before, no nodes creep: so gains fall where short waves are left, which sweeps even
+    out. looks: whether the mesh is measured after it. often: after so many rounds of it, too.
+    """
+
+    name: str
+    create: Callable[[], Smoother]
+    sweeps: int
+    first: int = 0
+    rounds: int = 1
+    gain: float = math.inf
+    least: float = 0.0
+    lasting: float = 0.0
+    looks: bool = True
+    often: int = 4
+
+
+def newton(relaxation: float = RELAXATION, *, means: int = 0) -> Barrier:
+    """Newton steps on Σq, over-relaxed throughout: where many sweeps are needed, it halves them."""
+    return Barrier("q", relaxation, ALWAYS, means)
+
+
+def worst_first(more: int, enough: float = math.inf) -> WorstFirst:
+    """The list of cycles, and so many times the highest powers, in one sweep: one guard and one ranking for all.
+
+    enough: a least 1/q of which nothing more is asked.
+    """
+    cycles = CYCLES + LAST * more
+    return WorstFirst(cycles, len(cycles), enough)
+
+
+NEWTON = Phase("Newton on q", lambda: newton(means=1), 2, first=3, rounds=40, gain=0.006)
+WORST = Phase("worst first", lambda: worst_first(3), 1)
+MEAN = Phase("Newton on q, worst kept", newton, 1, rounds=10, gain=0.002)
+SHORT = WORST._replace(create=lambda: worst_first(0))
+LONG = Phase("Newton on q, to its end", lambda: newton(1.85, means=1), 4, first=4, rounds=20, gain=0.00005)
+ABOVE = Phase("MetricLoss, above 1/q = 0.4", lambda: Newton("metric", floor=0.4), 1, rounds=8, gain=0.0003)
+POLISH = Phase("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1, rounds=8, gain=0.0003)
+
+LARGE_PLAN = (NEWTON._replace(looks=False), WORST._replace(looks=False), MEAN)
+# Quads gain for longer, and what the mean takes back from the worst of them is worth another turn.
+QUADS_PLAN = (
+    NEWTON._replace(gain=0.0005, least=0.0005, lasting=0.8, looks=False),
+    WORST._replace(create=lambda: worst_first(3, IDEAL), looks=False),
+    MEAN._replace(gain=0.0003, least=0.0002, lasting=math.inf, rounds=20, looks=False),
+    WORST._replace(create=lambda: worst_first(6, IDEAL), looks=False),
+    MEAN._replace(gain=0.0003, least=0.0002, lasting=math.inf, rounds=20),
+)
+SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
+# Of volumes; q there is the mean ratio to the power of 3/2.
+VOLUME_PLAN = (
+    Phase("Newton on q", lambda: Barrier("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False),
+    Phase("worst first", WorstFirst, 1, looks=False),
+    Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0005),
+)
+
+
+def plan_for(topology: Topology | Volume) -> Sequence[Phase]:
+    """The phases for a mesh of this size and these cells."""
+    if isinstance(topology, Volume):
+        return VOLUME_PLAN
+    if len(topology.free) <= SMALL:
+        return SMALL_PLAN
+    return LARGE_PLAN if topology.near_shapes is None else QUADS_PLAN
