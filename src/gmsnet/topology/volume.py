@@ -116,7 +116,8 @@ class Volume(Connectivity):
     @cached_property
     def changeable(self) -> Tetrahedra:
         """Those that have a free node."""
-        return self.simplices.take(np.flatnonzero(self.near_free[self.near].any(axis=1)).astype(np.int32))
+        rows = connectivity.touching(self.near, self.near_free)
+        return self.simplices if len(rows) == len(self.near) else self.simplices.take(rows)
 
     @property
     def scored(self) -> Tetrahedra:

@@ -57,13 +57,13 @@ class Wound:
         keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
         layout.morton_order3(points, keys, other, memory, position)
         place, origin = np.empty_like(cells), np.empty(len(cells), dtype=np.int32)
-        facets.order_cells(cells, position, np.zeros(nodes + 2, dtype=np.int32), place, origin)
+        used = np.zeros(nodes, dtype=np.bool_)
+        facets.order_cells(cells, position, np.zeros(nodes + 2, dtype=np.int32), place, origin, used)
         rows, region = place.take(origin, axis=0), region.take(origin) if len(region) else region
         marks = _known_marks(mesh, fixed, position)
         orientation = _wound(points[memory], rows, region, marks)
         others = np.uint16(connectivity.LINE | connectivity.UNSUPPORTED_CELL)
-        unused = (np.bincount(rows.ravel(), minlength=nodes) == 0) & (marks & others == 0)
-        marks[unused] |= np.uint16(connectivity.UNUSED)
+        marks[~used & (marks & others == 0)] |= np.uint16(connectivity.UNUSED)
         return cls(cell, cells, rows, orientation, region, origin, marks, memory, position)
 
     @cached_property
@@ -147,7 +147,7 @@ def _marked_alike(rows: Ints, region: NDArray[np.int64], marks: NDArray[np.uint1
     facets.scatter(places)
     own = np.empty(nodes if len(region) else 0, dtype=np.int64)
     facets.enclose(rows, region, places, area, own, marks, connectivity.INTERFACE)
-    outer = np.flatnonzero((area != 0)[rows].any(axis=1))
+    outer = connectivity.touching(rows, area != 0)
     part, alike = rows[outer], np.ones(len(outer), dtype=np.int8)
     if not facets.mark_facets(part, _matched(part, nodes), region[:0], alike, area, *BITS, marks):
         return False
