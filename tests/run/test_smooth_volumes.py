@@ -115,11 +115,6 @@ def test_what_cannot_be_asked_is_refused(cube, options, message):
         gmsnet.smooth(cube, **options)
 
 
-def test_layers_are_not_looked_for_and_that_is_said(cube):
-    notes = gmsnet.smooth(cube, fix_layers=True, max_sweeps=1).notes
-    assert notes == ["fix_layers: stretched layers of volumes are not looked for yet, so none are held"]
-
-
 @pytest.mark.parametrize("kind", ["hexahedron", "wedge", "pyramid", "tetra10", "hexahedron20"])
 def test_volumes_of_other_kinds_alone_are_refused(cube, kind):
     nodes = {"hexahedron": 8, "wedge": 6, "pyramid": 5, "tetra10": 10, "hexahedron20": 20}[kind]

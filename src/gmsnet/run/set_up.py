@@ -26,7 +26,7 @@ from gmsnet.methods.cells import check_cells
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
-from gmsnet.preserve.protection import Protection, protected
+from gmsnet.preserve.protection import Protection, protected, protected_volume
 from gmsnet.run.metric_stage import check_given
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.second_order import second_order_of
@@ -141,14 +141,13 @@ def _first_of_volume(
         topology = Volume.made(wound, surface[1].slides | surface[1].curves.slides)
         sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free)
     remarks = held_anyway(asked, topology, fixed)
-    if options.fix_layers:
-        remarks.append("fix_layers: stretched layers of volumes are not looked for yet, so none are held")
     if others := unmeasured(given):
         remarks.append(f"not measured, and their nodes are held: {others}")
     given = given.without_cells()
     start = taken(space_points(given), topology.memory)
     before = measure(given, topology, start, executor.for_blocks(0))
-    protection, nothing = Protection(topology, []), np.empty(0, dtype=np.float32)
+    nothing = np.empty(0, dtype=np.float32)
+    protection = protected_volume(topology, options.preserved, options.fix_layers, start, firm=before.inverted > 0)
     return State(given, restore, smoother, before, protection, start, start, nothing, tuple(remarks), sliding=sliding)
 
 
