@@ -1,0 +1,346 @@
+// Joins the picture to the controls of the page.
+
+const find = (id) => document.getElementById(id);
+const DIGITS = { shape: 3, angle: 1 };
+
+class View {
+  constructor(scene) {
+    this.scene = scene;
+    this.cells = new Cells(scene);
+    this.canvas = find("canvas");
+    this.picture = new Picture(this.canvas, this.cells);
+    this.both = scene.states.length > 1;
+    this.measureExtents();
+    this.camera = new Camera(scene.dimension, this.box);
+    this.look = { camera: this.camera, mixing: 1, edged: true, displaced: false, greatest: this.greatest, clip: null };
+    this.chosen = -1;
+    this.waiting = false;
+    this.picture.setLayer("shell", this.cells.triangles(scene.volumes ? scene.arrays.shell : null));
+    this.offerColours();
+    this.colour("shape");
+    this.wireControls();
+    this.wireLists();
+    this.wirePointer();
+    this.canvas.addEventListener("keydown", (event) => this.key(event));
+    this.wirePage();
+    this.resize();
+    this.camera.whole();
+  }
+
+  /** The box of all nodes, and the greatest displacement of one. */
+  measureExtents() {
+    const { nodes, dimension, high } = this.cells;
+    const low = [0, 0, 0];
+    const top = [0, 0, 0];
+    for (let d = 0; d < dimension; d++) {
+      let [least, most] = [Infinity, -Infinity];
+      for (const column of high)
+        for (let k = d * nodes; k < (d + 1) * nodes; k++) {
+          if (column[k] < least) least = column[k];
+          if (column[k] > most) most = column[k];
+        }
+      [low[d], top[d]] = [least, most];
+    }
+    this.box = [low, top];
+    let greatest = 0;
+    for (let i = 0; this.both && i < nodes; i++) {
+      let sum = 0;
+      for (let d = 0; d < dimension; d++) sum += (high[1][d * nodes + i] - high[0][d * nodes + i]) ** 2;
+      if (sum > greatest) greatest = sum;
+    }
+    this.greatest = Math.sqrt(greatest);
+  }
+
+  offerColours() {
+    const { symbol, angle } = this.scene;
+    const offered = [["shape", symbol], ["angle", `smallest ${angle.replace(/^min /, "")}`]];
+    if (this.greatest > 0) offered.push(["moved", "displacement"]);
+    for (const [value, label] of offered) find("colour").add(new Option(label, value));
+  }
+
+  colour(name) {
+    const { scene } = this;
+    this.look.displaced = name === "moved";
+    const measure = this.look.displaced ? "shape" : name;
+    const most = measure === "angle" ? scene.greatest_angle : 1;
+    const values = new Float32Array(2 * this.cells.count);
+    [scene.states[0], scene.states.at(-1)].forEach((state, k) => {
+      const column = scene.arrays[`${measure}-${state}`];
+      const steps = scene.steps[measure] * most;
+      for (let i = 0; i < column.length; i++)
+        values[2 * i + k] = column[i] === scene.unknown ? -2 : Math.max(0, column[i] / steps);
+      for (const i of scene.arrays[`invalid-${state}`]) values[2 * i + k] = -1;
+    });
+    this.picture.setValues(values);
+    const { good, inverted, other, moved } = scene.colours;
+    const invalid = scene.states.some((state) => scene.arrays[`invalid-${state}`].length);
+    const unknown = scene.arrays[`shape-${scene.states[0]}`].includes(scene.unknown);
+    const others = [...(invalid ? [[inverted, "inverted"]] : []), ...(unknown ? [[other, "not measured"]] : [])];
+    if (this.look.displaced) legend(find("legend"), moved, ["0", figure(this.greatest * scene.half)], "displacement", []);
+    else if (name === "angle") legend(find("legend"), good, ["0°", `${figure(most)}°`], find("colour").selectedOptions[0].text, others);
+    else legend(find("legend"), good, ["0", "1"], scene.symbol, others);
+  }
+
+  wireControls() {
+    const change = (id, work) => find(id) && find(id).addEventListener("input", () => (work(find(id)), this.paint()));
+    change("mix", (slider) => this.mixTo(slider.value / 100));
+    change("colour", (select) => this.colour(select.value));
+    change("edges", (box) => (this.look.edged = box.checked));
+    for (const id of ["axis", "cut", "inner"]) change(id, () => this.cut());
+    find("whole").addEventListener("click", () => this.showWhole());
+    for (const button of document.querySelectorAll("[data-look]"))
+      button.addEventListener("click", () => (this.camera.lookAlong(button.dataset.look), this.paint()));
+    find("controls").hidden = false;
+  }
+
+  wireLists() {
+    this.buttons = [...document.querySelectorAll("button.go")];
+    for (const button of this.buttons) {
+      button.disabled = false;
+      button.addEventListener("click", () => this.goTo(button));
+    }
+    for (const box of document.querySelectorAll("input[data-reason]")) {
+      box.disabled = false;
+      box.addEventListener("input", () => this.dots(Number(box.dataset.reason), box.checked));
+    }
+  }
+
+  dots(reason, shown) {
+    const { held } = this.scene.arrays;
+    const nodes = [];
+    if (shown) held.forEach((code, node) => code === reason + 1 && nodes.push(node));
+    this.picture.setDots(`held-${reason}`, shown ? Uint32Array.from(nodes) : null, reason);
+    this.paint();
+  }
+
+  mixTo(share) {
+    this.look.mixing = share;
+    if (this.look.clip) this.cut();
+  }
+
+  /** The plane of the cut, and the cells on both of its sides. */
+  cut() {
+    const axis = ["x", "y", "z"].indexOf(find("axis").value);
+    find("cut").disabled = find("inner").disabled = axis < 0;
+    if (axis < 0) {
+      this.look.clip = null;
+      this.picture.setLayer("inner", null);
+      this.say();
+      return;
+    }
+    const share = find("cut").value / 1000;
+    const offset = this.box[0][axis] * (1 - share) + this.box[1][axis] * share;
+    this.look.clip = { axis, offset };
+    const { cells, triangles } = this.cells.cutBy(axis, offset, this.look.mixing);
+    this.picture.setLayer("inner", find("inner").checked ? triangles : null);
+    const place = this.scene.middle[axis] + offset * this.scene.half;
+    this.say(`${cells.toLocaleString("en")} cells are cut at ${find("axis").value} = ${figure(place)}`);
+  }
+
+  showWhole() {
+    this.chosen = -1;
+    this.camera.whole();
+    this.say();
+    this.paint();
+  }
+
+  /** Shows the cell that a button names, as it was or as it is. */
+  goTo(button) {
+    const cell = this.cells.withNumber(Number(button.dataset.cell));
+    if (this.both) {
+      const share = button.dataset.state === "before" ? 0 : 1;
+      find("mix").value = 100 * share;
+      this.mixTo(share);
+    }
+    this.at = this.buttons.indexOf(button);
+    this.choose(cell);
+    const places = this.cells.placesOf(cell, this.look.mixing);
+    const box = [Math.min, Math.max].map((end) => [0, 1, 2].map((k) => end(...places.map((place) => place[k]))));
+    const reach = Math.max(...[0, 1, 2].map((k) => box[1][k] - box[0][k]));
+    const wide = box.map((corner, end) => corner.map((value, k) => 0.5 * (box[0][k] + box[1][k]) + (end ? 0.5 : -0.5) * reach));
+    this.camera.show(wide, 0.22);
+    if (this.scene.volumes) this.cutThrough(places);
+    this.paint();
+  }
+
+  /** A cell inside a volume is seen only where the volume is cut. */
+  cutThrough(places) {
+    if (!find("axis").value) find("axis").value = "z";
+    const axis = ["x", "y", "z"].indexOf(find("axis").value);
+    const middle = places.reduce((sum, place) => sum + place[axis], 0) / places.length;
+    const [low, high] = [this.box[0][axis], this.box[1][axis]];
+    find("cut").value = (1000 * (middle - low)) / (high - low || 1);
+    const said = find("said").textContent;
+    this.cut();
+    this.look.clip.offset = middle;
+    const { triangles } = this.cells.cutBy(axis, middle, this.look.mixing);
+    this.picture.setLayer("inner", find("inner").checked ? triangles : null);
+    find("said").textContent = said;
+  }
+
+  next(step) {
+    const worst = this.buttons.filter((button) => button.closest("#view"));
+    if (!worst.length) return;
+    const at = worst.indexOf(this.buttons[this.at]);
+    this.goTo(worst[(at < 0 ? (step > 0 ? 0 : worst.length - 1) : at + step + worst.length) % worst.length]);
+  }
+
+  choose(cell) {
+    this.chosen = cell;
+    for (const button of this.buttons)
+      button.setAttribute("aria-pressed", cell >= 0 && Number(button.dataset.cell) === this.cells.numberOf(cell));
+    this.say(cell < 0 ? undefined : this.words(cell));
+  }
+
+  words(cell) {
+    const { scene, cells } = this;
+    const both = (name, unit) => {
+      const texts = scene.states.map((state) => {
+        const value = scene.arrays[`${name}-${state}`][cell];
+        return value === scene.unknown ? "not measured" : (value / scene.steps[name]).toFixed(DIGITS[name]) + unit;
+      });
+      return texts.join(" → ");
+    };
+    const places = cells.placesOf(cell, this.look.mixing);
+    const centre = scene.axes.map((_, k) => {
+      const mean = places.reduce((sum, place) => sum + place[k], 0) / places.length;
+      return (scene.middle[k] + mean * scene.half).toPrecision(6).replace(/\.?0+(e|$)/, "$1");
+    });
+    const kind = cells.groupOf(cell).kind;
+    return `${kind} ${cells.numberOf(cell)} at ${centre.join(" ")}: ${scene.symbol} ${both("shape", "")}, ${scene.angle} ${both("angle", "°")}`;
+  }
+
+  say(words) {
+    const { cells, nodes } = this.scene;
+    const count = (value) => value.toLocaleString("en");
+    find("said").textContent = words || `${count(cells)} cells and ${count(nodes)} nodes are drawn. Click on a cell to see its figures.`;
+  }
+
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const moves = { ArrowLeft: [40, 0], ArrowRight: [-40, 0], ArrowUp: [0, 40], ArrowDown: [0, -40] };
+    const { camera } = this;
+    if (moves[event.key]) {
+      const [dx, dy] = moves[event.key];
+      if (this.scene.dimension === 3 && !event.shiftKey) camera.turn(dx / 2, dy / 2);
+      else camera.move(dx, dy);
+    } else if (event.key === "+" || event.key === "=") camera.zoomBy(1.25, 0, 0);
+    else if (event.key === "-" || event.key === "_") camera.zoomBy(0.8, 0, 0);
+    else if (event.key === "0" || event.key === "Home") this.showWhole();
+    else if (event.key === "n" || event.key === "p") this.next(event.key === "n" ? 1 : -1);
+    else if (event.key === "Escape") this.choose(-1);
+    else if (event.key === " " && this.both) {
+      find("mix").value = this.look.mixing > 0.5 ? 0 : 100;
+      this.mixTo(find("mix").value / 100);
+    } else return;
+    event.preventDefault();
+    this.paint();
+  }
+
+  wirePointer() {
+    const { canvas, camera } = this;
+    const held = new Map();
+    let travelled = 0;
+    const place = (event) => [event.offsetX, event.offsetY];
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      held.set(event.pointerId, place(event));
+      travelled = held.size > 1 ? Infinity : 0;
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      const from = held.get(event.pointerId);
+      if (!from) return;
+      const to = place(event);
+      const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+      travelled += Math.hypot(dx, dy);
+      if (held.size === 2) {
+        const other = [...held.entries()].find(([id]) => id !== event.pointerId)[1];
+        const apart = ([x, y]) => Math.hypot(x - other[0], y - other[1]);
+        const middle = [0, 1].map((k) => 0.5 * (to[k] + other[k]));
+        camera.move(dx / 2, dy / 2);
+        camera.zoomBy(apart(to) / Math.max(apart(from), 1), middle[0] - 0.5 * camera.width, middle[1] - 0.5 * camera.height);
+      } else if (this.scene.dimension === 3 && !event.shiftKey && event.buttons === 1) camera.turn(dx, dy);
+      else camera.move(dx, dy);
+      held.set(event.pointerId, to);
+      this.paint();
+    });
+    for (const name of ["pointerup", "pointercancel"])
+      canvas.addEventListener(name, (event) => {
+        const began = held.delete(event.pointerId);
+        if (began && name === "pointerup" && travelled < 4 && event.button === 0) this.pick(...place(event));
+      });
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+    canvas.addEventListener(
+      "wheel",
+      (event) => {
+        if (document.activeElement !== canvas && !event.ctrlKey) return; // the page scrolls until one has chosen the picture
+        event.preventDefault();
+        const lines = event.deltaMode === 1 ? 16 : 1;
+        camera.zoomBy(Math.exp((-event.deltaY * lines) / 400), event.offsetX - 0.5 * camera.width, event.offsetY - 0.5 * camera.height);
+        this.paint();
+      },
+      { passive: false },
+    );
+  }
+
+  pick(x, y) {
+    this.choose(this.picture.cellAt(this.look, x, y));
+    this.paint();
+  }
+
+  wirePage() {
+    new ResizeObserver(() => (this.resize(), this.paint())).observe(this.canvas);
+    const dark = matchMedia("(prefers-color-scheme: dark)");
+    dark.addEventListener("change", () => this.paint());
+    addEventListener("beforeprint", () => this.paintNow(true));
+    addEventListener("afterprint", () => this.paint());
+    this.canvas.addEventListener("webglcontextlost", () => fail(new Error("the graphics driver gave up; load the page anew")));
+  }
+
+  resize() {
+    const { canvas, camera } = this;
+    const ratio = Math.min(devicePixelRatio || 1, 2);
+    const [width, height] = [canvas.clientWidth || 1, canvas.clientHeight || 1];
+    const share = Math.min(width / camera.width, height / camera.height);
+    if (camera.zoom) camera.zoom *= share;
+    [camera.width, camera.height] = [width, height];
+    [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+  }
+
+  paint() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.paintNow(false);
+    });
+  }
+
+  paintNow(printed) {
+    const style = getComputedStyle(document.documentElement);
+    const dark = matchMedia("(prefers-color-scheme: dark)").matches && !printed;
+    this.look.paper = rgb(style.getPropertyValue(dark ? "--canvas-dark" : "--canvas-light").trim());
+    this.look.ink = dark ? [0.9, 0.92, 0.95] : [0.1, 0.12, 0.16];
+    this.picture.draw(this.look);
+    outline(find("over"), this.cells, this.camera, this.chosen, this.look.mixing);
+  }
+}
+
+const figure = (value) => Number(value.toPrecision(4)).toString();
+
+const fail = (error) => {
+  find("failure").textContent = `The mesh cannot be drawn: ${error.message}.`;
+  find("failure").hidden = false;
+  find("said").textContent = "";
+  document.documentElement.dataset.picture = "failed";
+};
+
+const start = async () => {
+  if (!window.DecompressionStream) throw new Error("this browser is too old: it needs one of 2023 or later");
+  const view = new View(await readScene());
+  view.paintNow(false);
+  view.say();
+  document.documentElement.dataset.picture = "ready";
+};
+
+start().catch(fail);
