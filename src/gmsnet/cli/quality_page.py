@@ -20,10 +20,12 @@ def write_quality_page(
     path: str, source: str, mesh: Mesh, found: QualityReport, document: Mapping[str, Any], command: str
 ) -> None:
     """Writes the page of one mesh. document: what --json prints."""
-    others = unmeasured(mesh)
+    facts = [("read", shown(source))]
+    if others := unmeasured(mesh):
+        facts.append(("not measured", others))
     contents = Contents(
-        title=os.path.basename(shown(source)), verdict=_verdict(mesh, found), mesh=mesh, after=found, document=document, command=command,
-        worst_after=worst_cells(mesh, found, count=WORST), facts=[("read", shown(source)), *([("not measured", others)] if others else [])],
+        title=os.path.basename(shown(source)), verdict=_verdict(mesh, found), mesh=mesh, after=found, document=document,
+        command=command, worst_after=worst_cells(mesh, found, count=WORST), facts=facts,
     )  # fmt: skip
     write_page(path, contents)
 

@@ -34,8 +34,7 @@ def _pieces(contents: Contents) -> Iterator[str]:
     yield header(contents)
     yield viewer(contents, scene, worst(contents) + held(contents))
     yield unmended(contents)
-    yield figures(contents)
-    yield section("histograms", "Distribution", histograms(contents))
+    yield f'<div class="two">{figures(contents)}{section("histograms", "Distribution", histograms(contents))}</div>'
     yield remarks(contents)
     yield _footer(contents)
     yield json_block("report", contents.document) + "\n"

@@ -32,7 +32,10 @@ def histograms(contents: Contents) -> str:
 
 
 def _figure(contents: Contents, name: str, label: str) -> str:
-    states = {state: report.column(name) for state, report in contents.reports.items()}
+    columns = {state: report.column(name) for state, report in contents.reports.items()}
+    states = {state: column[np.isfinite(column)] for state, column in columns.items()}
+    if not all(len(each) for each in states.values()):
+        return ""
     ends = bins_of(name, list(states.values()), contents.quads)
     shares = {state: 100.0 * np.histogram(each, ends)[0] / len(each) for state, each in states.items()}
     top = _round_up(max(float(share.max()) for share in shares.values()))

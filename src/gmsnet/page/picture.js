@@ -136,23 +136,27 @@ class Picture {
     gl.uniform3fv(places.displacement, colours.moved.flatMap(rgb));
     gl.uniform3fv(places.inverted, rgb(colours.inverted));
     gl.uniform3fv(places.other, rgb(colours.other));
-    gl.uniform3fv(places.ink, flatland ? [1, 1, 1] : [0.08, 0.1, 0.14]);
     gl.activeTexture(gl.TEXTURE5);
     gl.bindTexture(gl.TEXTURE_2D, this.values);
     gl.uniform1i(places.values, 5);
     gl.uniform1i(places.triangles, 4);
     for (const [name, { texture, count }] of this.layers) {
-      const clip = name === "shell" && look.clip;
-      gl.uniform1i(places.clipped, clip ? 1 : 0);
-      if (clip) {
-        const normal = [0, 0, 0];
-        normal[clip.axis] = 1;
-        gl.uniform4f(places.clip, ...normal, clip.offset - look.camera.centre[clip.axis]);
-      }
+      this.clip(places, name === "shell" ? look : { clip: null });
       gl.activeTexture(gl.TEXTURE4);
       gl.bindTexture(gl.TEXTURE_2D, texture);
       gl.drawArrays(gl.TRIANGLES, 0, count);
     }
+  }
+
+  /** Takes away what lies before the plane of the cut. */
+  clip(places, { clip, camera }) {
+    const { gl } = this;
+    gl.uniform1i(places.clipped, clip ? 1 : 0);
+    if (!clip) return;
+    const side = camera.rows[2][clip.axis] < 0 ? -1 : 1;
+    const plane = [0, 0, 0, side * (clip.offset - camera.centre[clip.axis])];
+    plane[clip.axis] = side;
+    gl.uniform4fv(places.clip, plane);
   }
 
   drawMarks(look, ratio) {
@@ -161,6 +165,7 @@ class Picture {
     this.common(this.markProgram, look);
     const flatland = cells.dimension === 2;
     if (flatland) gl.disable(gl.DEPTH_TEST);
+    this.clip(places, look);
     gl.uniform1f(places.forward, flatland ? 0 : 2e-3);
     gl.uniform1f(places.size, 7 * ratio);
     gl.uniform3fv(places.rim, look.paper);

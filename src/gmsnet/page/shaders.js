@@ -58,7 +58,7 @@ flat in uint cell;
 uniform float mixing, pixel;
 uniform bool flatland, displaced, picking, edged, clipped;
 uniform vec4 clip;
-uniform vec3 good[5], displacement[3], inverted, other, ink;
+uniform vec3 good[5], displacement[3], inverted, other;
 out vec4 colour;
 vec3 ramp(float x) {
   x = clamp(x, 0.0, 1.0) * 4.0;
@@ -92,7 +92,8 @@ void main() {
     vec3 near = smoothstep(vec3(0.3), vec3(1.0), edge / max(width, 1e-12) / pixel);
     float line = 1.0 - min(min(near.x, near.y), near.z);
     float most = max(max(width.x, width.y), width.z) * pixel;
-    shade = mix(shade, ink, line * 0.75 * (1.0 - smoothstep(0.1, 0.35, most)));  // slivers keep their colour
+    vec3 ink = dot(shade, vec3(0.3, 0.6, 0.1)) > 0.66 ? vec3(0.25) : vec3(1);
+    shade = mix(shade, ink, line * 0.7 * (1.0 - smoothstep(0.1, 0.35, most)));  // slivers keep their colour
   }
   colour = vec4(shade, 1);
 }`;
@@ -100,9 +101,12 @@ void main() {
 const MARK_VERTEX = `${COMMON}
 uniform usampler2D list;
 uniform float size, forward;
+uniform bool clipped;
+uniform vec4 clip;
 void main() {
-  vec3 view = turn * placeOf(int(texelFetch(list, at(gl_VertexID), 0).x));
+  vec3 place = placeOf(int(texelFetch(list, at(gl_VertexID), 0).x)), view = turn * place;
   gl_Position = vec4(view.xy * scale, clamp(-view.z * depth, -1.0, 1.0) - forward, 1);
+  if (clipped && dot(clip.xyz, place) > clip.w) gl_Position = vec4(2, 2, 2, 1);  // nowhere
   gl_PointSize = size;
 }`;
 

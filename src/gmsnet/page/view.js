@@ -14,7 +14,7 @@ class View {
     this.camera = new Camera(scene.dimension, this.box);
     this.look = { camera: this.camera, mixing: 1, edged: true, displaced: false, greatest: this.greatest, clip: null };
     this.chosen = -1;
-    this.waiting = false;
+    this.waiting = this.printing = false;
     this.picture.setLayer("shell", this.cells.triangles(scene.volumes ? scene.arrays.shell : null));
     this.offerColours();
     this.colour("shape");
@@ -118,8 +118,8 @@ class View {
     if (this.look.clip) this.cut();
   }
 
-  /** The plane of the cut, and the cells on both of its sides. */
-  cut() {
+  /** The plane of the cut, where the slider is or at a place, and the cells on both of its sides. */
+  cut(place = null) {
     const axis = ["x", "y", "z"].indexOf(find("axis").value);
     find("cut").disabled = find("inner").disabled = axis < 0;
     if (axis < 0) {
@@ -128,13 +128,14 @@ class View {
       this.say();
       return;
     }
-    const share = find("cut").value / 1000;
-    const offset = this.box[0][axis] * (1 - share) + this.box[1][axis] * share;
+    const [low, high] = [this.box[0][axis], this.box[1][axis]];
+    if (place !== null) find("cut").value = (1000 * (place - low)) / (high - low || 1);
+    const offset = place === null ? low + (find("cut").value / 1000) * (high - low) : place;
     this.look.clip = { axis, offset };
     const { cells, triangles } = this.cells.cutBy(axis, offset, this.look.mixing);
     this.picture.setLayer("inner", find("inner").checked ? triangles : null);
-    const place = this.scene.middle[axis] + offset * this.scene.half;
-    this.say(`${cells.toLocaleString("en")} cells are cut at ${find("axis").value} = ${figure(place)}`);
+    const at = this.scene.middle[axis] + offset * this.scene.half;
+    this.say(`${cells.toLocaleString("en")} cells are cut at ${find("axis").value} = ${figure(at)}`);
   }
 
   showWhole() {
@@ -153,13 +154,13 @@ class View {
       this.mixTo(share);
     }
     this.at = this.buttons.indexOf(button);
-    this.choose(cell);
     const places = this.cells.placesOf(cell, this.look.mixing);
+    if (this.scene.volumes) this.cutThrough(places);
+    this.choose(cell);
     const box = [Math.min, Math.max].map((end) => [0, 1, 2].map((k) => end(...places.map((place) => place[k]))));
     const reach = Math.max(...[0, 1, 2].map((k) => box[1][k] - box[0][k]));
     const wide = box.map((corner, end) => corner.map((value, k) => 0.5 * (box[0][k] + box[1][k]) + (end ? 0.5 : -0.5) * reach));
     this.camera.show(wide, 0.22);
-    if (this.scene.volumes) this.cutThrough(places);
     this.paint();
   }
 
@@ -167,15 +168,7 @@ class View {
   cutThrough(places) {
     if (!find("axis").value) find("axis").value = "z";
     const axis = ["x", "y", "z"].indexOf(find("axis").value);
-    const middle = places.reduce((sum, place) => sum + place[axis], 0) / places.length;
-    const [low, high] = [this.box[0][axis], this.box[1][axis]];
-    find("cut").value = (1000 * (middle - low)) / (high - low || 1);
-    const said = find("said").textContent;
-    this.cut();
-    this.look.clip.offset = middle;
-    const { triangles } = this.cells.cutBy(axis, middle, this.look.mixing);
-    this.picture.setLayer("inner", find("inner").checked ? triangles : null);
-    find("said").textContent = said;
+    this.cut(places.reduce((sum, place) => sum + place[axis], 0) / places.length);
   }
 
   next(step) {
@@ -213,7 +206,7 @@ class View {
   say(words) {
     const { cells, nodes } = this.scene;
     const count = (value) => value.toLocaleString("en");
-    find("said").textContent = words || `${count(cells)} cells and ${count(nodes)} nodes are drawn. Click on a cell to see its figures.`;
+    find("said").textContent = words || `${count(cells)} cells and ${count(nodes)} nodes are drawn.`;
   }
 
   key(event) {
@@ -292,8 +285,12 @@ class View {
     new ResizeObserver(() => (this.resize(), this.paint())).observe(this.canvas);
     const dark = matchMedia("(prefers-color-scheme: dark)");
     dark.addEventListener("change", () => this.paint());
-    addEventListener("beforeprint", () => this.paintNow(true));
-    addEventListener("afterprint", () => this.paint());
+    const printing = (now) => {
+      this.printing = now;
+      this.paintNow();
+    };
+    addEventListener("beforeprint", () => printing(true));
+    addEventListener("afterprint", () => printing(false));
     this.canvas.addEventListener("webglcontextlost", () => fail(new Error("the graphics driver gave up; load the page anew")));
   }
 
@@ -312,13 +309,13 @@ class View {
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
-      this.paintNow(false);
+      this.paintNow();
     });
   }
 
-  paintNow(printed) {
+  paintNow() {
     const style = getComputedStyle(document.documentElement);
-    const dark = matchMedia("(prefers-color-scheme: dark)").matches && !printed;
+    const dark = matchMedia("(prefers-color-scheme: dark)").matches && !this.printing;
     this.look.paper = rgb(style.getPropertyValue(dark ? "--canvas-dark" : "--canvas-light").trim());
     this.look.ink = dark ? [0.9, 0.92, 0.95] : [0.1, 0.12, 0.16];
     this.picture.draw(this.look);
@@ -338,7 +335,7 @@ const fail = (error) => {
 const start = async () => {
   if (!window.DecompressionStream) throw new Error("this browser is too old: it needs one of 2023 or later");
   const view = new View(await readScene());
-  view.paintNow(false);
+  view.paintNow();
   view.say();
   document.documentElement.dataset.picture = "ready";
 };

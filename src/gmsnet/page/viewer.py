@@ -6,12 +6,11 @@ from gmsnet.page.contents import Contents
 from gmsnet.page.markup import text
 from gmsnet.page.scene import Scene
 
-KEYS = "Arrow keys move the picture, + and − zoom, 0 shows the whole, n and p go to the next and previous of the worst "
-PLANAR_KEYS = KEYS + "cells, the space bar changes between before and after."
-SPACE_KEYS = (
-    "Arrow keys turn the picture, with Shift they move it; + and − zoom, 0 shows the whole, n and p go to the next and "
-    "previous of the worst cells, the space bar changes between before and after."
-)
+POINTER = "Drag to {drag}, and click on a cell to see its figures; the wheel zooms once the picture was clicked. "
+PLANAR_KEYS = POINTER.format(drag="move the picture") + "Keys: arrows move, "
+SPACE_KEYS = POINTER.format(drag="turn the mesh, with Shift to move it") + "Keys: arrows turn, with Shift they move, "
+COMMON_KEYS = "+ and − zoom, 0 shows the whole, n and p go to the next and the previous of the worst cells"
+BOTH_KEYS = ", the space bar changes between before and after"
 
 
 def viewer(contents: Contents, scene: Scene | None, aside: str) -> str:
@@ -20,7 +19,8 @@ def viewer(contents: Contents, scene: Scene | None, aside: str) -> str:
         return f'<section id="view"><p>There are no cells that could be drawn.</p>{aside}</section>'
     space = scene.known["dimension"] == 3
     remark = f'<p id="remark" class="remark">{text(scene.remark)}</p>' if scene.remark else ""
-    keys = SPACE_KEYS if space else PLANAR_KEYS
+    both = BOTH_KEYS if contents.before is not None else ""
+    keys = f"{SPACE_KEYS if space else PLANAR_KEYS}{COMMON_KEYS}{both}."
     return (
         '<section id="view" aria-labelledby="view-title"><h2 id="view-title">The mesh</h2>'
         f'{remark}<p id="failure" class="remark" role="alert" hidden></p>'

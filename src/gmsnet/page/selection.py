@@ -1,0 +1,45 @@
+"""Of meshes too large to be drawn as a whole: the cells that are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.page.contents import Contents
+from gmsnet.page.groups import MOST_FACETS, Group
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MOST_CELLS = 1_500_000  # are drawn all
+FEW_CELLS = 300_000  # are drawn of a mesh of more: those at the boundary and those nearest to the worst ones
+
+
+def seeds_of(contents: Contents) -> Ints:
+    """The numbers of the cells that must be seen."""
+    named = [int(cell["cell"]) for cell in (*contents.worst_after, *contents.worst_before)]
+    return np.array([*named, *(cell for cell, _ in contents.unmended)], dtype=np.int64)
+
+
+def few_of(
+    groups: Sequence[Group], shell: NDArray[np.uint32] | None, points: Floats, seeds: Ints
+) -> tuple[list[Group], NDArray[np.uint32] | None]:
+    """The cells nearest to the seeds, and those at the boundary of volumes."""
+    centres = np.concatenate([np.mean([points[corner] for corner in group.nodes.T], axis=0) for group in groups])
+    numbers = np.concatenate([group.number for group in groups])
+    distance = np.full(len(centres), np.inf)
+    for centre in centres[np.isin(numbers, seeds)]:
+        np.minimum(distance, ((centres - centre) ** 2).sum(axis=1), out=distance)
+    if shell is not None:
+        distance[shell // MOST_FACETS] = -1.0
+    most = max(FEW_CELLS, int(np.count_nonzero(distance < 0.0)))
+    chosen = np.zeros(len(centres), dtype=bool)
+    chosen[np.argpartition(distance, min(most, len(distance) - 1))[:most]] = True
+    parts = np.split(chosen, np.cumsum([len(group.nodes) for group in groups])[:-1])
+    kept = [group.taken(part) for group, part in zip(groups, parts, strict=True) if part.any()]
+    if shell is not None:
+        place = (np.cumsum(chosen) - 1).astype(np.uint32)
+        shell = place[shell // MOST_FACETS] * np.uint32(MOST_FACETS) + shell % MOST_FACETS
+    return kept, shell
