@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MOST_CELLS = 1_500_000  # are drawn all
-FEW_CELLS = 300_000  # are drawn of a mesh of more: those at the boundary and those nearest to the worst ones
+FEW_CELLS = 300_000  # nearest to the worst ones are drawn of a mesh of more; of volumes besides those at the boundary
 
 
 def seeds_of(contents: Contents) -> Ints:
@@ -32,11 +32,10 @@ def few_of(
     distance = np.full(len(centres), np.inf)
     for centre in centres[np.isin(numbers, seeds)]:
         np.minimum(distance, ((centres - centre) ** 2).sum(axis=1), out=distance)
-    if shell is not None:
-        distance[shell // MOST_FACETS] = -1.0
-    most = max(FEW_CELLS, int(np.count_nonzero(distance < 0.0)))
     chosen = np.zeros(len(centres), dtype=bool)
-    chosen[np.argpartition(distance, min(most, len(distance) - 1))[:most]] = True
+    chosen[np.argpartition(distance, min(FEW_CELLS, len(distance) - 1))[:FEW_CELLS]] = True
+    if shell is not None:
+        chosen[shell // MOST_FACETS] = True
     parts = np.split(chosen, np.cumsum([len(group.nodes) for group in groups])[:-1])
     kept = [group.taken(part) for group, part in zip(groups, parts, strict=True) if part.any()]
     if shell is not None:
