@@ -13,6 +13,8 @@ from gmsnet.measure.cells import MeasuredCells
 from gmsnet.measure.report import QualityReport
 from gmsnet.mesh.mesh import Mesh
 
+LISTED = 100  # cells that could not be mended are named
+
 
 class Grid(NamedTuple):
     """A table. rows: the first of them is its head."""

@@ -17,7 +17,7 @@ from gmsnet.page.scene import scene_of
 from gmsnet.page.sections import figures, header, held, remarks, unmended, worst
 from gmsnet.page.viewer import viewer
 
-SCRIPTS = ("data.js", "cells.js", "camera.js", "shaders.js", "picture.js", "overlay.js", "view.js")
+SCRIPTS = ("data.js", "cells.js", "camera.js", "shaders.js", "picture.js", "overlay.js", "input.js", "view.js")
 STYLE = "page.css"
 
 

@@ -10,10 +10,9 @@ from gmsnet.measure.report import BEST_IS_LOW
 from gmsnet.measure.worst import worst_rows
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import counts
-from gmsnet.page.contents import Contents
+from gmsnet.page.contents import LISTED, Contents
 from gmsnet.page.markup import grid, listed, row, section, table, text
 
-MOST = 100  # cells that could not be mended are listed
 CARDS = (("inverted",), ("shape", "min"), ("shape", "mean"), ("min_angle", "min"), ("min_dihedral", "min"))
 
 
@@ -75,8 +74,8 @@ def unmended(contents: Contents) -> str:
     """The cells that could not be mended, and why."""
     if not contents.unmended:
         return ""
-    rows = "".join(row(_button(cell, "after", f"{cell}"), [reason]) for cell, reason in contents.unmended[:MOST])
-    rest = len(contents.unmended) - MOST
+    rows = "".join(row(_button(cell, "after", f"{cell}"), [reason]) for cell, reason in contents.unmended[:LISTED])
+    rest = len(contents.unmended) - LISTED
     more = f"<p>And {rest:,} more.</p>" if rest > 0 else ""
     return section(
         "unmended", "What could not be mended", table("Cells, by number from 0", ["cell", "why"], rows) + more

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.page.contents import Contents
+from gmsnet.page.contents import LISTED, Contents
 from gmsnet.page.groups import MOST_FACETS, Group
 
 Floats = NDArray[np.float64]
@@ -20,7 +20,7 @@ FEW_CELLS = 300_000  # nearest to the worst ones are drawn of a mesh of more; of
 def seeds_of(contents: Contents) -> Ints:
     """The numbers of the cells that must be seen."""
     named = [int(cell["cell"]) for cell in (*contents.worst_after, *contents.worst_before)]
-    return np.array([*named, *(cell for cell, _ in contents.unmended)], dtype=np.int64)
+    return np.array([*named, *(cell for cell, _ in contents.unmended[:LISTED])], dtype=np.int64)
 
 
 def few_of(

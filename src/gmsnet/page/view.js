@@ -20,8 +20,8 @@ class View {
     this.colour("shape");
     this.wireControls();
     this.wireLists();
-    this.wirePointer();
-    this.canvas.addEventListener("keydown", (event) => this.key(event));
+    wirePointer(this);
+    this.canvas.addEventListener("keydown", (event) => pressed(this, event));
     this.wirePage();
     this.resize();
     this.camera.whole();
@@ -207,73 +207,6 @@ class View {
     const { cells, nodes } = this.scene;
     const count = (value) => value.toLocaleString("en");
     find("said").textContent = words || `${count(cells)} cells and ${count(nodes)} nodes are drawn.`;
-  }
-
-  key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const moves = { ArrowLeft: [40, 0], ArrowRight: [-40, 0], ArrowUp: [0, 40], ArrowDown: [0, -40] };
-    const { camera } = this;
-    if (moves[event.key]) {
-      const [dx, dy] = moves[event.key];
-      if (this.scene.dimension === 3 && !event.shiftKey) camera.turn(dx / 2, dy / 2);
-      else camera.move(dx, dy);
-    } else if (event.key === "+" || event.key === "=") camera.zoomBy(1.25, 0, 0);
-    else if (event.key === "-" || event.key === "_") camera.zoomBy(0.8, 0, 0);
-    else if (event.key === "0" || event.key === "Home") this.showWhole();
-    else if (event.key === "n" || event.key === "p") this.next(event.key === "n" ? 1 : -1);
-    else if (event.key === "Escape") this.choose(-1);
-    else if (event.key === " " && this.both) {
-      find("mix").value = this.look.mixing > 0.5 ? 0 : 100;
-      this.mixTo(find("mix").value / 100);
-    } else return;
-    event.preventDefault();
-    this.paint();
-  }
-
-  wirePointer() {
-    const { canvas, camera } = this;
-    const held = new Map();
-    let travelled = 0;
-    const place = (event) => [event.offsetX, event.offsetY];
-    canvas.addEventListener("pointerdown", (event) => {
-      canvas.setPointerCapture(event.pointerId);
-      held.set(event.pointerId, place(event));
-      travelled = held.size > 1 ? Infinity : 0;
-    });
-    canvas.addEventListener("pointermove", (event) => {
-      const from = held.get(event.pointerId);
-      if (!from) return;
-      const to = place(event);
-      const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
-      travelled += Math.hypot(dx, dy);
-      if (held.size === 2) {
-        const other = [...held.entries()].find(([id]) => id !== event.pointerId)[1];
-        const apart = ([x, y]) => Math.hypot(x - other[0], y - other[1]);
-        const middle = [0, 1].map((k) => 0.5 * (to[k] + other[k]));
-        camera.move(dx / 2, dy / 2);
-        camera.zoomBy(apart(to) / Math.max(apart(from), 1), middle[0] - 0.5 * camera.width, middle[1] - 0.5 * camera.height);
-      } else if (this.scene.dimension === 3 && !event.shiftKey && event.buttons === 1) camera.turn(dx, dy);
-      else camera.move(dx, dy);
-      held.set(event.pointerId, to);
-      this.paint();
-    });
-    for (const name of ["pointerup", "pointercancel"])
-      canvas.addEventListener(name, (event) => {
-        const began = held.delete(event.pointerId);
-        if (began && name === "pointerup" && travelled < 4 && event.button === 0) this.pick(...place(event));
-      });
-    canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-    canvas.addEventListener(
-      "wheel",
-      (event) => {
-        if (document.activeElement !== canvas && !event.ctrlKey) return; // the page scrolls until one has chosen the picture
-        event.preventDefault();
-        const lines = event.deltaMode === 1 ? 16 : 1;
-        camera.zoomBy(Math.exp((-event.deltaY * lines) / 400), event.offsetX - 0.5 * camera.width, event.offsetY - 0.5 * camera.height);
-        this.paint();
-      },
-      { passive: false },
-    );
   }
 
   pick(x, y) {
