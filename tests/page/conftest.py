@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import os
 import shutil
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ import pytest
 
 import gmsnet
 from gmsnet.generate import disturb, random_mesh, random_volume
+from gmsnet.page import write_page
 from gmsnet.run.account import Account
 from gmsnet.run.reporting import contents_of
 
@@ -79,16 +81,12 @@ class Seen:
               return [btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join("")), width, height];
             }"""
         )
-        import base64
-
         return np.frombuffer(base64.b64decode(values), dtype=np.uint8).reshape(height, width, 4)[..., :3]
 
 
 @pytest.fixture
 def seen(browser, tmp_path):
     """seen(contents) → its page in the browser; it is checked at the end that it said and asked for nothing."""
-    from gmsnet.page import write_page
-
     opened = []
 
     def open_page(contents, **options) -> Seen:
