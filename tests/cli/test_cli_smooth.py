@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.cli.smooth_report import Outcome
-from gmsnet.measure.target import Target
 from gmsnet.run import stop
+from gmsnet.run.account import Account
 
 
 def listing(folder):
@@ -233,9 +232,10 @@ def test_the_target_is_judged_by_the_cells_and_not_by_the_reason_to_stop(square)
         (np.nextafter(least, 1), stop.TARGET_REACHED, False),
         (least, stop.MAX_SWEEPS, True),
     ):
-        outcome = Outcome("in", "out", "gmsnet", mesh, replace(result, stop_reason=reason), Target(target), [], None)
-        assert outcome.target_met is met
-    assert "1 cell misses it" in Outcome("", "", "", mesh, result, Target(np.nextafter(least, 1)), [], None).shortfall()
+        asked = {"target_quality": target}
+        assert Account(mesh, replace(result, stop_reason=reason, asked=asked)).target_met is met
+    missed = replace(result, asked={"target_quality": np.nextafter(least, 1)})
+    assert "1 cell misses it" in Account(mesh, missed).shortfall()
 
 
 def test_a_bug_is_one_line_and_a_traceback_on_demand(run, square, tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ import re
 import pytest
 
 import gmsnet
-from gmsnet.cli.visible import visible
+from gmsnet.mesh.display import visible
 from gmsnet.mesh.mesh import Mesh
 
 HARM = "\x1b]0;title\x07\x1b[2J\x9b31m\u202etxt.\x7f"

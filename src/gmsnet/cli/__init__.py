@@ -18,9 +18,9 @@ import typer
 from gmsnet.cli import deform, generate, methods, quality, reproduce, smooth, train
 from gmsnet.cli.moves import joined
 from gmsnet.cli.signals import Interrupted
-from gmsnet.cli.visible import visible
 from gmsnet.errors import GmsnetError
 from gmsnet.kernels.jit.usable import UnusableNumbaError
+from gmsnet.mesh.display import visible
 from gmsnet.parallel.interrupts import interruptible
 
 DONE, BAD_INPUT = 0, 2
@@ -88,7 +88,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         with interruptible():
             given = list(sys.argv[1:] if arguments is None else arguments)
-            code = app(joined(given) if given[:1] == ["deform"] else given, prog_name="gmsnet", standalone_mode=False)
+            parsed = joined(given) if given[:1] == ["deform"] else given
+            code = app(parsed, prog_name="gmsnet", standalone_mode=False, obj=given)
             sys.stdout.flush()
     except SystemExit as error:
         if isinstance(error.__context__, BrokenPipeError):  # Typer makes an exit of it

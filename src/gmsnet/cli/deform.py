@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 
 def deform(
+    context: typer.Context,
     input: Annotated[str, typer.Argument(metavar="IN", help="The mesh file; - reads the standard input.")],
     output: Annotated[
         str | None, typer.Argument(metavar="OUT", help="The file to write; - writes the standard output.")
@@ -83,6 +84,13 @@ def deform(
     plot: Annotated[
         str | None, typer.Option(metavar="FILE", help="Draw the mesh before and after (.png, .svg or .pdf).")
     ] = None,
+    report: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write one HTML file that shows the mesh before and after, its figures, what is held and why.",
+        ),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
@@ -94,19 +102,22 @@ def deform(
 
     Ctrl-C ends the work; the last valid mesh is written if there is one. A second one ends at once and writes nothing.
     """
-    from gmsnet.cli.destination import check_picture, destination_of, refuse_mixture
+    from gmsnet.cli.destination import check_picture, check_report, destination_of, refuse_mixture
     from gmsnet.cli.moves import split
 
     destination = destination_of(input, output, in_place, output_format)
     refuse_mixture(destination, json)
     if plot is not None:
         check_picture(plot, input, destination)
+    if report is not None:
+        check_report(report, input, destination)
     if not (move or rotate or displacement):
         raise InputError("there is nothing to move: give --move, --rotate or --displacement")
     given = {"--move": move or [], "--rotate": rotate or []}
     moves = {option: [split(option, each) for each in values] for option, values in given.items()}
 
     # Heavy imports only now, when the command line is known to be in order.
+    from gmsnet.cli.command import command_of
     from gmsnet.cli.deform_report import MovedOutcome
     from gmsnet.cli.file_work import Done, FileWork
     from gmsnet.cli.fix import fixed_nodes
@@ -115,8 +126,9 @@ def deform(
     from gmsnet.run.options import SmoothOptions
 
     work = FileWork(
-        input, format, destination, in_place=in_place, plot=plot, most_sweeps=max_sweeps, json=json, quiet=quiet
-    )
+        input, format, destination, in_place=in_place, plot=plot, report=report, most_sweeps=max_sweeps, json=json,
+        quiet=quiet, command=command_of(context),
+    )  # fmt: skip
     options = SmoothOptions(
         max_sweeps=max_sweeps, threads=threads, preserve=preserve, fix_layers=fix_layers, guard=guard,
         callback=work.after_sweep, slide=True if slide and "all" in slide else slide or None,
@@ -128,8 +140,6 @@ def deform(
         return partial(deform_with, mesh, options, places, fixed_nodes(mesh, fix) if fix else None)
 
     def told(done: Done) -> MovedOutcome:
-        return MovedOutcome(
-            input, done.written, "auto", done.mesh, done.result, options.target, done.lost, plot, {}, done.compiled
-        )
+        return MovedOutcome(done.mesh, done.result, done.compiled, input, done.written, done.lost, plot, report)
 
     work.carry_out(check_deformable, make, told)

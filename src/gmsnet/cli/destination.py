@@ -73,10 +73,22 @@ def check_picture(plot: str, source: str, destination: Destination | None = None
     from gmsnet.plot import check_target
 
     check_target(plot)
+    _check_beside(plot, "picture", source, destination)
+
+
+def check_report(report: str, source: str, destination: Destination | None = None) -> None:
+    """The same of a page."""
+    from gmsnet.page import check_page
+
+    check_page(report)
+    _check_beside(report, "report", source, destination)
+
+
+def _check_beside(path: str, what: str, source: str, destination: Destination | None) -> None:
     meshes = [*_files(source), *(_files(destination.path, destination.format) if destination else ())]
-    if any(_is_same(plot, path) for path in meshes):
-        raise InputError(f"{plot}: the picture would overwrite the mesh: give it another name")
-    check_writable(plot)
+    if any(_is_same(path, mesh) for mesh in meshes):
+        raise InputError(f"{path}: the {what} would overwrite the mesh: give it another name")
+    check_writable(path)
 
 
 def check_drawable(mesh: Mesh, source: str) -> None:

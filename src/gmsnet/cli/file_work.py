@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,8 +11,8 @@ import typer
 
 from gmsnet.cli.destination import Destination, check_drawable, shown
 from gmsnet.cli.signals import Deferral, Interrupted
-from gmsnet.cli.visible import visible
 from gmsnet.errors import GmsnetError, InputError
+from gmsnet.mesh.display import visible
 from gmsnet.parallel.interrupts import interruptible
 
 if TYPE_CHECKING:
@@ -33,16 +34,17 @@ class Done(NamedTuple):
 
 
 class FileWork:
-    """One run on a file. input: its path, format: its format where the suffix does not tell. plot: of a picture."""
+    """One run on a file. input: its path, format: its format where the suffix does not tell. plot, report: of a
+    picture and of a page. command: as it was given."""
 
     def __init__(
         self, input: str, format: str | None, destination: Destination, *, in_place: bool, plot: str | None,
-        most_sweeps: int, json: bool, quiet: bool,
+        report: str | None, most_sweeps: int, json: bool, quiet: bool, command: str,
     ) -> None:  # fmt: skip
         from gmsnet.cli.progress import Progress
 
         self.input, self.format, self.destination, self.in_place, self.plot = input, format, destination, in_place, plot
-        self.json, self.quiet = json, quiet
+        self.report, self.command, self.json, self.quiet = report, command, json, quiet
         self.progress, self.interruption = Progress(most_sweeps, enabled=not quiet), Deferral()
         self.written: str | None = None
 
@@ -64,8 +66,11 @@ class FileWork:
         """
         try:
             with interruptible(), self.progress, self.interruption:
-                done = self._work(check, make)
-            outcome = told(done)
+                outcome = told(self._work(check, make))
+                if self.report is not None:
+                    self.progress.begin(f"writing {self.report}")
+                    with _mesh_is_there(self.written, "report"):
+                        outcome.write_report(self.report, self.command)
             if self.json:
                 outcome.print_json()
             elif not self.quiet:
@@ -111,7 +116,8 @@ class FileWork:
         self.interruption.end()
         if self.plot is not None:
             self.progress.begin(f"drawing {self.plot}")
-            _draw(mesh, result.mesh, self.plot, self.written)
+            with _mesh_is_there(self.written, "picture"):
+                _draw(mesh, result.mesh, self.plot)
         return Done(mesh, result, self.written, lost, compiled)
 
 
@@ -135,13 +141,18 @@ def _check_conversion(mesh: Mesh, destination: Destination) -> None:
             raise InputError(f"{destination.path}: {error}") from error
 
 
-def _draw(before: Mesh, after: Mesh, plot: str, written: str | None) -> None:
-    """The picture; where it fails the error says that the mesh is written."""
+def _draw(before: Mesh, after: Mesh, plot: str) -> None:
     from gmsnet.plot import plot_smoothing
 
+    plot_smoothing(before, after, plot)
+
+
+@contextlib.contextmanager
+def _mesh_is_there(written: str | None, what: str) -> Iterator[None]:
+    """Where what follows the mesh fails, the error says that the mesh is written."""
     try:
-        plot_smoothing(before, after, plot)
+        yield
     except Exception as error:
         kind = InputError if isinstance(error, (GmsnetError, OSError, MemoryError)) else RuntimeError
         done = "the mesh is left as it is" if written is None else f"mesh written to {written}"
-        raise kind(f"{done}; the picture failed: {str(error) or type(error).__name__}") from error
+        raise kind(f"{done}; the {what} failed: {str(error) or type(error).__name__}") from error

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,7 +11,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from gmsnet.cli.visible import visible
+from gmsnet.mesh.display import strict, visible
 
 PIPE_WIDTH = 1000  # where nobody looks, nothing is wrapped
 TABLE_WIDTH = 100  # a narrower terminal wraps the lines itself: better than figures cut short
@@ -50,14 +49,4 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
 
 def print_json(document: Mapping[str, Any]) -> None:
     """The one JSON document on the standard output; what is not a finite number is null."""
-    sys.stdout.write(json.dumps(_strict(document), indent=2, allow_nan=False) + "\n")
-
-
-def _strict(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _strict(each) for key, each in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_strict(each) for each in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    sys.stdout.write(json.dumps(strict(document), indent=2, allow_nan=False) + "\n")

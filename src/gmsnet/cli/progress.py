@@ -6,8 +6,8 @@ import sys
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from gmsnet.cli.visible import visible
 from gmsnet.kernels.jit.watch import Compilation
+from gmsnet.mesh.display import visible
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar

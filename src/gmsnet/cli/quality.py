@@ -10,6 +10,7 @@ from gmsnet.errors import InputError
 
 
 def quality(
+    context: typer.Context,
     input: Annotated[str, typer.Argument(metavar="IN", help="The mesh file; - reads the standard input.")],
     threshold: Annotated[
         float | None,
@@ -17,19 +18,27 @@ def quality(
     ] = None,
     format: Annotated[str | None, typer.Option(help="Format of IN, where its suffix does not tell it.")] = None,
     plot: Annotated[str | None, typer.Option(metavar="FILE", help="Draw the mesh (.png, .svg or .pdf).")] = None,
+    report: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="Write one HTML file that shows the mesh and its figures."),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
     """Measure the triangles and quads, or the tetrahedra, of a mesh: angles, 1/q or η, inverted, the worst."""
-    from gmsnet.cli.destination import check_drawable, check_picture, shown
+    from gmsnet.cli.destination import check_drawable, check_picture, check_report, shown
 
     if threshold is not None and not -1.0 <= threshold <= 1.0:
         raise InputError(f"--threshold is a value of 1/q and must lie between -1 and 1, got {threshold:g}")
     if plot is not None:
         check_picture(plot, input)
+    if report is not None:
+        check_report(report, input)
 
     from gmsnet import io
-    from gmsnet.cli import output, report
-    from gmsnet.mesh.mesh import unmeasured
+    from gmsnet.cli import output
+    from gmsnet.cli import report as tables
+    from gmsnet.measure.worst import named_cells, worst_cells
+    from gmsnet.mesh.mesh import counts, unmeasured
     from gmsnet.run.api import quality as measure
 
     mesh = io.read(input, format)
@@ -44,25 +53,31 @@ def quality(
             f"{shown(input)}: a threshold is asked of triangles and quads, and this mesh has none: "
             f"{others} cannot be measured so far"
         )
-    worst = report.worst_cells(mesh, found)
+    worst = worst_cells(mesh, found)
     if plot is not None:
         from gmsnet.plot import plot_quality
 
         plot_quality(mesh, plot)
     few = 0 if threshold is None else int((found.shape < threshold).sum())
+    document = {"input": input, "nodes": len(mesh.points), "planar": mesh.plane is not None, **found.summary()}
+    if threshold is not None:
+        document |= {"threshold": threshold, "below_threshold": few}
+    document |= {"worst": worst, "plot": plot, "report": report}
+    if report is not None:
+        from gmsnet.cli.command import command_of
+        from gmsnet.cli.quality_page import write_quality_page
+
+        write_quality_page(report, input, mesh, found, document, command_of(context))
     if json:
-        document = {"input": input, "nodes": len(mesh.points), "planar": mesh.plane is not None, **found.summary()}
-        if threshold is not None:
-            document |= {"threshold": threshold, "below_threshold": few}
-        output.print_json({**document, "worst": worst, "plot": plot})
+        output.print_json(document)
     else:
         console = output.console()
-        console.print(f"{shown(input)}: {report.counts(mesh)}")
+        console.print(f"{shown(input)}: {counts(mesh)}")
         if len(found.cell):
             console.print()
-            console.print(report.figures({"now": found}))
+            console.print(tables.figures({"now": found}))
             console.print("\nworst cells (numbers from 0)")
-            console.print(report.worst_table(worst))
+            console.print(tables.worst_table(worst))
         else:
             console.print("there are no triangles or quads to measure")
         if others and len(found.cell):
@@ -71,7 +86,9 @@ def quality(
             console.print("the mesh is a surface in space: its cells have no sign, none counts as inverted")
         if plot is not None:
             console.print(f"picture: {plot}")
+        if report is not None:
+            console.print(f"report: {report}")
     if threshold is not None and few:
-        cells = report.named_cells(found, found.worst(few), "below it")
+        cells = named_cells(found, found.worst(few), "below it")
         typer.echo(f"gmsnet: below the threshold {threshold:g}: {cells}", err=True)
         raise typer.Exit(1)

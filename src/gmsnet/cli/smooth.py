@@ -26,6 +26,7 @@ def _format_names() -> list[str]:
 
 
 def smooth(
+    context: typer.Context,
     input: Annotated[str, typer.Argument(metavar="IN", help="The mesh file to smooth; - reads the standard input.")],
     output: Annotated[
         str | None, typer.Argument(metavar="OUT", help="The file to write; - writes the standard output.")
@@ -118,6 +119,13 @@ def smooth(
     plot: Annotated[
         str | None, typer.Option(metavar="FILE", help="Draw the mesh before and after (.png, .svg or .pdf).")
     ] = None,
+    report: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write one HTML file that shows the mesh before and after, its figures, what is held and why.",
+        ),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
@@ -132,14 +140,17 @@ def smooth(
 
     Ctrl-C stops the smoothing; the best mesh so far is written. A second one ends at once and writes nothing.
     """
-    from gmsnet.cli.destination import check_picture, destination_of, refuse_mixture
+    from gmsnet.cli.destination import check_picture, check_report, destination_of, refuse_mixture
 
     destination = destination_of(input, output, in_place, output_format)
     refuse_mixture(destination, json)
     if plot is not None:
         check_picture(plot, input, destination)
+    if report is not None:
+        check_report(report, input, destination)
 
     # Heavy imports only now, when the command line is known to be in order.
+    from gmsnet.cli.command import command_of
     from gmsnet.cli.file_work import Done, FileWork
     from gmsnet.cli.fix import fixed_nodes
     from gmsnet.cli.metric import values_at_nodes
@@ -149,8 +160,9 @@ def smooth(
     from gmsnet.run.set_up import check_mesh
 
     work = FileWork(
-        input, format, destination, in_place=in_place, plot=plot, most_sweeps=max_sweeps, json=json, quiet=quiet
-    )
+        input, format, destination, in_place=in_place, plot=plot, report=report, most_sweeps=max_sweeps, json=json,
+        quiet=quiet, command=command_of(context),
+    )  # fmt: skip
     options = SmoothOptions(  # before the file is read, which may be large
         method=method, variant=variant, objective=objective, max_sweeps=max_sweeps, threads=threads,
         target_quality=target_quality, target_angle=target_angle, preserve=preserve, fix_layers=fix_layers,
@@ -163,9 +175,6 @@ def smooth(
         return partial(smooth_with, mesh, options, fixed_nodes(mesh, fix) if fix else None)
 
     def told(done: Done) -> Outcome:
-        choice = {"variant": variant, "objective": objective, "weights": weights}
-        return Outcome(
-            input, done.written, method, done.mesh, done.result, options.target, done.lost, plot, choice, done.compiled
-        )
+        return Outcome(done.mesh, done.result, done.compiled, input, done.written, done.lost, plot, report)
 
     work.carry_out(lambda mesh: check_mesh(mesh, options.target), make, told)

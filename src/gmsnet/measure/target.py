@@ -36,6 +36,12 @@ class Target:
     def __bool__(self) -> bool:
         return self.quality is not None or self.angle is not None
 
+    @property
+    def words(self) -> str:
+        """What is asked for."""
+        asked = [] if self.quality is None else [f"1/q of {self.quality:g} or more"]
+        return " and ".join([*asked, *([] if self.angle is None else [f"angles of {self.angle:g}° or more"])])
+
     def missed(self, shape: Floats, min_angle: Floats) -> Flags:
         """Which cells miss it, by their 1/q and their smallest angles in degrees."""
         missed: Flags = np.zeros(len(shape), dtype=bool)

@@ -1,11 +1,17 @@
-"""How counts, figures and small tables read: in messages, at a prompt, in a notebook."""
+"""How counts, figures and small tables read: in messages, at a prompt, in a notebook, on a page."""
 
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 NAMES = 6  # at most of them are shown of a mesh
+_CONTROLS = [*range(0x20), *range(0x7F, 0xA0)]  # ESC among them, with which colours, titles and answers begin
+_DIRECTIONS = [*range(0x202A, 0x202F), *range(0x2066, 0x206A)]  # that show text in another order than it is in
+_SHOWN = {code: f"\\x{code:02x}" for code in _CONTROLS} | {code: f"\\u{code:04x}" for code in _DIRECTIONS}
+del _SHOWN[ord("\n")]
 
 
 def amount(count: int, what: str) -> str:
@@ -51,3 +57,22 @@ def html_table(caption: str, rows: Sequence[Sequence[str]], below: Sequence[str]
         f"<table><caption>{html.escape(caption)}</caption><thead><tr>{head}</tr></thead>"
         f"<tbody>{lines}</tbody></table>{notes}"
     )
+
+
+def visible(text: str) -> str:
+    """The same text with its control characters, all but line ends, as Python writes them.
+
+    Text of files and names of files can hold commands to a terminal, and marks that turn the order of what is read.
+    """
+    return text.translate(_SHOWN)
+
+
+def strict(value: Any) -> Any:
+    """A document as JSON has it: what is not a finite number is null."""
+    if isinstance(value, Mapping):
+        return {str(key): strict(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [strict(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

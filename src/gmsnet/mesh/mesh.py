@@ -208,6 +208,11 @@ class Mesh:
         return {name: np.unique(np.concatenate(ids)) for name, ids in nodes.items()}
 
 
+def counts(mesh: Mesh) -> str:
+    """How many nodes and cells of which kind a mesh has, in words."""
+    return ", ".join([amount(len(mesh.points), "node"), *cells_in_words(mesh.cells)])
+
+
 def unmeasured(mesh: Mesh) -> str:
     """How many cells of which kind are no triangles and no plane quads, in words: no quality is known of them.
 

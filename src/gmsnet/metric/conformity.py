@@ -69,6 +69,10 @@ class ConformityChange(NamedTuple):
     before: Conformity
     after: Conformity
 
+    def rows(self) -> list[list[str]]:
+        """Name, before and after of each figure."""
+        return [[*one, other] for one, (_, other) in zip(*(each.figures() for each in self), strict=True)]
+
 
 def oriented(simplices: Simplices) -> tuple[Ints, Floats | None]:
     """The rows (S, 3) of corner simplices counter-clockwise, and the weights (S, 3) of their edges, None if all 1."""

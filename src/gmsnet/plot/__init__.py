@@ -5,7 +5,8 @@ The only place that imports matplotlib, on use and without its global state, so 
 
 from typing import TYPE_CHECKING
 
-from gmsnet.plot.figure import AFTER, BEFORE, check_target, new_figure, png_bytes
+from gmsnet.measure.palette import AFTER, BEFORE
+from gmsnet.plot.figure import check_target, new_figure, png_bytes
 from gmsnet.plot.histogram import histogram
 from gmsnet.plot.smoothing import plot_quality, plot_smoothing
 from gmsnet.plot.view import View, add_colour_bar, check_mesh, draw

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".svg", ".pdf")
 DPI = 150
-BEFORE, AFTER = "#e0a800", "#173f7a"  # two states of one mesh wherever they are compared
 
 
 def check_target(path: str | os.PathLike[str]) -> None:

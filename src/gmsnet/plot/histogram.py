@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.measure.bins import bins_of
 from gmsnet.measure.report import QualityReport
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-
-ENDS = {"min_dihedral": (0.0, np.degrees(np.arccos(1 / 3))), "max_dihedral": (60.0, 180.0)}
 
 
 class Shown(Protocol):
@@ -42,18 +40,9 @@ class Shown(Protocol):
 
 
 def histogram(axes: Axes, views: Sequence[Shown], name: str, label: str) -> None:
-    """The share of cells by a measure (an array of QualityReport, by name), and a mark at the worst value.
-
-    The axis goes to the best value there is: for ``min_angle`` 60 degrees, or 90 where there are quads, for
-    ``min_dihedral`` that of the regular tetrahedron, and 1 else. Below 0 if cells are inverted. For ``max_dihedral`` it
-    goes from 60 to 180 degrees.
-    """
+    """The share of cells by a measure (an array of QualityReport, by name), and a mark at the worst value."""
     values, worst = [view.report.column(name) for view in views], np.max if name == "max_dihedral" else np.min
-    low, best = ENDS.get(name, (0.0, 1.0))
-    low = min([low, *(float(v.min()) for v in values)])
-    if name == "min_angle":
-        best = 90.0 if any(view.corners.shape[1] == 4 for view in views) else 60.0
-    bins = np.linspace(low, best, 61).tolist()
+    bins = bins_of(name, values, quads=any(view.corners.shape[1] == 4 for view in views)).tolist()
     for view, each in zip(views, values, strict=True):
         share = np.full(len(each), 100.0 / len(each))
         axes.hist(each, bins, weights=share, color=view.colour, alpha=0.35, edgecolor="none")

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.io.atomic import replace_files
+from gmsnet.measure.palette import AFTER, BEFORE
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.plot.figure import AFTER, BEFORE, check_target, file_bytes, new_figure
+from gmsnet.plot.figure import check_target, file_bytes, new_figure
 from gmsnet.plot.histogram import histogram
 from gmsnet.plot.view import View, add_colour_bar, check_mesh, draw
 from gmsnet.plot.volumes import volume_figure

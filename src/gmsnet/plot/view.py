@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
+from gmsnet.measure.palette import AFTER, BAD_TO_GOOD, INVERTED, OTHER_CELLS
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.mesh.mesh import Mesh, measured
-from gmsnet.plot.figure import AFTER
 from gmsnet.topology.topology import Topology
 
 if TYPE_CHECKING:
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
-BAD_TO_GOOD = ["#ffd60a", "#e9c46a", "#8fb8a0", "#3f7fb5", "#103a80"]  # yellow … blue; also apart in grey print
-INVERTED = "#d1001f"
-OTHER_CELLS = "#e6e6e6"
 EDGE = "#ffffff"
 MANY = 20_000  # more cells than this are an image in SVG and PDF, so that the file stays small, and share one style
 POINTS = 345.6  # across a picture, in printer's points: 4.8 inches

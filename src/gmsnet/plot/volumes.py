@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.cells.tetrahedron import TETRAHEDRON
+from gmsnet.measure.palette import AFTER, BEFORE, INVERTED
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.plot.figure import AFTER, BEFORE, new_figure
+from gmsnet.plot.figure import new_figure
 from gmsnet.plot.histogram import histogram
-from gmsnet.plot.view import EDGE, INVERTED, bad_to_good
+from gmsnet.plot.view import EDGE, bad_to_good
 from gmsnet.topology.volume import Volume
 
 if TYPE_CHECKING:

@@ -98,7 +98,7 @@ def smooth_with(mesh: Any, options: SmoothOptions, fixed: Any = None) -> SmoothR
         with interruptible(), workers(options.thread_count) as executor:
             return carry_out(first_state(mesh, fixed, smoother, options, executor), options, executor)
 
-    return ended(work, lambda state: result_of(state, began))
+    return ended(work, lambda state: result_of(state, options, began))
 
 
 @interruptible()

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gmsnet.errors import InputError
 from gmsnet.kernels.simplex.bernstein import NAMES
@@ -28,6 +28,9 @@ from gmsnet.run.state import Motion, State
 from gmsnet.run.sweep import Sweep
 from gmsnet.run.untangle_stage import untangle_all
 
+if TYPE_CHECKING:
+    from gmsnet.run.account import Account
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DeformResult(SmoothResult):
@@ -40,6 +43,13 @@ class DeformResult(SmoothResult):
     fraction: float = 0.0
     steps: int = 0
     reason: str = ""
+
+    _function = "deform"
+
+    def _account(self, mesh: Mesh) -> Account:
+        from gmsnet.run.moved_account import MovedAccount
+
+        return MovedAccount(mesh, self)
 
     @property
     def _remarks(self) -> list[str]:
@@ -111,7 +121,7 @@ def deform_with(mesh: Any, options: SmoothOptions, prescribed: Prescribed, fixed
             move = partial(move_boundary, prescribed=prescribed)
             return carry_out(state, options, executor, (untangle_all, move))
 
-    return ended(work, lambda state: _result(state, began))
+    return ended(work, lambda state: _result(state, options, began))
 
 
 def check_deformable(mesh: Mesh) -> None:
@@ -135,7 +145,7 @@ def _check_fixed(mesh: Mesh, fixed: Any, prescribed: Prescribed) -> None:
         raise InputError(f"fixed names the node {min(both)}, which is to be moved: leave it out of one of the two")
 
 
-def _result(state: State, began: float) -> DeformResult:
-    done, motion = result_of(state, began), state.motion or Motion(reason=state.stop_reason)
+def _result(state: State, options: SmoothOptions, began: float) -> DeformResult:
+    done, motion = result_of(state, options, began), state.motion or Motion(reason=state.stop_reason)
     known = {each.name: getattr(done, each.name) for each in fields(SmoothResult)}
     return DeformResult(**known, fraction=motion.fraction, steps=motion.steps, reason=motion.reason)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -89,6 +89,14 @@ class SmoothOptions:
         """At most so many threads are used."""
         return self.threads or available_threads()
 
+    @property
+    def asked(self) -> dict[str, Any]:
+        """The options that are not as they are by default, but for the callback, as plain values: of arrays, functions
+        and other objects what they are."""
+        given = {each.name: (_told(getattr(self, each.name)), each.default) for each in fields(self)}
+        given.pop("callback")
+        return {name: value for name, (value, default) in given.items() if value != default}
+
     def smoother(self) -> Smoother:
         """The method, ready for one run. Raises InputError for weights that cannot be read."""
         method, options = self._method()
@@ -120,6 +128,21 @@ class SmoothOptions:
     def _method(self) -> tuple[Method, MethodOptions]:
         name = method_for(self.method, self.variant, self.preserve, self.target)
         return chosen(name, variant=self.variant, objective=self.objective, weights=self.weights, seed=self.seed)
+
+
+def _told(value: Any) -> Any:
+    """An option as a plain value."""
+    if isinstance(value, np.ndarray):
+        return f"array of shape {value.shape}"
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    if isinstance(value, (list, tuple)):
+        return [_told(each) for each in value]
+    return getattr(value, "__name__", type(value).__name__)
 
 
 def _check_whole(name: str, value: Any, least: int) -> None:

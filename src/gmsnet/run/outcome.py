@@ -46,7 +46,7 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
     return replace(state, start=nothing, points=nothing, shapes=np.empty(0, dtype=np.float32), final=final)
 
 
-def result_of(state: State, began: float) -> SmoothResult:
+def result_of(state: State, options: SmoothOptions, began: float) -> SmoothResult:
     """What the caller gets. began: when the call did, by ``time.perf_counter``."""
     assert state.final is not None
     points, moved, after = state.final
@@ -66,6 +66,7 @@ def result_of(state: State, began: float) -> SmoothResult:
         seconds=time.perf_counter() - began,
         invalid_curved=0 if state.second_order is None else state.second_order.invalid[1],
         conformity=None if state.metric is None else ConformityChange(*state.conformity),
+        asked=options.asked,
     )
 
 

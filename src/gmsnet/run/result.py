@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,10 @@ from gmsnet.run.sweep import Sweep as Sweep
 from gmsnet.run.untangle_stage import StillInvertedCell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
+
+if TYPE_CHECKING:
+    from gmsnet.mesh.mesh import Mesh
+    from gmsnet.run.account import Account
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +48,7 @@ class SmoothResult:
     topology: what follows from the connectivity, with the nodes that were held.
     seconds: for the whole call. invalid_curved: how many second-order cells are not certified valid. conformity: before
     and after, to the metric or the sizes that were asked for; None without any. With one, the least and the mean 1/q in
-    ``history`` are those in the metric.
+    ``history`` are those in the metric. asked: the options of the call that were not the defaults, as plain values.
     """
 
     mesh: Any
@@ -60,6 +66,7 @@ class SmoothResult:
     seconds: float
     invalid_curved: int = 0
     conformity: ConformityChange | None = None
+    asked: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "held", HeldNodes(self.held))
@@ -90,6 +97,26 @@ class SmoothResult:
         reasons = ", ".join(f"{reason} {len(ids):,}" for reason, ids in self.held.items())
         inverted = f"inverted still: {amount(len(self.unmended), 'cell')}, see unmended"
         return [*([f"held: {reasons}"] if reasons else []), *([inverted] if self.unmended else []), *self.notes]
+
+    def report(self, path: str | os.PathLike[str]) -> None:
+        """Write one HTML file that shows what was done: figures, a picture before and after, what is held and why.
+
+        It needs nothing but a browser, and loads nothing. path: ``.html``. Raises InputError for another suffix, and
+        where the file cannot be written.
+        """
+        from gmsnet.page import write_page
+        from gmsnet.run.reporting import contents_of
+
+        given = "".join(f", {name}={value!r}" for name, value in self.asked.items())
+        mesh = to_mesh(self.mesh)[0]
+        write_page(path, contents_of(self._account(mesh), "mesh", f"gmsnet.{self._function}(mesh{given})"))
+
+    _function = "smooth"  # that returned it
+
+    def _account(self, mesh: Mesh) -> Account:
+        from gmsnet.run.account import Account
+
+        return Account(mesh, self)
 
     @cached_property
     def limits(self) -> Limits:

@@ -1,0 +1,73 @@
+"""The worst cells of a mesh, with their places: as plain values, as rows of a table, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.measure.report import QualityReport
+from gmsnet.mesh.display import amount
+from gmsnet.mesh.mesh import Mesh
+
+WORST = 5  # cells are shown
+NAMED = 10  # cells are named in one line
+
+
+def worst_cells(
+    mesh: Mesh, report: QualityReport, held: NDArray[np.bool_] | None = None, count: int = WORST
+) -> list[dict[str, Any]]:
+    """The cells of minimum 1/q, the worst first: number from 0, measures, place, and how many corners are held."""
+    rows = []
+    for row in report.worst(count).tolist():
+        cell = int(report.cell[row])
+        found: dict[str, Any] = {
+            "cell": cell,
+            "shape": float(report.shape[row]),
+            **{name: float(report.column(name)[row]) for name in report.angles},
+            "inverted": not report.valid[row],
+            "centre": report.centre[row].tolist(),
+        }
+        if held is not None:
+            found["held_corners"] = int(held[corners_of(mesh, cell)].sum())
+            found["corners"] = len(corners_of(mesh, cell))
+        rows.append(found)
+    return rows
+
+
+def worst_rows(cells: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """The answer of ``worst_cells`` as rows of a table, the first of them its head."""
+    space = any("min_dihedral" in cell for cell in cells)
+    low, high = ("min_dihedral", "max_dihedral") if space else ("min_angle", "max_angle")
+    columns = ["cell", "η" if space else "1/q", low.replace("_", " "), high.replace("_", " "), "at"]
+    rows = [
+        [
+            f"{cell['cell']}{' (inverted)' if cell['inverted'] else ''}",
+            f"{cell['shape']:.4f}",
+            f"{cell[low]:.2f}",
+            f"{cell[high]:.2f}",
+            " ".join(f"{value:.6g}" for value in cell["centre"]),
+            *([f"{cell['held_corners']} of {cell['corners']}"] if "held_corners" in cell else []),
+        ]
+        for cell in cells
+    ]
+    with_held = any("held_corners" in cell for cell in cells)
+    return [[*columns, *(["held corners"] if with_held else [])], *rows]
+
+
+def corners_of(mesh: Mesh, cell: int) -> NDArray[np.int64]:
+    """The corner nodes of a cell by its index among all cells of the mesh."""
+    for block in mesh.cells:
+        if cell < len(block.nodes):
+            return block.nodes[cell, : block.corners]
+        cell -= len(block.nodes)
+    raise IndexError(cell)
+
+
+def named_cells(report: QualityReport, rows: NDArray[np.int64], what: str) -> str:
+    """The cells of these rows, the worst first, in words: how many are what, and the first of them by number."""
+    named = ", ".join(str(cell) for cell in report.cell[rows[:NAMED]].tolist())
+    more = ", …" if len(rows) > NAMED else ""
+    return f"{amount(len(rows), 'cell')} {what} (numbers from 0, worst first: {named}{more})"
