@@ -39,7 +39,7 @@ class FileWork:
         self, input: str, format: str | None, destination: Destination, *, in_place: bool, plot: str | None,
         most_sweeps: int, json: bool, quiet: bool,
     ) -> None:  # fmt: skip
-        from gmsnet.cli.progress import Progress
+        from gmsnet.run.progress import Progress
 
         self.input, self.format, self.destination, self.in_place, self.plot = input, format, destination, in_place, plot
         self.json, self.quiet = json, quiet
@@ -82,7 +82,7 @@ class FileWork:
     def _work(self, check: Callable[[Mesh], None], make: Callable[[Mesh], Callable[[], SmoothResult]]) -> Done:
         from gmsnet import io
 
-        self.progress.begin(f"reading {shown(self.input)}")
+        self.progress.begin(visible(f"reading {shown(self.input)}"))
         mesh = io.read(self.input, self.format)
         try:
             check(mesh)
@@ -105,12 +105,12 @@ class FileWork:
         self.interruption.begin()
         lost: list[str] = []
         if not self.in_place or result.moved.any():  # else there is nothing to write
-            self.progress.begin(f"writing {destination.path}")
+            self.progress.begin(visible(f"writing {destination.path}"))
             lost = io.write(result.mesh, destination.path, destination.format)
             self.written = destination.path
         self.interruption.end()
         if self.plot is not None:
-            self.progress.begin(f"drawing {self.plot}")
+            self.progress.begin(visible(f"drawing {self.plot}"))
             _draw(mesh, result.mesh, self.plot, self.written)
         return Done(mesh, result, self.written, lost, compiled)
 
