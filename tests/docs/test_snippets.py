@@ -6,14 +6,15 @@ import re
 from pathlib import Path
 
 import pytest
+from support.optional import library
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = {"pyvista.md": "pyvista"}  # page → the package that it needs
+PAGES = {"gmsh.md": "gmsh", "pyvista.md": "pyvista"}  # page → the package that it needs
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_the_python_of_a_page_runs(page, tmp_path, monkeypatch):
-    pytest.importorskip(PAGES[page])
+    library(PAGES[page])
     monkeypatch.chdir(tmp_path)
     text = (DOCS / page).read_text(encoding="utf-8")
     blocks = list(re.finditer(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL))
