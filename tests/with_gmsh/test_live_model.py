@@ -184,8 +184,6 @@ def test_what_cannot_be_smoothed_is_said(gmsh):
     ball_in_box(gmsh)
     with pytest.raises(InputError, match=r"dim must be 3, .* or None, got 2"):
         gmsnet.gmsh.smooth(dim=2)
-    with pytest.raises(InputError, match="boundary nodes of volumes cannot slide yet"):
-        gmsnet.gmsh.smooth(on_geometry="slide")
     with pytest.raises(InputError, match='on_geometry must be "hold" or "slide", got \'glide\''):
         gmsnet.gmsh.smooth(on_geometry="glide")
     with pytest.raises(InputError, match='slide and geometry are of use with on_geometry="slide" alone'):

@@ -10,7 +10,7 @@ import gmsnet.gmsh
 from gmsnet.errors import InputError
 from gmsnet.gmsh import snapping
 from gmsnet.gmsh.curve import CadCurve
-from with_gmsh.conftest import inside, places, plate, throw
+from with_gmsh.conftest import ball_in_box, inside, places, plate, throw
 
 KERNELS = ["occ", "geo"]
 
@@ -77,18 +77,18 @@ def test_places_on_curves_are_kept_off_where_cells_would_suffer(gmsh, monkeypatc
         at, parameters = genuine(self, points)
         return at + np.array([0.0, 5.0, 0.0]), parameters
 
-    live = {}
+    genuine_snapping, seen = snapping.on_geometry, []
 
-    def on_curves(given, curves, result, target):
-        live["result"] = result
+    def on_geometry(module, live, curves, result, target):
+        seen.append(result)
         with monkeypatch.context() as patch:
             patch.setattr(CadCurve, "project", far)
-            return snapping.on_curves(given, curves, result, target)
+            return genuine_snapping(module, live, curves, result, target)
 
-    monkeypatch.setattr("gmsnet.gmsh.smoothing.on_curves", on_curves)
+    monkeypatch.setattr(snapping, "on_geometry", on_geometry)
     result = gmsnet.gmsh.smooth(on_geometry="slide")
     assert snapping.KEPT in result.notes
-    assert np.array_equal(result.points, live["result"].points)
+    assert np.array_equal(result.points, seen[0].points)
 
 
 def test_only_the_curves_that_are_named_slide(gmsh):
@@ -103,6 +103,30 @@ def test_only_the_curves_that_are_named_slide(gmsh):
         for _, curve in gmsh.model.getEntities(1):
             rows = np.searchsorted(tags, gmsh.model.mesh.getNodes(1, curve)[0])
             assert (after[rows] != before[rows]).any() == (curve == circle)
+
+
+def test_in_volumes_nodes_slide_on_surfaces_and_are_on_them_in_all_digits(gmsh):
+    ball_in_box(gmsh, size=0.15)
+    throw(gmsh, 3, 0.01, axes=3)
+    tags, before = places(gmsh)
+    result = gmsnet.gmsh.smooth(on_geometry="slide")
+    assert snapping.KEPT not in result.notes
+    assert result.after.inverted == 0
+    assert result.after.shape.min() >= result.before.shape.min()
+    after = places(gmsh)[1]
+    for _, surface in gmsh.model.getEntities(2):
+        nodes, points, parameters = gmsh.model.mesh.getNodes(2, surface, False, True)
+        rows = np.searchsorted(tags, nodes)
+        assert (after[rows] != before[rows]).any()
+        if gmsh.model.getType(2, surface) == "Sphere":
+            assert np.abs(np.linalg.norm(points.reshape(-1, 3) - 0.5, axis=1) - 0.25).max() < 1e-12
+        else:
+            same = np.ptp(before[rows], axis=0) == 0.0
+            assert same.sum() == 1
+            assert np.array_equal(after[rows][:, same], before[rows][:, same])
+        assert np.abs(gmsh.model.getValue(2, surface, parameters) - points).max() < 1e-12
+    gmsh.model.mesh.relocateNodes()
+    assert np.abs(places(gmsh)[1] - after).max() < 1e-12
 
 
 def test_periodic_curves_stay_matched(gmsh):

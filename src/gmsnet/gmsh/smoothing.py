@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
+from gmsnet.gmsh import snapping
 from gmsnet.gmsh.cad import Cad
 from gmsnet.gmsh.coordinates import set_points
 from gmsnet.gmsh.library import current, library
 from gmsnet.gmsh.live import Live, read
-from gmsnet.gmsh.snapping import on_curves
 from gmsnet.measure.target import Target
 from gmsnet.mesh.selection import chosen_nodes
 from gmsnet.run.api import smooth as smooth_mesh
@@ -30,8 +30,8 @@ def smooth(
 
     model: the name of a model (default: the current one). dim: 2 or 3, of the elements to smooth (default: the highest
     that there is). method, options: those of ``gmsnet.smooth``. on_geometry: "hold" keeps all nodes of points and
-    curves, in volumes also of surfaces, where they are; "slide" lets nodes of planar meshes move along their CAD
-    curves. Where no curve has a geometry (a mesh file alone), nodes slide on arcs through the mesh's own nodes.
+    curves, in volumes also of surfaces, where they are; "slide" lets them move along their CAD curves and surfaces.
+    Where these have no geometry (a mesh file alone), nodes slide on what the mesh itself tells of its boundary.
     fixed: tags of nodes to hold besides, or names of physical groups, or of entities ("curve 3", "surface 1").
     progress_bar: show the sweeps. gmsh: the user's module (default: the one that is imported).
 
@@ -50,7 +50,7 @@ def smooth(
         cad = Cad(gmsh, live) if on_geometry == SLIDE and "geometry" not in options else None
         if on_geometry == SLIDE:
             options = {"slide": True, **options}
-        if cad is not None and cad.curves:  # else the mesh itself tells its curves
+        if cad is not None and cad.curves and live.dimension == 2:  # else the mesh itself tells where they slide
             options["geometry"] = cad
         held = _held(gmsh, live, fixed, on_geometry)
         with Progress(options.get("max_sweeps", 100), bar=progress_bar) as progress:
@@ -58,21 +58,21 @@ def smooth(
             result = smooth_mesh(live.mesh, method, fixed=held, **options)
         if cad is not None:
             target = Target(options.get("target_quality"), options.get("target_angle"))
-            result = on_curves(live, cad.curves, result, target)
+            result = snapping.on_geometry(gmsh, live, cad.curves, result, target)
         set_points(gmsh, live, result.points, result.moved)
     return result
 
 
 def _held(gmsh: Any, live: Live, fixed: Any, on_geometry: str) -> NDArray[np.bool_]:
-    """(N,) the nodes that shapes and the user hold; those of periodic curves, too, which must stay alike."""
+    """(N,) the nodes that shapes and the user hold; those of periodic shapes, too, which must stay alike."""
     dimension = live.dimension if on_geometry == HOLD else 1
     held = live.below(dimension)
     for block in live.mesh.cells:
         if block.dimension is not None and block.dimension < dimension:  # which hold their nodes by themselves
             held[block.nodes] = False
     for part in live.parts:
-        if part.dimension == 1 and on_geometry == SLIDE:
-            _, nodes, masters, _ = gmsh.model.mesh.getPeriodicNodes(1, part.tag)
+        if part.dimension in (1, 2) and on_geometry == SLIDE:
+            _, nodes, masters, _ = gmsh.model.mesh.getPeriodicNodes(part.dimension, part.tag)
             held[live.rows(nodes)] = held[live.rows(masters)] = True
     if fixed is not None:
         values = np.asarray(list(fixed) if isinstance(fixed, (set, frozenset)) else fixed)
