@@ -65,7 +65,10 @@ def main():
                 left, free = result.after.inverted, len(result.topology.free)
                 found.setdefault(kind, []).append((left, seconds / free * 1e4, result.before.inverted))
                 if left:
-                    print(f"{name}, seed {seed}, {kind}: {left} of {result.before.inverted} left; {result.notes}", flush=True)
+                    print(
+                        f"{name}, seed {seed}, {kind}: {left} of {result.before.inverted} left; {result.notes}",
+                        flush=True,
+                    )
     print("| tangle | meshes | mended | s of CPU for 1e4 nodes, median, most |\n|---|---|---|---|")
     for kind, rows in found.items():
         left, seconds, _ = map(np.array, zip(*rows, strict=True))
