@@ -149,6 +149,9 @@ What the names of facts mean that do not say it themselves:
 SU2's markers `SEND_RECEIVE` (periodic boundaries, parts of a partitioned mesh) are vertices, so their nodes are held;
 `NPERIODIC` and `PERIODIC_INDEX` are kept.
 
+A file of any format may be compressed with gzip: its name then ends with `.gz` (`wing.su2.gz`). What it unpacks to is
+promised byte for byte. It is compressed anew (level 6, without a name or a time), so its packed bytes differ.
+
 ## Smoothing: the same file with other coordinates
 
 The sample is made of the decimals of its points. It is read and written without smoothing: the same bytes. It is

@@ -14,7 +14,8 @@ from gmsnet.io.cells import sealed
 from gmsnet.io.contents import Data, is_open_pipe, load, refuse_unless_regular
 from gmsnet.io.convert import listed
 from gmsnet.io.document import Parsed
-from gmsnet.io.formats import FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
+from gmsnet.io.formats import BY_SUFFIX, FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
+from gmsnet.io.packed import MAGIC, is_packed, packed, split_name, unpacked
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import FileSource
 from gmsnet.io.stamps import Stamp, Stamps
@@ -25,7 +26,8 @@ from gmsnet.mesh.mesh import Mesh, Source
 def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     """The mesh in a file; ``mesh.source`` keeps the file, so that ``write`` can put new coordinates into it.
 
-    path: the file; ``-`` is the standard input. Of Triangle's pair either file may be named. format: a name of the
+    path: the file; ``-`` is the standard input. Of Triangle's pair either file may be named. A file whose name ends
+    with ``.gz`` is unpacked. format: a name of the
     table of formats (su2, gmsh, vtk, vtu, medit, triangle, stl, obj, off, ply); by default the suffix tells, or the
     contents where there is none to tell (standard input, pipes).
 
@@ -75,7 +77,7 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
             raise InputError(f"{shown}: its format cannot be seen; name it with --format ({', '.join(FORMATS)})")
         entry = FORMATS[key]
         return entry, {entry.suffixes[0]: opened}
-    entry = entry_of(format) if format is not None else FORMATS[format_of_suffix(name, os.path.splitext(name)[1])]
+    entry = entry_of(format) if format is not None else FORMATS[format_of_suffix(name, split_name(name)[1])]
     if len(entry.suffixes) == 1:
         return entry, {entry.suffixes[0]: _loaded(name)}
     if stream:
@@ -85,7 +87,14 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
 
 def _loaded(name: str) -> tuple[str, Data, Stamp | None]:
     try:
-        return name, *load(name)
+        data, stamp = load(name)
+        if is_packed(name):
+            return name, unpacked(data, name), stamp
+        if data[: len(MAGIC)] == MAGIC:
+            raise FormatError("this is compressed with gzip: add .gz to the name of the file, or unpack it first")
+        return name, data, stamp
+    except FormatError as error:
+        raise FormatError(f"{name}: {error}") from None
     except FileNotFoundError:
         raise InputError(f"{name}: there is no such file") from None
     except IsADirectoryError:
@@ -97,11 +106,11 @@ def _loaded(name: str) -> tuple[str, Data, Stamp | None]:
 
 
 def _beside(name: str, suffix: str) -> str:
-    """The name of a companion file, its suffix in capitals if that of ``name`` is."""
-    stem, given = os.path.splitext(name)
-    known_suffix = any(given.lower() in entry.suffixes for entry in FORMATS.values())
-    stem, given = (stem, given) if known_suffix else (name, "")
-    return stem + (suffix.upper() if given.isupper() else suffix)
+    """The name of a companion file, its suffix in capitals if that of ``name`` is, and compressed if that is."""
+    stem, given, gz = split_name(name)
+    if given.lower() not in BY_SUFFIX:
+        stem, given = stem + given, ""
+    return stem + (suffix.upper() if given.isupper() else suffix) + gz
 
 
 def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamps) -> Mesh:
@@ -130,7 +139,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     """Writes a mesh to a file and returns, in words, what the target's format could not hold.
 
     A mesh that was read from a file of the same format, and differs from it in coordinates alone, is written as that
-    file with the new coordinates in the places of the old ones; then nothing is lost. Any other is converted.
+    file with the new coordinates in the places of the old ones; then nothing is lost. Any other is converted. A file
+    whose name ends with ``.gz`` is compressed; what is promised byte for byte is what it unpacks to.
 
     path: the file; ``-`` is the standard output, and pipes and devices are written straight. Everything else is
     replaced in one step, once all is on the disk. format: as in ``read``; by default the suffix tells, or the format
@@ -157,6 +167,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     except InputError as error:
         raise FormatError(f"{shown}: {error}") from None
     pieces = {suffix: _with_memory(shown, part) for suffix, part in files.items()}
+    if is_packed(name):
+        pieces = {suffix: packed(part) for suffix, part in pieces.items()}
     if name in STANDARD_OUTPUT:
         _to_standard_output(*pieces.values())
     else:
@@ -196,7 +208,7 @@ def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
     elif stream:
         raise InputError(f"{shown}: name the format with --format ({', '.join(FORMATS)})")
     else:
-        entry = FORMATS[format_of_suffix(path, os.path.splitext(path)[1], reading=False)]
+        entry = FORMATS[format_of_suffix(path, split_name(path)[1], reading=False)]
     if stream and len(entry.suffixes) > 1:
         raise InputError(f"{shown}: {entry.title} takes several files and cannot be written to a stream")
     return entry

@@ -51,7 +51,6 @@ MENDS = {  # files that one may well have, but that are not read
     ".poly": "a .poly file is the input of Triangle: run Triangle on it and give the .node file",
     ".cgns": "CGNS is not read: convert it to .su2, .vtu or .msh",
     ".geo": "a .geo file is a geometry: mesh it with Gmsh and give the .msh file",
-    ".gz": "unpack it first",
     ".zip": "unpack it first",
 }
 
@@ -75,7 +74,6 @@ STRANGERS = {
     "an HDF5 file (CGNS, XDMF or the like)": rb"\x89HDF\r\n",
     "an Abaqus or CalculiX file": rb"\*(Heading|Node|Part)\b",
     "a zip archive": rb"PK\x03\x04",
-    "compressed with gzip": rb"\x1f\x8b",
     "a binary Medit mesh": rb"\x01\0\0\0[\x01-\x04]\0\0\0\x03\0\0\0|\0\0\0\x01\0\0\0[\x01-\x04]\0\0\0\x03",
 }
 HEAD = 4096  # bytes that are looked at
