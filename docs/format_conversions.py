@@ -19,7 +19,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 SOURCES = ("SU2", "Gmsh 2.2, text", "Gmsh 4.1, text", "VTK 4.2, text", "VTU, text", "Medit, 3D", "Triangle",
-           "STL, text", "STL, binary", "OBJ", "OFF", "PLY, text")  # fmt: skip
+           "STL, text", "STL, binary", "OBJ", "OFF", "PLY, text", "Abaqus")  # fmt: skip
 MEMORY = "memory"
 SILENT = "**silent**"
 

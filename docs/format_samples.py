@@ -100,7 +100,7 @@ class Sample:
     def end(self) -> str:
         return "\r\n" if self.has("line ends") else "\n"
 
-    def row(self, *parts: tuple[str, Iterable[object]], end: str | None = None) -> None:
+    def row(self, *parts: tuple[str, Iterable[object]], end: str | None = None, comma: str = "") -> None:
         """Numbers with their types as ``struct`` calls them."""
         if self.order:
             for code, values in parts:
@@ -109,7 +109,9 @@ class Sample:
         else:
             gap = " \t " if self.has("blanks") else " "
             tokens = [str(value) for _, values in parts for value in values]
-            self.bytes += (gap * self.has("blanks") + gap.join(tokens) + (self.end if end is None else end)).encode()
+            self.bytes += (
+                gap * self.has("blanks") + (comma + gap).join(tokens) + (self.end if end is None else end)
+            ).encode()
             self.bytes += self.end.encode() * (self.has("blanks") and end is None)
 
     def close(self, text: str = "") -> None:
@@ -376,6 +378,33 @@ def ply(out: Sample) -> Files:
     return {".ply": bytes(out.bytes)}
 
 
+ABAQUS = {"triangle": "CPS3", "quad": "CPS4", "triangle6": "CPS6", "tetra": "C3D4", "hexahedron": "C3D8",
+          "line": "T2D2"}  # fmt: skip
+
+
+def abaqus(out: Sample) -> Files:
+    out.line("** made by hand", out.has("comments"))
+    out.line("*NODE")
+    for k in range(len(out.points)):
+        out.row(("i", [out.tags[k]]), ("d", out.space(k)), comma=",")
+    group, names = None, out.names()
+    for cell in [cell for cell in out.cells if cell.kind in ABAQUS]:
+        dim = DIMENSION.get(cell.kind, 2)
+        told = out.has("regions") if dim > 1 else out.has("markers")
+        if (key := (cell.kind, cell.region if told else 0)) != group:
+            label = names.get((dim, cell.region), f"set{cell.region}").replace(" ", "_")
+            out.line(f"*ELEMENT, TYPE={ABAQUS[cell.kind]}" + f", ELSET={label}" * told)
+            group = key
+        out.row(("i", [cell.number, *(out.tags[k] for k in cell.nodes)]), comma=",")
+    if vertices := out.of("vertex"):
+        out.line("*BOUNDARY")
+        for cell in vertices:
+            out.row(("i", [out.tags[cell.nodes[0]], 1]), comma=",")
+    for text in ("*MATERIAL, NAME=steel", "*ELASTIC", "2e5, 0.3") if out.has("more") else ():
+        out.line(text)
+    return {".inp": bytes(out.bytes)}
+
+
 VTK = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "triangle6": 22}
 
 
@@ -570,6 +599,7 @@ VARIANTS = [
     Variant("stl", "STL, binary", stl_binary, "<", True),
     Variant("obj", "OBJ", obj),
     Variant("off", "OFF", off),
+    Variant("abaqus", "Abaqus", abaqus),
     *(Variant("ply", f"PLY, {how}{', single' * single}", ply, order, single)
       for how, order in (("text", ""), (_LITTLE, "<"), (_BIG, ">")) for single in (False, True)),
 ]  # fmt: skip

@@ -131,4 +131,4 @@ def moved(mesh: Mesh, random: np.random.Generator) -> np.ndarray:
     new[some] = random.normal(size=(int(some.sum()), new.shape[1])).astype(kind)
     extremes = np.array([np.finfo(kind).max, -np.finfo(kind).smallest_subnormal, kind(1) / kind(3)], dtype=kind)
     new[np.argmax(some), random.integers(new.shape[1])] = random.choice(extremes)
-    return new
+    return new if mesh.rounding is None else mesh.rounding.kept(mesh.points, new)

@@ -8,6 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.atomic import reason, refuse_folder, replace_files
 from gmsnet.io.cells import sealed
@@ -27,9 +30,8 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     """The mesh in a file; ``mesh.source`` keeps the file, so that ``write`` can put new coordinates into it.
 
     path: the file; ``-`` is the standard input. Of Triangle's pair either file may be named. A file whose name ends
-    with ``.gz`` is unpacked. format: a name of the
-    table of formats (su2, gmsh, vtk, vtu, medit, triangle, stl, obj, off, ply); by default the suffix tells, or the
-    contents where there is none to tell (standard input, pipes).
+    with ``.gz`` is unpacked. format: a name of the table of formats (``gmsnet.io.FORMATS``: su2, gmsh, vtk, …); by
+    default the suffix tells, or the contents where there is none to tell (standard input, pipes).
 
     Raises InputError where the file cannot be opened or is no regular file, where others change it while it is read,
     or where the format is unknown; FormatError (naming the line) where it is damaged or not of that format.
@@ -125,12 +127,15 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamp
         parsed.point_data,
         parsed.cell_data,
         parsed.single,
+        node_sets=parsed.node_sets,
+        rounding=parsed.rounding,
     )
     main = entry.suffixes[0]
     companions = {suffix: data for suffix, data in files.items() if suffix != main}
     source = FileSource(
         entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions,
         mesh.region_names, mesh.point_data, mesh.cell_data, tuple(parsed.unread), stamps, parsed.matched,
+        mesh.node_sets,
     )  # fmt: skip
     return replace(mesh, source=source)
 
@@ -158,7 +163,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     lost: list[str] = []
     try:
         if isinstance(source, FileSource) and source.format == entry.key and source.fits(mesh):
-            files = source.splice(mesh.points)
+            points, lost = _as_kept(mesh, source)
+            files = source.splice(points)
         else:
             written = entry.load().write(mesh)
             files, lost = dict(written.files), [*written.lost, *_unread(source)]
@@ -176,6 +182,18 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
         several = len(files) > 1
         replace_files({_beside(name, suffix) if several else name: part for suffix, part in pieces.items()}, stamps)
     return lost
+
+
+def _as_kept(mesh: Mesh, source: FileSource) -> tuple[NDArray[np.float64], list[str]]:
+    """The points as the file that was read can keep them; and, in words, by how much they differ, if they do.
+
+    What ``smooth`` returns is so already.
+    """
+    if mesh.rounding is None:
+        return mesh.points, []
+    points = mesh.rounding.kept(source.points, mesh.points)
+    most = float(np.abs(points - mesh.points).max(initial=0.0))
+    return points, [f"coordinates were rounded to {mesh.rounding.words}, by at most {most:.2g}"] * (most > 0.0)
 
 
 def _unread(source: Source | None) -> Iterator[str]:

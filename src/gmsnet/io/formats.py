@@ -42,6 +42,7 @@ FORMATS = {
         Entry("obj", "OBJ", (".obj",)),
         Entry("off", "OFF", (".off",)),
         Entry("ply", "PLY", (".ply",)),
+        Entry("abaqus", "Abaqus", (".inp",)),
     )
 }
 BY_SUFFIX = {suffix: key for key, entry in FORMATS.items() for suffix in entry.suffixes}
@@ -56,6 +57,7 @@ MENDS = {  # files that one may well have, but that are not read
 
 # What files begin with, comments (a pattern that is taken out first) and white space aside.
 NONE, HASH, PERCENT, XML = rb"(?!)", rb"#[^\r\n]*", rb"%[^\r\n]*", rb"(?s)<\?.*?\?>|<!--.*?-->"
+STARS = rb"\*\*[^\r\n]*"
 SIGNS = {
     "gmsh": (NONE, rb"\$(MeshFormat|Comments|NOD|Nodes|PhysicalNames)\b"),
     "vtk": (NONE, rb"#\s*vtk DataFile Version"),
@@ -65,6 +67,7 @@ SIGNS = {
     "medit": (HASH, rb"MeshVersionFormatted\b"),
     "off": (HASH, rb"(ST)?C?N?4?n?OFF\b"),
     "su2": (PERCENT, rb"(NDIME|NZONE|NELEM|NPOIN|NMARK|IZONE|NCHUNK|AOA|FFD_NBOX)\s*="),
+    "abaqus": (STARS, rb"\*[ \t]*[A-Za-z][A-Za-z \t]*(,|[\r\n])"),
     "obj": (HASH, rb"((mtllib|o|g|usemtl|s)[ \t]+\S+[ \t]*[\r\n]\s*)*v[nt]?[ \t]+[-+.\deE]+[ \t]+[-+.\d]"),
 }
 # Known by sight, but not read.
@@ -72,7 +75,6 @@ STRANGERS = {
     "an MFEM mesh": rb"MFEM (NC )?mesh v",
     "a VTK file of another kind (not an UnstructuredGrid)": rb"(<\?xml[^>]*>\s*)?<VTKFile\b",
     "an HDF5 file (CGNS, XDMF or the like)": rb"\x89HDF\r\n",
-    "an Abaqus or CalculiX file": rb"\*(Heading|Node|Part)\b",
     "a zip archive": rb"PK\x03\x04",
     "a binary Medit mesh": rb"\x01\0\0\0[\x01-\x04]\0\0\0\x03\0\0\0|\0\0\0\x01\0\0\0[\x01-\x04]\0\0\0\x03",
 }
