@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from gmsnet.io.nastran_numbers import fitted
+
 Row = Sequence[str]  # the decimals of a point
 Files = dict[str, bytes]  # suffix → bytes
 
@@ -405,6 +407,42 @@ def abaqus(out: Sample) -> Files:
     return {".inp": bytes(out.bytes)}
 
 
+NASTRAN = {"triangle": "CTRIA3", "quad": "CQUAD4", "triangle6": "CTRIA6", "tetra": "CTETRA", "hexahedron": "CHEXA",
+           "line": "CROD"}  # fmt: skip
+
+
+def _real(word: str, width: int) -> str:
+    """A number with a point, as Nastran wants it; one that is not of this file, as gmsnet writes it."""
+    given = {text for texts in (POINTS, *OTHERS.values()) for point in texts for text in point.split()} | {"5.0"}
+    if word not in given:
+        return fitted(float(word), width)
+    return word if "." in word or "e" in word else f"{word}."
+
+
+def nastran(out: Sample, large: bool = False) -> Files:
+    """Fields of 8 or of 16 columns."""
+    out.line("$ a comment", out.has("comments"))
+    out.line("BEGIN BULK")
+    out.line("MAT1           1    2.+5              .3", out.has("more"))
+    for k in range(len(out.points)):
+        x, y, z = (_real(word, 16 if large else 8) for word in out.space(k))
+        if large:
+            out.line(f"GRID*   {out.tags[k]:>16}{'':16}{x:>16}{y:>16}")
+            out.line(f"*       {z:>16}")
+        else:
+            out.line(f"GRID    {out.tags[k]:>8}{'':8}{x:>8}{y:>8}{z:>8}")
+    for cell in [cell for cell in out.cells if cell.kind in NASTRAN]:
+        told = out.has("regions") or out.has("markers")
+        words = [cell.number, cell.region if told else 1, *(out.tags[k] for k in cell.nodes)]
+        for k in range(0, len(words), 8):
+            name = "+" if k else NASTRAN[cell.kind]
+            out.line(f"{name:<8}" + "".join(f"{word:>8}" for word in words[k : k + 8]))
+    for cell in out.of("vertex"):
+        out.line(f"FORCE          1{out.tags[cell.nodes[0]]:>8}       0      1.      1.")
+    out.line("ENDDATA")
+    return {".bdf": bytes(out.bytes)}
+
+
 VTK = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "triangle6": 22}
 
 
@@ -600,6 +638,8 @@ VARIANTS = [
     Variant("obj", "OBJ", obj),
     Variant("off", "OFF", off),
     Variant("abaqus", "Abaqus", abaqus),
+    Variant("nastran", "Nastran, 8 columns", nastran),
+    Variant("nastran", "Nastran, 16 columns", partial(nastran, large=True)),
     *(Variant("ply", f"PLY, {how}{', single' * single}", ply, order, single)
       for how, order in (("text", ""), (_LITTLE, "<"), (_BIG, ">")) for single in (False, True)),
 ]  # fmt: skip

@@ -143,7 +143,7 @@ What the names of facts mean that do not say it themselves:
   cell.
 - *more*: what is not about the mesh. SU2: `AOA`, a box of free-form deformation; Gmsh: `$Periodic`; VTK, VTU: a field
   of the whole grid; Medit: ridges; OBJ: normals, a library of materials; PLY: another element;
-  Abaqus: a material.
+  Abaqus, Nastran: a material.
 - *point data*, *cell data* of OBJ and OFF: colours; of binary STL: attributes. *comments* of VTK: the title.
 - *markers*: lines in two groups. *curved*: triangles of six nodes. *other plane*: z = 5.
   *tetrahedra*: beside the faces; these are marks then.

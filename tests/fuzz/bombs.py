@@ -51,6 +51,7 @@ def bombs() -> Iterator[tuple[str, str, bytes, str]]:
     yield from _texts()
     yield from _vtu()
     yield from _abaqus()
+    yield from _nastran()
 
 
 def _large_cells() -> Iterator[tuple[str, str, bytes, str]]:
@@ -118,6 +119,27 @@ def _abaqus() -> Iterator[tuple[str, str, bytes, str]]:
     )
     yield "abaqus", "sets of sets", deck + sets, READS
     yield "abaqus", "an element of many nodes", deck + b"*ELEMENT,TYPE=U1\n2," + b"1," * MANY + b"1\n", READS
+
+
+def _nastran() -> Iterator[tuple[str, str, bytes, str]]:
+    grids = b"".join(b"GRID,%d,,%d.,0.,0.\n" % (k, k) for k in range(1, 20_001))
+    deck = grids + b"CTRIA3,1,1,1,2,3\n"
+    yield (
+        "nastran",
+        "cards of many names",
+        deck + b"".join(b"X%d,1\n" % k for k in range(100_000)),
+        "more than 10000 names",
+    )
+    yield (
+        "nastran",
+        "a card of many lines",
+        deck + b"RBE2,1,1,123\n" + b"+,1,2,3\n" * (MANY // 5),
+        "goes on in more than 10000",
+    )
+    yield "nastran", "ranges of all", deck + b"SPC1,1,1,1,THRU,20000\n" * 100_000, "more than 1000 SPC1 with THRU"
+    yield "nastran", "a long field", deck + b"CTRIA3,2,1,1,2," + b"3" * MANY + b"\n", "a field has 1000000 characters"
+    yield "nastran", "commas", deck + b"CTRIA3,2,1,1,2,3" + b"," * 5 * MANY + b"\n", READS
+    yield "nastran", "blanks", b" " * 5 * MANY + b"\n" + deck, READS
 
 
 def _vtu() -> Iterator[tuple[str, str, bytes, str]]:

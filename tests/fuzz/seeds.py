@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "io"))  # the tests of the re
 import test_abaqus
 import test_gmsh_partitions
 import test_medit
+import test_nastran
 import test_obj
 import test_off
 import test_ply
@@ -127,6 +128,25 @@ BEAM, 3, 4
 *BOUNDARY
 some, 1, 3
 """
+NASTRAN = b"""GRID    1               0.      0.      0.
+GRID    2               1.      0.      0.
+GRID    3               0.      1.      0.
+GRID    4               0.      0.      1.
+GRID*   5                               5.-1            .5+0            *A
+*A      0.
+CTETRA  1       1       1       2       3       4       5       5       +B
++B      5       5       5       5
+CQUAD8,2,1,1,2,3,4,5,,+
++,5,5
+CTRIAX6 3       1       1       5       2       5       3       5
+PSOLID,1,1
+SPC1,1,123,1,thru,3
+SPC1,1,123,4
+SPC     1       1       3       0.      2       3       0.
+RBE3    9               5       123     1.      123     1       2       +C
++C      3
+CWELD   7       1       1       5       2
+"""
 ONE_CELL = b"\nCELLS 1 2\n" + bytes([0, 0, 0, 1, 0, 0, 0, 0]) + b"\nCELL_TYPES 1\n" + bytes([0, 0, 0, 1])
 VTK_STRINGS = b"FIELD data 2\nnames 1 2 string\n\xc3abc\x80\x02de\nbits 1 9 bit\n\xaa\x80\n"
 ENTITIES = '<FieldData><Array type="String" Name="who" format="ascii">65 0</Array></FieldData>'
@@ -176,6 +196,7 @@ def seeds() -> Iterator[tuple[str, bytes]]:
     for single in (False, True):
         yield from (("vtu", data) for _, data in vtu_variants(grid_of(mixed_mesh(1), single)))
     yield from (("abaqus", data) for data in (test_abaqus.PLAIN, test_abaqus.PARTS, ABAQUS))
+    yield from (("nastran", data) for data in (test_nastran.PLAIN, NASTRAN))
     yield from _written()
 
 

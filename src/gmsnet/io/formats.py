@@ -17,12 +17,13 @@ class Entry:
     """A format in the table.
 
     key: the name that ``--format`` takes. title: what messages call it. suffixes: lower case, the first is that of the
-    file with the coordinates.
+    file with the coordinates. aliases: other suffixes of that file.
     """
 
     key: str
     title: str
     suffixes: tuple[str, ...]
+    aliases: tuple[str, ...] = ()
 
     def load(self) -> Format:
         """The module that reads and writes the format, imported on first use."""
@@ -43,9 +44,10 @@ FORMATS = {
         Entry("off", "OFF", (".off",)),
         Entry("ply", "PLY", (".ply",)),
         Entry("abaqus", "Abaqus", (".inp",)),
+        Entry("nastran", "Nastran", (".bdf",), (".nas", ".fem", ".dat")),
     )
 }
-BY_SUFFIX = {suffix: key for key, entry in FORMATS.items() for suffix in entry.suffixes}
+BY_SUFFIX = {suffix: key for key, entry in FORMATS.items() for suffix in (*entry.suffixes, *entry.aliases)}
 
 MENDS = {  # files that one may well have, but that are not read
     ".meshb": "binary Medit is not read: convert it to text (.mesh)",
@@ -57,7 +59,7 @@ MENDS = {  # files that one may well have, but that are not read
 
 # What files begin with, comments (a pattern that is taken out first) and white space aside.
 NONE, HASH, PERCENT, XML = rb"(?!)", rb"#[^\r\n]*", rb"%[^\r\n]*", rb"(?s)<\?.*?\?>|<!--.*?-->"
-STARS = rb"\*\*[^\r\n]*"
+STARS, DOLLAR = rb"\*\*[^\r\n]*", rb"\$[^\r\n]*"
 SIGNS = {
     "gmsh": (NONE, rb"\$(MeshFormat|Comments|NOD|Nodes|PhysicalNames)\b"),
     "vtk": (NONE, rb"#\s*vtk DataFile Version"),
@@ -68,6 +70,11 @@ SIGNS = {
     "off": (HASH, rb"(ST)?C?N?4?n?OFF\b"),
     "su2": (PERCENT, rb"(NDIME|NZONE|NELEM|NPOIN|NMARK|IZONE|NCHUNK|AOA|FFD_NBOX)\s*="),
     "abaqus": (STARS, rb"\*[ \t]*[A-Za-z][A-Za-z \t]*(,|[\r\n])"),
+    "nastran": (
+        DOLLAR,
+        rb"(?i)(NASTRAN|SOL|ID|INIT|ASSIGN)[ \t]+\w|CEND\b|BEGIN[ \t]+BULK\b"
+        rb"|(GRID|CTRIA\w|CQUAD\w|CTETRA|CHEXA|CPENTA|CPYRAM?|PSHELL|PSOLID|MAT1|PARAM)[ \t,*]",
+    ),
     "obj": (HASH, rb"((mtllib|o|g|usemtl|s)[ \t]+\S+[ \t]*[\r\n]\s*)*v[nt]?[ \t]+[-+.\deE]+[ \t]+[-+.\d]"),
 }
 # Known by sight, but not read.
@@ -84,7 +91,7 @@ MAY_BE_BINARY = ("gmsh", "vtk", "vtu", "stl", "ply")
 
 def known() -> str:
     """The suffixes that are read and written, in words."""
-    return ", ".join(suffix for entry in FORMATS.values() for suffix in entry.suffixes)
+    return ", ".join(BY_SUFFIX)
 
 
 def entry_of(key: str) -> Entry:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.star.guard3 import COARSE3
 from gmsnet.kernels.star.space import (
     AFTER,
     GX,
@@ -90,7 +91,7 @@ def settle3(workspace, unit, grain, last):
     """Which lanes may go as they are: certified, and F falls. Returns how many may not; their steps are halved.
 
     last: there is no further trial. Steps by which F does not fall become zero; what is not certified may be so in
-    float64.
+    float64. That alone can tell where coordinates are known less well than in float32.
     """
     certify3(workspace, unit, grain)
     sums, step, refused = workspace.sums, workspace.step, 0
@@ -102,8 +103,9 @@ def settle3(workspace, unit, grain, last):
         still = step[lane] == 0.0 and step[LANES3 + lane] == 0.0 and step[2 * LANES3 + lane] == 0.0
         allowed = workspace.allowed[lane] and falls
         workspace.allowed[lane] = allowed
-        refused += not (allowed or still)
-        factor = np.float32(1.0) if allowed or (last and falls) else np.float32(0.0 if last else 0.5)
+        kept = allowed or (falls and (last or grain > COARSE3 * workspace.size[lane]))
+        refused += not (kept or still)
+        factor = np.float32(1.0) if kept else np.float32(0.0 if last else 0.5)
         for k in range(3):
             step[k * LANES3 + lane] *= factor
     return refused
