@@ -103,7 +103,6 @@ def test_a_named_marker_can_be_held(cube, free):
     [
         ({"target_quality": 0.3}, "a target cannot be asked of volumes yet: leave out target_quality and target_angle"),
         ({"target_angle": 10}, "a target cannot be asked of volumes yet"),
-        ({"slide": True}, "boundary nodes of volumes cannot slide yet: leave out slide"),
         ({"preserve": "size"}, r"and this mesh has [\d,]+ tetrahedra: choose auto, "),
         ({"method": "getme"}, r"getme moves cells in a plane alone, and this mesh has [\d,]+ tetrahedra"),
         ({"method": "gmsnet"}, "gmsnet moves triangles alone"),

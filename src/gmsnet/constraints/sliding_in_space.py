@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from gmsnet.constraints.facets import Facets, boundary_of
 from gmsnet.constraints.features import may_slide
 from gmsnet.constraints.on_surface import surface_of
-from gmsnet.constraints.options import FEATURE_ANGLE, check_slide
+from gmsnet.constraints.options import FEATURE_ANGLE
 from gmsnet.constraints.outline import Flags
 from gmsnet.constraints.patches import Patches, patches_of
 from gmsnet.kernels.star.surface import Surface
@@ -42,7 +43,8 @@ class SurfaceSliding:
         nodes = np.zeros(len(points), dtype=bool)
         nodes[free] = True
         nodes &= patches.slides | patches.curves.slides
-        return cls(facets, patches, points, nodes, surface_of(patches, points, memory, mesh.single))
+        constraint = surface_of(patches, points, memory, mesh.single) if nodes.any() else None
+        return cls(facets, patches, points, nodes, constraint)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:
         """What to say of it. mesh: as it has become. moved: (N,) bool."""
@@ -65,15 +67,15 @@ def enclosed(points: Floats, facets: Facets) -> float:
 
 
 def patches_to_slide_on(
-    mesh: Mesh, wound: Wound, slide: object, feature_angle: float = FEATURE_ANGLE, held: Flags | None = None
-) -> tuple[Facets, Patches] | None:
-    """The boundary of a mesh of tetrahedra and its patches; None where no node is to slide. held: (N,) bool.
+    mesh: Mesh, wound: Wound, names: Sequence[str] | None, feature_angle: float = FEATURE_ANGLE,
+    held: Flags | None = None,
+) -> tuple[Facets, Patches] | None:  # fmt: skip
+    """The boundary of a mesh of tetrahedra and its patches; None where no node is to slide.
 
-    Raises InputError as ``check_slide``.
+    names: as ``check_slide`` gives them. held: (N,) bool.
     """
-    if slide is None or slide is False:
+    if names == ():
         return None
-    names = check_slide(mesh, slide, feature_angle)
     facets = boundary_of(mesh, wound)
     points = space_points(mesh)[:, :3].copy()
     return facets, patches_of(facets, points, feature_angle, mesh.single, may_slide(mesh, names, held))

@@ -132,9 +132,9 @@ def _first_of_volume(
     options: SmoothOptions, executor: Executor,
 ) -> State:  # fmt: skip
     """The same of a mesh of tetrahedra."""
-    check_slide(given, options.slide, options.feature_angle, options.geometry)
+    names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     wound, sliding = Wound.of(given, asked), None
-    surface = patches_to_slide_on(given, wound, options.slide, options.feature_angle, asked)
+    surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked)
     if surface is None:
         topology = Volume.made(wound)
     else:
