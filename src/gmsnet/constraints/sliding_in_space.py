@@ -14,6 +14,7 @@ from gmsnet.constraints.on_surface import surface_of
 from gmsnet.constraints.options import FEATURE_ANGLE
 from gmsnet.constraints.outline import Flags
 from gmsnet.constraints.patches import Patches, patches_of
+from gmsnet.kernels.star.off_surface import farthest
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import space_points
@@ -25,14 +26,17 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSliding:
-    """facets, patches: of the boundary. start: (N, 3) points of the input by ids. nodes: (N,) bool, those that slide.
+    """facets, patches: of the boundary. start: (N, 3) points of the input by ids, over 2 to the power of ``exponent``.
 
-    constraint: for the kernels; None where no node slides.
+    memory: (N,) ids in memory order. nodes: (N,) bool by ids, those that slide. constraint: for the kernels; None where
+    no node slides.
     """
 
     facets: Facets
     patches: Patches
     start: Floats
+    exponent: int
+    memory: Ints
     nodes: Flags
     constraint: Surface | None
 
@@ -44,18 +48,19 @@ class SurfaceSliding:
         nodes[free] = True
         nodes &= patches.slides | patches.curves.slides
         constraint = surface_of(patches, points, memory, mesh.single) if nodes.any() else None
-        return cls(facets, patches, points, nodes, constraint)
+        return cls(facets, patches, points, mesh.exponent, memory, nodes, constraint)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:
         """What to say of it. mesh: as it has become. moved: (N,) bool."""
-        count = int(self.nodes.sum())
-        if not count:
+        if self.constraint is None:
             return "slide: no node of the boundary can move along it"
-        before, after = (enclosed(points, self.facets) for points in (self.start, space_points(mesh)[:, :3]))
+        points = np.ldexp(mesh.points, -self.exponent)  # its own exponent may differ
+        before, after = enclosed(self.start, self.facets), enclosed(points, self.facets)
         change = abs(after - before) / abs(before) if before else 0.0
-        slid = int((self.nodes & moved).sum())
+        away = farthest(self.constraint, points[self.memory], moved[self.memory])
         return (
-            f"slide: {slid:,} of {count:,} nodes have moved along the boundary; "
+            f"slide: {int((self.nodes & moved).sum()):,} of {int(self.nodes.sum()):,} nodes have moved along the "
+            f"boundary, at most {away:.2g} of an edge from the input's facets; "
             f"the volume changes by {change:.2g} of itself"
         )
 
