@@ -11,6 +11,9 @@ from scipy.spatial import ConvexHull
 from gmsnet.constraints.facets import Facets
 from gmsnet.constraints.on_surface import surface_of
 from gmsnet.constraints.patches import patches_of
+from gmsnet.constraints.sliding_in_space import SurfaceSliding, patches_to_slide_on
+from gmsnet.topology.volume import Volume
+from gmsnet.topology.wound import Wound
 from support import volumes
 
 
@@ -103,6 +106,14 @@ def ell(at):
 def boundary(cells):
     """(F, 3) facets of one cell."""
     return np.array([facet for facet, seen in volumes.facets_of(cells).items() if len(seen) == 1])
+
+
+def sliding(mesh, angle=30.0, fixed=None):
+    """(topology, SurfaceSliding) of a mesh of tetrahedra, as a call has them."""
+    wound = Wound.of(mesh, fixed)
+    facets, found = patches_to_slide_on(mesh, wound, None, angle, fixed)
+    topology = Volume.made(wound, found.slides | found.curves.slides)
+    return topology, SurfaceSliding.of(mesh, facets, found, topology.memory, topology.free)
 
 
 class Twin:
