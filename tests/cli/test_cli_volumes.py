@@ -141,6 +141,7 @@ def test_quality_of_a_file_with_inverted_cells(run, tmp_path):
     ("options", "words"),
     [
         (["--target-quality", "0.3"], "a target cannot be asked of volumes yet"),
+        (["--slide", "hul"], "there is no marker 'hul' to slide on"),
         (["--method", "getme"], "getme moves cells in a plane alone"),
         (["--preserve", "size"], "tetrahedra: choose auto"),
     ],

@@ -70,7 +70,7 @@ def first_state(
     sliding = None
     if curves is not None:
         sliding = Sliding.of(given, curves, topology.memory, topology.free, options.geometry)
-    remarks += held_anyway(asked, topology, fixed)
+    remarks += held_anyway(asked, topology, fixed, options.slides)
     second = second_order_of(given, topology, options)
     if options.adapts and second is not None:
         raise InputError("a metric for second-order cells cannot be had so far: leave out metric, size and preserve")
@@ -117,9 +117,9 @@ def first_state(
     )
 
 
-def held_anyway(asked: NDArray[np.bool_], topology: Topology | Volume, fixed: Any) -> list[str]:
-    """Says so where all nodes that are to be held are held for other reasons."""
-    if not asked.any() or REASONS[CHOSEN] in topology.held:
+def held_anyway(asked: NDArray[np.bool_], topology: Topology | Volume, fixed: Any, slides: bool) -> list[str]:
+    """Says so where all nodes that are to be held are held for other reasons. slides: else some might slide."""
+    if slides or not asked.any() or REASONS[CHOSEN] in topology.held:
         return []
     count = np.count_nonzero(asked)
     named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
@@ -132,15 +132,15 @@ def _first_of_volume(
     options: SmoothOptions, executor: Executor,
 ) -> State:  # fmt: skip
     """The same of a mesh of tetrahedra."""
-    check_slide(given, options.slide, options.feature_angle, options.geometry)
+    names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     wound, sliding = Wound.of(given, asked), None
-    surface = patches_to_slide_on(given, wound, options.slide, options.feature_angle, asked)
+    surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked)
     if surface is None:
         topology = Volume.made(wound)
     else:
         topology = Volume.made(wound, surface[1].slides | surface[1].curves.slides)
         sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free)
-    remarks = held_anyway(asked, topology, fixed)
+    remarks = held_anyway(asked, topology, fixed, options.slides)
     if others := unmeasured(given):
         remarks.append(f"not measured, and their nodes are held: {others}")
     given = given.without_cells()

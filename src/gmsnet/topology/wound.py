@@ -69,14 +69,25 @@ class Wound:
     @cached_property
     def outer(self) -> NDArray[np.int64]:
         """(F,) the facets of one cell alone, 4t + k (kernels.topology.facets)."""
-        return np.flatnonzero(_matched(self.rows, len(self.marks)) == facets.ALONE)
+        at_boundary = self.marks & np.uint16(connectivity.BOUNDARY) != 0
+        near = np.flatnonzero(at_boundary[self.rows].sum(axis=1) >= 3)  # few: the others have none of these facets
+        part = self.rows[near]
+        alone = np.flatnonzero(_matched(part, len(self.marks)) == facets.ALONE)
+        alone = alone[at_boundary[self._corners(part, alone)].all(axis=1)]  # others have a cell that is not near
+        found: NDArray[np.int64] = 4 * near[alone >> 2] + (alone & 3)
+        return found
 
     @cached_property
     def boundary(self) -> Ints:
         """(F, 3) the nodes of these facets, counter-clockwise as seen from outside."""
-        cell, k = self.outer >> 2, self.outer & 3
-        corners: Ints = np.take_along_axis(self.rows[cell], facets.OPPOSITE[k], axis=1)
-        return np.where(self.orientation[cell, None] > 0, corners, corners[:, [0, 2, 1]])
+        corners = self._corners(self.rows, self.outer)
+        return np.where(self.orientation[self.outer >> 2, None] > 0, corners, corners[:, [0, 2, 1]])
+
+    @staticmethod
+    def _corners(rows: Ints, chosen: NDArray[np.int64]) -> Ints:
+        """(K, 3) the nodes of some facets 4t + k of rows."""
+        corners: Ints = np.take_along_axis(rows[chosen >> 2], facets.OPPOSITE[chosen & 3], axis=1)
+        return corners
 
 
 def refuse_flat(mesh: Mesh) -> None:

@@ -8,9 +8,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import part
+from gmsnet.kernels.jit.compile import inlined, part
 from gmsnet.kernels.star.space import GX, GY, GZ, ISO, LANES3, XX, XY, XZ, YY, YZ, ZZ
 from gmsnet.kernels.star.surface import directions_at, on_curves, snap3
+
+
+@inlined
+def find_rows(row, centre, block, rows):
+    """Writes the rows of the nodes of a block; returns whether one of them slides: few blocks have such nodes."""
+    found = False
+    for lane in range(LANES3):
+        rows[lane] = row[centre[block * LANES3 + lane]]
+        found |= rows[lane] >= 0
+    return found
 
 
 @part
@@ -19,14 +29,12 @@ def restrict3(surface, blocks, block, isotropic, workspace):
 
     With the normal n, H becomes PHP + (nᵀHn)nnᵀ, P = I − nnᵀ; with the tangent t, (tᵀHt)I. isotropic: of ISO.
     """
-    if surface is not None:
-        sums, half = workspace.sums, np.float32(0.5)
+    if surface is not None and find_rows(surface.row, blocks.centre, block, workspace.row):
+        sums, star, half = workspace.sums, workspace.star, np.float32(0.5)
         for lane in range(LANES3):
-            i = blocks.centre[block * LANES3 + lane]
-            row = surface.row[i]
+            row = workspace.row[lane]
             if row < 0:
                 continue
-            star = workspace.star
             u, v, w = directions_at(surface, row, star[4 * lane], star[4 * lane + 1], star[4 * lane + 2])
             u, v, w = np.float32(u), np.float32(v), np.float32(w)
             iso = np.float32(isotropic) * sums[ISO * LANES3 + lane]
@@ -58,11 +66,10 @@ def restrict3(surface, blocks, block, isotropic, workspace):
 @part
 def land3(surface, blocks, block, workspace):
     """Turns steps of nodes that slide into those to their places, which are kept in ``target`` and ``place``."""
-    if surface is not None:
+    if surface is not None and find_rows(surface.row, blocks.centre, block, workspace.row):
         star, step = workspace.star, workspace.step
         for lane in range(LANES3):
-            i = blocks.centre[block * LANES3 + lane]
-            row = surface.row[i]
+            row = workspace.row[lane]
             if row < 0:
                 continue
             inverse = np.float64(workspace.inverse[lane])
@@ -78,14 +85,12 @@ def land3(surface, blocks, block, workspace):
 
 
 @part
-def landed3(surface, node, workspace, lane, x, y, z):
-    """Where the node of a lane goes by a step that was judged: as ``land3`` found it, if it slides. Notes it."""
+def note_places(surface, workspace):
+    """Takes note of where nodes that slide will be, as ``land3`` found it, in the lanes that are allowed to move."""
     if surface is not None:
-        row = surface.row[node]
-        if row >= 0:
-            surface.place[row] = workspace.place[lane]
-            return workspace.target[4 * lane], workspace.target[4 * lane + 1], workspace.target[4 * lane + 2]
-    return x, y, z
+        for lane in range(LANES3):
+            if workspace.row[lane] >= 0 and workspace.allowed[lane]:
+                surface.place[workspace.row[lane]] = workspace.place[lane]
 
 
 @part
