@@ -79,15 +79,17 @@ def curves_of(
     Raises InputError for a mesh that is not planar, unknown markers and angles out of range.
     """
     names = check_slide(mesh, slide, feature_angle)
-    outline = outline_of(mesh)
-    points = planar_points(mesh)
-    parts, closed = _split(*_chains(outline, points, feature_angle), points, mesh.single)
-    may = _may_slide(mesh, names, held)
-    return _curves(parts, closed, outline, points, may, mesh.single)
+    return curves_along(outline_of(mesh), planar_points(mesh), mesh.single, feature_angle, may_slide(mesh, names, held))
 
 
-def _may_slide(mesh: Mesh, names: Sequence[str] | None, held: Flags | None) -> Flags:
-    """(N,) bool: not held, of the named markers, and of no cell that is not smoothed."""
+def curves_along(outline: Outline, points: Floats, single: bool, feature_angle: float, may: Flags) -> Curves:
+    """The curves of an outline. points: (N, 2), or (N, 3) in space. may: (N,) bool, which nodes may slide."""
+    parts, closed = _split(*_chains(outline, points, feature_angle), points, single)
+    return _curves(parts, closed, outline, points, may, single)
+
+
+def may_slide(mesh: Mesh, names: Sequence[str] | None, held: Flags | None) -> Flags:
+    """(N,) bool: not held, of the named markers, and in a plane of no cell that is not smoothed."""
     if names is None:
         may = np.ones(len(mesh.points), dtype=bool)
     else:
@@ -97,9 +99,10 @@ def _may_slide(mesh: Mesh, names: Sequence[str] | None, held: Flags | None) -> F
             may[markers[name]] = True
     if held is not None:
         may &= ~held
-    for block in mesh.cells:
-        if block.dimension not in (0, 1) and block.kind not in SMOOTHED:
-            may[block.nodes] = False
+    if not mesh.has_volumes:
+        for block in mesh.cells:
+            if block.dimension not in (0, 1) and block.kind not in SMOOTHED:
+                may[block.nodes] = False
     return may
 
 
@@ -116,7 +119,7 @@ def _chains(outline: Outline, points: Floats, feature_angle: float) -> tuple[lis
     one, two = at[start[nodes]] // 2, at[start[nodes] + 1] // 2
     back = points[edges[one].sum(axis=1) - ids[nodes]] - points[ids[nodes]]
     ahead = points[edges[two].sum(axis=1) - ids[nodes]] - points[ids[nodes]]
-    lengths = np.hypot(*back.T) * np.hypot(*ahead.T)
+    lengths = lengths_of(back) * lengths_of(ahead)
     cosine = -(back * ahead).sum(axis=1)
     least = max(math.cos(math.radians(feature_angle)), 0.0) - SLACK
     smooth = (lengths > 0.0) & (cosine >= least * lengths)
@@ -128,19 +131,32 @@ def _chains(outline: Outline, points: Floats, feature_angle: float) -> tuple[lis
     return found, closed[:count].tolist()
 
 
-def _rounding(points: Floats, single: bool) -> float:
+def rounding_of(points: Floats, single: bool) -> float:
+    """By how much nodes on a line or plane may be off it."""
     return 4.0 * (2.0**-23 if single else 2.0**-52) * float(abs(points).max(initial=0.0))
 
 
 def _on_a_line(points: Floats, rounding: float) -> bool:
     """Are points (K, 2) on the line through the first and the last one, up to COLLINEAR of the length and rounding?"""
     along = points[-1] - points[0]
-    distance = float(np.hypot(*along))
+    distance = float(lengths_of(along))
     if distance == 0.0:
         return False
-    off = points - points[0]
-    away = abs(off[:, 0] * (along[1] / distance) - off[:, 1] * (along[0] / distance)).max()
-    return bool(away <= COLLINEAR * np.hypot(*np.diff(points, axis=0).T).sum() + rounding)
+    away = _crossed(points - points[0], along / distance).max()
+    return bool(away <= COLLINEAR * lengths_of(np.diff(points, axis=0)).sum() + rounding)
+
+
+def lengths_of(vectors: Floats) -> Floats:
+    """Of vectors (…, 2) or (…, 3)."""
+    lengths: Floats = np.hypot.reduce(vectors, axis=-1)
+    return lengths
+
+
+def _crossed(one: Floats, other: Floats) -> Floats:
+    """The area between vectors (K, 2 or 3) and others, or one other."""
+    if one.shape[-1] == 2:
+        return abs(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
+    return lengths_of(np.cross(one, other))
 
 
 def _split(parts: list[Ints], closed: list[bool], points: Floats, single: bool) -> tuple[list[Ints], list[bool]]:
@@ -150,7 +166,7 @@ def _split(parts: list[Ints], closed: list[bool], points: Floats, single: bool) 
     """
     if single:
         return parts, closed
-    rounding = _rounding(points, single)
+    rounding = rounding_of(points, single)
     out, rings = list[Ints](), list[bool]()
     for nodes, ring in zip(parts, closed, strict=True):
         cuts = _run_ends(points[nodes], ring, rounding) if len(nodes) > RUN + 1 else []
@@ -174,9 +190,7 @@ def _run_ends(p: Floats, ring: bool, rounding: float) -> list[int]:
     last = len(p) - 1  # how many edges
     q = np.vstack([p[-2:-1], p]) if ring else p
     edge = np.diff(q, axis=0)
-    bend = abs(edge[:-1, 0] * edge[1:, 1] - edge[:-1, 1] * edge[1:, 0])
-    chord = np.hypot(*(edge[:-1] + edge[1:]).T)
-    length = np.hypot(*edge.T)
+    bend, chord, length = _crossed(edge[:-1], edge[1:]), lengths_of(edge[:-1] + edge[1:]), lengths_of(edge)
     flat = bend <= (COLLINEAR * (length[:-1] + length[1:]) + rounding) * chord
     if ring:  # flat[k] is of place k; begun at one that is not flat
         if flat.all():
@@ -200,7 +214,7 @@ def _curves(
     parts: list[Ints], closed: list[bool], outline: Outline, points: Floats, may: Flags, single: bool
 ) -> Curves:
     count = len(may)
-    rounding = _rounding(points, single)
+    rounding = rounding_of(points, single)
     start = np.zeros(len(parts) + 1, dtype=np.int64)
     np.cumsum([len(nodes) for nodes in parts], out=start[1:])
     curve, before, after = (np.full(count, -1, dtype=np.int32) for _ in range(3))

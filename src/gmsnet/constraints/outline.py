@@ -39,18 +39,18 @@ def outline_of(mesh: Mesh) -> Outline:
     faces, nodes = Faces.of(mesh), len(mesh.points)
     twin, head = twins(faces, nodes), heads(faces)
     halves, kinds, regions = sides(faces, twin)
-    side_keys = _keys(faces.corner[halves], head[halves], nodes)
-    lines, marks, still = _lines(mesh)
-    line_keys = _keys(lines[:, 0], lines[:, 1], nodes)
+    side_keys = edge_keys(faces.corner[halves], head[halves], nodes)
+    lines, marks, still = line_cells(mesh)
+    line_keys = edge_keys(lines[:, 0], lines[:, 1], nodes)
     on_lines = _half_edges_on(np.unique(line_keys), faces, head, nodes)
     still |= _still(mesh, faces, twin, np.union1d(halves, on_lines))
-    still[lines[~np.isin(line_keys, _keys(faces.corner[on_lines], head[on_lines], nodes))]] = True
+    still[lines[~np.isin(line_keys, edge_keys(faces.corner[on_lines], head[on_lines], nodes))]] = True
 
     keys, first = np.unique(np.concatenate([side_keys, line_keys]), return_index=True)
     about = np.zeros((len(keys), 3), dtype=np.int64)  # kind, and the two regions
     of_side = first < len(side_keys)
     about[of_side] = np.column_stack([kinds, regions])[first[of_side]]
-    rows, names = _marks(mesh, np.searchsorted(keys, line_keys), marks, len(keys))
+    rows, names = mark_sets(mesh, np.searchsorted(keys, line_keys), marks, len(keys))
     table, label = np.unique(np.column_stack([about, rows]), axis=0, return_inverse=True)
     return Outline(
         edges=np.column_stack([keys // max(nodes, 1), keys % max(nodes, 1)]),
@@ -60,7 +60,7 @@ def outline_of(mesh: Mesh) -> Outline:
     )
 
 
-def _keys(one: NDArray[np.integer], other: NDArray[np.integer], nodes: int) -> Longs:
+def edge_keys(one: NDArray[np.integer], other: NDArray[np.integer], nodes: int) -> Longs:
     """One number per edge, whichever way it is read."""
     keys: Longs = np.minimum(one, other).astype(np.int64) * nodes + np.maximum(one, other)
     return keys
@@ -101,7 +101,7 @@ def sides(faces: Faces, twin: Offsets) -> tuple[Longs, Longs, Longs]:
     return halves, kinds, regions
 
 
-def _lines(mesh: Mesh) -> tuple[Longs, Longs, Flags]:
+def line_cells(mesh: Mesh) -> tuple[Longs, Longs, Flags]:
     """The ends of line cells (L, 2), their marks (L,), and the nodes that line and vertex cells keep still (N,)."""
     still = np.zeros(len(mesh.points), dtype=bool)
     ends, marks = [np.zeros((0, 2), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
@@ -124,7 +124,7 @@ def _half_edges_on(keys: Longs, faces: Faces, head: Ints, nodes: int) -> Longs:
     ends = np.zeros(nodes, dtype=bool)
     ends[keys // nodes] = True  # few: only where the smaller end is one of them is the key asked for
     near = np.flatnonzero(ends[np.minimum(faces.corner, head)])
-    return near[np.isin(_keys(faces.corner[near], head[near], nodes), keys)]
+    return near[np.isin(edge_keys(faces.corner[near], head[near], nodes), keys)]
 
 
 def _still(mesh: Mesh, faces: Faces, twin: Offsets, halves: Longs) -> Flags:
@@ -143,17 +143,22 @@ def _still(mesh: Mesh, faces: Faces, twin: Offsets, halves: Longs) -> Flags:
     return still
 
 
-def _marks(mesh: Mesh, edge: Longs, marks: Longs, edges: int) -> tuple[Longs, list[tuple[str, ...]]]:
-    """The set of marks of each edge as a number (E,), 0 where it has none; and the names behind each number."""
-    rows = np.zeros(edges, dtype=np.int64)
+def mark_sets(
+    mesh: Mesh, owner: Longs, marks: Longs, owners: int, dimension: int = 1
+) -> tuple[Longs, list[tuple[str, ...]]]:
+    """The set of marks of each edge, or facet, as a number (E,), 0 where it has none; and the names behind each number.
+
+    owner: (L,) to which of so many owners a cell of this dimension belongs that has one of the marks (L,).
+    """
+    rows = np.zeros(owners, dtype=np.int64)
     names: list[tuple[str, ...]] = [()]
-    if not len(edge):
+    if not len(owner):
         return rows, names
-    pairs = np.unique(np.column_stack([edge, marks]), axis=0)
+    pairs = np.unique(np.column_stack([owner, marks]), axis=0)
     marked, first, count = np.unique(pairs[:, 0], return_index=True, return_counts=True)
     for size in np.unique(count).tolist():
         here = count == size
         table, which = np.unique(pairs[first[here][:, None] + np.arange(size), 1], axis=0, return_inverse=True)
         rows[marked[here]] = len(names) + which.reshape(-1)
-        names += [tuple(mesh.region_names.get((1, mark), str(mark)) for mark in row) for row in table.tolist()]
+        names += [tuple(mesh.region_names.get((dimension, mark), str(mark)) for mark in row) for row in table.tolist()]
     return rows, names

@@ -48,12 +48,12 @@ class Sliding:
         constraint = constraint_of(curves, points, memory, mesh.single, geometry, mesh.exponent)
         return cls(curves, borders_of(mesh, points), points, nodes, constraint if nodes.any() else None)
 
-    def note(self, after: NDArray[np.float64], moved: Flags) -> str:
-        """What to say of it. after: (N, 2) planar points by ids. moved: (N,) bool."""
+    def note(self, mesh: Mesh, moved: Flags) -> str:
+        """What to say of it. mesh: as it has become. moved: (N,) bool."""
         if self.constraint is None:
             return "slide: no node of a boundary, interface or marker can move along a curve"
         slid, curves = int((self.nodes & moved).sum()), len(np.unique(self.curves.curve[self.nodes]))
-        change = float(np.abs(area_changes(self.borders, self.start, after)).max(initial=0.0))
+        change = float(np.abs(area_changes(self.borders, self.start, planar_points(mesh))).max(initial=0.0))
         return (
             f"slide: {slid:,} of {int(self.nodes.sum()):,} nodes have moved along {curves:,} "
             f"curve{'s' if curves != 1 else ''}; the area of no region changes by more than {change:.2g} of itself"

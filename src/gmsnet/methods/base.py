@@ -25,6 +25,7 @@ from gmsnet.kernels.star.guard import (
 )
 from gmsnet.kernels.star.guard3 import star_floors3
 from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.surface import Surface
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.stars import Stars
@@ -49,7 +50,7 @@ class Field:
     precision: Precision
     level: int = VALID
     floor: Floor = field(default_factory=Floor)
-    constraint: Constraint | None = None
+    constraint: Constraint | Surface | None = None
 
     @property
     def planar(self) -> Topology:

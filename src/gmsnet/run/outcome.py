@@ -24,7 +24,7 @@ from gmsnet.run.result import SmoothResult
 from gmsnet.run.state import Final, State
 from gmsnet.run.untangle_stage import still_inverted
 from gmsnet.topology.held import OF_SECOND_ORDER
-from gmsnet.topology.ordering import near_points, planar_points
+from gmsnet.topology.ordering import near_points
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -102,7 +102,7 @@ def _notes(state: State) -> list[str]:
         near_walls.append(carried if state.motion else _wall_note(protection, moved=state.released))
     slid = []
     if state.sliding is not None and state.final is not None:
-        slid.append(state.sliding.note(planar_points(state.mesh.with_points(state.final.points)), state.final.moved))
+        slid.append(state.sliding.note(state.mesh.with_points(state.final.points), state.final.moved))
     given = state.second_order
     if given is not None and given.sign is not None and state.final is not None:
         of_order.append(given.note(state.final.moved))

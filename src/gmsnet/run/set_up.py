@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.options import check_slide
 from gmsnet.constraints.sliding import Sliding, curves_to_slide_on
+from gmsnet.constraints.sliding_in_space import SurfaceSliding, patches_to_slide_on
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology.connectivity import CHOSEN
 from gmsnet.measure.report import ASPECT, QualityReport, measure
@@ -32,7 +34,8 @@ from gmsnet.run.state import State
 from gmsnet.topology.held import REASONS
 from gmsnet.topology.ordering import space_points, taken
 from gmsnet.topology.topology import Topology
-from gmsnet.topology.volume import Volume, refuse_flat
+from gmsnet.topology.volume import Volume
+from gmsnet.topology.wound import Wound, refuse_flat
 
 Floats = NDArray[np.float64]
 
@@ -129,7 +132,14 @@ def _first_of_volume(
     options: SmoothOptions, executor: Executor,
 ) -> State:  # fmt: skip
     """The same of a mesh of tetrahedra."""
-    topology = Volume.of(given, asked)
+    check_slide(given, options.slide, options.feature_angle, options.geometry)
+    wound, sliding = Wound.of(given, asked), None
+    surface = patches_to_slide_on(given, wound, options.slide, options.feature_angle, asked)
+    if surface is None:
+        topology = Volume.made(wound)
+    else:
+        topology = Volume.made(wound, surface[1].slides | surface[1].curves.slides)
+        sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free)
     remarks = held_anyway(asked, topology, fixed)
     if options.fix_layers:
         remarks.append("fix_layers: stretched layers of volumes are not looked for yet, so none are held")
@@ -139,15 +149,13 @@ def _first_of_volume(
     start = taken(space_points(given), topology.memory)
     before = measure(given, topology, start, executor.for_blocks(0))
     protection, nothing = Protection(topology, []), np.empty(0, dtype=np.float32)
-    return State(given, restore, smoother, before, protection, start, start, nothing, tuple(remarks))
+    return State(given, restore, smoother, before, protection, start, start, nothing, tuple(remarks), sliding=sliding)
 
 
 def check_volume(options: SmoothOptions) -> None:
     """InputError for what cannot be asked of volumes yet."""
     if options.target:
         raise InputError("a target cannot be asked of volumes yet: leave out target_quality and target_angle")
-    if options.slides:
-        raise InputError("boundary nodes of volumes cannot slide yet: leave out slide")
     if options.adapts:
         raise InputError("volumes cannot be smoothed towards a metric yet: leave out metric and size")
     if options.best_by == ASPECT:

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.sliding import Sliding
+from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.kernels.simplex.bernstein import CORNERS
 from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.guard import Precision
+from gmsnet.kernels.star.surface import Surface
 from gmsnet.measure.report import QualityReport
 from gmsnet.measure.totals import Totals
 from gmsnet.mesh.mesh import Mesh
@@ -102,10 +104,10 @@ class State:
     untangled: the points after that, in which ``protection`` was found, None where nothing was done. reasons: why
     some are left, by the index of each cell. history: one Sweep for each look. stop_reason: one of ``run.stop``,
     "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
-    sliding: the nodes that move along curves, if any. curved: while the corners of second-order cells move, those cells
-    (``second_order``, which is all that is known of them). nodal: (N, 3) by id, the logarithms of a metric that is
-    given at nodes. metric: what cells are to become, once it is known; conformity: of the input to it, and of the
-    result. interruption: what ends the smoothing before its end. final:
+    sliding: the nodes that move along curves or a boundary, if any. curved: while the corners of second-order cells
+    move, those cells (``second_order``, which is all that is known of them). nodal: (N, 3) by id, the logarithms of a
+    metric that is given at nodes. metric: what cells are to become, once it is known; conformity: of the input to it,
+    and of the result. interruption: what ends the smoothing before its end. final:
     once the mesh is written back to the order of the input; start, points and shapes are then empty, lest the result
     needs more memory than the stages. motion: of a boundary that moves (``deform_stage``).
     """
@@ -128,7 +130,7 @@ class State:
     released: bool = False
     interruption: KeyboardInterrupt | None = None
     final: Final | None = None
-    sliding: Sliding | None = None
+    sliding: Sliding | SurfaceSliding | None = None
     second_order: SecondOrder | None = None
     curved: Curved | None = None
     motion: Motion | None = None
@@ -160,8 +162,8 @@ class State:
         )  # fmt: skip
 
     @property
-    def constraint(self) -> Constraint | None:
-        """The curves that nodes slide on."""
+    def constraint(self) -> Constraint | Surface | None:
+        """What nodes slide on."""
         return None if self.sliding is None else self.sliding.constraint
 
     def ended(self, stop_reason: str, interruption: KeyboardInterrupt | None = None) -> State:

@@ -64,17 +64,18 @@ def protect_untangled(state: State, options: SmoothOptions, executor: Executor) 
 
 
 def _untangled(state: State, executor: Executor) -> State:
-    if isinstance(state.topology, Volume):
-        from gmsnet.untangle.space import untangle_volume
-
-        done = untangle_volume(state.points, state.topology, state.precision, executor, state.before.inverted)
-        return _noted(state, done, state.topology)
-    from gmsnet.untangle import untangle  # what it needs of SciPy takes 0.15 s more to import
-
-    topology = state.planar
+    topology = state.topology
     if state.sliding is not None:
         topology = topology.holding(state.sliding.nodes, REASON)
-    return _noted(state, untangle(state.points, topology, state.precision), topology)
+    if isinstance(topology, Volume):
+        from gmsnet.untangle.space import untangle_volume
+
+        done = untangle_volume(state.points, topology, state.precision, executor, state.before.inverted)
+    else:
+        from gmsnet.untangle import untangle  # what it needs of SciPy takes 0.15 s more to import
+
+        done = untangle(state.points, topology, state.precision)
+    return _noted(state, done, topology)
 
 
 def _noted(state: State, done: Untangled, topology: Topology | Volume) -> State:

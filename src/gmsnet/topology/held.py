@@ -73,16 +73,21 @@ def _mark_of(mesh: Mesh, block: CellBlock) -> int:
     return marks_of.SECOND_ORDER if curved else marks_of.UNSUPPORTED_CELL
 
 
+ON_CURVE = marks_of.BOUNDARY | marks_of.INTERFACE | marks_of.LINE  # what does not hold a node that slides
+AT_BOUNDARY = marks_of.BOUNDARY | marks_of.LINE  # the same in space, where interfaces stay
+
+
 def released(
-    marks: Marks, sliding: NDArray[np.bool_], position: Ints
-) -> tuple[NDArray[np.bool_], dict[str, NDArray[np.int64]]]:
-    """Of some nodes (N, by places in memory), those that are held for being on a curve alone; they lose their marks.
+    marks: Marks, sliding: NDArray[np.bool_], position: Ints, where: int = ON_CURVE,
+    texts: Mapping[int, str] = REASONS,
+) -> tuple[NDArray[np.bool_], dict[str, NDArray[np.int64]]]:  # fmt: skip
+    """Of some nodes (N, by places in memory), those held for these marks alone (``where``); they lose their marks.
 
     And the reasons that they were held for, as in ``sorted_out``.
     """
-    curve = np.uint16(marks_of.BOUNDARY | marks_of.INTERFACE | marks_of.LINE)
-    freed: NDArray[np.bool_] = sliding & (marks & curve != 0) & (marks & ~curve == 0)
-    reasons, _, _ = sorted_out(np.where(freed, marks, np.uint16(0)), position)
+    bits = np.uint16(where)
+    freed: NDArray[np.bool_] = sliding & (marks & bits != 0) & (marks & ~bits == 0)
+    reasons, _, _ = sorted_out(np.where(freed, marks, np.uint16(0)), position, texts)
     marks[freed] = 0
     return freed, reasons
 

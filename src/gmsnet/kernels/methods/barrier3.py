@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.star.slide3 import restrict3
 from gmsnet.kernels.star.space import (
     AFTER,
     GX,
@@ -117,9 +118,10 @@ def sweep3(points, blocks, first, last, guard, power, relaxation, tally):
     for block in range(first, last):
         fetch3(points, blocks, block, workspace)
         derive3(blocks, block, power, None, workspace)
+        restrict3(guard.constraint, blocks, block, power.isotropic, workspace)
         propose3(workspace.sums, power, relaxation, workspace.step)
         for trial in range(TRIALS):
-            judge3(blocks, block, power, None, floor, workspace)
+            judge3(blocks, block, power, None, floor, workspace, guard.constraint)
             if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1) == 0:
                 break
         store3(points, blocks, block, workspace, guard, tally)

@@ -38,7 +38,7 @@ def sweep3(points, blocks, first, last, guard, power, smart, tally):
         derive3(blocks, block, power, None, workspace)
         to_mean(blocks, block, workspace)
         for trial in range(TRIALS):
-            judge3(blocks, block, power, None, floor, workspace)
+            judge3(blocks, block, power, None, floor, workspace, guard.constraint)
             if not smart:
                 certify3(workspace, guard.unit, guard.grain)
                 break

@@ -37,6 +37,7 @@ from gmsnet.kernels.simplex.mean_ratio2 import (
 )
 from gmsnet.kernels.simplex.predicates import SHEWCHUK, UNDERFLOW, UNIT, determinant_and_bound
 from gmsnet.kernels.star.constraint import Constraint
+from gmsnet.kernels.star.surface import Surface
 
 LEVELS = ("valid", "worst", "star")
 VALID, WORST, STAR = range(3)
@@ -68,7 +69,7 @@ class Precision(NamedTuple):
 class MeshGuard(NamedTuple):
     """What a sweep must keep. unit, grain, single: see Precision.
 
-    floor: of D/L for the whole mesh, −∞ at the level VALID. constraint: the curves that nodes slide on; None: no node
+    floor: of D/L for the whole mesh, −∞ at the level VALID. constraint: what nodes slide on; None: no node
     does.
     """
 
@@ -76,7 +77,7 @@ class MeshGuard(NamedTuple):
     grain: float
     single: bool
     floor: float
-    constraint: Constraint | None = None
+    constraint: Constraint | Surface | None = None
 
 
 class StarGuard(NamedTuple):
@@ -86,7 +87,7 @@ class StarGuard(NamedTuple):
     grain: float
     single: bool
     floor: float
-    constraint: Constraint | None
+    constraint: Constraint | Surface | None
     floors: NDArray[np.float64]
 
 
@@ -97,7 +98,7 @@ WITH_FLOORS = len(StarGuard._fields)
 
 def plain_guard(
     precision: Precision = Precision(),  # noqa: B008 (a tuple of constants)
-    constraint: Constraint | None = None,
+    constraint: Constraint | Surface | None = None,
 ) -> MeshGuard:
     """The guard of the level VALID."""
     return MeshGuard(*precision, -math.inf, constraint)

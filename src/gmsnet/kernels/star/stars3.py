@@ -12,6 +12,7 @@ from gmsnet.kernels.simplex.orientation3 import largest_component
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.guard3 import certified, error_bound3
+from gmsnet.kernels.star.slide3 import land3, landed3, on_surface, take_place
 from gmsnet.kernels.star.space import KEPT, LANES3, MARGIN, SUMS, derive, judge, relate
 
 WIDER = 1.0 + 2.0**-20
@@ -20,7 +21,8 @@ HALVINGS = 12  # of a step that is not allowed
 
 class Workspace3(NamedTuple):
     """The arrays that a sweep works in. star: the centres. size: of each star, inverse: 1/size in float32. width: the
-    largest component of each star, over its size. allowed: which lanes may be moved as they are.
+    largest component of each star, over its size. allowed: which lanes may be moved as they are. target, place: where
+    nodes that slide go (slide3.land3).
     """
 
     star: NDArray[np.float64]
@@ -33,6 +35,8 @@ class Workspace3(NamedTuple):
     wide: NDArray[np.float32]
     width: NDArray[np.float32]
     allowed: NDArray[np.bool_]
+    target: NDArray[np.float64]
+    place: NDArray[np.int64]
 
 
 @part
@@ -43,6 +47,7 @@ def workspace3_for(most, most_simplices):
         np.empty(4 * most * LANES3, dtype=np.float32), np.empty(KEPT * most_simplices * LANES3, dtype=np.float32),
         np.empty(SUMS * LANES3, dtype=np.float32), np.empty(3 * LANES3, dtype=np.float32),
         np.empty(4 * LANES3, dtype=np.float32), np.empty(LANES3, dtype=np.float32), np.empty(LANES3, dtype=np.bool_),
+        np.empty(4 * LANES3), np.empty(LANES3, dtype=np.int64),
     )  # fmt: skip
 
 
@@ -81,8 +86,9 @@ def derive3(blocks, block, power, soft, workspace):
 
 
 @part
-def judge3(blocks, block, power, soft, floor, workspace):
-    """What follows of them after the step. floor: c, of D/S^(3/2)."""
+def judge3(blocks, block, power, soft, floor, workspace, surface=None):
+    """What follows of them after the step. floor: c, of D/S^(3/2). surface: what nodes slide on."""
+    land3(surface, blocks, block, workspace)
     rows = np.int64(blocks.simplices[block])
     judge(
         workspace.kept, rows, blocks.cells, block, power.number, power.constants, soft, workspace.step, floor,
@@ -114,6 +120,7 @@ def store3(points, blocks, block, workspace, guard, tally):
         dx, dy, dz = size * step[lane], size * step[LANES3 + lane], size * step[2 * LANES3 + lane]
         if len(guard) != WITH_FLOORS and workspace.allowed[lane]:
             x, y, z = star[4 * lane] + dx, star[4 * lane + 1] + dy, star[4 * lane + 2] + dz
+            x, y, z = landed3(guard.constraint, i, workspace, lane, x, y, z)
             if guard.single:
                 x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
             tally[MOVED] += (x != points[i, 0]) | (y != points[i, 1]) | (z != points[i, 2])
@@ -132,12 +139,14 @@ def truncate3(points, blocks, block, lane, dx, dy, dz, guard, tally):
         return
     for halving in range(HALVINGS):
         tx, ty, tz = x + dx, y + dy, z + dz
+        tx, ty, tz, place = on_surface(guard.constraint, i, tx, ty, tz)
         if guard.single:
             tx, ty, tz = np.float64(np.float32(tx)), np.float64(np.float32(ty)), np.float64(np.float32(tz))
         if tx == x and ty == y and tz == z:
             break
         if allowed3(points, blocks, block, lane, tx, ty, tz, guard):
             points[i, 0], points[i, 1], points[i, 2] = tx, ty, tz
+            take_place(guard.constraint, i, place)
             tally[MOVED] += 1
             tally[TRUNCATED] += halving > 0
             return

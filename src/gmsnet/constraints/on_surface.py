@@ -1,0 +1,160 @@
+"""What the nodes of a surface in space slide on, for the kernels: planes, smooth patches, lines and curves."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.constraints.features import COLLINEAR, Curves, rounding_of
+from gmsnet.constraints.outline import Flags, Longs
+from gmsnet.constraints.patches import NOTHING, Patches
+from gmsnet.constraints.smooth_patches import controls_of, dot, handles, normals_of
+from gmsnet.kernels.star.surface import CONTROLS, CURVE, CURVED, FLAT, LINE, NOWHERE, Surface
+from gmsnet.topology.polygons import Ints
+
+Floats = NDArray[np.float64]
+
+
+class Rows(NamedTuple):
+    """Of nodes (K,) that slide on things of one kind: which plane or line, and the facet or piece where each is."""
+
+    nodes: Longs
+    kind: int
+    of: Longs
+    place: Longs
+
+
+def surface_of(patches: Patches, points: Floats, memory: Ints, single: bool) -> Surface | None:
+    """The constraint for kernels, with the nodes where they are; None where none slides.
+
+    points: (N, 3) by node ids. memory: (N,) node ids in memory order.
+    """
+    slides = patches.slides | patches.curves.slides
+    if not slides.any():
+        return None
+    facet = np.full(len(points), NOTHING, dtype=np.int64)
+    facet[patches.rows] = np.arange(len(patches.rows))[:, None]
+    plane, frame = _planes(patches, points, single)
+    inner = np.flatnonzero(patches.slides)
+    number = plane[patches.patch[facet[inner]]]
+    level = number != NOTHING
+    found = [Rows(inner[level], FLAT, number[level], np.zeros(level.sum(), dtype=np.int64))]
+    curved = inner[~level]
+    kept = np.isin(patches.patch, patches.patch[facet[curved]])
+    fewer = np.cumsum(kept) - 1
+    found.append(Rows(curved, CURVED, np.zeros(len(curved), dtype=np.int64), fewer[facet[curved]]))
+    lines, line_frame, pieces, before, after = _along_curves(patches.curves, points, len(frame[0]))
+    found += lines
+
+    nodes, kind, of, place = (np.concatenate(parts) for parts in zip(*map(_columns, found), strict=True))
+    order = np.argsort(nodes)
+    row = np.full(len(points), NOWHERE, dtype=np.int32)
+    row[nodes[order]] = np.arange(len(nodes))
+    corners, normal = patches.rows[kept], normals_of(patches, points)[kept]
+    beside = patches.beside[kept]
+    origin, direction, same = (np.concatenate(parts) for parts in zip(frame, line_frame, strict=True))
+    return Surface(
+        row[memory], kind[order].astype(np.int8), of[order].astype(np.int32), place[order].astype(np.int32),
+        origin, direction, same, points[corners], normal,
+        np.where(beside == NOTHING, NOWHERE, fewer[beside]).astype(np.int32),
+        controls_of(points, corners, normal) if len(corners) else np.empty((0, CONTROLS, 3)),
+        pieces, before, after, bool(single),
+    )  # fmt: skip
+
+
+def _columns(rows: Rows) -> tuple[Longs, Longs, Longs, Longs]:
+    return rows.nodes, np.full(len(rows.nodes), rows.kind), rows.of, rows.place
+
+
+def _planes(patches: Patches, points: Floats, single: bool) -> tuple[Longs, tuple[Floats, Floats, Flags]]:
+    """The number of the plane of each patch that is one, else NOTHING; origin, direction and common coordinates."""
+    count = int(patches.patch.max(initial=-1)) + 1
+    normal = np.zeros((count, 3))
+    np.add.at(normal, patches.patch, patches.unit * patches.area[:, None])
+    length = np.sqrt(dot(normal, normal))
+    normal = np.divide(normal, length[:, None], out=np.zeros_like(normal), where=length[:, None] > 0.0)
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    corners, owner = patches.rows.ravel(), np.repeat(patches.patch, 3)
+    np.minimum.at(low, owner, points[corners])
+    np.maximum.at(high, owner, points[corners])
+    origin = np.zeros((count, 3))
+    origin[owner] = points[corners]
+    away = np.zeros(count)
+    np.maximum.at(away, owner, abs(dot(points[corners] - origin[owner], normal[owner])))
+    near = away <= COLLINEAR * (high - low).max(axis=1, initial=0.0) + rounding_of(points, single)
+    same = low == high
+    normal[same.any(axis=1)] = same[same.any(axis=1)]
+    chosen = np.flatnonzero((length > 0.0) & near & (same.sum(axis=1) <= 1))
+    plane = np.full(count, NOTHING, dtype=np.int64)
+    plane[chosen] = np.arange(len(chosen))
+    return plane, (origin[chosen], normal[chosen], same[chosen])
+
+
+def _along_curves(
+    curves: Curves, points: Floats, first: int
+) -> tuple[list[Rows], tuple[Floats, Floats, Flags], Floats, Ints, Ints]:
+    """The nodes on each curve; the frames of lines, numbered from ``first`` on; cubic pieces and what follows them."""
+    found, frames, pieces, links, count = list[Rows](), list[tuple[Floats, Floats, Flags]](), list[Floats](), [], 0
+    for c in range(len(curves)):
+        nodes = curves.nodes_of(c)
+        inner, place = nodes[:-1] if curves.closed[c] else nodes[1:-1], np.arange(len(nodes) - 1)
+        place = place if curves.closed[c] else place[1:]
+        sliding = curves.slides[inner]
+        if not sliding.any():
+            continue
+        chosen, place, p = inner[sliding].astype(np.int64), place[sliding], points[nodes]
+        if curves.straight[c]:
+            same, way = (p == p[0]).all(axis=0), p[-1] - p[0]
+            number = np.full(len(chosen), first + len(frames))
+            frames.append((p[0], way / np.sqrt(dot(way[None], way[None])[0]), same))
+            found.append(Rows(chosen, LINE, number, np.zeros_like(number)))
+            continue
+        found.append(Rows(chosen, CURVE, np.zeros_like(chosen), count + place))
+        pieces.append(_cubics(p, bool(curves.closed[c])))
+        numbers = np.arange(count, count + len(p) - 1)
+        links.append(_neighbours(numbers, bool(curves.closed[c])))
+        count += len(numbers)
+    none = np.empty((0, 3))
+    frame = (
+        np.vstack([none, *(origin for origin, _, _ in frames)]),
+        np.vstack([none, *(direction for _, direction, _ in frames)]),
+        np.vstack([none.astype(bool), *(same for _, _, same in frames)]),
+    )
+    before, after = np.concatenate([np.empty((2, 0), dtype=np.int32), *links], axis=1)
+    return found, frame, np.concatenate([np.empty((0, 4, 3)), *pieces]), before, after
+
+
+def _neighbours(numbers: Longs, closed: bool) -> Ints:
+    """(2, P) int32 the pieces before and after each of a curve, NOWHERE at its ends."""
+    both = np.stack([np.roll(numbers, 1), np.roll(numbers, -1)]).astype(np.int32)
+    if not closed:
+        both[0, 0] = both[1, -1] = NOWHERE
+    return both
+
+
+def _cubics(p: Floats, closed: bool) -> Floats:
+    """(K − 1, 4, 3) cubics over the edges of a chain (K, 3), along the tangents of circles through three nodes.
+
+    At an end of a chain the tangent makes the same angle with the edge as at the edge's other end. On circles the
+    error is of sixth order.
+    """
+    edge = np.diff(p, axis=0)
+    length = np.sqrt(dot(edge, edge))[:, None]
+    unit = edge / length
+    back, ahead = (np.roll(unit, 1, axis=0), unit) if closed else (unit[:-1], unit[1:])
+    near, far = (np.roll(length, 1, axis=0), length) if closed else (length[:-1], length[1:])
+    tangent = back * far + ahead * near
+    if closed:
+        start, end = tangent, np.roll(tangent, -1, axis=0)
+    else:
+        first = _mirrored(tangent[:1], unit[:1])
+        start, end = np.vstack([first, tangent]), np.vstack([tangent, _mirrored(tangent[-1:], unit[-1:])])
+    return np.stack([p[:-1], p[:-1] + handles(edge, start), p[1:] - handles(edge, end), p[1:]], axis=1)
+
+
+def _mirrored(tangent: Floats, unit: Floats) -> Floats:
+    """Tangents (K, 3) at the other ends of arcs whose chords have these directions."""
+    mirrored: Floats = 2.0 * dot(tangent, unit)[:, None] * unit - tangent
+    return mirrored

@@ -1,0 +1,79 @@
+"""The nodes of one run that slide on the boundary of a volume, and what that changes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.constraints.facets import Facets, boundary_of
+from gmsnet.constraints.features import may_slide
+from gmsnet.constraints.on_surface import surface_of
+from gmsnet.constraints.options import FEATURE_ANGLE, check_slide
+from gmsnet.constraints.outline import Flags
+from gmsnet.constraints.patches import Patches, patches_of
+from gmsnet.kernels.star.surface import Surface
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.ordering import space_points
+from gmsnet.topology.polygons import Ints
+from gmsnet.topology.wound import Wound
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceSliding:
+    """facets, patches: of the boundary. start: (N, 3) points of the input by ids. nodes: (N,) bool, those that slide.
+
+    constraint: for the kernels; None where no node slides.
+    """
+
+    facets: Facets
+    patches: Patches
+    start: Floats
+    nodes: Flags
+    constraint: Surface | None
+
+    @classmethod
+    def of(cls, mesh: Mesh, facets: Facets, patches: Patches, memory: Ints, free: Ints) -> SurfaceSliding:
+        """Of a mesh and the patches of its boundary; memory, free: of its topology."""
+        points = space_points(mesh)[:, :3].copy()
+        nodes = np.zeros(len(points), dtype=bool)
+        nodes[free] = True
+        nodes &= patches.slides | patches.curves.slides
+        return cls(facets, patches, points, nodes, surface_of(patches, points, memory, mesh.single))
+
+    def note(self, mesh: Mesh, moved: Flags) -> str:
+        """What to say of it. mesh: as it has become. moved: (N,) bool."""
+        count = int(self.nodes.sum())
+        if not count:
+            return "slide: no node of the boundary can move along it"
+        before, after = (enclosed(points, self.facets) for points in (self.start, space_points(mesh)[:, :3]))
+        change = abs(after - before) / abs(before) if before else 0.0
+        slid = int((self.nodes & moved).sum())
+        return (
+            f"slide: {slid:,} of {count:,} nodes have moved along the boundary; "
+            f"the volume changes by {change:.2g} of itself"
+        )
+
+
+def enclosed(points: Floats, facets: Facets) -> float:
+    """The volume that facets enclose."""
+    a, b, c = (points[facets.rows[:, k]] - points.mean(axis=0) for k in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def patches_to_slide_on(
+    mesh: Mesh, wound: Wound, slide: object, feature_angle: float = FEATURE_ANGLE, held: Flags | None = None
+) -> tuple[Facets, Patches] | None:
+    """The boundary of a mesh of tetrahedra and its patches; None where no node is to slide. held: (N,) bool.
+
+    Raises InputError as ``check_slide``.
+    """
+    if slide is None or slide is False:
+        return None
+    names = check_slide(mesh, slide, feature_angle)
+    facets = boundary_of(mesh, wound)
+    points = space_points(mesh)[:, :3].copy()
+    return facets, patches_of(facets, points, feature_angle, mesh.single, may_slide(mesh, names, held))

@@ -1,0 +1,95 @@
+"""What a surface through the nodes of facets looks like between them: normals at the nodes, and cubics over them.
+
+Over each facet of a patch stands a cubic Bézier triangle (Vlachos, Peters, Boyd, Mitchell: Curved PN triangles, 2001).
+The handles of an edge are those of a circular arc: 2/(3(1 + cos α)) of its length, α the angle between the edge and
+the tangent. Where all nodes of a facet have the normal of one plane, the cubic lies in that plane.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.constraints.outline import Longs
+from gmsnet.constraints.patches import NOTHING, Patches, linked
+from gmsnet.kernels.star.surface import CENTRE, CONTROLS
+
+Floats = NDArray[np.float64]
+
+
+def normals_of(patches: Patches, points: Floats) -> Floats:
+    """(F, 3, 3) the unit normal of the surface at each corner of each facet.
+
+    At a node, that is the mean of the normals of its facets in the patch, weighted so that it is exact on a sphere
+    (Max: Weights for computing vertex normals from facet normals, 1999). At nodes of plane parts it is theirs.
+    """
+    rows, nodes = patches.rows, len(points)
+    _, owner = np.unique(patches.patch[:, None] * nodes + rows, return_inverse=True)
+    owner = owner.reshape(rows.shape)  # a node in each of its patches
+    count = int(owner.max(initial=-1)) + 1
+    total = np.zeros((count, 3))
+    corner = points[rows]
+    for k in range(3):
+        a, b = corner[:, (k + 1) % 3] - corner[:, k], corner[:, (k + 2) % 3] - corner[:, k]
+        weight = dot(a, a) * dot(b, b)
+        share = np.divide(patches.area, weight, out=np.zeros(len(rows)), where=weight > 0.0)
+        np.add.at(total, owner[:, k], patches.unit * share[:, None])
+    plane, parts = _planes(patches, owner, count)
+    total[plane != NOTHING] = parts[plane[plane != NOTHING]]
+    length = np.sqrt(dot(total, total))
+    unit = np.divide(total, length[:, None], out=np.zeros_like(total), where=length[:, None] > 0.0)
+    normals: Floats = unit[owner]
+    return normals
+
+
+def _planes(patches: Patches, owner: Longs, count: int) -> tuple[Longs, Floats]:
+    """The plane of each owner that lies in a plane part, else NOTHING; the normals of the parts.
+
+    A part is what facets in one plane make up that have a node all of whose facets are in it: the two triangles of a
+    quad are none.
+    """
+    part = linked(patches.beside, patches.flat)
+    normals = np.zeros((int(part.max(initial=-1)) + 1, 3))
+    np.add.at(normals, part, patches.unit * patches.area[:, None])
+    low, high = np.full(count, len(part)), np.full(count, NOTHING)
+    np.minimum.at(low, owner, part[:, None])
+    np.maximum.at(high, owner, part[:, None])
+    inner = (low == high)[owner].any(axis=1)  # facets with such a node
+    plane = np.full(count, NOTHING, dtype=np.int64)
+    plane[owner[inner]] = part[inner, None]
+    return plane, normals
+
+
+def controls_of(points: Floats, rows: Longs, normals: Floats) -> Floats:
+    """(F, CONTROLS, 3) the inner control points of the cubics (kernels.star.surface) over facets with these normals."""
+    corner = points[rows]
+    made = np.empty((len(rows), CONTROLS, 3))
+    for k in range(3):
+        j = (k + 1) % 3
+        edge = corner[:, j] - corner[:, k]
+        made[:, 2 * k] = corner[:, k] + handles(edge, across(edge, normals[:, k]))
+        made[:, 2 * k + 1] = corner[:, j] - handles(edge, across(edge, normals[:, j]))
+    edges, middle = made[:, :CENTRE].mean(axis=1), corner.mean(axis=1)
+    made[:, CENTRE] = edges + 0.5 * (edges - middle)
+    return made
+
+
+def across(edge: Floats, normal: Floats) -> Floats:
+    """The part of edges (K, 3) that is tangent to surfaces with these unit normals."""
+    tangent: Floats = edge - dot(edge, normal)[:, None] * normal
+    return tangent
+
+
+def handles(edge: Floats, tangent: Floats) -> Floats:
+    """The handles of cubics over edges (K, 3) along tangents of any length: those of an arc where it is one."""
+    length, size = np.sqrt(dot(edge, edge)), np.sqrt(dot(tangent, tangent))
+    unit = np.divide(tangent, size[:, None], out=np.zeros_like(tangent), where=size[:, None] > 0.0)
+    cosine = np.divide(dot(unit, edge), length, out=np.ones(len(edge)), where=length > 0.0)
+    reach = 2.0 * length / (3.0 * (1.0 + np.maximum(cosine, 0.0)))
+    return unit * reach[:, None]
+
+
+def dot(one: Floats, other: Floats) -> Floats:
+    """Products of vectors (K, 3), by operations that round alike everywhere."""
+    products: Floats = (one[:, 0] * other[:, 0] + one[:, 1] * other[:, 1]) + one[:, 2] * other[:, 2]
+    return products

@@ -1,0 +1,175 @@
+"""The tetrahedra of a mesh in memory order, read so that all of a part are alike: what ``Volume`` is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import InputError
+from gmsnet.kernels.simplex import orientation3
+from gmsnet.kernels.topology import connectivity, facets, layout
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.parallel.memory import refuse_unless_free
+from gmsnet.topology.fans import Marks
+from gmsnet.topology.ordering import space_points
+from gmsnet.topology.polygons import Ints
+
+Flags = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+
+SMOOTHED = ("tetra",)  # the kinds whose nodes may move
+BITS = connectivity.BOUNDARY, connectivity.INTERFACE, connectivity.NON_MANIFOLD
+BYTES_PER_CELL = 190  # that the set-up takes at most
+
+
+@dataclass(frozen=True, eq=False)
+class Wound:
+    """Tetrahedra that are read alike.
+
+    cell: (T,) the index of each among all cells of the mesh; cells: (T, 4) their nodes, both in file order. By places
+    in memory: rows (T, 4), orientation (T,) int8, −1 where the volume is to be taken with the other sign, region (T,),
+    or none (0,) where all are the same; origin: the place in file order of each row. marks: (N,) uint16 by places in
+    memory, why nodes are held, as far as facets tell. memory: (N,) node ids in memory order; position: the places.
+    """
+
+    cell: NDArray[np.int64]
+    cells: Ints
+    rows: Ints
+    orientation: NDArray[np.int8]
+    region: NDArray[np.int64]
+    origin: Ints
+    marks: Marks
+    memory: Ints
+    position: Ints
+
+    @classmethod
+    def of(cls, mesh: Mesh, fixed: Flags | None = None) -> Wound:
+        """Of a mesh; ``fixed`` and errors: see ``Volume.of``."""
+        refuse_flat(mesh)
+        cells, cell, region = _tetrahedra(mesh)
+        nodes = len(mesh.points)
+        refuse_unless_free(len(cells) * BYTES_PER_CELL, f"the connectivity of {len(cells):,} tetrahedra")
+        points = space_points(mesh)
+        memory, position = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
+        keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
+        layout.morton_order3(points, keys, other, memory, position)
+        place, origin = np.empty_like(cells), np.empty(len(cells), dtype=np.int32)
+        facets.order_cells(cells, position, np.zeros(nodes + 2, dtype=np.int32), place, origin)
+        rows, region = place.take(origin, axis=0), region.take(origin) if len(region) else region
+        marks = _known_marks(mesh, fixed, position)
+        orientation = _wound(points[memory], rows, region, marks)
+        others = np.uint16(connectivity.LINE | connectivity.UNSUPPORTED_CELL)
+        unused = (np.bincount(rows.ravel(), minlength=nodes) == 0) & (marks & others == 0)
+        marks[unused] |= np.uint16(connectivity.UNUSED)
+        return cls(cell, cells, rows, orientation, region, origin, marks, memory, position)
+
+    @cached_property
+    def outer(self) -> NDArray[np.int64]:
+        """(F,) the facets of one cell alone, 4t + k (kernels.topology.facets)."""
+        return np.flatnonzero(_matched(self.rows, len(self.marks)) == facets.ALONE)
+
+    @cached_property
+    def boundary(self) -> Ints:
+        """(F, 3) the nodes of these facets, counter-clockwise as seen from outside."""
+        cell, k = self.outer >> 2, self.outer & 3
+        corners: Ints = np.take_along_axis(self.rows[cell], facets.OPPOSITE[k], axis=1)
+        return np.where(self.orientation[cell, None] > 0, corners, corners[:, [0, 2, 1]])
+
+
+def refuse_flat(mesh: Mesh) -> None:
+    """InputError for volumes that lie in a plane."""
+    if mesh.plane is not None:
+        raise InputError("the mesh has volumes, but all its nodes lie in one plane: check the file's coordinates")
+
+
+def _tetrahedra(mesh: Mesh) -> tuple[Ints, NDArray[np.int64], NDArray[np.int64]]:
+    """The cells (T, 4), the index of each among all cells, and their regions, none (0,) where all are the same."""
+    chosen, numbers, before = [], [], 0
+    for block in mesh.cells:
+        if block.kind in SMOOTHED and len(block.nodes):
+            chosen.append(block)
+            numbers.append(np.arange(before, before + len(block.nodes)))
+        before += len(block.nodes)
+    if not chosen:
+        return np.empty((0, 4), dtype=np.int32), np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    cells = np.concatenate([block.nodes for block in chosen], dtype=np.int32, casting="same_kind")
+    first = chosen[0].regions[0]
+    same = all((block.regions == first).all() for block in chosen)
+    region = np.empty(0, dtype=np.int64) if same else np.concatenate([block.regions for block in chosen])
+    return cells, numbers[0] if len(numbers) == 1 else np.concatenate(numbers), region
+
+
+def _known_marks(mesh: Mesh, fixed: Flags | None, position: Ints) -> NDArray[np.uint16]:
+    """(N,) by places in memory: of cells that are not smoothed, of faces and lines, and of chosen nodes."""
+    marks = np.zeros(len(position), dtype=np.uint16)
+    for block in mesh.cells:
+        if block.kind not in SMOOTHED:
+            volume = block.dimension in (3, None)
+            mark = connectivity.UNSUPPORTED_CELL if volume else connectivity.LINE
+            marks[position[block.nodes.ravel()]] |= np.uint16(mark)
+    if fixed is not None and fixed.any():
+        marks[position[fixed]] |= np.uint16(connectivity.CHOSEN)
+    return marks
+
+
+def _wound(points: Floats, rows: Ints, region: NDArray[np.int64], marks: NDArray[np.uint16]) -> NDArray[np.int8]:
+    """The orientation of each cell; marks the nodes of the boundary, of interfaces and of what cannot be wound."""
+    count = len(rows)
+    positive, negative = orientation3.count_signs(points, rows)
+    if count in (positive, negative):
+        orientation = np.full(count, 1 if positive == count else -1, dtype=np.int8)
+        if _marked_alike(rows, region, marks):
+            return orientation
+    twin, nothing = _matched(rows, len(marks)), np.empty(0, dtype=np.uint64)
+    piece, orientation = np.full(count, -1, dtype=np.int32), np.ones(count, dtype=np.int8)
+    consistent = facets.wind(rows, twin, piece, orientation)
+    facets.mark_facets(rows, twin, region, orientation, nothing, *BITS, marks)
+    volume, extent = _part_volumes(points, rows, piece, orientation, len(consistent))
+    orientation[volume[piece] < 0.0] *= -1
+    for parts, mark in (
+        (~consistent, connectivity.NON_ORIENTABLE),
+        (np.abs(volume) <= 1e-9 * extent, connectivity.ZERO_AREA),
+    ):
+        marks[rows[parts[piece]].ravel()] |= np.uint16(mark)
+    return orientation
+
+
+def _marked_alike(rows: Ints, region: NDArray[np.int64], marks: NDArray[np.uint16]) -> bool:
+    """The same marks where all cells have one orientation; False if some see a facet from the same side.
+
+    Only the cells at nodes around which they do not close are looked at for facets.
+    """
+    nodes = len(marks)
+    places, area = np.empty((nodes, 2), dtype=np.uint64), np.zeros(nodes, dtype=np.uint64)
+    facets.scatter(places)
+    own = np.empty(nodes if len(region) else 0, dtype=np.int64)
+    facets.enclose(rows, region, places, area, own, marks, connectivity.INTERFACE)
+    outer = np.flatnonzero((area != 0)[rows].any(axis=1))
+    part, alike = rows[outer], np.ones(len(outer), dtype=np.int8)
+    if not facets.mark_facets(part, _matched(part, nodes), region[:0], alike, area, *BITS, marks):
+        return False
+    marks[(area != 0) & (marks == 0)] |= np.uint16(connectivity.NOT_A_DISK)
+    return True
+
+
+def _matched(rows: Ints, nodes: int) -> Ints:
+    """(4T,) the facet on the other side of each (kernels.topology.facets)."""
+    twin = np.empty(4 * len(rows), dtype=np.int32)
+    keys, numbers = np.empty(4 * len(rows), dtype=np.int64), np.empty(4 * len(rows), dtype=np.int32)
+    facets.match(rows, np.zeros(nodes + 2, dtype=np.int64), keys, numbers, twin)
+    return twin
+
+
+def _part_volumes(
+    points: Floats, rows: Ints, piece: Ints, orientation: NDArray[np.int8], parts: int
+) -> tuple[Floats, Floats]:
+    """The signed volume of each part, and the sum of the absolute ones, six times."""
+    a, b, c = (points[rows[:, k], :3] - points[rows[:, 0], :3] for k in (1, 2, 3))
+    volume = orientation * np.einsum("ij,ij->i", a, np.cross(b, c))
+    signed, absolute = np.zeros(parts), np.zeros(parts)
+    np.add.at(signed, piece, volume)
+    np.add.at(absolute, piece, np.abs(volume))
+    return signed, absolute
