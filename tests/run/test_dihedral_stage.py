@@ -10,6 +10,7 @@ import pytest
 from support import volumes
 
 import gmsnet
+import gmsnet.generate
 from gmsnet.methods.dihedral import Dihedral
 from gmsnet.run import dihedral_stage, stop
 from gmsnet.topology.volume import Volume
@@ -86,3 +87,19 @@ def test_a_mesh_whose_smallest_angle_is_a_held_one():
     assert after.inverted == 0
     held = np.setdiff1d(np.arange(len(mesh.points)), Volume.of(mesh).free)
     assert result.points[held].tobytes() == mesh.points[held].tobytes()
+
+
+def test_nodes_that_slide_stay_on_their_faces(monkeypatch):
+    mesh = gmsnet.generate.random_volume(800, seed=3)
+    monkeypatch.setattr(dihedral_stage, "GAIN", np.inf)
+    before = gmsnet.smooth(mesh, slide=True)
+    monkeypatch.undo()
+    result = gmsnet.smooth(mesh, slide=True)
+    assert result.history[-1].stage == Dihedral.phase
+    assert result.after.min_dihedral.min() > before.after.min_dihedral.min()
+    on = (mesh.points == 0) | (mesh.points == 1)
+    assert (result.points[on] == mesh.points[on]).all()
+    corners = on.sum(axis=1) >= 2
+    assert (result.moved & on.any(axis=1)).any()
+    assert corners.sum() > 8
+    assert result.after.volume.sum() == pytest.approx(1, abs=1e-12)

@@ -9,6 +9,7 @@ import numpy as np
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.guard import LEVELS, VALID
+from gmsnet.kernels.star.surface import Surface, locate3
 from gmsnet.measure.dihedral import REGULAR, WIDE, worst
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.methods.auto import Auto
@@ -44,7 +45,9 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     if level != VALID:
         start = state.start if state.untangled is None else state.untangled
         floor = max(floor, Floor().of(start, topology, state.precision, executor))
-    field = Field(state.points.copy(), topology, state.precision, level)
+    field = Field(state.points.copy(), topology, state.precision, level, constraint=state.constraint)
+    if isinstance(state.constraint, Surface):
+        locate3(state.constraint, field.points)
     smoother = Dihedral(floor=floor)
     tally = smoother.sweep(field, executor, lambda: False)
     after = totals_of(field.points, topology.scored, executor)

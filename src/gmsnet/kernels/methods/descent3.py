@@ -4,6 +4,9 @@ Newton: d = −(H + μI)⁻¹g, μ the least multiple of H's size tried with whi
 half the star's radius (the root mean square of its spokes) long, halved until the objective falls by at least 1e-4 of
 what the slope promises (Armijo). Adam: as in the plane (kernels.methods.adam), with the same sizes of steps.
 
+A node that slides (kernels.star.surface) goes along the normal plane or the tangent at its place; the guard puts it onto
+its patch or curve.
+
 Every place keeps all simplices positive; that of a bounded objective, which would flatten one for the good of the
 others, makes none smaller than a tenth of the star's mean. A star that is tangled to begin with stays: of
 tetrahedra no move may leave one inverted (kernels.star.guard3), and untangling comes before.
@@ -35,13 +38,16 @@ from gmsnet.kernels.simplex.objectives3 import (
     ZZ,
     evaluate3,
 )
+from gmsnet.kernels.star.slide3 import confined
 from gmsnet.kernels.star.space import LANES3
 from gmsnet.kernels.star.stars3 import truncate3
+from gmsnet.kernels.star.surface import directions_at, on_curves
 
 TRIALS, SHIFTS = 10, 12  # halvings of a step, and values of μ that are tried
 REACH, END, ARMIJO = 0.5, 1e-9, 1e-4
 SOFT = 1e-6  # the first μ over the largest entry of H's diagonal
 MARGIN = 0.1
+FREE, ON_PATCH, ON_CURVE = range(3)  # where a node may go
 
 
 @part
@@ -82,6 +88,29 @@ def lowest_of(aim, ends, count):
 
 
 @part
+def way_of(surface, points, i):
+    """Where a node may go, and the normal or the tangent there."""
+    if surface is not None:
+        row = surface.row[i]
+        if row >= 0:
+            u, v, w = directions_at(surface, row, points[i, 0], points[i, 1], points[i, 2])
+            return (ON_CURVE if on_curves(surface.kind[row]) else ON_PATCH), u, v, w
+    return FREE, 0.0, 0.0, 0.0
+
+
+@part
+def confine(way, sums):
+    """Makes the gradient and the Hessian those along the way."""
+    if way[0] != FREE:
+        found = confined(
+            way[0] == ON_CURVE, way[1], way[2], way[3], sums[GX], sums[GY], sums[GZ], sums[XX], sums[YY], sums[ZZ],
+            sums[XY], sums[XZ], sums[YZ],
+        )  # fmt: skip
+        for k, value in enumerate(found):
+            sums[GX + k] = value
+
+
+@part
 def newton_step3(sums):
     """d."""
     size = max(abs(sums[XX]), max(abs(sums[YY]), abs(sums[ZZ])))
@@ -103,10 +132,11 @@ def newton_step3(sums):
 
 
 @part
-def newton3(aim, scale, ends, count, steps, lowest, sums):
+def newton3(aim, scale, way, ends, count, steps, lowest, sums):
     """Where so many Newton steps lead from the origin. sums: as ``evaluate3`` leaves them there, with derivatives."""
     x, y, z = 0.0, 0.0, 0.0
     for _ in range(steps):
+        confine(way, sums)
         value, gx, gy, gz = sums[VALUE], sums[GX], sums[GY], sums[GZ]
         dx, dy, dz = newton_step3(sums)
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
@@ -127,7 +157,19 @@ def newton3(aim, scale, ends, count, steps, lowest, sums):
 
 
 @part
-def adam3(aim, scale, ends, count, sizes, lowest, sums):
+def onto(way, place):
+    """Puts a place, from the node, onto the way."""
+    if way[0] != FREE:
+        u, v, w = way[1], way[2], way[3]
+        along = place[0] * u + place[1] * v + place[2] * w
+        if way[0] == ON_CURVE:
+            place[0], place[1], place[2] = along * u, along * v, along * w
+        else:
+            place[0], place[1], place[2] = place[0] - along * u, place[1] - along * v, place[2] - along * w
+
+
+@part
+def adam3(aim, scale, way, ends, count, sizes, lowest, sums):
     """The best of the places that Adam steps of these sizes visit from the origin."""
     place, best, m, v = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     least, factor, first, second = np.inf, 1.0, 1.0, 1.0
@@ -138,6 +180,7 @@ def adam3(aim, scale, ends, count, sizes, lowest, sums):
             best[:] = place
         if step == len(sizes):
             break
+        confine(way, sums)
         first *= BETA_1
         second *= BETA_2
         factor = factor if inside else 0.5 * factor
@@ -145,8 +188,9 @@ def adam3(aim, scale, ends, count, sizes, lowest, sums):
             g = sums[GX + k] if inside else 0.0
             m[k] = BETA_1 * m[k] + (1.0 - BETA_1) * g
             v[k] = BETA_2 * v[k] + (1.0 - BETA_2) * g * g
-            way = sizes[step] / (1.0 - first) * factor * m[k] / (math.sqrt(v[k] / (1.0 - second)) + EPSILON)
-            place[k] = place[k] - way if inside else best[k]
+            size = sizes[step] / (1.0 - first) * factor * m[k] / (math.sqrt(v[k] / (1.0 - second)) + EPSILON)
+            place[k] = place[k] - size if inside else best[k]
+        onto(way, place)
     return best[0], best[1], best[2]
 
 
@@ -167,9 +211,10 @@ def sweep3(points, blocks, first, last, guard, aim, steps, sizes, tally):
                 if not 0.0 < scale < aim.enough:
                     continue
             evaluate3(aim, scale, ends, count, 0.0, 0.0, 0.0, lowest, True, sums)
+            way = way_of(guard.constraint, points, np.uint32(blocks.centre[block * LANES3 + lane]))
             if len(sizes):
-                x, y, z = adam3(aim, scale, ends, count, sizes, lowest, sums)
+                x, y, z = adam3(aim, scale, way, ends, count, sizes, lowest, sums)
             else:
-                x, y, z = newton3(aim, scale, ends, count, steps, lowest, sums)
+                x, y, z = newton3(aim, scale, way, ends, count, steps, lowest, sums)
             if x != 0.0 or y != 0.0 or z != 0.0:
                 truncate3(points, blocks, block, lane, radius * x, radius * y, radius * z, guard, tally)
