@@ -103,9 +103,7 @@ def test_a_named_marker_can_be_held(cube, free):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"target_quality": 0.3}, "a target cannot be asked of volumes yet: leave out target_quality and target_angle"),
-        ({"target_angle": 10}, "a target cannot be asked of volumes yet"),
-        ({"slide": True}, "boundary nodes of volumes cannot slide yet: leave out slide"),
+        ({"target_angle": 10}, "target_angle is of the angles of triangles and quads, .*: give target_dihedral"),
         ({"preserve": "size"}, r"and this mesh has [\d,]+ tetrahedra: choose auto, "),
         ({"method": "getme"}, r"getme moves cells in a plane alone, and this mesh has [\d,]+ tetrahedra"),
         ({"method": "gmsnet"}, "gmsnet moves triangles alone"),

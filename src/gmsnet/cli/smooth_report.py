@@ -49,13 +49,19 @@ class Outcome:
         """The minimum 1/q of a cell after smoothing; infinite where there are no triangles."""
         return float(self.result.after.shape.min(initial=math.inf))
 
+    @property
+    def _angles(self) -> NDArray[np.float64]:
+        """The smallest angle of each cell, of tetrahedra the smallest dihedral one."""
+        after = self.result.after
+        return after.min_angle if "min_angle" in after.cells.names else after.min_dihedral
+
     @cached_property
     def missed(self) -> NDArray[np.int64]:
         """Rows of the cells that miss the target as they are now, if any was asked for, the worst first."""
         after = self.result.after
         if not self.target:
             return np.empty(0, dtype=np.int64)
-        missed = np.flatnonzero(self.target.missed(after.shape, after.min_angle))
+        missed = np.flatnonzero(self.target.missed(after.shape, self._angles))
         return missed[np.argsort(after.shape[missed], kind="stable")]
 
     @property
@@ -80,10 +86,11 @@ class Outcome:
         figures, wanted = [], self.target
         if wanted.quality is not None and self.least < wanted.quality:
             gap = wanted.quality - self.least
-            figures.append(f"the minimum 1/q is {self.least:.4g}, {gap:.4g} below {wanted.quality:g}")
-        angle = float(after.min_angle.min(initial=math.inf))
-        if wanted.angle is not None and angle < wanted.angle:
-            figures.append(f"the minimum angle is {angle:.4g}°, {wanted.angle - angle:.4g}° below {wanted.angle:g}°")
+            figures.append(f"the minimum {after.symbol} is {self.least:.4g}, {gap:.4g} below {wanted.quality:g}")
+        least, angle = wanted.least_angle, float(self._angles.min(initial=math.inf))
+        if least is not None and angle < least:
+            kind = "angle" if wanted.dihedral is None else "dihedral angle"
+            figures.append(f"the minimum {kind} is {angle:.4g}°, {least - angle:.4g}° below {least:g}°")
         cells = self.missed[: report.NAMED]
         why = self.result.limits.reasons(cells, self.target.shape)
         miss = "misses it" if len(self.missed) == 1 else "miss it"
@@ -218,6 +225,7 @@ class Outcome:
             "stop_reason": result.stop_reason,
             "target_quality": self.target.quality,
             "target_angle": self.target.angle,
+            "target_dihedral": self.target.dihedral,
             "target_met": self.target_met if self.target else None,
             "below_target": len(self.missed),
             "ceiling": result.limits.ceiling,

@@ -29,7 +29,7 @@ Rows = NDArray[np.int32]
 REGULAR = math.degrees(math.acos(1.0 / 3.0))  # the dihedral angles of a regular tetrahedron
 WIDE = REGULAR / (180.0 - REGULAR)  # the weight of what an angle lacks to 180°: there both count alike
 MORE = 4  # times as many cells of the least η are looked at first
-SURE = 1.0 + 1e-6  # times an η: for its rounding
+SHARE = 1.0 + 1e-6  # times an η: for its rounding
 
 
 class Ranked(NamedTuple):
@@ -50,7 +50,7 @@ def most_shape_below(measure: float, wide: float) -> float:
     if measure >= REGULAR:
         return math.inf
     greatest = 180.0 - measure / wide if wide > 0.0 else 180.0
-    return SURE * max(most_shape_with(max(measure, 0.0)), most_shape_with(greatest) if greatest < 180.0 else 0.0)
+    return SHARE * max(most_shape_with(max(measure, 0.0)), most_shape_with(greatest) if greatest < 180.0 else 0.0)
 
 
 def columns_of(points: Floats, cells: Tetrahedra, rows: Rows | None = None) -> Floats:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
-import numpy as np
-
+from gmsnet.kernels.methods.barrier3 import K3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.guard import LEVELS, VALID
@@ -41,10 +41,7 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     if totals is None or totals.uncertain:
         return state
     level = LEVELS.index(options.guard)
-    floor = floor_of(1.0 / (1.0 / totals.shape_min + SPENT))
-    if level != VALID:
-        start = state.start if state.untangled is None else state.untangled
-        floor = max(floor, Floor().of(start, topology, state.precision, executor))
+    floor = floor_for_angles(state, level, 1.0 / (1.0 / totals.shape_min + SPENT), executor)
     field = Field(state.points.copy(), topology, state.precision, level, constraint=state.constraint)
     if isinstance(state.constraint, Surface):
         locate3(state.constraint, field.points)
@@ -64,11 +61,12 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     return state.ended(CALLBACK) if stopped else state
 
 
+def floor_for_angles(state: State, level: int, shape: float, executor: Executor) -> float:
+    """c of D/S^(3/2) for an η, or for the level of the guard to hold from the untangled input on, if that is more."""
+    start, floor = state.start if state.untangled is None else state.untangled, math.sqrt(shape**3 / K3)
+    return floor if level == VALID else max(floor, Floor().of(start, state.topology, state.precision, executor))
+
+
 def merit(totals: Totals, points: Floats, cells: Tetrahedra) -> float:
     """The least η, the mean η, and the least measure of the dihedral angles over that of a regular tetrahedron."""
     return totals.shape_min + totals.shape_mean + float(worst(points, cells, 1, WIDE).measure[0]) / REGULAR
-
-
-def floor_of(shape: float) -> float:
-    """c of D/S^(3/2) for an η."""
-    return float(np.sqrt(shape**3 / 432.0))

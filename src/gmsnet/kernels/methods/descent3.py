@@ -4,8 +4,8 @@ Newton: d = −(H + μI)⁻¹g, μ the least multiple of H's size tried with whi
 half the star's radius (the root mean square of its spokes) long, halved until the objective falls by at least 1e-4 of
 what the slope promises (Armijo). Adam: as in the plane (kernels.methods.adam), with the same sizes of steps.
 
-A node that slides (kernels.star.surface) goes along the normal plane or the tangent at its place; the guard puts it onto
-its patch or curve.
+A node that slides (kernels.star.surface) goes along the tangent plane or the tangent at its place; the guard puts it
+onto its patch or curve.
 
 Every place keeps all simplices positive; that of a bounded objective, which would flatten one for the good of the
 others, makes none smaller than a tenth of the star's mean. A star that is tangled to begin with stays: of
