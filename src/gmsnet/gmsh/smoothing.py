@@ -57,7 +57,7 @@ def smooth(
             options["callback"] = progress.before(options.get("callback"))
             result = smooth_mesh(live.mesh, method, fixed=held, **options)
         if cad is not None:
-            target = Target(options.get("target_quality"), options.get("target_angle"))
+            target = Target(*(options.get(f"target_{of}") for of in ("quality", "angle", "dihedral")))
             result = snapping.on_geometry(gmsh, live, cad.curves, result, target)
         set_points(gmsh, live, result.points, result.moved)
     return result

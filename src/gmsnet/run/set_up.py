@@ -153,17 +153,26 @@ def _first_of_volume(
 
 def check_volume(options: SmoothOptions) -> None:
     """InputError for what cannot be asked of volumes yet."""
-    if options.target:
-        raise InputError("a target cannot be asked of volumes yet: leave out target_quality and target_angle")
     if options.adapts:
         raise InputError("volumes cannot be smoothed towards a metric yet: leave out metric and size")
     if options.best_by == ASPECT:
         raise InputError("volumes have no aspect ratio by which meshes could be compared: leave out best_by")
 
 
+def check_target(mesh: Mesh, target: Target) -> None:
+    """InputError for a minimum angle that cells of this mesh do not have."""
+    if mesh.has_volumes and target.angle is not None:
+        raise InputError(
+            "target_angle is of the angles of triangles and quads, and this mesh has volumes: give target_dihedral"
+        )
+    if not mesh.has_volumes and target.dihedral is not None:
+        raise InputError("target_dihedral is of tetrahedra, and this mesh has none: give target_angle")
+
+
 def check_mesh(mesh: Mesh, target: Target) -> None:
     """InputError for curved surfaces, which cannot be smoothed yet, and targets of no triangle."""
-    others = unmeasured(mesh) if target else ""
+    check_target(mesh, target)
+    others = unmeasured(mesh) if target and not mesh.has_volumes else ""
     if others and not any(len(block.nodes) for block in mesh.cells if measured(mesh, block)):
         raise InputError(
             f"a target is asked of triangles and quads, and this mesh has none: {others} cannot be measured so far"

@@ -23,12 +23,27 @@ def find_rows(row, centre, block, rows):
     return found
 
 
+@inlined
+def confined(on_curve, u, v, w, gx, gy, gz, xx, yy, zz, xy, xz, yz):
+    """A gradient and a Hessian along a curve with the tangent (u, v, w), or along a patch with that normal.
+
+    With the normal n, H becomes PHP + (nᵀHn)nnᵀ, P = I − nnᵀ; with the tangent t, (tᵀHt)I.
+    """
+    p, q, r = xx * u + xy * v + xz * w, xy * u + yy * v + yz * w, xz * u + yz * v + zz * w
+    slope, bend = gx * u + gy * v + gz * w, u * p + v * q + w * r
+    if on_curve:
+        return slope * u, slope * v, slope * w, bend, bend, bend, 0.0 * bend, 0.0 * bend, 0.0 * bend
+    gx, gy, gz = gx - slope * u, gy - slope * v, gz - slope * w
+    xx, yy, zz = xx + 2.0 * u * (bend * u - p), yy + 2.0 * v * (bend * v - q), zz + 2.0 * w * (bend * w - r)
+    xy = xy + 2.0 * bend * u * v - u * q - v * p
+    xz = xz + 2.0 * bend * u * w - u * r - w * p
+    yz = yz + 2.0 * bend * v * w - v * r - w * q
+    return gx, gy, gz, xx, yy, zz, xy, xz, yz
+
+
 @part
 def restrict3(surface, blocks, block, isotropic, workspace):
-    """Makes gradients and Hessians those along the patch or curve, so that Newton's step is, too.
-
-    With the normal n, H becomes PHP + (nᵀHn)nnᵀ, P = I − nnᵀ; with the tangent t, (tᵀHt)I. isotropic: of ISO.
-    """
+    """Makes gradients and Hessians those along the patch or curve, so that Newton's step is, too. isotropic: of ISO."""
     if surface is not None and find_rows(surface.row, blocks.centre, block, workspace.row):
         sums, star, half = workspace.sums, workspace.star, np.float32(0.5)
         for lane in range(LANES3):
@@ -42,17 +57,9 @@ def restrict3(surface, blocks, block, isotropic, workspace):
             zz = 2.0 * sums[ZZ * LANES3 + lane] + iso
             xy, xz, yz = sums[XY * LANES3 + lane], sums[XZ * LANES3 + lane], sums[YZ * LANES3 + lane]
             gx, gy, gz = sums[GX * LANES3 + lane], sums[GY * LANES3 + lane], sums[GZ * LANES3 + lane]
-            p, q, r = xx * u + xy * v + xz * w, xy * u + yy * v + yz * w, xz * u + yz * v + zz * w
-            slope, bend = gx * u + gy * v + gz * w, u * p + v * q + w * r
-            if on_curves(surface.kind[row]):
-                gx, gy, gz = slope * u, slope * v, slope * w
-                xx, yy, zz, xy, xz, yz = bend, bend, bend, 0.0 * bend, 0.0 * bend, 0.0 * bend
-            else:
-                gx, gy, gz = gx - slope * u, gy - slope * v, gz - slope * w
-                xx, yy, zz = xx + 2.0 * u * (bend * u - p), yy + 2.0 * v * (bend * v - q), zz + 2.0 * w * (bend * w - r)
-                xy += 2.0 * bend * u * v - u * q - v * p
-                xz += 2.0 * bend * u * w - u * r - w * p
-                yz += 2.0 * bend * v * w - v * r - w * q
+            gx, gy, gz, xx, yy, zz, xy, xz, yz = confined(
+                on_curves(surface.kind[row]), u, v, w, gx, gy, gz, xx, yy, zz, xy, xz, yz
+            )
             sums[GX * LANES3 + lane], sums[GY * LANES3 + lane], sums[GZ * LANES3 + lane] = gx, gy, gz
             sums[XX * LANES3 + lane], sums[YY * LANES3 + lane], sums[ZZ * LANES3 + lane] = (
                 half * xx,
