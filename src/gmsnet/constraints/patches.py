@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from gmsnet.constraints.facets import Facets
 from gmsnet.constraints.features import COLLINEAR, SLACK, Curves, curves_along, lengths_of, rounding_of
@@ -85,6 +83,9 @@ def patches_of(facets: Facets, points: Floats, feature_angle: float, single: boo
 
 def linked(beside: Longs, chosen: Flags | None = None) -> Longs:
     """(F,) the number of the part of each facet, of those that are joined across their edges; chosen: (F, 3) which."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components  # loads what few runs need
+
     joins = beside != NOTHING if chosen is None else chosen
     one, _ = np.nonzero(joins)
     shape = (len(beside), len(beside))

@@ -13,8 +13,6 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from gmsnet.kernels.topology import columns as kernels
 from gmsnet.kernels.topology import connectivity
@@ -125,6 +123,9 @@ def _accepted(
     rows: Ints, columns: Ints, heights: Floats, flatness: Floats, last: Floats, long: Flags, wall: Flags
 ) -> Flags:
     """(C,) which columns stand beside enough others and have grown, or are of rows of one height."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components  # loads what few runs need
+
     number = np.full(len(wall), -1, dtype=np.int64)
     number[columns[long, 0]] = np.flatnonzero(long)
     beside = number[rows]
