@@ -124,6 +124,7 @@ def test_the_worst_cells_zoom_and_say_their_figures(name, request, seen):
     assert found.page.locator("#over path").count() == 2
     assert changed(found.pixels(), whole) > 0.1
     found.page.click("#whole")
+    assert found.page.locator("[aria-pressed=true]").count() == 0
     set_to(found.page, "mix", 100)
     if name == "volume":
         set_to(found.page, "axis", "")

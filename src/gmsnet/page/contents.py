@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -53,6 +54,11 @@ class Contents:
     def reports(self) -> dict[str, QualityReport]:
         """The meshes that are compared, by what they are called."""
         return {"now": self.after} if self.before is None else {"before": self.before, "after": self.after}
+
+    @cached_property
+    def summaries(self) -> list[dict[str, Any]]:
+        """Their figures."""
+        return [report.summary() for report in self.reports.values()]
 
     @property
     def quads(self) -> bool:

@@ -91,7 +91,7 @@ def remarks(contents: Contents) -> str:
 
 
 def _figures(contents: Contents) -> list[Figure]:
-    return figures_of([report.summary() for report in contents.reports.values()])
+    return figures_of(contents.summaries)
 
 
 def _cards(contents: Contents) -> str:
@@ -117,7 +117,7 @@ def _change(contents: Contents, figure: Figure) -> str:
     """Whether a figure became better or worse."""
     if contents.before is None:
         return "same"
-    before, after = (at(report.summary(), figure.path) for report in contents.reports.values())
+    before, after = (at(summary, figure.path) for summary in contents.summaries)
     if figure.texts[0] == figure.texts[-1] or before is None or after is None:
         return "same"
     low = figure.path[0] == "inverted" or figure.path[0] in BEST_IS_LOW or figure.path[-1].startswith("below")

@@ -139,9 +139,8 @@ class View {
   }
 
   showWhole() {
-    this.chosen = -1;
+    this.choose(-1);
     this.camera.whole();
-    this.say();
     this.paint();
   }
 
