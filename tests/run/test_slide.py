@@ -236,3 +236,15 @@ def test_every_method_that_lets_nodes_slide_does(method):
         result = gmsnet.smooth(mesh, method, slide=True, preserve="none")
         assert result.moved[mesh.markers["bottom"]].any()
         assert result.after.shape.min() >= result.before.shape.min()
+
+
+@pytest.mark.parametrize("below", [0.0, 1e-6, 1e-3])
+def test_the_area_that_is_told_does_not_depend_on_the_scale(below):
+    """Coordinates are divided by a power of two, which changes if the largest one falls below another."""
+    mesh = random_mesh(300, "circle", boundary="random", seed=1)
+    points = mesh.points - 0.5
+    scaled = mesh.with_points(points * (1.0 - below) / abs(points).max())
+    result = gmsnet.smooth(scaled, slide=True)
+    assert below or scaled.exponent != result.mesh.exponent
+    note = next(note for note in result.notes if note.startswith("slide: "))
+    assert float(note.split("more than ")[1].split()[0]) < 0.01

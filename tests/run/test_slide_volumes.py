@@ -109,7 +109,7 @@ def test_fixed_nodes_stay():
     assert not result.moved[mesh.markers["top"]].any()
     assert result.moved[mesh.markers["bottom"]].sum() == len(mesh.markers["bottom"]) - 4
     assert set(result.held) == {"boundary"}
-    assert [note[:6] for note in result.notes] == ["slide:"]  # not that they would be held anyway
+    assert "fixed: 49 nodes are named, and do not slide" in result.notes
 
 
 def test_interfaces_stay():
@@ -141,6 +141,58 @@ def test_cells_of_other_kinds_hold_their_nodes():
     result = gmsnet.smooth(mesh, slide=True)
     assert not result.moved[outer[:10]].any()
     assert result.moved[outer[10:]].all()
+
+
+@pytest.mark.parametrize(("axes", "held"), [((0, 1, 2), 1), ((0, 1), 7)])
+def test_parts_that_touch_at_a_node_or_an_edge(axes, held):
+    points, cells, on = solid(6, None, 0.35)
+    other = points + np.isin(range(3), axes)
+    there = ((points == 1) | ~np.isin(range(3), axes)).all(axis=1)
+    here = ((points == 0) | ~np.isin(range(3), axes)).all(axis=1)
+    pairs = np.flatnonzero(there)[np.argsort(points[there][:, 2])], np.flatnonzero(here)[np.argsort(points[here][:, 2])]
+    number = np.arange(2 * len(points))
+    number[pairs[1] + len(points)] = pairs[0]
+    other[pairs[1]] = points[pairs[0]]
+    mesh = volumes.mesh_of(np.vstack([points, other]), number[np.vstack([cells, cells + len(points)])])
+    assert (volumes.volumes6(mesh.points, mesh.cells[0].nodes) > 0).all()
+    result = gmsnet.smooth(mesh, slide=True)
+    assert len(pairs[0]) == held
+    assert not result.moved[pairs[0]].any()
+    corners = np.concatenate([on.all(axis=1), on.all(axis=1)])
+    used = np.isin(np.arange(len(corners)), mesh.cells[0].nodes)
+    still = used & ~result.moved
+    assert still.sum() == {1: 15, 7: 19}[held]  # corners of both, and what they share
+    assert (corners | np.isin(np.arange(len(corners)), pairs[0]))[still].all()
+    assert result.after.inverted == 0
+
+
+PERIODIC = """MARKER_TAG= SEND_RECEIVE
+MARKER_ELEMS= 2
+SEND_TO= 1
+1 {} 1
+1 {} 1
+MARKER_TAG= SEND_RECEIVE
+MARKER_ELEMS= 2
+SEND_TO= -1
+1 {} 1
+1 {} 1
+"""
+
+
+def test_nodes_that_su2_copies_stay(tmp_path):
+    mesh, on = marked()
+    path = tmp_path / "in.su2"
+    gmsnet.write(mesh, path)
+    four = np.flatnonzero(on.sum(axis=1) == 1)[:4]
+    text = path.read_text()
+    assert text.count("NMARK= 3") == 1
+    path.write_text(text.replace("NMARK= 3", "NMARK= 5") + PERIODIC.format(*four))
+    result = gmsnet.smooth(gmsnet.read(path), slide=True)
+    assert not result.moved[four].any()
+    assert result.moved[np.setdiff1d(np.flatnonzero(on.sum(axis=1) == 1), four)].all()
+    gmsnet.write(result.mesh, tmp_path / "out.su2")
+    found = gmsnet.read(tmp_path / "out.su2")
+    assert list(found.markers) == list(gmsnet.read(path).markers)
 
 
 def test_the_boundary_may_be_inside_out_where_cells_are_inverted():

@@ -98,12 +98,15 @@ def smooth(
         list[str] | None,
         typer.Option(
             metavar="WHAT",
-            help="Let nodes of boundaries, interfaces and markers move along their curves: all, or a marker's name. "
-            "Repeatable.",
+            help="Let nodes of boundaries, interfaces and markers move along their curves, and boundary nodes of "
+            "tetrahedra on their surface: all, or a marker's name. Repeatable.",
         ),
     ] = None,
     feature_angle: Annotated[
-        float, typer.Option(help="With --slide: a curve ends where it turns by more degrees than this.")
+        float,
+        typer.Option(
+            help="With --slide: curves end, and edges of surfaces are sharp, where they turn by more degrees than this."
+        ),
     ] = 30.0,
     threads: Annotated[
         int | None,

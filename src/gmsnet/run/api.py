@@ -72,8 +72,9 @@ def smooth(
     methods after each sweep; a true answer stops the run. weights: a safetensors file for methods with weights.
     best_by: which 1/q enters the q̂ that says which mesh is the best: "shape" (1/q) or "aspect" (1/q_V, with which
     the paper's tables are formed). slide: whether nodes of boundaries, interfaces and line cells move along their
-    curves: None (they stay), True, or names of markers whose nodes may. feature_angle: degrees; a curve ends where it
-    turns by more. geometry: what to slide on instead of arcs through the input's nodes (docs/sliding.md).
+    curves, boundary nodes of tetrahedra on their surface: None (they stay), True, or names of markers whose nodes may.
+    feature_angle: degrees; curves end, and edges of surfaces are sharp, where they turn by more. geometry: what to
+    slide on in the plane instead of arcs through the input's nodes (docs/sliding.md).
     metric: the tensors of which the cells are to be unit cells, by shape and size (docs/metric.md): an array (N, 3) of
     m11, m12, m22 at the nodes, or a function from points (n, 2) to such an array. size: the same for lengths h of
     edges: an array (N,), or a function from points (n, 2) to one (n,); its metric is h⁻²·I.

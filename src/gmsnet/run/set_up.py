@@ -119,12 +119,16 @@ def first_state(
 
 def held_anyway(asked: NDArray[np.bool_], topology: Topology | Volume, fixed: Any, slides: bool) -> list[str]:
     """Says so where all nodes that are to be held are held for other reasons. slides: else some might slide."""
-    if slides or not asked.any() or REASONS[CHOSEN] in topology.held:
+    if not asked.any() or REASONS[CHOSEN] in topology.held:
         return []
     count = np.count_nonzero(asked)
     named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
     where = " by the point data 'fixed' of the mesh" if fixed is None else ""
-    return [f"fixed: {named}{where}, and held for other reasons anyway"]
+    return [
+        f"fixed: {named}{where}, and {'does' if count == 1 else 'do'} not slide"
+        if slides
+        else f"fixed: {named}{where}, and held for other reasons anyway"
+    ]
 
 
 def _first_of_volume(

@@ -250,7 +250,7 @@ def test_kernels_over_all_nodes():
         if surface.kind[surface.row[node]] == CURVED:
             corners = surface.corner[place]
             sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
-            truth.append(from_facets(moved[node], surface.corner).min() / sides.max())
+            truth.append(from_facets(moved[node], surface.corner).min() / sides.mean())
         else:
             a, b = surface.piece[place][[0, 3]]
             truth.append(on_segments(moved[node], a[None], b[None])[0] / np.linalg.norm(b - a))

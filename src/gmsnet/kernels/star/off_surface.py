@@ -25,14 +25,14 @@ def edge_length(corner, f, k):
 
 @part
 def off_facet(surface, place, x, y, z):
-    """The distance of a point from the facet nearest to it, from ``place`` on, over the longest edge of that."""
+    """The distance of a point from the facet nearest to it, from ``place`` on, over the mean length of its edges."""
     corner = surface.corner
     f, a, b, c = walk(surface, place, x, y, z)
     px = a * corner[f, 0, 0] + b * corner[f, 1, 0] + c * corner[f, 2, 0]
     py = a * corner[f, 0, 1] + b * corner[f, 1, 1] + c * corner[f, 2, 1]
     pz = a * corner[f, 0, 2] + b * corner[f, 1, 2] + c * corner[f, 2, 2]
-    longest = max(edge_length(corner, f, 0), max(edge_length(corner, f, 1), edge_length(corner, f, 2)))
-    return distance(px, py, pz, x, y, z) / longest
+    whole = (edge_length(corner, f, 0) + edge_length(corner, f, 1)) + edge_length(corner, f, 2)
+    return 3.0 * distance(px, py, pz, x, y, z) / whole
 
 
 @part
