@@ -132,4 +132,4 @@ def deform(
             input, done.written, "auto", done.mesh, done.result, options.target, done.lost, plot, {}, done.compiled
         )
 
-    work.carry_out(check_deformable, make, told)
+    raise typer.Exit(work.carry_out(check_deformable, make, told))
