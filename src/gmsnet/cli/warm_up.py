@@ -18,13 +18,13 @@ def warm_up(
         list[str] | None,
         typer.Option(
             metavar="KIND",
-            help="Compile for these: triangle, quad (with triangles or not), tetra. Repeatable (default: all)",
+            help="Compile for these: triangle, quad (with triangles or not), tetra, second-order. Default: all.",
             autocompletion=_kinds,
         ),
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Compile the kernels ahead, so that no later run has to. What is compiled already costs nothing.
+    """Compile the kernels ahead, so that no later run has to: minutes, once.
 
     They are kept in the folder that GMSNET_CACHE names, else beside the package or in the user's cache folder.
     """
