@@ -15,22 +15,17 @@ from typing import Annotated
 
 import typer
 
-from gmsnet.cli import deform, generate, gmsh, methods, quality, reproduce, smooth, train
+from gmsnet.cli import deform, generate, gmsh, methods, quality, reproduce, smooth, train, warm_up
+from gmsnet.cli.failure import BAD_INPUT, DONE, print_failure
 from gmsnet.cli.moves import joined
 from gmsnet.cli.signals import Interrupted
-from gmsnet.errors import GmsnetError
-from gmsnet.kernels.jit.usable import UnusableNumbaError
 from gmsnet.mesh.display import visible
 from gmsnet.parallel.interrupts import interruptible
 
-DONE, BAD_INPUT = 0, 2
 MANY_OBJECTS = (
     200_000  # before cycles are looked for: what imports make is kept, and rounds over it took a tenth of a run
 )
-BUG, INTERRUPTED, BROKEN_PIPE = 70, 130, 141  # as the shells and sysexits.h have them
-
-# Whichever Click the installed Typer uses, its own or the package: this is the base of all its usage errors.
-UsageError: type[Exception] = next(base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException")
+INTERRUPTED, BROKEN_PIPE = 130, 141  # as the shells have them
 
 app = typer.Typer(
     name="gmsnet",
@@ -49,6 +44,7 @@ app.command()(generate.generate)
 app.command()(gmsh.gmsh)
 app.command()(train.train)
 app.command()(reproduce.reproduce)
+app.command()(warm_up.warm_up)
 
 
 def _print_version(wanted: bool) -> None:
@@ -100,23 +96,12 @@ def _run(arguments: Sequence[str] | None) -> int:
         raise
     except BrokenPipeError:
         return _close_pipe()
-    except (GmsnetError, UsageError, OSError, UnusableNumbaError) as error:
-        return _fail(error.format_message() if isinstance(error, UsageError) else _describe(error))  # type: ignore[attr-defined]
     except Interrupted as interruption:
         return _interrupted(str(interruption))
     except (KeyboardInterrupt, typer.Abort):
         return _interrupted("interrupted; nothing was written")
-    except MemoryError as error:
-        return _fail(f"the memory does not suffice: {str(error) or 'what is asked for is too large'}")
     except Exception as error:
-        if os.environ.get("GMSNET_DEBUG"):
-            raise
-        what = visible(" ".join(f"{type(error).__name__}: {error}".split()))
-        print(
-            f"gmsnet: internal error: {what}; please report it; GMSNET_DEBUG=1 shows the traceback",
-            file=sys.stderr,
-        )
-        return BUG
+        return print_failure(error)
     if code == INTERRUPTED:  # Typer swallows KeyboardInterrupt
         return _interrupted("interrupted; nothing was written")
     return code if isinstance(code, int) else DONE
@@ -138,17 +123,6 @@ def _open_what_is_closed() -> None:
 def _interrupted(message: str) -> int:
     print(f"gmsnet: {visible(message)}", file=sys.stderr)
     return INTERRUPTED
-
-
-def _describe(error: Exception) -> str:
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"{os.fsdecode(error.filename)}: {error.strerror}"
-    return str(error)
-
-
-def _fail(message: str) -> int:
-    print(f"gmsnet: error: {visible(' '.join(message.split()))}", file=sys.stderr)
-    return BAD_INPUT
 
 
 def _close_pipe() -> int:

@@ -142,4 +142,4 @@ def deform(
     def told(done: Done) -> MovedOutcome:
         return MovedOutcome(done.mesh, done.result, done.compiled, input, done.written, done.lost, plot, report)
 
-    work.carry_out(check_deformable, make, told)
+    raise typer.Exit(work.carry_out(check_deformable, make, told))

@@ -35,16 +35,22 @@ class Done(NamedTuple):
 
 class FileWork:
     """One run on a file. input: its path, format: its format where the suffix does not tell. plot, report: of a
-    picture and of a page. command: as it was given."""
+    picture and of a page. command: as it was given.
+
+    destination: None where there is none. dry_run: nothing is written. number: of one of several files, of which a line
+    each is printed.
+    """
 
     def __init__(
-        self, input: str, format: str | None, destination: Destination, *, in_place: bool, plot: str | None,
-        report: str | None, most_sweeps: int, json: bool, quiet: bool, command: str,
+        self, input: str, format: str | None, destination: Destination | None, *, in_place: bool, plot: str | None,
+        report: str | None, most_sweeps: int, json: bool, quiet: bool, command: str, number: str = "",
+        dry_run: bool = False,
     ) -> None:  # fmt: skip
         from gmsnet.run.progress import Progress
 
         self.input, self.format, self.destination, self.in_place, self.plot = input, format, destination, in_place, plot
         self.report, self.command, self.json, self.quiet = report, command, json, quiet
+        self.number, self.dry_run = number, dry_run
         self.progress, self.interruption = Progress(most_sweeps, enabled=not quiet), Deferral()
         self.written: str | None = None
 
@@ -58,8 +64,8 @@ class FileWork:
     def carry_out(
         self, check: Callable[[Mesh], None], make: Callable[[Mesh], Callable[[], SmoothResult]],
         told: Callable[[Done], Outcome],
-    ) -> None:  # fmt: skip
-        """Reads, works, writes, and prints the outcome; raises Exit with code 1 where that has faults.
+    ) -> int:  # fmt: skip
+        """Reads, works, writes, and prints the outcome; returns the exit code, 1 where the outcome has faults.
 
         check: of the mesh that was read; the path is put before its InputError. make: what is to be done with it, once
         the rest of the command line is checked.
@@ -71,23 +77,28 @@ class FileWork:
                     self.progress.begin(visible(f"writing {self.report}"))
                     with _mesh_is_there(self.written, "report"):
                         outcome.write_report(self.report, self.command)
-            if self.json:
-                outcome.print_json()
-            elif not self.quiet:
-                outcome.print(aside=self.destination.aside)
+            self._tell(outcome)
         except KeyboardInterrupt:
             if self.written is None:
                 raise
             raise Interrupted(f"interrupted; the mesh is written to {self.written}") from None
-        if faults := outcome.faults():
-            for fault in faults:
-                typer.echo(f"gmsnet: {visible(fault)}", err=True)
-            raise typer.Exit(1)
+        faults = outcome.faults()
+        for fault in faults:
+            typer.echo(f"gmsnet: {visible(f'{self.number}{fault}')}", err=True)
+        return 1 if faults else 0
+
+    def _tell(self, outcome: Outcome) -> None:
+        if self.json:
+            outcome.print_json(line=bool(self.number))
+        elif self.number and not self.quiet:
+            outcome.print_line(self.number)
+        elif not self.quiet:
+            outcome.print(aside=self.destination is not None and self.destination.aside)
 
     def _work(self, check: Callable[[Mesh], None], make: Callable[[Mesh], Callable[[], SmoothResult]]) -> Done:
         from gmsnet import io
 
-        self.progress.begin(visible(f"reading {shown(self.input)}"))
+        self.progress.begin(visible(f"{self.number}reading {shown(self.input)}"))
         mesh = io.read(self.input, self.format)
         try:
             check(mesh)
@@ -96,10 +107,11 @@ class FileWork:
         if self.plot is not None:
             check_drawable(mesh, self.input)
         destination = self.destination
-        if self.in_place and mesh.source is not None:
+        if destination is not None and self.in_place and mesh.source is not None:
             destination = replace(destination, format=mesh.source.format)
         work = make(mesh)
-        _check_conversion(mesh, destination)
+        if destination is not None:
+            _check_conversion(mesh, destination)
         self.progress.begin("preparing")
         compiled = self.progress.compilation.seconds
         try:
@@ -109,7 +121,7 @@ class FileWork:
         compiled = self.progress.compilation.seconds - compiled
         self.interruption.begin()
         lost: list[str] = []
-        if not self.in_place or result.moved.any():  # else there is nothing to write
+        if destination is not None and not self.dry_run and (not self.in_place or result.moved.any()):
             self.progress.begin(visible(f"writing {destination.path}"))
             lost = io.write(result.mesh, destination.path, destination.format)
             self.written = destination.path

@@ -47,6 +47,8 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     return made
 
 
-def print_json(document: Mapping[str, Any]) -> None:
-    """The one JSON document on the standard output; what is not a finite number is null."""
-    sys.stdout.write(json.dumps(strict(document), indent=2, allow_nan=False) + "\n")
+def print_json(document: Mapping[str, Any], *, line: bool = False) -> None:
+    """A JSON document on the standard output, on one line if asked for; what is not a finite number is null."""
+    sys.stdout.write(json.dumps(strict(document), indent=None if line else 2, allow_nan=False) + "\n")
+    if line:  # for who waits for the lines of several files
+        sys.stdout.flush()

@@ -12,6 +12,7 @@ from gmsnet.errors import InputError
 def quality(
     context: typer.Context,
     input: Annotated[str, typer.Argument(metavar="IN", help="The mesh file; - reads the standard input.")],
+    other: Annotated[str | None, typer.Argument(metavar="OTHER", help="A second one to compare with.")] = None,
     threshold: Annotated[
         float | None,
         typer.Option(help="Name the cells whose 1/q is below this; exit code 1 if there are any."),
@@ -24,15 +25,26 @@ def quality(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
-    """Measure the triangles and quads, or the tetrahedra, of a mesh: angles, 1/q or η, inverted, the worst."""
+    """Measure the triangles and quads, or the tetrahedra, of a mesh: angles, 1/q or η, inverted, the worst.
+
+    Two meshes are measured side by side; how far nodes have moved is told as well where both have the same cells.
+    """
     from gmsnet.cli.destination import check_drawable, check_picture, check_report, shown
 
     if threshold is not None and not -1.0 <= threshold <= 1.0:
         raise InputError(f"--threshold is a value of 1/q and must lie between -1 and 1, got {threshold:g}")
+    if plot is not None and other is not None:
+        raise InputError("--plot draws one mesh: leave it out, or leave out the second mesh")
+    if report is not None and other is not None:
+        raise InputError("--report shows one mesh: leave it out, or leave out the second mesh")
     if plot is not None:
         check_picture(plot, input)
     if report is not None:
         check_report(report, input)
+    if other is not None:
+        from gmsnet.cli.comparison import compare
+
+        raise typer.Exit(compare((input, other), threshold, format, json=json))
 
     from gmsnet import io
     from gmsnet.cli import output

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gmsnet.errors import InputError
+
 if TYPE_CHECKING:
+    from gmsnet.cli.destination import Destination
     from gmsnet.mesh.mesh import Mesh
     from gmsnet.run.result import SmoothResult
 
@@ -28,8 +32,11 @@ def _format_names() -> list[str]:
 def smooth(
     context: typer.Context,
     input: Annotated[str, typer.Argument(metavar="IN", help="The mesh file to smooth; - reads the standard input.")],
-    output: Annotated[
-        str | None, typer.Argument(metavar="OUT", help="The file to write; - writes the standard output.")
+    others: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="OUT", help="The file to write; - writes the standard output. With --out-dir: further inputs."
+        ),
     ] = None,
     method: Annotated[
         str, typer.Option(help="The smoother; see 'gmsnet methods'.", autocompletion=_method_names)
@@ -123,6 +130,14 @@ def smooth(
         str | None, typer.Option(help="Format of OUT, where its suffix does not tell it.", autocompletion=_format_names)
     ] = None,
     in_place: Annotated[bool, typer.Option("--in-place", help="Write the result to IN; give no OUT.")] = False,
+    out_dir: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Smooth all that is named, files, folders and patterns, and write each by its name to this folder.",
+        ),
+    ] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Do everything but write; OUT may be left out.")] = False,
     plot: Annotated[
         str | None, typer.Option(metavar="FILE", help="Draw the mesh before and after (.png, .svg or .pdf).")
     ] = None,
@@ -142,21 +157,32 @@ def smooth(
     becomes invalid. Inverted cells are untangled first. The worst cell never gets worse, and the result is never worse
     than the input. Exit code 1: a target is missed, or cells are inverted still.
 
+    With --out-dir a line tells of each file, with --json a document. A file that fails does not stop the others, and
+    the exit code is that of the worst.
+
     Formats are told by the suffix: .su2 .msh .vtk .vtu .mesh .node/.ele .stl .obj .off .ply; OUT of another format
     than IN is converted.
 
     Ctrl-C stops the smoothing; the best mesh so far is written. A second one ends at once and writes nothing.
     """
     from gmsnet.cli.destination import check_picture, check_report, destination_of, refuse_mixture
+    from gmsnet.cli.several import Job, carry_out_each, jobs_of, only_output
 
-    destination = destination_of(input, output, in_place, output_format)
-    refuse_mixture(destination, json)
+    output = only_output(others or [], out_dir, in_place=in_place, plot=plot)
+    whole = None if out_dir is not None or (dry_run and output is None and not in_place) else destination_of(
+        input, output, in_place, output_format
+    )  # fmt: skip
+    if whole is not None:
+        refuse_mixture(whole, json)
     if plot is not None:
-        check_picture(plot, input, destination)
+        check_picture(plot, input, whole)
     if report is not None:
-        check_report(report, input, destination)
+        if out_dir is not None:
+            raise InputError("--report shows one mesh: leave it out, or --out-dir")
+        check_report(report, input, whole)
 
     # Heavy imports only now, when the command line is known to be in order.
+    from gmsnet.cli import output as printed
     from gmsnet.cli.command import command_of
     from gmsnet.cli.file_work import Done, FileWork
     from gmsnet.cli.fix import fixed_nodes
@@ -166,23 +192,40 @@ def smooth(
     from gmsnet.run.options import SmoothOptions
     from gmsnet.run.set_up import check_mesh
 
-    work = FileWork(
-        input, format, destination, in_place=in_place, plot=plot, report=report, most_sweeps=max_sweeps, json=json,
-        quiet=quiet, command=command_of(context),
-    )  # fmt: skip
-    options = SmoothOptions(  # before the file is read, which may be large
+    asked = SmoothOptions(  # before the file is read, which may be large
         method=method, variant=variant, objective=objective, max_sweeps=max_sweeps, threads=threads,
         target_quality=target_quality, target_angle=target_angle, target_dihedral=target_dihedral,
-        preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed,
-        callback=work.after_sweep, weights=weights, best_by=best_by,
+        preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, weights=weights,
+        best_by=best_by,
         slide=True if slide and "all" in slide else slide or None, feature_angle=feature_angle,
         **values_at_nodes(metric, size),
     )  # fmt: skip
 
-    def make(mesh: Mesh) -> Callable[[], SmoothResult]:
-        return partial(smooth_with, mesh, options, fixed_nodes(mesh, fix) if fix else None)
+    def one(job: Job, destination: Destination | None) -> tuple[int, bool]:
+        work = FileWork(
+            job.source, format, destination, in_place=in_place, plot=plot, report=report, most_sweeps=max_sweeps,
+            json=json, quiet=quiet, command=command_of(context), number=job.number, dry_run=dry_run,
+        )  # fmt: skip
+        options = replace(asked, callback=work.after_sweep)
 
-    def told(done: Done) -> Outcome:
-        return Outcome(done.mesh, done.result, done.compiled, input, done.written, done.lost, plot, report)
+        def make(mesh: Mesh) -> Callable[[], SmoothResult]:
+            return partial(smooth_with, mesh, options, fixed_nodes(mesh, fix) if fix else None)
 
-    work.carry_out(lambda mesh: check_mesh(mesh, options.target), make, told)
+        def told(done: Done) -> Outcome:
+            return Outcome(done.mesh, done.result, done.compiled, job.source, done.written, done.lost, plot, report)
+
+        code = work.carry_out(lambda mesh: check_mesh(mesh, options.target), make, told)
+        return code, work.interruption.caught
+
+    if out_dir is None:
+        raise typer.Exit(one(Job(input, output or "", ""), whole)[0])
+
+    def into_folder(job: Job) -> tuple[int, bool]:
+        return one(job, None if dry_run else destination_of(job.source, job.output, False, output_format))
+
+    def fail(job: Job, text: str) -> None:
+        if json:
+            printed.print_json({"input": job.source, "error": text}, line=True)
+
+    jobs = jobs_of([input, *(others or [])], out_dir, output_format, dry_run=dry_run)
+    carry_out_each(jobs, into_folder, fail, quiet=quiet or json)

@@ -72,9 +72,20 @@ class Outcome(Account):
         facts += [("lost in conversion", loss) for loss in self.lost]
         write_page(path, contents_of(self, os.path.basename(shown(self.input)), command, facts))
 
-    def print_json(self) -> None:
+    def print_line(self, number: str) -> None:
+        """What matters most, in one line."""
+        before, after = self.result.before, self.result.after
+        gain = "no cells to measure"
+        if before.totals is not None and after.totals is not None:
+            pairs = [(before.shape.min(), after.shape.min()), (before.shape.mean(), after.shape.mean())]
+            least, mean = (f"{one:.4f} → {other:.4f}" for one, other in pairs)
+            gain = f"{after.symbol} least {least}, mean {mean}"
+        written = "not written" if self.written is None else self.written
+        output.console().print(f"{number}{shown(self.input)}: {gain}; {self.verdict()}; {written}")
+
+    def print_json(self, *, line: bool = False) -> None:
         """The whole outcome as one document."""
-        output.print_json(self.document())
+        output.print_json(self.document(), line=line)
 
     def document(self) -> dict[str, Any]:
         """The whole outcome as plain values."""

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from gmsnet.run.sweep import Sweep
 
-COMPILING = "compiling kernels, once; about 15 s"
+COMPILING = "compiling kernels, once; about 15 s ('gmsnet warm-up' does it ahead)"
 
 
 class Progress:
