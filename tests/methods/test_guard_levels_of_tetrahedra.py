@@ -118,15 +118,16 @@ def test_each_sweep_keeps_what_the_level_promises(method, level, seed, kind, nod
         before = after
 
 
+@pytest.mark.parametrize("target", [{}, {"target_dihedral": 25.0}, {"target_quality": 0.5}], ids=str)
 @pytest.mark.parametrize("level", LEVELS)
 @some_meshes
 @settings(max_examples=3 * EXAMPLES, deadline=None)
-def test_so_does_the_whole_from_input_to_output_at_any_stop(level, seed, kind, nodes, thrown, where, single):
+def test_so_does_the_whole_from_input_to_output_at_any_stop(level, target, seed, kind, nodes, thrown, where, single):
     mesh = some_mesh(seed, kind, nodes, thrown, where, single)
     rng = np.random.default_rng(seed)
     fixed = rng.random(len(mesh.points)) < 0.1
     topology = Volume.of(mesh, fixed)
-    result = gmsnet.smooth(mesh, guard=level, max_sweeps=int(rng.integers(0, 12)), fixed=fixed)
+    result = gmsnet.smooth(mesh, guard=level, max_sweeps=int(rng.integers(0, 40)), fixed=fixed, **target)
     cells, orientation = topology.cells, topology.orientation
     changed = np.flatnonzero(np.isin(cells, topology.free).any(axis=1))
     still = np.setdiff1d(np.arange(len(mesh.points)), topology.free)
