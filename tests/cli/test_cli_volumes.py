@@ -165,7 +165,7 @@ def test_quality_of_a_file_with_inverted_cells(run, tmp_path):
     [
         (["--slide", "hul"], "there is no marker 'hul' to slide on"),
         (["--target-angle", "10"], "this mesh has volumes: give target_dihedral"),
-        (["--method", "getme"], "getme moves cells in a plane alone"),
+        (["--method", "getme"], "the variant sequential of getme moves cells in a plane alone"),
         (["--preserve", "size"], "tetrahedra: choose auto"),
     ],
 )

@@ -122,16 +122,19 @@ def test_each_sweep_keeps_what_the_level_promises(method, level, seed, slide, ki
         before = after
 
 
+@pytest.mark.parametrize("target", [{}, {"target_dihedral": 25.0}, {"target_quality": 0.5}], ids=str)
 @pytest.mark.parametrize("level", LEVELS)
 @some_meshes
 @settings(max_examples=3 * EXAMPLES, deadline=None)
-def test_so_does_the_whole_from_input_to_output_at_any_stop(level, seed, slide, kind, nodes, thrown, where, single):
+def test_so_does_the_whole_from_input_to_output_at_any_stop(
+    level, target, seed, slide, kind, nodes, thrown, where, single
+):
     mesh = some_mesh(seed, kind, nodes, thrown, where, single)
     rng = np.random.default_rng(seed)
     fixed = rng.random(len(mesh.points)) < 0.1
     topology, _ = surfaces.sliding(mesh, 60.0, fixed) if slide else (Volume.of(mesh, fixed), None)
-    sweeps = int(rng.integers(0, 12))
-    result = gmsnet.smooth(mesh, guard=level, max_sweeps=sweeps, fixed=fixed, slide=slide, feature_angle=60.0)
+    sweeps = int(rng.integers(0, 40))
+    result = gmsnet.smooth(mesh, guard=level, max_sweeps=sweeps, fixed=fixed, slide=slide, feature_angle=60.0, **target)
     cells, orientation = topology.cells, topology.orientation
     changed = np.flatnonzero(np.isin(cells, topology.free).any(axis=1))
     still = np.setdiff1d(np.arange(len(mesh.points)), topology.free)

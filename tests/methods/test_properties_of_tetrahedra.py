@@ -22,6 +22,9 @@ LESSER_GAINS = {
     "laplacian-smart": (0.0, 0.7),  # falling sums of q^(3/2) leave the worst cell to itself
     "laplacian-plain": (0.0, 0.68),
     "worst-first": (0.2, 0.66),  # leaves all but the worst cells alone
+    "getme-simultaneous": (0.01, 0.68),
+    "optimize-adam-metric": (0.01, 0.7),  # bounded: it gives up single cells for the mean
+    "optimize-newton-metric": (0.01, 0.7),
 }
 
 
@@ -38,7 +41,9 @@ def large_lattice():
 
 def test_these_methods_smooth_tetrahedra():
     assert set(map(name_of, IN_SPACE)) == {
-        "auto", "barrier-q", "barrier-q2", "barrier-q4", "laplacian-plain", "laplacian-smart", "worst-first",
+        "auto", "barrier-q", "barrier-q2", "barrier-q4", "getme-simultaneous", "laplacian-plain", "laplacian-smart",
+        "optimize-adam-metric", "optimize-adam-q", "optimize-adam-q2", "optimize-newton-metric", "optimize-newton-q",
+        "optimize-newton-q2", "worst-first",
     }  # fmt: skip
     assert set(LESSER_GAINS) <= set(map(name_of, IN_SPACE))
 

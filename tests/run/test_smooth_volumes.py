@@ -105,7 +105,8 @@ def test_a_named_marker_can_be_held(cube, free):
     [
         ({"target_angle": 10}, "target_angle is of the angles of triangles and quads, .*: give target_dihedral"),
         ({"preserve": "size"}, r"and this mesh has [\d,]+ tetrahedra: choose auto, "),
-        ({"method": "getme"}, r"getme moves cells in a plane alone, and this mesh has [\d,]+ tetrahedra"),
+        ({"method": "getme"}, "the variant sequential of getme moves .*: choose one of its variants simultaneous, or"),
+        ({"method": "optimize", "objective": "cosine"}, "choose one of its objectives metric, q, q2, or another"),
         ({"method": "gmsnet"}, "gmsnet moves triangles alone"),
         ({"method": "laplacian", "variant": "area"}, "choose one of its variants smart, plain, or another method"),
         ({"fixed": [100_000]}, "the mesh has the nodes 0 to"),

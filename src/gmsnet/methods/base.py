@@ -194,5 +194,9 @@ class Method:
 
     def moves(self, kind: str, choice: str | None = None) -> bool:
         """Does it move the nodes of cells of this kind, with this objective or variant (None: the default one)?"""
-        chosen = choice or (self.objectives[0] if self.objectives else "")
-        return kind in self.limits.get(chosen, self.cells)
+        return kind in self.limits.get(choice or self.default, self.cells)
+
+    @property
+    def default(self) -> str:
+        """The objective, or else the variant, that is used if none is chosen; "" where there are none."""
+        return (*self.objectives, *self.variants, "")[0]

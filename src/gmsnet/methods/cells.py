@@ -16,6 +16,7 @@ def check_cells(mesh: Mesh, name: str, choice: str | None = None) -> None:
     Such a mesh it does not smooth at all: nodes of triangles alone would be moved as if there were no quads.
     """
     method = method_named(name)
+    choice = choice or method.default
     kind = "tetra" if mesh.has_volumes else "quad"
     count = sum(len(block.nodes) for block in mesh.cells if block.kind == kind)
     if not count or method.moves(kind, choice):
@@ -24,7 +25,7 @@ def check_cells(mesh: Mesh, name: str, choice: str | None = None) -> None:
     moves = "moves triangles alone" if method.cells == TRIANGLES or kind == "quad" else "moves cells in a plane alone"
     cells = f"1 {one}" if count == 1 else f"{count:,} {many}"
     others = ", ".join(each.name for each in METHODS.values() if each.moves(kind) and each is not method)
-    what = "objective" if choice in method.objectives or not choice else "variant"
+    what = "objective" if choice in method.objectives else "variant"
     able = ", ".join(each for each in getattr(method, f"{what}s") if method.moves(kind, each))
     if able and kind in method.cells:
         raise InputError(

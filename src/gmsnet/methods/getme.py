@@ -7,6 +7,10 @@ squares). The simultaneous variant with the paper's θ and λ is not in the pape
 which raises q̂ by 0.05 to 0.1 over η = 0 and costs 0.01 of the mean 1/q; with the book's θ and λ, which transform more
 at once, η = 2 lowers q̂.
 
+Tetrahedra have the simultaneous variant (kernels/methods/getme3.py), with σ = ½ and weights (1 − η)². Of σ = ½, 1, 2
+and 4 and the powers 0 to 3 that ends with the best worst cell by far: after thirty sweeps of a random cube at a least η
+of 0.051 and a mean of 0.724, with the power 0 at 0.015 and 0.738.
+
 Quads have a θ and a λ of their own in all variants: π/4 and ½. The paper knows triangles alone, and with its setting no
 quad becomes a square.
 
@@ -24,15 +28,18 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import getme as kernels
-from gmsnet.kernels.methods import getme_simultaneous
+from gmsnet.kernels.methods import getme3, getme_simultaneous
 from gmsnet.kernels.methods.getme import Queue
 from gmsnet.kernels.methods.getme_elements import Elements, Transformation
 from gmsnet.kernels.simplex.mean_ratio2 import SQUARE, Simplices
 from gmsnet.kernels.star.block import MOVED
-from gmsnet.methods.base import Field, Method, MethodOptions, Smoother, Tally, by_colour
+from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.methods.base import ALL_CELLS, CELLS, Field, Method, MethodOptions, Smoother, Tally, by_colour, over_stars
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
+SIGMA, POWER = 0.5, 2  # of tetrahedra: how far nodes go, in roots of faces, and the power of their weights
 PERIOD = 100  # steps between tests
 PERIODS = 10  # of a sweep, at maximum: on large meshes a test after each hundred steps would be most of the work
 PATIENCE = 20  # tests without gain after which it has settled
@@ -84,6 +91,8 @@ class SimultaneousGetme(Smoother):
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
+        if isinstance(field.topology, Volume):
+            return _in_space(field, executor)
         stars, guard = field.topology.stars, field.guard(executor)
         points, blocks = field.points, stars.blocks
         shifts = np.empty((len(blocks.filled), 2 * LANES))
@@ -98,6 +107,25 @@ class SimultaneousGetme(Smoother):
 
         executor.map(plan, 0, len(shifts))
         return by_colour(executor, carry_out, stars, points)
+
+
+def _in_space(field: Field, executor: Executor) -> Tally:
+    """One sweep over tetrahedra."""
+    stars, guard, points = field.topology.stars, field.guard(executor), field.points
+    blocks = stars.blocks
+    assert isinstance(blocks, SpaceBlocks)
+    shifts = np.zeros((len(blocks.centre), 3))
+
+    def plan(first: int, last: int) -> None:
+        getme3.plan(points, blocks, first, last, SIGMA, POWER, shifts)
+
+    def carry_out(blocks: SpaceBlocks, first: int, last: int, counts: Tally) -> None:
+        getme3.carry_out(points, blocks, first, last, guard, shifts, counts)
+
+    executor.map(plan, 0, len(blocks.filled))
+    tally = over_stars(carry_out, stars, points, executor)
+    field.floor.swept(tally)
+    return tally
 
 
 def elements_of(topology: Topology) -> Elements:
@@ -165,7 +193,9 @@ def create(options: MethodOptions) -> Smoother:
 METHOD = Method(
     name="getme",
     summary="geometric element transformation: the worst element first (or all at once) is made more regular",
-    source="Vartziotis, Wipper: The GETMe Mesh Smoothing Framework (2018)",
+    source="Vartziotis, Wipper: The GETMe Mesh Smoothing Framework (2018); with Schwald of tetrahedra (2009)",
     create=create,
     variants=tuple(TRANSFORMATIONS),
+    cells=ALL_CELLS,
+    limits=dict.fromkeys((name for name in TRANSFORMATIONS if name != "simultaneous"), CELLS),
 )

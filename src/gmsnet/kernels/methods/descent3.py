@@ -1,8 +1,9 @@
 """Descent on an objective of a star in space, star by star in float64: Newton steps, or Adam's.
 
 Newton: d = −(H + μI)⁻¹g, μ the least multiple of H's size tried with which the pivots of LDLᵀ are positive; at most
-half the star's radius (the root mean square of its spokes) long, halved until the objective falls by at least 1e-4 of
-what the slope promises (Armijo). Adam: as in the plane (kernels.methods.adam), with the same sizes of steps.
+REACH times the star's radius (the root mean square of its spokes) long, halved until the objective falls by at least
+1e-4 of what the slope promises (Armijo). For angles it is made up to twice as long, as for F^(−1/p)
+(kernels.methods.barrier3). Adam: as in the plane (kernels.methods.adam), with the same sizes of steps.
 
 A node that slides (kernels.star.surface) goes along the tangent plane or the tangent at its place; the guard puts it
 onto its patch or curve.
@@ -47,6 +48,7 @@ TRIALS, SHIFTS = 10, 12  # halvings of a step, and values of μ that are tried
 REACH, END, ARMIJO = 0.5, 1e-9, 1e-4
 SOFT = 1e-6  # the first μ over the largest entry of H's diagonal
 MARGIN = 0.1
+MOST = 0.5  # of angles, the inverse of how much longer a step can become: more costs the mean of η
 FREE, ON_PATCH, ON_CURVE = range(3)  # where a node may go
 
 
@@ -142,7 +144,11 @@ def newton3(aim, scale, way, ends, count, steps, lowest, sums):
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         if not (length > END and value < np.inf):
             break
-        share, slope, taken = min(1.0, REACH / length), gx * dx + gy * dy + gz * dz, False
+        slope, taken = gx * dx + gy * dy + gz * dz, False
+        if aim.kind == DIHEDRAL:
+            longer = 1.0 / max(1.0 + (1.0 + 0.5**aim.doublings) * slope / value, MOST)
+            dx, dy, dz, slope, length = longer * dx, longer * dy, longer * dz, longer * slope, longer * length
+        share = min(1.0, REACH / length)
         for _ in range(TRIALS):
             tx, ty, tz = x + share * dx, y + share * dy, z + share * dz
             inside = evaluate3(aim, scale, ends, count, tx, ty, tz, lowest, False, sums)

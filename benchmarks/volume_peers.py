@@ -1,0 +1,160 @@
+"""gmsnet.smooth beside other tools that move the nodes of tetrahedra and keep their connectivity, in one table.
+
+    python benchmarks/volume_peers.py [--meshes NAME ...] [--tools NAME ...] [--repeats 3] [--limit 300]
+
+Each tool runs in a process of its own, one after the other, in turns: first all once, then again. Told are the least
+seconds of the processor (peers/volume_tools.py says of what), and figures over the cells with a free node; inverted
+ones are counted among all. The boundary is held for all. What to install: peers/requirements.txt; Mesquite is compiled
+(peers/mesquite_volumes.cpp), and MESQUITE_VOLUMES names the program. A tool that is not there is left out, and said so.
+
+gmsnet runs twice, the second time with a minimum dihedral angle that is a sixth more than it reaches without.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from machine import describe
+from peers.volume_tools import MESQUITE, TOOLS, tool_named
+from volumes import _blocks, cube
+
+import gmsnet
+from gmsnet.generate import disturb
+from gmsnet.generate.volumes import boundary_faces, lattice_volume, part_volume
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.volume import Volume
+
+SLOW = 5.0  # seconds: of tools that take longer one run is enough
+MORE = 7.0 / 6.0  # of the smallest angle: what is asked of gmsnet beside its default
+
+
+def jittered(mesh: Mesh) -> Mesh:
+    return disturb(mesh, Volume.of(mesh).free, 0.3, seed=0)
+
+
+def random_cube(seed: int) -> Mesh:
+    points, cells = cube(10_000, seed)
+    return Mesh(points, _blocks(cells))
+
+
+def of_file(name: str) -> Callable[[], Mesh]:
+    return lambda: gmsnet.read(Path(os.environ["GMSNET_MESHES"], name))
+
+
+MESHES: dict[str, Callable[[], Mesh]] = {
+    **{f"random cube, seed {seed}": partial(random_cube, seed) for seed in range(5)},
+    "jittered lattice": lambda: jittered(lattice_volume(17)),
+    "part with two holes": lambda: jittered(part_volume(17)),
+    **{name: of_file(name) for name in ("cub_wedge_like.vtk", "island.mesh", "cylinder_in_box.mesh")},
+}
+
+
+class Case:
+    """A mesh as arrays in a file, and how a result is judged."""
+
+    def __init__(self, mesh: Mesh, path: Path) -> None:
+        topology = Volume.of(mesh)
+        self.topology, self.path = topology, path
+        used, rows = np.unique(topology.cells, return_inverse=True)
+        cells = np.where(topology.orientation[:, None] > 0, topology.cells, topology.cells[:, [0, 2, 1, 3]])
+        _, rows = np.unique(cells, return_inverse=True)
+        self.cells, self.points = rows.reshape(cells.shape), mesh.points[used]
+        free = np.zeros(len(mesh.points), dtype=bool)
+        free[topology.free] = True
+        self.held = ~free[used]
+        self.own = ~self.held[self.cells].all(axis=1)
+        np.savez(path, self.points, self.cells, boundary_faces(self.cells), self.held)
+
+    def figures(self, points: np.ndarray) -> tuple[float, ...]:
+        """Least and mean η, smallest and largest dihedral angle, inverted cells, and how far a held node has gone."""
+        report = gmsnet.quality((points, [("tetra", self.cells)]))
+        away = float(np.abs(points - self.points)[self.held].max())
+        shape, low, high = report.shape[self.own], report.min_dihedral[self.own], report.max_dihedral[self.own]
+        return shape.min(), shape.mean(), low.min(), high.max(), report.inverted, away
+
+    def run(self, tool: str, limit: float) -> tuple[np.ndarray, float] | str:
+        """What a tool makes of it, and its seconds; or why there is nothing."""
+        target = self.path.with_suffix(".out.npz")
+        command = [sys.executable, __file__, "--work", tool, str(self.path), str(target)]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=False)
+        except subprocess.TimeoutExpired:
+            return f"more than {limit:g} s"
+        if done.returncode:
+            return (done.stderr.strip().splitlines() or [f"ended with {done.returncode}"])[-1][:90]
+        with np.load(target) as found:
+            return found["points"], float(found["seconds"])
+
+
+def line(name: str, figures: tuple[float, ...], seconds: float | None) -> str:
+    least, mean, low, high, inverted, away = figures
+    time = "" if seconds is None else f"{seconds:9.3f}"
+    odd = f"  {int(inverted)} inverted" if inverted else ""
+    odd += f"  moved held nodes by {away:.0e}" if away else ""
+    return f"  {name:34}{least:9.4f}{mean:9.4f}{low:8.2f}{high:9.2f}{time}{odd}"
+
+
+def run_mesh(name: str, case: Case, tools: list[str], repeats: int, limit: float) -> None:
+    print(f"\n{name}: {len(case.points):,} nodes, {(~case.held).sum():,} free, {len(case.cells):,} tetrahedra")
+    print(f"  {'':34}{'least η':>9}{'mean':>9}{'angle':>8}{'largest':>9}{'seconds':>9}")
+    print(line("input", case.figures(case.points), None), flush=True)
+    ends: dict[str, np.ndarray] = {}
+    least: dict[str, float] = {}
+    failed: dict[str, str] = {}
+    for turn in range(repeats):
+        for tool in list(tools):
+            if tool in failed or (turn and least[tool] > SLOW):
+                continue
+            found = case.run(tool, limit)
+            if isinstance(found, str):
+                failed[tool] = found
+                continue
+            ends[tool], seconds = found
+            least[tool] = min(least.get(tool, np.inf), seconds)
+            if turn == 0 and tool == "gmsnet":
+                tools = [tool, f"gmsnet, {MORE * case.figures(ends[tool])[2]:.1f}°", *tools[1:]]
+                case_target = case.run(tools[1], limit)
+                if not isinstance(case_target, str):
+                    ends[tools[1]], least[tools[1]] = case_target
+    for tool in tools:
+        if tool in failed:
+            print(f"  {tool:34} {failed[tool]}", flush=True)
+        elif tool in ends:
+            print(line(tool, case.figures(ends[tool]), least[tool]), flush=True)
+
+
+def main() -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--meshes", nargs="+", choices=list(MESHES), default=list(MESHES), metavar="NAME")
+    parser.add_argument("--tools", nargs="+", choices=list(TOOLS), default=list(TOOLS), metavar="NAME")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--limit", type=float, default=300.0, help="seconds after which a process is ended")
+    parser.add_argument("--work", nargs=3, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.work:
+        tool, source, target = options.work
+        with np.load(source) as arrays:
+            points, seconds = tool_named(tool)(*(arrays[f"arr_{k}"] for k in range(4)))
+        np.savez(target, points=points, seconds=seconds)
+        return
+    print(describe())
+    tools = [tool for tool in options.tools if MESQUITE in os.environ or not tool.startswith("Mesquite")]
+    if len(tools) < len(options.tools):
+        print(f"{MESQUITE} names no program: Mesquite is left out")
+    with tempfile.TemporaryDirectory() as folder:
+        for name in options.meshes:
+            case = Case(MESHES[name](), Path(folder, "mesh.npz"))
+            run_mesh(name, case, tools, options.repeats, options.limit)
+
+
+if __name__ == "__main__":
+    main()
