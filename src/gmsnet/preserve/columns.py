@@ -45,6 +45,8 @@ def layers_of_volume(topology: Volume, points: Floats) -> Layers:
         return none
     columns, heights, last = _grown(topology, points, foot, normal)
     long: Flags = np.asarray((columns[:, ROWS : ROWS + 1] >= 0).any(axis=1))
+    if long.sum() < FEWEST:
+        return none
     chosen = long & _accepted(rows, columns, heights, flatness, last, long, wall)
     if not chosen.any():
         return none
@@ -128,7 +130,7 @@ def _accepted(
 
     number = np.full(len(wall), -1, dtype=np.int64)
     number[columns[long, 0]] = np.flatnonzero(long)
-    beside = number[rows]
+    beside = number[rows[connectivity.touching(rows, number >= 0)]]
     pairs = np.concatenate([beside[:, [a, b]] for a, b in kernels.EDGES])
     pairs = pairs[(pairs >= 0).all(axis=1)]
     shape = (len(columns), len(columns))
