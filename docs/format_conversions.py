@@ -20,7 +20,7 @@ from gmsnet.mesh.mesh import Mesh
 
 SOURCES = ("SU2", "Gmsh 2.2, text", "Gmsh 4.1, text", "VTK 4.2, text", "VTU, text", "Medit, 3D", "Triangle",
            "STL, text", "STL, binary", "OBJ", "OFF", "PLY, text", "Abaqus",
-           "Nastran, 16 columns")  # fmt: skip
+           "Nastran, 16 columns", "UGRID, text")  # fmt: skip
 MEMORY = "memory"
 SILENT = "**silent**"
 

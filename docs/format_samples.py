@@ -443,6 +443,27 @@ def nastran(out: Sample, large: bool = False) -> Files:
     return {".bdf": bytes(out.bytes)}
 
 
+def ugrid(out: Sample, form: str = "") -> Files:
+    kinds = ("triangle", "quad", "tetra", "hexahedron")
+    lists = {kind: out.of(kind) for kind in kinds}
+    out.row(("i", [len(out.points), len(lists["triangle"]), len(lists["quad"]), len(lists["tetra"]), 0, 0,
+                   len(lists["hexahedron"])]))  # fmt: skip
+    for k in range(len(out.points)):
+        out.row((out.real, out.space(k)))
+    for kind in kinds[:2]:
+        for cell in lists[kind]:
+            out.row(("i", [k + 1 for k in cell.nodes]))
+    for kind in kinds[:2]:
+        for cell in lists[kind]:
+            out.row(("i", [cell.region if out.has("regions") else 1]))
+    for kind in kinds[2:]:
+        for cell in lists[kind]:
+            out.row(("i", [k + 1 for k in cell.nodes]))
+    if out.has("more") and out.real == "d":  # a length that fits no form is taken for one of double precision
+        out.row(("i", [0, 0, 0]))
+    return {f"{form}.ugrid": bytes(out.bytes)}
+
+
 VTK = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "triangle6": 22}
 
 
@@ -639,6 +660,10 @@ VARIANTS = [
     Variant("off", "OFF", off),
     Variant("abaqus", "Abaqus", abaqus),
     Variant("nastran", "Nastran, 8 columns", nastran),
+    Variant("ugrid", "UGRID, text", ugrid),
+    Variant("ugrid", "UGRID, b8", partial(ugrid, form=".b8"), ">"),
+    Variant("ugrid", "UGRID, lb8", partial(ugrid, form=".lb8"), "<"),
+    Variant("ugrid", "UGRID, b4", partial(ugrid, form=".b4"), ">", True),
     Variant("nastran", "Nastran, 16 columns", partial(nastran, large=True)),
     *(Variant("ply", f"PLY, {how}{', single' * single}", ply, order, single)
       for how, order in (("text", ""), (_LITTLE, "<"), (_BIG, ">")) for single in (False, True)),

@@ -49,8 +49,8 @@ class Smoothed:
 def saved(files: Files, stem: Path) -> Path:
     """Writes the files of a mesh; returns the name of the first."""
     for suffix, data in files.items():
-        stem.with_suffix(suffix).write_bytes(data)
-    return stem.with_suffix(next(iter(files)))
+        Path(f"{stem}{suffix}").write_bytes(data)
+    return Path(f"{stem}{next(iter(files))}")
 
 
 def smoothed(variant: Variant, facts: Iterable[str], folder: Path, plain: bool = False) -> Smoothed:
@@ -62,11 +62,12 @@ def smoothed(variant: Variant, facts: Iterable[str], folder: Path, plain: bool =
     files = variant.make(facts, points)
     path = saved(files, folder / "sample")
     mesh = gmsnet.read(path)
-    said = gmsnet.write(mesh, folder / path.with_stem("untouched").name)
+    main = next(iter(files))
+    said = gmsnet.write(mesh, folder / f"untouched{main}")
     result = gmsnet.smooth(mesh).mesh
-    said += gmsnet.write(result, folder / path.with_stem("smoothed").name)
+    said += gmsnet.write(result, folder / f"smoothed{main}")
     untouched, written = (_saved_as(folder / stem, files) for stem in ("untouched", "smoothed"))
-    again = gmsnet.read((folder / "smoothed").with_suffix(path.suffix))
+    again = gmsnet.read(folder / f"smoothed{main}")
     moved = (mesh.points != result.points).any(axis=1)
     assert moved.any(), f"{variant.title} with {sorted(facts)}: no node has moved"
     expected = variant.make(facts, _moved(points, mesh, result))
@@ -74,7 +75,7 @@ def smoothed(variant: Variant, facts: Iterable[str], folder: Path, plain: bool =
 
 
 def _saved_as(stem: Path, files: Files) -> Files:
-    return {suffix: stem.with_suffix(suffix).read_bytes() for suffix in files}
+    return {suffix: Path(f"{stem}{suffix}").read_bytes() for suffix in files}
 
 
 def _moved(points: Sequence[Sequence[str]], old: Mesh, new: Mesh) -> list[list[str]]:
@@ -143,7 +144,7 @@ What the names of facts mean that do not say it themselves:
   cell.
 - *more*: what is not about the mesh. SU2: `AOA`, a box of free-form deformation; Gmsh: `$Periodic`; VTK, VTU: a field
   of the whole grid; Medit: ridges; OBJ: normals, a library of materials; PLY: another element;
-  Abaqus, Nastran: a material.
+  Abaqus, Nastran: a material; UGRID: what follows the volumes.
 - *point data*, *cell data* of OBJ and OFF: colours; of binary STL: attributes. *comments* of VTK: the title.
 - *markers*: lines in two groups. *curved*: triangles of six nodes. *other plane*: z = 5.
   *tetrahedra*: beside the faces; these are marks then.

@@ -52,6 +52,7 @@ def bombs() -> Iterator[tuple[str, str, bytes, str]]:
     yield from _vtu()
     yield from _abaqus()
     yield from _nastran()
+    yield from _ugrid()
 
 
 def _large_cells() -> Iterator[tuple[str, str, bytes, str]]:
@@ -140,6 +141,18 @@ def _nastran() -> Iterator[tuple[str, str, bytes, str]]:
     yield "nastran", "a long field", deck + b"CTRIA3,2,1,1,2," + b"3" * MANY + b"\n", "a field has 1000000 characters"
     yield "nastran", "commas", deck + b"CTRIA3,2,1,1,2,3" + b"," * 5 * MANY + b"\n", READS
     yield "nastran", "blanks", b" " * 5 * MANY + b"\n" + deck, READS
+
+
+def _ugrid() -> Iterator[tuple[str, str, bytes, str]]:
+    counts = struct.pack(">7i", *[2**31 - 1] * 7)
+    yield "ugrid", "counts", counts + bytes(MANY), "its counts ask for"
+    yield "ugrid", "counts of a text", b"999999999999 1 1 1 1 1 1 " + b"0 " * MANY, "expected 2999999999997 numbers"
+    yield (
+        "ugrid",
+        "bytes behind the volumes",
+        struct.pack(">7i", 3, 1, 0, 0, 0, 0, 0) + bytes(72) + struct.pack(">4i", 1, 2, 3, 0) + bytes(5 * MANY),
+        READS,
+    )
 
 
 def _vtu() -> Iterator[tuple[str, str, bytes, str]]:

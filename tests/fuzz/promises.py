@@ -113,8 +113,8 @@ def _check_splice(mesh: Mesh, files: Mapping[str, bytes], folder: Path, random: 
     assert isinstance(again.source, FileSource)
     if source.format == "stl" and len(np.unique(mesh.points, axis=0)) < len(mesh.points):
         return  # nodes that only their decimals tell apart
-    back = gmsnet.read(_write(_spliced(again.source, mesh.points), folder / "back"), source.format)
     kept = mesh.points if again.rounding is None else again.rounding.kept(again.points, mesh.points)
+    back = gmsnet.read(_write(_spliced(again.source, kept), folder / "back"), source.format)
     if not np.array_equal(back.points, kept) or not source.fits(back):
         raise Broken("points that are moved there and back are not the same")
 

@@ -27,6 +27,7 @@ import test_su2
 import test_su2_periodic
 import test_tetgen
 import test_triangle
+import test_ugrid
 import test_volume_files
 import test_vtk
 import test_vtu
@@ -197,6 +198,9 @@ def seeds() -> Iterator[tuple[str, bytes]]:
         yield from (("vtu", data) for _, data in vtu_variants(grid_of(mixed_mesh(1), single)))
     yield from (("abaqus", data) for data in (test_abaqus.PLAIN, test_abaqus.PARTS, ABAQUS))
     yield from (("nastran", data) for data in (test_nastran.PLAIN, NASTRAN))
+    yield "ugrid", test_ugrid.PLAIN
+    yield from (("ugrid", test_ugrid.in_form(key)) for key in test_ugrid.ugrid.FORMS)
+    yield "ugrid", test_ugrid.in_form("b8") + b"more"
     yield from _written()
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from gmsnet.errors import InputError
 from gmsnet.io.atomic import check_writable, refuse_folder
-from gmsnet.io.files import files_of
+from gmsnet.io.files import OPENFOAM, case_of, files_of
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, entry_of, format_of_suffix
 from gmsnet.io.packed import split_name
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, is_standard_output, standard_output
@@ -38,9 +38,10 @@ def destination_of(source: str, output: str | None, in_place: bool, format: str 
             raise InputError(f"--in-place writes to the input, so leave out {output}, or leave out --in-place")
         if format is not None:
             raise InputError("--in-place keeps the format of the input: leave out --output-format")
-        if not os.path.isfile(source):
+        (own, *_) = [*_case(source), source]
+        if not os.path.isfile(own):
             raise InputError(f"{source}: only a file can be smoothed in place")
-        check_writable(source)
+        check_writable(own)
         return Destination(source, None, is_standard_output(source))
     if output is None:
         raise InputError("the output is missing: give IN and OUT, or --in-place to overwrite the input")
@@ -51,8 +52,11 @@ def destination_of(source: str, output: str | None, in_place: bool, format: str 
         standard_output()  # raises where it is closed
     if output in STANDARD_OUTPUT or is_special(output):
         return Destination(output, format, aside)
-    refuse_folder(output)
-    key = format or format_of_suffix(output, split_name(output)[1], "--output-format", reading=False)
+    if case_of(output, format) is not None:
+        key = OPENFOAM
+    else:
+        refuse_folder(output)
+        key = format or format_of_suffix(output, split_name(output)[1], "--output-format", reading=False)
     for read, written in itertools.product(_files(source), _files(output, key)):
         if os.path.isfile(read) and _is_same(read, written):
             raise InputError(f"{written} is the input {read} itself: name another output, or use --in-place")
@@ -108,8 +112,15 @@ def shown(path: str) -> str:
 
 
 def _files(path: str, format: str | None = None) -> Sequence[str]:
+    if format is None and (own := _case(path)):
+        return own
     key = format or BY_SUFFIX.get(split_name(path)[1].lower())
     return list(dict.fromkeys([path, *(files_of(path, FORMATS[key]) if key in FORMATS else ())]))
+
+
+def _case(path: str) -> list[str]:
+    """The files of an OpenFOAM case, that of the points first; none where the path leads to no case."""
+    return files_of(path, FORMATS[OPENFOAM]) if case_of(path, None) is not None else []
 
 
 def _is_same(one: str, other: str) -> bool:

@@ -23,7 +23,7 @@ class Parsed:
 
     unread: what else the file holds, in words; it stays in the file, but no conversion can keep it. matched: (pairs, 2)
     nodes that the file says to be images of each other, such as those of periodic boundaries; None where it has none.
-    node_sets, rounding: see Mesh.
+    node_sets, rounding: see Mesh. form: which of its format's forms the file has (see Entry).
     """
 
     points: NDArray[np.float64]
@@ -37,6 +37,7 @@ class Parsed:
     matched: NDArray[np.int64] | None = None
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     rounding: Rounding | None = None
+    form: str = ""
 
 
 @dataclass(frozen=True)

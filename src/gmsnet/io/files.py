@@ -17,6 +17,7 @@ from gmsnet.io.cells import sealed
 from gmsnet.io.contents import Data, is_open_pipe, load, refuse_unless_regular
 from gmsnet.io.convert import listed
 from gmsnet.io.document import Parsed
+from gmsnet.io.foam_case import file_in, mesh_folder
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
 from gmsnet.io.packed import MAGIC, is_packed, packed, split_name, unpacked
 from gmsnet.io.pieces import Piece, Pieces
@@ -25,13 +26,16 @@ from gmsnet.io.stamps import Stamp, Stamps
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_output
 from gmsnet.mesh.mesh import Mesh, Source
 
+OPENFOAM = "openfoam"  # the format whose meshes are folders
+
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     """The mesh in a file; ``mesh.source`` keeps the file, so that ``write`` can put new coordinates into it.
 
     path: the file; ``-`` is the standard input. Of Triangle's pair either file may be named. A file whose name ends
-    with ``.gz`` is unpacked. format: a name of the table of formats (``gmsnet.io.FORMATS``: su2, gmsh, vtk, …); by
-    default the suffix tells, or the contents where there is none to tell (standard input, pipes).
+    with ``.gz`` is unpacked. Of an OpenFOAM case give the folder. format: a name of the table of formats
+    (``gmsnet.io.FORMATS``: su2, gmsh, vtk, …); by default the suffix tells, or the contents where there is none to tell
+    (standard input, pipes).
 
     Raises InputError where the file cannot be opened or is no regular file, where others change it while it is read,
     or where the format is unknown; FormatError (naming the line) where it is damaged or not of that format.
@@ -41,10 +45,13 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     entry, opened = _open(name, shown, format)
     files = {suffix: data for suffix, (_, data, _) in opened.items()}
     if len(files) > 1:
-        shown = _beside(name, entry.suffixes[0])
+        shown = opened[entry.suffixes[0]][0]
     try:
         check_contents(files[entry.suffixes[0]], entry.key)
-        return _mesh(entry.load().read(files), entry, files, Stamps.of(opened.values()))
+        parsed = entry.load().read(files)
+        if not _is_stream(name):
+            parsed = replace(parsed, form=_form_told(parsed.form, entry, name))
+        return _mesh(parsed, entry, files, Stamps.of(opened.values()))
     except MemoryError:
         raise InputError(f"{shown}: there is not enough memory for this mesh") from None
     except InputError as error:
@@ -66,7 +73,11 @@ def _name(path: Any) -> str:
 
 def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, tuple[str, Data, Stamp | None]]]:
     """The format and, by suffix, the path, the bytes and the stamp of each file of the mesh."""
-    stream = name in STANDARD_INPUT or is_open_pipe(name)
+    stream = _is_stream(name)
+    if (folder := case_of(name, format)) is not None:
+        entry = FORMATS[OPENFOAM]
+        there = [key for key in entry.optional if os.path.exists(file_in(folder, key))]
+        return entry, {key: _loaded(file_in(folder, key)) for key in (*entry.suffixes, *there)}
     refuse_folder(name)
     if not stream:
         if not os.path.exists(name):
@@ -85,6 +96,34 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
     if stream:
         raise InputError(f"{shown}: {entry.title} takes several files and cannot be read from a stream")
     return entry, {suffix: _loaded(_beside(name, suffix)) for suffix in entry.suffixes}
+
+
+def case_of(name: str, format: str | None) -> str | None:
+    """The folder of an OpenFOAM mesh that a path leads to; None where it is none, or another format is asked for.
+
+    Raises InputError where this format is asked for and there is no such folder.
+    """
+    folder = mesh_folder(name) if format is None or format.lower() == OPENFOAM else None
+    if folder is None and format is not None and format.lower() == OPENFOAM:
+        raise InputError(f"{name}: there is no mesh of an OpenFOAM case: give the folder that holds constant/polyMesh")
+    return folder
+
+
+def _is_stream(name: str) -> bool:
+    return name in STANDARD_INPUT or is_open_pipe(name)
+
+
+def _form_told(form: str, entry: Entry, name: str) -> str:
+    """The form that the name of a file says. FormatError where it says another one than the file has.
+
+    A name that says none is right for any: the file keeps its form under such names.
+    """
+    told = entry.form_of(name)
+    if told and form != told:
+        suffix = entry.suffixes[0]
+        found = f".{form}{suffix}" if form else f"text ({suffix})"
+        raise FormatError(f"the contents are those of {found}, but the name says .{told}{suffix}: rename the file")
+    return told
 
 
 def _loaded(name: str) -> tuple[str, Data, Stamp | None]:
@@ -135,7 +174,7 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamp
     source = FileSource(
         entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions,
         mesh.region_names, mesh.point_data, mesh.cell_data, tuple(parsed.unread), stamps, parsed.matched,
-        mesh.node_sets,
+        mesh.node_sets, parsed.form,
     )  # fmt: skip
     return replace(mesh, source=source)
 
@@ -162,26 +201,43 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     source = mesh.source
     lost: list[str] = []
     try:
-        if isinstance(source, FileSource) and source.format == entry.key and source.fits(mesh):
+        form = _form_for(source, entry, name)
+        if isinstance(source, FileSource) and (source.format, source.form) == (entry.key, form) and source.fits(mesh):
             points, lost = _as_kept(mesh, source)
             files = source.splice(points)
         else:
-            written = entry.load().write(mesh)
+            written = entry.write(mesh, form)
             files, lost = dict(written.files), [*written.lost, *_unread(source)]
     except MemoryError:
         raise _no_memory(shown) from None
     except InputError as error:
         raise FormatError(f"{shown}: {error}") from None
     pieces = {suffix: _with_memory(shown, part) for suffix, part in files.items()}
-    if is_packed(name):
-        pieces = {suffix: packed(part) for suffix, part in pieces.items()}
     if name in STANDARD_OUTPUT:
         _to_standard_output(*pieces.values())
     else:
         stamps = source.stamps if isinstance(source, FileSource) else None
-        several = len(files) > 1
-        replace_files({_beside(name, suffix) if several else name: part for suffix, part in pieces.items()}, stamps)
+        targets = _targets(name, entry, list(files), stamps)
+        replace_files({path: packed(pieces[key]) if is_packed(path) else pieces[key] for key, path in targets.items()},
+                      stamps)  # fmt: skip
     return lost
+
+
+def _targets(name: str, entry: Entry, keys: list[str], stamps: Stamps | None) -> dict[str, str]:
+    """Suffix → the path of each file that is written. Files of a case that were read and do not change are not."""
+    folder = case_of(name, entry.key)
+    if folder is None:
+        return {key: _beside(name, key) if len(keys) > 1 else name for key in keys}
+    paths = {key: file_in(folder, key, is_packed(name)) for key in keys}
+    own = stamps.known if stamps else {}
+    return {key: path for key, path in paths.items() if key == entry.suffixes[0] or os.path.abspath(path) not in own}
+
+
+def _form_for(source: Source | None, entry: Entry, name: str) -> str:
+    """The form that is written: what the name says, and in a stream, which has none, that of the file that was read."""
+    if name not in STANDARD_OUTPUT and not is_special(name):
+        return entry.form_of(name)
+    return source.form if isinstance(source, FileSource) and source.format == entry.key else ""
 
 
 def _as_kept(mesh: Mesh, source: FileSource) -> tuple[NDArray[np.float64], list[str]]:
@@ -218,6 +274,8 @@ def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
     """The format that ``write`` takes. Raises the InputErrors of ``write`` that do not need the conversion."""
     stream = path in STANDARD_OUTPUT or is_special(path)
     shown = "standard output" if path in STANDARD_OUTPUT else path
+    if case_of(path, format) is not None:
+        return FORMATS[OPENFOAM]
     refuse_folder(path)
     if format is not None:
         entry = entry_of(format)
@@ -234,6 +292,8 @@ def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
 
 def files_of(name: str, entry: Entry) -> list[str]:
     """The files that a mesh of this name and format stands in: more than one where its format says so."""
+    if (folder := case_of(name, entry.key)) is not None:
+        return [file_in(folder, key, is_packed(name)) for key in entry.suffixes]
     return [name] if len(entry.suffixes) == 1 else [_beside(name, suffix) for suffix in entry.suffixes]
 
 

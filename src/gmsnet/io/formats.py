@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass
 from importlib import import_module
@@ -9,7 +10,9 @@ from typing import cast
 
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.contents import Data
-from gmsnet.io.document import Format
+from gmsnet.io.document import Format, Written
+from gmsnet.io.packed import split_name
+from gmsnet.mesh.mesh import Mesh
 
 
 @dataclass(frozen=True)
@@ -17,17 +20,33 @@ class Entry:
     """A format in the table.
 
     key: the name that ``--format`` takes. title: what messages call it. suffixes: lower case, the first is that of the
-    file with the coordinates. aliases: other suffixes of that file.
+    file with the coordinates. aliases: other suffixes of that file. forms: of which one stands before the suffix of
+    its files (``b8`` of a.b8.ugrid); without it a file has the form "". folder: the mesh is a folder, and the suffixes
+    are the names of its files; those of ``optional`` may be there.
     """
 
     key: str
     title: str
     suffixes: tuple[str, ...]
     aliases: tuple[str, ...] = ()
+    forms: tuple[str, ...] = ()
+    folder: bool = False
+    optional: tuple[str, ...] = ()
+
+    def form_of(self, path: str) -> str:
+        """The form that the name of a file says."""
+        stem, _, _ = split_name(path)
+        form = os.path.splitext(stem)[1][1:].lower()
+        return form if form in self.forms else ""
 
     def load(self) -> Format:
         """The module that reads and writes the format, imported on first use."""
         return cast(Format, import_module(f"gmsnet.io.{self.key}"))
+
+    def write(self, mesh: Mesh, form: str) -> Written:
+        """The mesh in one of the forms. Raises FormatError where it cannot hold the cells at all."""
+        module = self.load()
+        return module.write_as(mesh, form) if form else module.write(mesh)  # type: ignore[attr-defined]
 
 
 FORMATS = {
@@ -45,9 +64,24 @@ FORMATS = {
         Entry("ply", "PLY", (".ply",)),
         Entry("abaqus", "Abaqus", (".inp",)),
         Entry("nastran", "Nastran", (".bdf",), (".nas", ".fem", ".dat")),
+        Entry(
+            "openfoam",
+            "OpenFOAM",
+            ("points", "faces", "owner", "neighbour", "boundary"),
+            folder=True,
+            optional=("cellZones", "faceZones", "pointZones"),
+        ),
+        Entry(
+            "ugrid",
+            "UGRID",
+            (".ugrid",),
+            (),
+            tuple(f"{little}{how}{real}" for real in (8, 4) for how in "br" for little in ("", "l")),
+        ),
     )
 }
-BY_SUFFIX = {suffix: key for key, entry in FORMATS.items() for suffix in (*entry.suffixes, *entry.aliases)}
+BY_SUFFIX = {suffix: key for key, entry in FORMATS.items() if not entry.folder
+             for suffix in (*entry.suffixes, *entry.aliases)}  # fmt: skip
 
 MENDS = {  # files that one may well have, but that are not read
     ".meshb": "binary Medit is not read: convert it to text (.mesh)",
@@ -59,6 +93,7 @@ MENDS = {  # files that one may well have, but that are not read
 
 # What files begin with, comments (a pattern that is taken out first) and white space aside.
 NONE, HASH, PERCENT, XML = rb"(?!)", rb"#[^\r\n]*", rb"%[^\r\n]*", rb"(?s)<\?.*?\?>|<!--.*?-->"
+SLASHES = rb"(?s)/\*.*?\*/|//[^\r\n]*"
 STARS, DOLLAR = rb"\*\*[^\r\n]*", rb"\$[^\r\n]*"
 SIGNS = {
     "gmsh": (NONE, rb"\$(MeshFormat|Comments|NOD|Nodes|PhysicalNames)\b"),
@@ -70,6 +105,7 @@ SIGNS = {
     "off": (HASH, rb"(ST)?C?N?4?n?OFF\b"),
     "su2": (PERCENT, rb"(NDIME|NZONE|NELEM|NPOIN|NMARK|IZONE|NCHUNK|AOA|FFD_NBOX)\s*="),
     "abaqus": (STARS, rb"\*[ \t]*[A-Za-z][A-Za-z \t]*(,|[\r\n])"),
+    "openfoam": (SLASHES, rb"FoamFile\s*\{"),
     "nastran": (
         DOLLAR,
         rb"(?i)(NASTRAN|SOL|ID|INIT|ASSIGN)[ \t]+\w|CEND\b|BEGIN[ \t]+BULK\b"
@@ -86,12 +122,12 @@ STRANGERS = {
     "a binary Medit mesh": rb"\x01\0\0\0[\x01-\x04]\0\0\0\x03\0\0\0|\0\0\0\x01\0\0\0[\x01-\x04]\0\0\0\x03",
 }
 HEAD = 4096  # bytes that are looked at
-MAY_BE_BINARY = ("gmsh", "vtk", "vtu", "stl", "ply")
+MAY_BE_BINARY = ("gmsh", "vtk", "vtu", "stl", "ply", "ugrid", "openfoam")
 
 
 def known() -> str:
     """The suffixes that are read and written, in words."""
-    return ", ".join(BY_SUFFIX)
+    return f"{', '.join(BY_SUFFIX)}, and folders of OpenFOAM cases"
 
 
 def entry_of(key: str) -> Entry:

@@ -126,7 +126,7 @@ class FileSource:
     points, cells, region_names, point_data, cell_data, node_sets: as read (see Mesh). companions: other files of the
     same mesh by suffix, which never change (Triangle's ``.ele``). unread: what else there is in the file (see Parsed).
     stamps: of the files, so that what others write into them meanwhile is not overwritten. matched: (pairs, 2) nodes
-    that the file says to be images of each other (see Parsed), read-only.
+    that the file says to be images of each other (see Parsed), read-only. form: see Parsed.
     """
 
     format: str
@@ -143,6 +143,7 @@ class FileSource:
     stamps: Stamps = field(default_factory=Stamps, repr=False)
     matched: NDArray[np.int64] | None = field(default=None, repr=False)
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict, repr=False)
+    form: str = ""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle: the bytes of the files themselves."""
@@ -151,6 +152,7 @@ class FileSource:
         return FileSource, (
             self.format, self.main, self.data[:], self.points, self.slots, self.cells, files,
             names, fields, cell_fields, self.unread, self.stamps, self.matched, dict(self.node_sets),
+            self.form,
         )  # fmt: skip
 
     def fits(self, mesh: Mesh) -> bool:

@@ -1,0 +1,124 @@
+"""Meshes of OpenFOAM cases (``constant/polyMesh``), in text and binary, each file plain or compressed.
+
+The file of points is spliced; faces, owner, neighbour and boundary stay as they are. Patches are markers. Cells of a
+zone are a region; points of zones of faces and of points are held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.cells.table import face_name
+from gmsnet.errors import FormatError
+from gmsnet.io.cells import sealed
+from gmsnet.io.contents import Data
+from gmsnet.io.document import Parsed, Written
+from gmsnet.io.foam_cells import Faces, Ints, volumes
+from gmsnet.io.foam_lists import coordinates, faces, head_of, labels
+from gmsnet.io.foam_patches import ZONES, Patch, patches, zones
+from gmsnet.io.foam_plane import cells_in, plane_of
+from gmsnet.io.places import ranges
+from gmsnet.io.splice import BinarySlots, Slots, TextSlots
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+
+name = "OpenFOAM"
+suffixes = ("points", "faces", "owner", "neighbour", "boundary")
+optional = ZONES
+
+
+def read(files: Mapping[str, Data]) -> Parsed:
+    """See Format; the names of the files stand for suffixes."""
+    points, slots, single = coordinates(files["points"], head_of(files["points"], "points"), "points")
+    found = _faces(files, len(points))
+    cells = 1 + int(max(found.owner.max(), found.neighbour.max(initial=0)))
+    known = patches(files["boundary"], len(found.sizes), len(found.neighbour))
+    regions, region_names = _regions(files, cells)
+    plane = plane_of(points, found, known, cells)
+    held = _of_zones(files, found, len(points))
+    if plane is not None:
+        back = np.ones(len(points), dtype=bool)
+        back[plane.points] = False
+        blocks = cells_in(plane, found, known, back, regions)
+        slots = _of_node(slots, plane.node)
+        points, held = sealed(points[plane.points]), np.unique(plane.node[held])
+    else:
+        blocks = volumes(found, cells, regions) + _walls(found, known)
+    dimension = 2 if plane is not None else 3
+    names = {(dimension, number): text for number, text in region_names.items()}
+    names |= {(dimension - 1, number): patch.name for number, patch in enumerate(known, 1) if patch.faces
+              and (plane is None or patch.kind != "empty")}  # fmt: skip
+    if len(held):
+        blocks.append(CellBlock("vertex", held[:, None], np.ones(len(held), dtype=np.int64)))
+        names[0, 1] = "zones"
+    unread = ["the faces and their order, types of patches"]
+    return Parsed(points, blocks, slots, names, single=single, unread=unread)
+
+
+def _faces(files: Mapping[str, Data], points: int) -> Faces:
+    """The faces with their cells. Raises FormatError where the lists do not fit each other."""
+    sizes, corners = faces(files["faces"], head_of(files["faces"], "faces"), "faces")
+    owner, neighbour = (labels(files[key], head, head.body, key)[0] for key in ("owner", "neighbour")
+                        for head in [head_of(files[key], key)])  # fmt: skip
+    if len(owner) == len(neighbour) and (neighbour < 0).any():  # of old versions: −1 for faces of the boundary
+        neighbour = neighbour[: int(np.argmax(neighbour < 0))]
+    if not len(owner) or len(owner) != len(sizes) or len(neighbour) > len(owner):
+        told = f"{len(sizes)} faces, {len(owner)} owners and {len(neighbour)} neighbours"
+        raise FormatError(f"{told} do not fit each other: is a file cut off, or of another mesh?")
+    if (sizes < 3).any():
+        raise FormatError(f"faces: face {int(np.argmin(sizes))} (counted from 0) has {sizes.min()} points")
+    if not 0 <= corners.min() <= corners.max() < points:
+        raise FormatError(f"faces: a face names the point {corners.max()}, but the points are 0 to {points - 1}")
+    most = len(sizes)  # each cell has several
+    for key, cells in (("owner", owner), ("neighbour", neighbour)):
+        if len(cells) and not 0 <= cells.min() <= cells.max() < most:
+            raise FormatError(f"{key}: a face names the cell {cells.max()}, but there are {most} faces in all")
+    return Faces(sizes, corners, owner, neighbour)
+
+
+def _regions(files: Mapping[str, Data], cells: int) -> tuple[Ints, dict[int, str]]:
+    """The zone of each cell, counted from 1, and their names; 0 for cells of none."""
+    regions, names = np.zeros(cells, dtype=np.int64), dict[int, str]()
+    if "cellZones" in files:
+        for number, (text, members) in enumerate(zones(files["cellZones"], "cellZones", cells), 1):
+            regions[members], names[number] = number, text
+    return regions, names
+
+
+def _of_zones(files: Mapping[str, Data], found: Faces, points: int) -> Ints:
+    """The points that zones of faces and of points name."""
+    parts = [np.empty(0, dtype=np.int64)]
+    if "faceZones" in files:
+        for _, members in zones(files["faceZones"], "faceZones", len(found.sizes)):
+            parts.append(found.points[ranges(found.starts[members], found.sizes[members])])
+    if "pointZones" in files:
+        parts += [members for _, members in zones(files["pointZones"], "pointZones", points)]
+    return np.unique(np.concatenate(parts))
+
+
+def _walls(found: Faces, known: list[Patch]) -> list[CellBlock]:
+    """The faces of all patches, those of one size together."""
+    blocks = []
+    for number, patch in enumerate(known, 1):
+        own = np.arange(patch.start, patch.start + patch.faces)
+        for size in np.unique(found.sizes[own]).tolist():
+            some = own[found.sizes[own] == size]
+            blocks.append(CellBlock(face_name(size), found.corners(some, size), np.full(len(some), number)))
+    return blocks
+
+
+def _of_node(slots: Slots, node: NDArray[np.int64]) -> Slots:
+    """The slots of all points where each stands for a node of the plane."""
+    assert isinstance(slots, (TextSlots, BinarySlots))
+    return replace(slots, node=sealed(node))
+
+
+def write(mesh: Mesh) -> Written:
+    """Raises FormatError: a case is more than a mesh."""
+    raise FormatError(
+        "OpenFOAM meshes are written into their own case only: write .msh or .vtu, and convert that (gmshToFoam)"
+    )
