@@ -115,11 +115,31 @@ def _from_meshio(thing: Any) -> tuple[Mesh, Restore]:
 def _from_pyvista(thing: Any) -> tuple[Mesh, Restore]:
     # A PolyData as a grid has its cells in the same order: vertices, lines, faces, strips.
     grid = thing if hasattr(thing, "celltypes") else thing.cast_to_unstructured_grid()
-    types = np.asarray(grid.celltypes)
     # Older releases of PyVista call the same array "offset".
     offsets = np.asarray(grid.cell_offsets if hasattr(type(grid), "cell_offsets") else grid.offset)
-    sizes = np.diff(offsets)
-    connectivity = np.asarray(grid.cell_connectivity, dtype=np.int64)
+    names = names_of_rows(np.ravel(thing.field_data[NAMES])) if NAMES in thing.field_data else {}
+    points = np.asarray(thing.points)
+    mesh = mesh_of_vtk(
+        points, np.asarray(grid.celltypes), offsets, np.asarray(grid.cell_connectivity), thing.cell_data,
+        thing.point_data, names,
+    )  # fmt: skip
+    return mesh, _refill(lambda: thing.copy(deep=True), points)
+
+
+def mesh_of_vtk(
+    points: NDArray[Any],
+    types: NDArray[Any],
+    offsets: NDArray[Any],
+    connectivity: NDArray[Any],
+    cell_fields: Mapping[str, Any],
+    point_fields: Mapping[str, Any],
+    names: Mapping[tuple[int, int], str] | None = None,
+) -> Mesh:
+    """Of VTK's arrays: types (n,), offsets (n + 1,) into connectivity, and data of cells and points by name.
+
+    names: (dimension, number) → the name of the regions of that number in the cell field "region".
+    """
+    sizes, connectivity = np.diff(offsets), connectivity.astype(np.int64, copy=False)
     change = (np.diff(types) != 0) | (np.diff(sizes) != 0)
     ends = [*(np.flatnonzero(change) + 1).tolist(), len(types)] if len(types) else []
     blocks: list[tuple[str, NDArray[np.int64]]] = []
@@ -143,11 +163,9 @@ def _from_pyvista(thing: Any) -> tuple[Mesh, Restore]:
         source.append(cells)
         start = end
     taken = np.concatenate(source) if source else np.zeros(0, dtype=np.int64)
-    cell_data = {name: np.asarray(values)[taken] for name, values in thing.cell_data.items()}
-    point_data = {name: np.asarray(values) for name, values in thing.point_data.items()}
-    names = names_of_rows(np.ravel(thing.field_data[NAMES])) if NAMES in thing.field_data else {}
-    points = np.asarray(thing.points)
-    return _mesh(points, blocks, cell_data, point_data, names), _refill(lambda: thing.copy(deep=True), points)
+    cell_data = {name: np.asarray(values)[taken] for name, values in cell_fields.items()}
+    point_data = {name: np.asarray(values) for name, values in point_fields.items()}
+    return _mesh(points, blocks, cell_data, point_data, names)
 
 
 def _mesh(
