@@ -41,7 +41,7 @@ def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
 
     thing: a Mesh; ``(points, cells)`` arrays or a mapping ``{"points": …, "cells": …, "regions": …, "markers": …}``
     (see ``mesh_from_arrays``); a ``Mesh`` of meshio or meshlane; an ``UnstructuredGrid`` or ``PolyData`` of PyVista; a
-    ``MeshTri`` or ``MeshQuad`` of scikit-fem; a ``Triangulation`` of Matplotlib; a ``Delaunay`` of SciPy.
+    ``MeshTri``, ``MeshQuad`` or ``MeshTet`` of scikit-fem; a ``Triangulation`` of Matplotlib; a ``Delaunay`` of SciPy.
     Points in single precision give a Mesh with ``single`` set.
 
     restore(points): points (N×dim, float64) → the type that came in, with these coordinates and all else equal. The
@@ -70,6 +70,8 @@ def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
         return from_pair(thing)
     if "pyvista" in libraries:
         mend = "call its .cast_to_unstructured_grid() first (or .combine(), where it holds several blocks)"
+    elif "dolfinx" in libraries:
+        mend = "give its arrays, mesh.geometry.x and the cells, if it lies on one process alone (docs/fem.md)"
     elif "vtkmodules" in libraries:
         mend = "wrap it with pyvista.wrap() first"
     elif isinstance(thing, str) or hasattr(thing, "__fspath__"):
