@@ -9,7 +9,7 @@ import pytest
 from support.optional import library
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = {"gmsh.md": "gmsh", "pyvista.md": "pyvista"}  # page → the package that it needs
+PAGES = {"fem.md": "skfem", "gmsh.md": "gmsh", "pyvista.md": "pyvista"}  # page → the package that it needs
 
 
 @pytest.mark.parametrize("page", PAGES)

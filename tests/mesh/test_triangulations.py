@@ -96,6 +96,47 @@ def test_a_mesh_of_quads_of_scikit_fem(skfem):
 
 
 def test_other_meshes_of_scikit_fem_are_refused_by_name(skfem):
-    for given in (skfem.MeshTri2(), skfem.MeshTet(), skfem.MeshQuad2()):
+    for given in (skfem.MeshTri2(), skfem.MeshHex(), skfem.MeshQuad2()):
         with pytest.raises(InputError, match=type(given).__name__):
             gmsnet.smooth(given)
+
+
+def test_tetrahedra_of_scikit_fem(skfem):
+    mesh = skfem.MeshTet.init_tensor(*[np.linspace(0.0, 1.0, 5)] * 3)
+    inner = mesh.interior_nodes()
+    p = mesh.p.copy()
+    p[:, inner] += 0.04 * np.random.default_rng(0).uniform(-1, 1, size=(3, len(inner)))
+    given = skfem.MeshTet(p, mesh.t).with_boundaries({"left": lambda x: x[0] == 0.0})
+    assert set(to_mesh(given)[0].node_sets) == {"left"}
+    result = gmsnet.smooth(given)
+    assert type(result.mesh) is type(given)
+    assert result.after.shape.min() > result.before.shape.min()
+    assert np.array_equal(result.mesh.p.T, result.points)
+    assert np.array_equal(result.mesh.t, given.t)
+    assert np.array_equal(result.mesh.boundaries["left"], given.boundaries["left"])
+    outer = np.setdiff1d(np.arange(p.shape[1]), inner)
+    assert np.array_equal(result.mesh.p[:, outer], p[:, outer])
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_tensors_come_back_as_tensors(precision):
+    torch = pytest.importorskip("torch")
+    points = jittered()
+    cells = torch.from_numpy(Delaunay(points).simplices.astype(np.int64))
+    given = torch.from_numpy(points).to(getattr(torch, precision))
+    before = given.clone()
+    result = gmsnet.smooth((given, cells), max_sweeps=3)
+    new, same = result.mesh
+    assert isinstance(new, torch.Tensor)
+    assert same is cells
+    assert new.dtype == given.dtype
+    assert torch.equal(given, before)
+    assert np.array_equal(new.numpy().astype(np.float64), result.points)
+    told = gmsnet.smooth({"points": given, "cells": cells}, max_sweeps=3).mesh["points"]
+    assert torch.equal(told, new)
+
+
+def test_a_mesh_of_dolfinx_is_told_how_to_be_given():
+    kind = type("Mesh", (), {"__module__": "dolfinx.mesh"})
+    with pytest.raises(InputError, match=r"mesh\.geometry\.x and the cells, if it lies on one process alone"):
+        to_mesh(kind())

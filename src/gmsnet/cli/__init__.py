@@ -15,7 +15,7 @@ from typing import Annotated
 
 import typer
 
-from gmsnet.cli import deform, generate, gmsh, methods, quality, reproduce, smooth, train, warm_up
+from gmsnet.cli import deform, generate, gmsh, methods, paraview, quality, reproduce, smooth, train, warm_up
 from gmsnet.cli.failure import BAD_INPUT, DONE, print_failure
 from gmsnet.cli.moves import joined
 from gmsnet.cli.signals import Interrupted
@@ -42,6 +42,7 @@ app.command()(quality.quality)
 app.command()(methods.methods)
 app.command()(generate.generate)
 app.command()(gmsh.gmsh)
+app.command("paraview-plugin")(paraview.paraview_plugin)
 app.command()(train.train)
 app.command()(reproduce.reproduce)
 app.command()(warm_up.warm_up)

@@ -41,7 +41,7 @@ def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
 
     thing: a Mesh; ``(points, cells)`` arrays or a mapping ``{"points": …, "cells": …, "regions": …, "markers": …}``
     (see ``mesh_from_arrays``); a ``Mesh`` of meshio or meshlane; an ``UnstructuredGrid`` or ``PolyData`` of PyVista; a
-    ``MeshTri`` or ``MeshQuad`` of scikit-fem; a ``Triangulation`` of Matplotlib; a ``Delaunay`` of SciPy.
+    ``MeshTri``, ``MeshQuad`` or ``MeshTet`` of scikit-fem; a ``Triangulation`` of Matplotlib; a ``Delaunay`` of SciPy.
     Points in single precision give a Mesh with ``single`` set.
 
     restore(points): points (N×dim, float64) → the type that came in, with these coordinates and all else equal. The
@@ -70,6 +70,8 @@ def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
         return from_pair(thing)
     if "pyvista" in libraries:
         mend = "call its .cast_to_unstructured_grid() first (or .combine(), where it holds several blocks)"
+    elif "dolfinx" in libraries:
+        mend = "give its arrays, mesh.geometry.x and the cells, if it lies on one process alone (docs/fem.md)"
     elif "vtkmodules" in libraries:
         mend = "wrap it with pyvista.wrap() first"
     elif isinstance(thing, str) or hasattr(thing, "__fspath__"):
@@ -115,11 +117,31 @@ def _from_meshio(thing: Any) -> tuple[Mesh, Restore]:
 def _from_pyvista(thing: Any) -> tuple[Mesh, Restore]:
     # A PolyData as a grid has its cells in the same order: vertices, lines, faces, strips.
     grid = thing if hasattr(thing, "celltypes") else thing.cast_to_unstructured_grid()
-    types = np.asarray(grid.celltypes)
     # Older releases of PyVista call the same array "offset".
     offsets = np.asarray(grid.cell_offsets if hasattr(type(grid), "cell_offsets") else grid.offset)
-    sizes = np.diff(offsets)
-    connectivity = np.asarray(grid.cell_connectivity, dtype=np.int64)
+    names = names_of_rows(np.ravel(thing.field_data[NAMES])) if NAMES in thing.field_data else {}
+    points = np.asarray(thing.points)
+    mesh = mesh_of_vtk(
+        points, np.asarray(grid.celltypes), offsets, np.asarray(grid.cell_connectivity), thing.cell_data,
+        thing.point_data, names,
+    )  # fmt: skip
+    return mesh, _refill(lambda: thing.copy(deep=True), points)
+
+
+def mesh_of_vtk(
+    points: NDArray[Any],
+    types: NDArray[Any],
+    offsets: NDArray[Any],
+    connectivity: NDArray[Any],
+    cell_fields: Mapping[str, Any],
+    point_fields: Mapping[str, Any],
+    names: Mapping[tuple[int, int], str] | None = None,
+) -> Mesh:
+    """Of VTK's arrays: types (n,), offsets (n + 1,) into connectivity, and data of cells and points by name.
+
+    names: (dimension, number) → the name of the regions of that number in the cell field "region".
+    """
+    sizes, connectivity = np.diff(offsets), connectivity.astype(np.int64, copy=False)
     change = (np.diff(types) != 0) | (np.diff(sizes) != 0)
     ends = [*(np.flatnonzero(change) + 1).tolist(), len(types)] if len(types) else []
     blocks: list[tuple[str, NDArray[np.int64]]] = []
@@ -143,11 +165,9 @@ def _from_pyvista(thing: Any) -> tuple[Mesh, Restore]:
         source.append(cells)
         start = end
     taken = np.concatenate(source) if source else np.zeros(0, dtype=np.int64)
-    cell_data = {name: np.asarray(values)[taken] for name, values in thing.cell_data.items()}
-    point_data = {name: np.asarray(values) for name, values in thing.point_data.items()}
-    names = names_of_rows(np.ravel(thing.field_data[NAMES])) if NAMES in thing.field_data else {}
-    points = np.asarray(thing.points)
-    return _mesh(points, blocks, cell_data, point_data, names), _refill(lambda: thing.copy(deep=True), points)
+    cell_data = {name: np.asarray(values)[taken] for name, values in cell_fields.items()}
+    point_data = {name: np.asarray(values) for name, values in point_fields.items()}
+    return _mesh(points, blocks, cell_data, point_data, names)
 
 
 def _mesh(

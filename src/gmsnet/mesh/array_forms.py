@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -203,9 +204,15 @@ def face(kind: str, nodes: NDArray[np.int64]) -> tuple[str, NDArray[np.int64]]:
 
 
 def in_precision_of(points: Any) -> Callable[[NDArray[np.float64]], NDArray[Any]]:
-    """How new coordinates become the points of the object that came in: in its own precision."""
+    """How new coordinates become the points of the object that came in: in its own precision.
+
+    Tensors of other libraries, on the CPU, come back as such, by DLPack.
+    """
     dtype = np.asarray(points).dtype
     kept = dtype if dtype.kind == "f" and dtype.itemsize == 4 else np.dtype(np.float64)
+    library = sys.modules.get(type(points).__module__.partition(".")[0])
+    if not isinstance(points, np.ndarray) and hasattr(points, "__dlpack__") and hasattr(library, "from_dlpack"):
+        return lambda new: library.from_dlpack(np.array(new, dtype=kept))  # type: ignore[union-attr]
     return lambda new: np.array(new, dtype=kept)
 
 

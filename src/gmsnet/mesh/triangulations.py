@@ -12,24 +12,27 @@ from gmsnet.mesh.array_forms import Restore, from_pair, in_precision_of, mesh_fr
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import combined
 
-SKFEM = {"MeshTri1": "triangle", "MeshQuad1": "quad"}  # those of order one
+SKFEM = {"MeshTri1": "triangle", "MeshQuad1": "quad", "MeshTet1": "tetra"}  # those of order one
 SIMPLEX = {2: "triangle", 3: "tetra"}
 
 
 def from_skfem(thing: Any) -> tuple[Mesh, Restore]:
-    """Of a ``MeshTri`` or ``MeshQuad``: p (2, N), t (3 or 4, M). Out goes the same class.
+    """Of a ``MeshTri``, ``MeshQuad`` or ``MeshTet``: p (2 or 3, N), t (3 or 4, M). Out goes the same class.
 
-    Cells belong to one region where the same subdomains hold them; the facets of named boundaries become markers.
+    Cells belong to one region where the same subdomains hold them. The facets of named boundaries become markers, of
+    volumes sets of nodes.
     Raises InputError for other classes of scikit-fem.
     """
     name = next(base.__name__ for base in type(thing).__mro__ if base.__module__.partition(".")[0] == "skfem")
     if name not in SKFEM:
-        raise InputError(f"gmsnet knows MeshTri and MeshQuad (of order one) of scikit-fem, not {name}")
+        raise InputError(f"gmsnet knows MeshTri, MeshQuad and MeshTet (of order one) of scikit-fem, not {name}")
     points, cells = np.asarray(thing.p).T, np.asarray(thing.t).T
     subdomains = (thing.subdomains or {}).values()
     regions = combined([np.isin(np.arange(len(cells)), ids) for ids in subdomains], len(cells))
     facets = np.asarray(thing.facets).T if thing.boundaries else np.zeros((0, 2), dtype=np.int64)
     markers = {name: facets[np.asarray(ids)] for name, ids in (thing.boundaries or {}).items()}
+    if SKFEM[name] == "tetra":
+        markers = {name: np.unique(nodes) for name, nodes in markers.items()}
     mesh, back = mesh_from_arrays(points, {SKFEM[name]: cells}, regions, markers), in_precision_of(points)
     return mesh, lambda new: dataclasses.replace(thing, doflocs=np.ascontiguousarray(back(new).T))
 
