@@ -19,7 +19,8 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 SOURCES = ("SU2", "Gmsh 2.2, text", "Gmsh 4.1, text", "VTK 4.2, text", "VTU, text", "Medit, 3D", "Triangle",
-           "STL, text", "STL, binary", "OBJ", "OFF", "PLY, text")  # fmt: skip
+           "STL, text", "STL, binary", "OBJ", "OFF", "PLY, text", "Abaqus",
+           "Nastran, 16 columns")  # fmt: skip
 MEMORY = "memory"
 SILENT = "**silent**"
 
@@ -28,7 +29,8 @@ Measured = tuple[str, str, bool, dict[str, str]]  # fact, source, is it in the m
 
 
 def _places(mesh: Mesh) -> list[tuple[float, ...]]:
-    return [(*point, 0.0)[:3] for point in mesh.points.tolist()]
+    """The points, in 12 digits: what formats of few columns round off is named in all cases."""
+    return [tuple(float(f"{x:.12g}") for x in (*point, 0.0)[:3]) for point in mesh.points.tolist()]
 
 
 def _cells(mesh: Mesh, chosen: Callable[[CellBlock], bool]) -> list[tuple[str, tuple[object, ...], int]]:

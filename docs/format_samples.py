@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from gmsnet.io.nastran_numbers import fitted
+
 Row = Sequence[str]  # the decimals of a point
 Files = dict[str, bytes]  # suffix → bytes
 
@@ -100,7 +102,7 @@ class Sample:
     def end(self) -> str:
         return "\r\n" if self.has("line ends") else "\n"
 
-    def row(self, *parts: tuple[str, Iterable[object]], end: str | None = None) -> None:
+    def row(self, *parts: tuple[str, Iterable[object]], end: str | None = None, comma: str = "") -> None:
         """Numbers with their types as ``struct`` calls them."""
         if self.order:
             for code, values in parts:
@@ -109,7 +111,9 @@ class Sample:
         else:
             gap = " \t " if self.has("blanks") else " "
             tokens = [str(value) for _, values in parts for value in values]
-            self.bytes += (gap * self.has("blanks") + gap.join(tokens) + (self.end if end is None else end)).encode()
+            self.bytes += (
+                gap * self.has("blanks") + (comma + gap).join(tokens) + (self.end if end is None else end)
+            ).encode()
             self.bytes += self.end.encode() * (self.has("blanks") and end is None)
 
     def close(self, text: str = "") -> None:
@@ -376,6 +380,69 @@ def ply(out: Sample) -> Files:
     return {".ply": bytes(out.bytes)}
 
 
+ABAQUS = {"triangle": "CPS3", "quad": "CPS4", "triangle6": "CPS6", "tetra": "C3D4", "hexahedron": "C3D8",
+          "line": "T2D2"}  # fmt: skip
+
+
+def abaqus(out: Sample) -> Files:
+    out.line("** made by hand", out.has("comments"))
+    out.line("*NODE")
+    for k in range(len(out.points)):
+        out.row(("i", [out.tags[k]]), ("d", out.space(k)), comma=",")
+    group, names = None, out.names()
+    for cell in [cell for cell in out.cells if cell.kind in ABAQUS]:
+        dim = DIMENSION.get(cell.kind, 2)
+        told = out.has("regions") if dim > 1 else out.has("markers")
+        if (key := (cell.kind, cell.region if told else 0)) != group:
+            label = names.get((dim, cell.region), f"set{cell.region}").replace(" ", "_")
+            out.line(f"*ELEMENT, TYPE={ABAQUS[cell.kind]}" + f", ELSET={label}" * told)
+            group = key
+        out.row(("i", [cell.number, *(out.tags[k] for k in cell.nodes)]), comma=",")
+    if vertices := out.of("vertex"):
+        out.line("*BOUNDARY")
+        for cell in vertices:
+            out.row(("i", [out.tags[cell.nodes[0]], 1]), comma=",")
+    for text in ("*MATERIAL, NAME=steel", "*ELASTIC", "2e5, 0.3") if out.has("more") else ():
+        out.line(text)
+    return {".inp": bytes(out.bytes)}
+
+
+NASTRAN = {"triangle": "CTRIA3", "quad": "CQUAD4", "triangle6": "CTRIA6", "tetra": "CTETRA", "hexahedron": "CHEXA",
+           "line": "CROD"}  # fmt: skip
+
+
+def _real(word: str, width: int) -> str:
+    """A number with a point, as Nastran wants it; one that is not of this file, as gmsnet writes it."""
+    given = {text for texts in (POINTS, *OTHERS.values()) for point in texts for text in point.split()} | {"5.0"}
+    if word not in given:
+        return fitted(float(word), width)
+    return word if "." in word or "e" in word else f"{word}."
+
+
+def nastran(out: Sample, large: bool = False) -> Files:
+    """Fields of 8 or of 16 columns."""
+    out.line("$ a comment", out.has("comments"))
+    out.line("BEGIN BULK")
+    out.line("MAT1           1    2.+5              .3", out.has("more"))
+    for k in range(len(out.points)):
+        x, y, z = (_real(word, 16 if large else 8) for word in out.space(k))
+        if large:
+            out.line(f"GRID*   {out.tags[k]:>16}{'':16}{x:>16}{y:>16}")
+            out.line(f"*       {z:>16}")
+        else:
+            out.line(f"GRID    {out.tags[k]:>8}{'':8}{x:>8}{y:>8}{z:>8}")
+    for cell in [cell for cell in out.cells if cell.kind in NASTRAN]:
+        told = out.has("regions") or out.has("markers")
+        words = [cell.number, cell.region if told else 1, *(out.tags[k] for k in cell.nodes)]
+        for k in range(0, len(words), 8):
+            name = "+" if k else NASTRAN[cell.kind]
+            out.line(f"{name:<8}" + "".join(f"{word:>8}" for word in words[k : k + 8]))
+    for cell in out.of("vertex"):
+        out.line(f"FORCE          1{out.tags[cell.nodes[0]]:>8}       0      1.      1.")
+    out.line("ENDDATA")
+    return {".bdf": bytes(out.bytes)}
+
+
 VTK = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "triangle6": 22}
 
 
@@ -570,6 +637,9 @@ VARIANTS = [
     Variant("stl", "STL, binary", stl_binary, "<", True),
     Variant("obj", "OBJ", obj),
     Variant("off", "OFF", off),
+    Variant("abaqus", "Abaqus", abaqus),
+    Variant("nastran", "Nastran, 8 columns", nastran),
+    Variant("nastran", "Nastran, 16 columns", partial(nastran, large=True)),
     *(Variant("ply", f"PLY, {how}{', single' * single}", ply, order, single)
       for how, order in (("text", ""), (_LITTLE, "<"), (_BIG, ">")) for single in (False, True)),
 ]  # fmt: skip

@@ -103,6 +103,7 @@ def facts_of(mesh: Mesh) -> tuple[object, ...]:
         [(b.kind, b.nodes.tolist(), b.regions.tolist()) for b in mesh.cells], dict(mesh.region_names),
         {name: values.tolist() for name, values in mesh.point_data.items()},
         {name: [part.tolist() for part in parts] for name, parts in mesh.cell_data.items()},
+        {name: nodes.tolist() for name, nodes in mesh.node_sets.items()},
     )  # fmt: skip
 
 
@@ -141,13 +142,17 @@ What the names of facts mean that do not say it themselves:
   another order. *entities*: cells of one region that belong to several pieces of the geometry. *unused node*: one in no
   cell.
 - *more*: what is not about the mesh. SU2: `AOA`, a box of free-form deformation; Gmsh: `$Periodic`; VTK, VTU: a field
-  of the whole grid; Medit: ridges; OBJ: normals, a library of materials; PLY: another element.
+  of the whole grid; Medit: ridges; OBJ: normals, a library of materials; PLY: another element;
+  Abaqus, Nastran: a material.
 - *point data*, *cell data* of OBJ and OFF: colours; of binary STL: attributes. *comments* of VTK: the title.
 - *markers*: lines in two groups. *curved*: triangles of six nodes. *other plane*: z = 5.
   *tetrahedra*: beside the faces; these are marks then.
 
 SU2's markers `SEND_RECEIVE` (periodic boundaries, parts of a partitioned mesh) are vertices, so their nodes are held;
 `NPERIODIC` and `PERIODIC_INDEX` are kept.
+
+A file of any format may be compressed with gzip: its name then ends with `.gz` (`wing.su2.gz`). What it unpacks to is
+promised byte for byte. It is compressed anew (level 6, without a name or a time), so its packed bytes differ.
 
 ## Smoothing: the same file with other coordinates
 

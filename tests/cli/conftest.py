@@ -12,9 +12,9 @@ from support.hand_made import vtk_text
 
 from gmsnet import CellBlock, Mesh
 from gmsnet.cli import main
-from gmsnet.cli.progress import COMPILING
 from gmsnet.generate import random_mesh
 from gmsnet.io import write
+from gmsnet.run.progress import COMPILING
 
 
 @dataclass(frozen=True)

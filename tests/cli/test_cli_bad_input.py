@@ -75,7 +75,7 @@ BAD_FILES = [  # input, what the message must hold
     ("curved.vtk", ["curved.vtk", "curved surface", "plane"]),
     ("cut.vtk", ["cut.vtk"]),
     ("good.xyz", ["good.xyz", ".su2", "--format"]),
-    ("packed.su2.gz", ["packed.su2.gz", "unpack"]),
+    ("packed.su2.gz", ["packed.su2.gz", "damaged", "unpack"]),
     ("", ["folder"]),
 ]
 
@@ -115,7 +115,7 @@ BAD_USAGE = [  # arguments after ``smooth``, what the message must hold; {in} is
     (["{in}", "/dev/fd/1", "--json"], ["--json", "standard output"]),
     (["{dir}/pair.node", "-"], ["Triangle takes several files"]),
     (["{in}", "-", "--output-format", "triangle"], ["standard output", "Triangle takes several files"]),
-    (["{in}", "{dir}/out.gz"], ["'.gz' is unknown", "--output-format"]),
+    (["{in}", "{dir}/out.gz"], ["no suffix", "--output-format"]),
     (["{in}", "{dir}/symbolic.png", "--output-format", "su2", "--plot", "{dir}/new.png"], ["overwrite the mesh"]),
     (["{in}", "{dir}/out.su2", "--sweeps", "3"], ["No such option", "--sweeps"]),
     ([], ["Missing argument 'IN'"]),

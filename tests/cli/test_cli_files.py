@@ -11,8 +11,8 @@ import pytest
 
 import gmsnet
 from gmsnet.cli import fix
-from gmsnet.cli.progress import Progress
 from gmsnet.io import atomic
+from gmsnet.run.progress import Progress
 
 CHANGED = (
     "others have changed this file since it was read, so nothing is written over it: "

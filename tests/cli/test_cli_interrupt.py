@@ -9,10 +9,10 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 import gmsnet
-from gmsnet.cli.progress import Progress
 from gmsnet.cli.signals import Deferral
 from gmsnet.io import write
 from gmsnet.run import stop
+from gmsnet.run.progress import Progress
 
 
 def listing(folder):

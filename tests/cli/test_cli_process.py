@@ -10,8 +10,8 @@ import sys
 
 import pytest
 
-from gmsnet.cli.progress import COMPILING
 from gmsnet.io import read
+from gmsnet.run.progress import COMPILING
 
 HEAVY = ("numpy", "scipy", "numba", "meshlane", "torch", "matplotlib", "pyvista", "safetensors")
 GMSNET = [sys.executable, "-m", "gmsnet"]

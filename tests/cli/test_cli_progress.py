@@ -8,7 +8,7 @@ import numba
 import pytest
 
 from gmsnet.cli import main
-from gmsnet.cli.progress import COMPILING, Progress
+from gmsnet.run.progress import COMPILING, Progress
 from gmsnet.topology.topology import Topology
 
 

@@ -55,5 +55,5 @@ def test_meshes_in_space():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]], float)
     mesh = Mesh(points, (CellBlock("triangle", [[0, 1, 2], [1, 3, 2]], [0, 0]),))
     assert check_slide(mesh, None) == ()
-    with pytest.raises(InputError, match="nodes slide in planar meshes alone"):
+    with pytest.raises(InputError, match="nodes of surfaces in space cannot slide yet"):
         check_slide(mesh, True)

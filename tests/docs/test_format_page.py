@@ -61,6 +61,8 @@ LOST = {  # format: a fact that is in the file alone, and words of what is said 
     "obj": ("more", ["normals (vn), the library of its materials (mtllib)"]),
     "off": ("point data", ["normals, colours or texture of points"]),
     "ply": ("more", ["the element 'material'"]),
+    "nastran": ("more", ["the card MAT1"]),
+    "abaqus": ("more", ["the keyword *MATERIAL, the keyword *ELASTIC"]),
 }
 
 

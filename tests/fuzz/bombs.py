@@ -50,6 +50,8 @@ def bombs() -> Iterator[tuple[str, str, bytes, str]]:
     yield from _large_cells()
     yield from _texts()
     yield from _vtu()
+    yield from _abaqus()
+    yield from _nastran()
 
 
 def _large_cells() -> Iterator[tuple[str, str, bytes, str]]:
@@ -102,6 +104,42 @@ def _texts() -> Iterator[tuple[str, str, bytes, str]]:
     yield "vtk", "metadata", VTK.format("ASCII").encode() + b"METADATA\n\n" * 200_000, "POINTS missing"
     sections = b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n" + b"$A\n$EndA\n" * 200_000
     yield "gmsh", "sections", sections, r"\$Nodes and \$Elements missing"
+
+
+def _abaqus() -> Iterator[tuple[str, str, bytes, str]]:
+    deck = b"*NODE\n" + b"".join(b"%d,%d,0\n" % (k, k) for k in range(1, 20_001)) + b"*ELEMENT,TYPE=S3\n1,1,2,3\n"
+    yield "abaqus", "keywords", b"*A\n" * MANY, "more than 100000 keywords"
+    yield "abaqus", "a keyword line that goes on", b"*A,\n" + b",\n" * MANY, "more than 4096 characters"
+    yield "abaqus", "asterisks", b"*HEADING\n" + b" *" * MANY + b"\n" + deck, READS
+    yield "abaqus", "ranges of all", deck + b"*NSET,NSET=a,GENERATE\n" + b"1,1000000000000\n" * 100_000, READS
+    steps = b"*NSET,NSET=a,GENERATE\n" + b"1,20000,3\n" * 100_000
+    yield "abaqus", "ranges with steps", deck + steps, "name the same numbers again and again"
+    sets = b"*NSET,NSET=s0,GENERATE\n1,20000\n" + b"".join(
+        b"*NSET,NSET=s%d\ns%d,s%d\n" % (k, k - 1, k - 1) for k in range(1, 40)
+    )
+    yield "abaqus", "sets of sets", deck + sets, READS
+    yield "abaqus", "an element of many nodes", deck + b"*ELEMENT,TYPE=U1\n2," + b"1," * MANY + b"1\n", READS
+
+
+def _nastran() -> Iterator[tuple[str, str, bytes, str]]:
+    grids = b"".join(b"GRID,%d,,%d.,0.,0.\n" % (k, k) for k in range(1, 20_001))
+    deck = grids + b"CTRIA3,1,1,1,2,3\n"
+    yield (
+        "nastran",
+        "cards of many names",
+        deck + b"".join(b"X%d,1\n" % k for k in range(100_000)),
+        "more than 10000 names",
+    )
+    yield (
+        "nastran",
+        "a card of many lines",
+        deck + b"RBE2,1,1,123\n" + b"+,1,2,3\n" * (MANY // 5),
+        "goes on in more than 10000",
+    )
+    yield "nastran", "ranges of all", deck + b"SPC1,1,1,1,THRU,20000\n" * 100_000, "more than 1000 SPC1 with THRU"
+    yield "nastran", "a long field", deck + b"CTRIA3,2,1,1,2," + b"3" * MANY + b"\n", "a field has 1000000 characters"
+    yield "nastran", "commas", deck + b"CTRIA3,2,1,1,2,3" + b"," * 5 * MANY + b"\n", READS
+    yield "nastran", "blanks", b" " * 5 * MANY + b"\n" + deck, READS
 
 
 def _vtu() -> Iterator[tuple[str, str, bytes, str]]:

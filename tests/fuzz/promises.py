@@ -114,7 +114,8 @@ def _check_splice(mesh: Mesh, files: Mapping[str, bytes], folder: Path, random: 
     if source.format == "stl" and len(np.unique(mesh.points, axis=0)) < len(mesh.points):
         return  # nodes that only their decimals tell apart
     back = gmsnet.read(_write(_spliced(again.source, mesh.points), folder / "back"), source.format)
-    if not np.array_equal(back.points, mesh.points) or not source.fits(back):
+    kept = mesh.points if again.rounding is None else again.rounding.kept(again.points, mesh.points)
+    if not np.array_equal(back.points, kept) or not source.fits(back):
         raise Broken("points that are moved there and back are not the same")
 
 
@@ -131,4 +132,4 @@ def moved(mesh: Mesh, random: np.random.Generator) -> np.ndarray:
     new[some] = random.normal(size=(int(some.sum()), new.shape[1])).astype(kind)
     extremes = np.array([np.finfo(kind).max, -np.finfo(kind).smallest_subnormal, kind(1) / kind(3)], dtype=kind)
     new[np.argmax(some), random.integers(new.shape[1])] = random.choice(extremes)
-    return new
+    return new if mesh.rounding is None else mesh.rounding.kept(mesh.points, new)

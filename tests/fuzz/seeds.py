@@ -15,8 +15,10 @@ from gmsnet.io.formats import FORMATS
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "io"))  # the tests of the readers, and what they share
 
+import test_abaqus
 import test_gmsh_partitions
 import test_medit
+import test_nastran
 import test_obj
 import test_off
 import test_ply
@@ -25,7 +27,7 @@ import test_su2
 import test_su2_periodic
 import test_tetgen
 import test_triangle
-import test_volumes
+import test_volume_files
 import test_vtk
 import test_vtu
 from support import gmsh_variants
@@ -102,6 +104,49 @@ PARTITIONED = b"""$PartitionedEntities
 21 2 21 2 1 2 0 0 0 1 1 0 1 3 1 5
 $EndPartitionedEntities
 """
+ABAQUS = b"""*PART, NAME=one
+*NODE
+1, 0, 0, 0
+2, 1, 0, 0
+3, 0, 1, 0
+4, 0, 0, 1
+*ELEMENT, TYPE=C3D4
+7, 1, 2, 3, 4
+*ELEMENT, TYPE=U2
+8, 1,
+2, 3
+9, 4, 1
+*END PART
+*EQUATION
+2
+1, 1, 1., 2, 1, -1.
+*MPC
+BEAM, 3, 4
+*NSET, NSET=some, GENERATE
+1, 9, 2
+2, 3
+*BOUNDARY
+some, 1, 3
+"""
+NASTRAN = b"""GRID    1               0.      0.      0.
+GRID    2               1.      0.      0.
+GRID    3               0.      1.      0.
+GRID    4               0.      0.      1.
+GRID*   5                               5.-1            .5+0            *A
+*A      0.
+CTETRA  1       1       1       2       3       4       5       5       +B
++B      5       5       5       5
+CQUAD8,2,1,1,2,3,4,5,,+
++,5,5
+CTRIAX6 3       1       1       5       2       5       3       5
+PSOLID,1,1
+SPC1,1,123,1,thru,3
+SPC1,1,123,4
+SPC     1       1       3       0.      2       3       0.
+RBE3    9               5       123     1.      123     1       2       +C
++C      3
+CWELD   7       1       1       5       2
+"""
 ONE_CELL = b"\nCELLS 1 2\n" + bytes([0, 0, 0, 1, 0, 0, 0, 0]) + b"\nCELL_TYPES 1\n" + bytes([0, 0, 0, 1])
 VTK_STRINGS = b"FIELD data 2\nnames 1 2 string\n\xc3abc\x80\x02de\nbits 1 9 bit\n\xaa\x80\n"
 ENTITIES = '<FieldData><Array type="String" Name="who" format="ascii">65 0</Array></FieldData>'
@@ -150,11 +195,13 @@ def seeds() -> Iterator[tuple[str, bytes]]:
     yield "vtu", test_vtu.PLAIN.replace("<Piece", ENTITIES + "<Piece").replace("Float64", "Float32").encode()
     for single in (False, True):
         yield from (("vtu", data) for _, data in vtu_variants(grid_of(mixed_mesh(1), single)))
+    yield from (("abaqus", data) for data in (test_abaqus.PLAIN, test_abaqus.PARTS, ABAQUS))
+    yield from (("nastran", data) for data in (test_nastran.PLAIN, NASTRAN))
     yield from _written()
 
 
 def _written() -> Iterator[tuple[str, bytes]]:
-    for mesh in (triangle_grid(1), triangle_grid(2, 3), mixed_mesh(1), test_volumes.sample(1)):
+    for mesh in (triangle_grid(1), triangle_grid(2, 3), mixed_mesh(1), test_volume_files.sample(1)):
         for key, entry in FORMATS.items():
             try:
                 written = entry.load().write(mesh)

@@ -19,6 +19,7 @@ from gmsnet.generate import (
     kershaw_mesh,
     lattice_volume,
     layered_mesh,
+    layered_volume,
     part_volume,
     random_mesh,
     random_quad_mesh,
@@ -56,6 +57,7 @@ def run(*arguments):
         ("--pattern structured --cells tetra --nodes 35", lambda: lattice_volume(3)),
         ("--pattern structured --cells tetra --columns 2", lambda: lattice_volume(2)),
         ("--pattern part --columns 9", lambda: part_volume(9)),
+        ("--pattern layered --columns 4 --layers 3 --aspect 10", lambda: layered_volume(4, 3, first=0.1)),
         ("--pattern structured --cells tetra --columns 3 --jitter 2 --tangled",
          lambda: disturb(m := lattice_volume(3), inner_nodes(m), 2.0, keep_valid=False)),
         ("--pattern structured --columns 3 --rows 5 --size 2", lambda: grid(3, 5, size=2.0)),
@@ -91,7 +93,10 @@ def test_command_makes_what_the_functions_make(tmp_path, options, expected):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--pattern zigzag", "unknown pattern 'zigzag'; there are random, structured, o-grid, adapted, kershaw, part"),
+        (
+            "--pattern zigzag",
+            "unknown pattern 'zigzag'; there are random, structured, o-grid, adapted, kershaw, layered, part",
+        ),
         ("--cells hex", "--pattern random makes --cells triangle or quad or mixed or tetra, not 'hex'"),
         ("--pattern kershaw --cells mixed", "--pattern kershaw makes --cells quad, not 'mixed'"),
         (
@@ -100,7 +105,7 @@ def test_command_makes_what_the_functions_make(tmp_path, options, expected):
         ),
         (
             "--columns 3",
-            "--columns is an option for structured quad, structured tetra, kershaw quad, part tetra",
+            "--columns is an option for structured quad, structured tetra, kershaw quad, layered tetra, part tetra",
         ),
         ("--pattern kershaw --share 0.5", "--share is an option for structured mixed, not for kershaw quad"),
         ("--pattern structured --interface", "--interface is an option for structured mixed"),

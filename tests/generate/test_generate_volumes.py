@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import gmsnet
 from gmsnet.errors import InputError
-from gmsnet.generate import disturb, lattice_volume, part_volume, random_volume
+from gmsnet.generate import disturb, lattice_volume, layered_volume, part_volume, random_volume
 from gmsnet.generate.volumes import CYLINDER, CYLINDER_RADIUS, SIDES, SPHERE, SPHERE_RADIUS
 from gmsnet.measure.volumes import exact_signs3
 
@@ -116,3 +116,23 @@ def test_free_disturbance_tangles_in_all_directions():
     step = (thrown.points - mesh.points)[free]
     assert np.abs(step.mean(axis=0)).max() < 0.15 * np.abs(step).max()
     assert step.std(axis=0).min() > 0.8 * step.std(axis=0).max()
+
+
+@pytest.mark.parametrize(("cells", "rows", "first", "growth"), [(4, 3, 0.1, 1.5), (8, 8, 0.02, 1.4), (12, 5, 0.1, 1.3)])
+def test_layered_volumes(cells, rows, first, growth):
+    mesh = layered_volume(cells, rows, first=first, growth=growth, size=2.0, seed=3)
+    rows_of = mesh.cells[0].nodes.astype(np.int32)
+    assert (exact_signs3(mesh.points, rows_of, np.ones(len(rows_of), dtype=np.int8)) == 1).all()
+    wall, above = mesh.points[: (cells + 1) ** 2], mesh.points[(cells + 1) ** 2 : 2 * (cells + 1) ** 2]
+    rise = np.sin(np.pi * wall[:, 0] / 2) * np.sin(np.pi * wall[:, 1] / 2)
+    np.testing.assert_allclose(above[:, 2] - wall[:, 2], (1.0 - 0.1 * rise) * first / cells * 2.0)
+    assert set(mesh.markers) == {"domain", *SIDES}
+    assert (mesh.points[mesh.markers["top"], 2] == 2.0).all()
+    assert len(mesh.cells[0].nodes) % (6 * cells**2) == 0
+
+
+def test_layers_that_are_too_high_are_refused():
+    with pytest.raises(InputError, match=r"rows are .* of the cube high"):
+        layered_volume(4, 20, first=0.5)
+    with pytest.raises(InputError, match="growth"):
+        layered_volume(4, growth=0.9)

@@ -13,10 +13,10 @@ from support.folder import SMOOTH, names
 
 import gmsnet
 from gmsnet.cli import main
-from gmsnet.cli.progress import COMPILING
 from gmsnet.errors import InputError
 from gmsnet.io import read, write
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.run.progress import COMPILING
 
 
 @pytest.fixture(scope="module")

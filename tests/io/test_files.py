@@ -136,7 +136,9 @@ SU2_TEXT = b"NDIME= 2\nNPOIN= 0\nNELEM= 0\nNMARK= 0\n"
         ("a.xyz", b"1 2 3", r"a\.xyz: the suffix '\.xyz' is unknown; known are \.su2, \.msh, .* with --format"),
         ("a", b"1 2 3", r"a: the name has no suffix; known are"),
         ("a.meshb", b"1 2 3", r"a\.meshb: binary Medit is not read: convert it to text"),
-        ("a.su2.gz", b"\x1f\x8b", r"a\.su2\.gz: unpack it first"),
+        ("a.su2.gz", b"\x1f\x8b", r"a\.su2\.gz: the compressed data end too early: the file is cut off"),
+        ("a.su2.gz", SU2_TEXT, r"a\.su2\.gz: byte 0: no gzip data begin here: leave out \.gz in the name"),
+        ("a.gz", b"\x1f\x8b", r"a\.gz: the name has no suffix; known are"),
     ],
 )  # fmt: skip
 def test_what_is_no_mesh_is_refused_with_its_name(name: str, data: bytes, message: str, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from support import volumes
+from support import surfaces, volumes
 from support.choices import CHOICES, name_of
 
 import gmsnet
@@ -45,6 +45,9 @@ def some_mesh(seed, kind, nodes, thrown, where, single):
     elif kind == "lattice":
         points, cells = volumes.lattice(3, 0.4, seed)
         points = points * 10.0 ** rng.uniform(-2, 0, 3)
+    elif kind == "globe":
+        points, cells = volumes.globe(nodes, seed)
+        points = points @ surfaces.turned(seed % 99).T
     else:
         points, cells = volumes.cube(nodes, seed)
     if rng.random() < 0.5:
@@ -64,7 +67,8 @@ def some_mesh(seed, kind, nodes, thrown, where, single):
 
 some_meshes = given(
     seed=st.integers(0, 2**32 - 1),
-    kind=st.sampled_from(["ball", "lattice", "cube", "cube"]),
+    slide=st.booleans(),
+    kind=st.sampled_from(["ball", "lattice", "cube", "cube", "globe"]),
     nodes=st.integers(30, 50),
     thrown=st.sampled_from([0.0, 0.0, 0.1, 0.5]),
     where=st.sampled_from([(0.0, 1.0), (1000.1, 1.0), (-3.7e5, 1.0), (0.3, 1e-7), (1.0, 1e3), (0.0, 1e-30)]),
@@ -88,15 +92,15 @@ def check(level, before, after, stars):
 @every_method
 @some_meshes
 @settings(max_examples=EXAMPLES, deadline=None)
-def test_each_sweep_keeps_what_the_level_promises(method, level, seed, kind, nodes, thrown, where, single):
+def test_each_sweep_keeps_what_the_level_promises(method, level, seed, slide, kind, nodes, thrown, where, single):
     mesh = some_mesh(seed, kind, nodes, thrown, where, single)
-    topology = Volume.of(mesh)
+    topology, on = surfaces.sliding(mesh, 60.0) if slide else (Volume.of(mesh), None)
     if not len(topology.free):
         return
     options = {**method}
     chosen = smoother(options.pop("method"), **options)
     start = space_points(mesh)[topology.memory]
-    field = Field(start.copy(), topology, precision_of(mesh), LEVELS.index(level))
+    field = Field(start.copy(), topology, precision_of(mesh), LEVELS.index(level), constraint=on and on.constraint)
     cells, orientation = topology.changeable
     rows = [np.flatnonzero((cells == node).any(axis=1)) for node in np.flatnonzero(topology.near_free)]
     readings = [Fraction] if single else [Fraction, volumes.as_written]
@@ -121,12 +125,13 @@ def test_each_sweep_keeps_what_the_level_promises(method, level, seed, kind, nod
 @pytest.mark.parametrize("level", LEVELS)
 @some_meshes
 @settings(max_examples=3 * EXAMPLES, deadline=None)
-def test_so_does_the_whole_from_input_to_output_at_any_stop(level, seed, kind, nodes, thrown, where, single):
+def test_so_does_the_whole_from_input_to_output_at_any_stop(level, seed, slide, kind, nodes, thrown, where, single):
     mesh = some_mesh(seed, kind, nodes, thrown, where, single)
     rng = np.random.default_rng(seed)
     fixed = rng.random(len(mesh.points)) < 0.1
-    topology = Volume.of(mesh, fixed)
-    result = gmsnet.smooth(mesh, guard=level, max_sweeps=int(rng.integers(0, 12)), fixed=fixed)
+    topology, _ = surfaces.sliding(mesh, 60.0, fixed) if slide else (Volume.of(mesh, fixed), None)
+    sweeps = int(rng.integers(0, 12))
+    result = gmsnet.smooth(mesh, guard=level, max_sweeps=sweeps, fixed=fixed, slide=slide, feature_angle=60.0)
     cells, orientation = topology.cells, topology.orientation
     changed = np.flatnonzero(np.isin(cells, topology.free).any(axis=1))
     still = np.setdiff1d(np.arange(len(mesh.points)), topology.free)

@@ -25,19 +25,20 @@ def read(reader: ModuleType, data: bytes) -> Parsed:
 def mesh_of(parsed: Parsed) -> Mesh:
     """The mesh, which checks its own contract."""
     return Mesh(
-        parsed.points, tuple(parsed.cells), parsed.region_names, parsed.point_data, parsed.cell_data, parsed.single
-    )
+        parsed.points, tuple(parsed.cells), parsed.region_names, parsed.point_data, parsed.cell_data, parsed.single,
+        node_sets=parsed.node_sets, rounding=parsed.rounding,
+    )  # fmt: skip
 
 
 def moved_points(parsed: Parsed, seed: int = 0) -> np.ndarray:
-    """Points of which a third have moved a little, exactly in single precision where the file is."""
+    """Points of which a third have moved a little, as exactly as the file can keep them."""
     random = np.random.default_rng(seed)
     new = parsed.points.copy()
     some = random.random(len(new)) < 0.34
     some[int(random.integers(len(new)))] = True
     shifted = new[some] + random.uniform(0.01, 0.1, new[some].shape)
     new[some] = shifted.astype(np.float32) if parsed.single else shifted
-    return new
+    return new if parsed.rounding is None else parsed.rounding.kept(parsed.points, new)
 
 
 def check_splice(reader: ModuleType, data: bytes, seed: int = 0) -> bytes:

@@ -47,6 +47,7 @@ def facts(parsed: Parsed) -> tuple[object, ...]:
         dict(parsed.region_names),
         {name: np.asarray(values).tolist() for name, values in parsed.point_data.items()},
         {name: [np.asarray(a).tolist() for a in arrays] for name, arrays in parsed.cell_data.items()},
+        {name: nodes.tolist() for name, nodes in parsed.node_sets.items()},
     )
 
 
@@ -64,7 +65,8 @@ def read_or_refuse(reader: ModuleType, files: Mapping[str, bytes]) -> Parsed | N
     """What the reader says of damaged files; None where it refuses them in words, naming no internals."""
     try:
         parsed = reader.read(files)
-        Mesh(parsed.points, tuple(parsed.cells), parsed.region_names, parsed.point_data, parsed.cell_data)
+        data = (parsed.region_names, parsed.point_data, parsed.cell_data)
+        Mesh(parsed.points, tuple(parsed.cells), *data, node_sets=parsed.node_sets, rounding=parsed.rounding)
     except FormatError:
         return None
     except InputError:

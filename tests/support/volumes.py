@@ -88,6 +88,17 @@ def ball(rng, around, off=0.4, stretch=(1.0, 1.0, 1.0)):
     return points * np.asarray(stretch), cells
 
 
+def globe(nodes, seed=0):
+    """(points, cells) of a Delaunay ball: random nodes on the unit sphere and inside; flat cells are left out."""
+    rng = np.random.default_rng(seed)
+    outer = rng.normal(size=(4 * round(nodes ** (2 / 3)), 3))
+    inner = rng.uniform(-1, 1, (3 * nodes, 3))
+    inner = inner[np.linalg.norm(inner, axis=1) < 0.85][:nodes]
+    points = np.vstack([outer / np.linalg.norm(outer, axis=1)[:, None], inner])
+    cells = Delaunay(points).simplices
+    return points, wound(points, cells[np.abs(volumes6(points, cells)) > 1e-7])
+
+
 def integers(points, number=Fraction):
     """Coordinates as whole numbers of one common unit, as an object array. number: how a float is to be read."""
     exact = [[number(v) for v in row] for row in np.asarray(points)[:, :3].tolist()]

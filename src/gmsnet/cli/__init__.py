@@ -15,7 +15,7 @@ from typing import Annotated
 
 import typer
 
-from gmsnet.cli import deform, generate, methods, quality, reproduce, smooth, train
+from gmsnet.cli import deform, generate, gmsh, methods, quality, reproduce, smooth, train
 from gmsnet.cli.moves import joined
 from gmsnet.cli.signals import Interrupted
 from gmsnet.errors import GmsnetError
@@ -46,6 +46,7 @@ app.command()(deform.deform)
 app.command()(quality.quality)
 app.command()(methods.methods)
 app.command()(generate.generate)
+app.command()(gmsh.gmsh)
 app.command()(train.train)
 app.command()(reproduce.reproduce)
 

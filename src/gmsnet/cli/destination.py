@@ -12,6 +12,7 @@ from gmsnet.errors import InputError
 from gmsnet.io.atomic import check_writable, refuse_folder
 from gmsnet.io.files import files_of
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, entry_of, format_of_suffix
+from gmsnet.io.packed import split_name
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, is_standard_output, standard_output
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def destination_of(source: str, output: str | None, in_place: bool, format: str 
     if output in STANDARD_OUTPUT or is_special(output):
         return Destination(output, format, aside)
     refuse_folder(output)
-    key = format or format_of_suffix(output, os.path.splitext(output)[1], "--output-format", reading=False)
+    key = format or format_of_suffix(output, split_name(output)[1], "--output-format", reading=False)
     for read, written in itertools.product(_files(source), _files(output, key)):
         if os.path.isfile(read) and _is_same(read, written):
             raise InputError(f"{written} is the input {read} itself: name another output, or use --in-place")
@@ -107,7 +108,7 @@ def shown(path: str) -> str:
 
 
 def _files(path: str, format: str | None = None) -> Sequence[str]:
-    key = format or BY_SUFFIX.get(os.path.splitext(path)[1].lower())
+    key = format or BY_SUFFIX.get(split_name(path)[1].lower())
     return list(dict.fromkeys([path, *(files_of(path, FORMATS[key]) if key in FORMATS else ())]))
 
 

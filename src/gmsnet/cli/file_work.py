@@ -41,7 +41,7 @@ class FileWork:
         self, input: str, format: str | None, destination: Destination, *, in_place: bool, plot: str | None,
         report: str | None, most_sweeps: int, json: bool, quiet: bool, command: str,
     ) -> None:  # fmt: skip
-        from gmsnet.cli.progress import Progress
+        from gmsnet.run.progress import Progress
 
         self.input, self.format, self.destination, self.in_place, self.plot = input, format, destination, in_place, plot
         self.report, self.command, self.json, self.quiet = report, command, json, quiet
@@ -68,7 +68,7 @@ class FileWork:
             with interruptible(), self.progress, self.interruption:
                 outcome = told(self._work(check, make))
                 if self.report is not None:
-                    self.progress.begin(f"writing {self.report}")
+                    self.progress.begin(visible(f"writing {self.report}"))
                     with _mesh_is_there(self.written, "report"):
                         outcome.write_report(self.report, self.command)
             if self.json:
@@ -87,7 +87,7 @@ class FileWork:
     def _work(self, check: Callable[[Mesh], None], make: Callable[[Mesh], Callable[[], SmoothResult]]) -> Done:
         from gmsnet import io
 
-        self.progress.begin(f"reading {shown(self.input)}")
+        self.progress.begin(visible(f"reading {shown(self.input)}"))
         mesh = io.read(self.input, self.format)
         try:
             check(mesh)
@@ -110,12 +110,12 @@ class FileWork:
         self.interruption.begin()
         lost: list[str] = []
         if not self.in_place or result.moved.any():  # else there is nothing to write
-            self.progress.begin(f"writing {destination.path}")
+            self.progress.begin(visible(f"writing {destination.path}"))
             lost = io.write(result.mesh, destination.path, destination.format)
             self.written = destination.path
         self.interruption.end()
         if self.plot is not None:
-            self.progress.begin(f"drawing {self.plot}")
+            self.progress.begin(visible(f"drawing {self.plot}"))
             with _mesh_is_there(self.written, "picture"):
                 _draw(mesh, result.mesh, self.plot)
         return Done(mesh, result, self.written, lost, compiled)

@@ -18,14 +18,15 @@ def generate(
         str,
         typer.Option(
             help="random, structured (rows and columns, or a body-centred lattice), o-grid (layers around a body), "
-            "adapted (to a front inside), kershaw (zigzag) or part (a cube of tetrahedra with two holes)."
+            "adapted (to a front inside), kershaw (zigzag), layered (tetrahedra on a wall) or part (a cube of them "
+            "with two holes)."
         ),
     ] = "random",
     cells: Annotated[
         str | None,
         typer.Option(
             help="triangle, quad, mixed or tetra.",
-            show_default="triangle if random or adapted, mixed if o-grid, tetra if part, else quad",
+            show_default="triangle if random or adapted, mixed if o-grid, tetra if layered or part, else quad",
         ),
     ] = None,
     shape: Annotated[
@@ -50,7 +51,7 @@ def generate(
         int | None, typer.Option(help="Of random: sweeps of Laplacian smoothing of the triangles.", show_default="0")
     ] = None,
     columns: Annotated[
-        int | None, typer.Option(help="Of structured, kershaw and part: columns of quads, or of the lattice.")
+        int | None, typer.Option(help="Of structured, kershaw, layered and part: columns of quads, or of the lattice.")
     ] = None,
     rows: Annotated[int | None, typer.Option(help="Of structured and kershaw: rows of quads.")] = None,
     flatness: Annotated[
@@ -62,10 +63,14 @@ def generate(
     interface: Annotated[
         bool, typer.Option("--interface", help="Of structured mixed: the patch is a region of its own.")
     ] = False,
-    layers: Annotated[int | None, typer.Option(help="Of o-grid: rows of stretched cells.", show_default="20")] = None,
+    layers: Annotated[
+        int | None, typer.Option(help="Of o-grid and layered: rows of stretched cells.", show_default="20; 8")
+    ] = None,
     aspect: Annotated[
         float | None,
-        typer.Option(help="Of o-grid: ratio of the sides at the wall (1000). Of adapted: at the front (10)."),
+        typer.Option(
+            help="Of o-grid: ratio of the sides at the wall (1000), of layered (50). Of adapted: at the front (10)."
+        ),
     ] = None,
     around: Annotated[int | None, typer.Option(help="Of o-grid: nodes on the wall.", show_default="120")] = None,
     body: Annotated[str | None, typer.Option(help="Of o-grid: airfoil or circle.", show_default="airfoil")] = None,

@@ -88,6 +88,13 @@ def _random_volume(given: Given, size: float, seed: int) -> Mesh:
     return random_volume(given.get("nodes", NODES), size=size, seed=seed)
 
 
+def _layered_volume(given: Given, size: float, seed: int) -> Mesh:
+    from gmsnet.generate import layered_volume
+
+    first = {"first": 1.0 / given["aspect"]} if given.get("aspect", 0.0) > 0.0 else {}
+    return layered_volume(given.get("columns", 10), given.get("layers", 8), size=size, seed=seed, **first)
+
+
 def _lattice(name: str) -> Callable[[Given, float, int], Mesh]:
     def make(given: Given, size: float, seed: int) -> Mesh:
         from gmsnet import generate
@@ -128,6 +135,7 @@ PATTERNS: dict[str, dict[str, Generator]] = {  # pattern → its cells, the defa
     },
     "adapted": {"triangle": Generator(_adapted, frozenset({"nodes", "aspect"}))},
     "kershaw": {"quad": Generator(_kershaw, GRID | {"flatness"})},
+    "layered": {"tetra": Generator(_layered_volume, frozenset({"columns", "layers", "aspect"}))},
     "part": {"tetra": Generator(_lattice("part_volume"), frozenset({"nodes", "columns"}))},
 }
 

@@ -48,6 +48,10 @@ def smooth(
     target_angle: Annotated[
         float | None, typer.Option(help="The same for the minimum angle of a cell, in degrees, in (0, 60].")
     ] = None,
+    target_dihedral: Annotated[
+        float | None,
+        typer.Option(help="The same for the minimum dihedral angle of tetrahedra, in degrees, in (0, 70.5]."),
+    ] = None,
     guard: Annotated[
         str,
         typer.Option(
@@ -165,8 +169,9 @@ def smooth(
     )  # fmt: skip
     options = SmoothOptions(  # before the file is read, which may be large
         method=method, variant=variant, objective=objective, max_sweeps=max_sweeps, threads=threads,
-        target_quality=target_quality, target_angle=target_angle, preserve=preserve, fix_layers=fix_layers,
-        untangle=untangle, guard=guard, seed=seed, callback=work.after_sweep, weights=weights, best_by=best_by,
+        target_quality=target_quality, target_angle=target_angle, target_dihedral=target_dihedral,
+        preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed,
+        callback=work.after_sweep, weights=weights, best_by=best_by,
         slide=True if slide and "all" in slide else slide or None, feature_angle=feature_angle,
         **values_at_nodes(metric, size),
     )  # fmt: skip

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gmsnet.constraints.outline import Flags, Longs, line_cells, mark_sets
 from gmsnet.mesh.mesh import Mesh
@@ -34,21 +33,36 @@ def boundary_of(mesh: Mesh, wound: Wound) -> Facets:
     rows = wound.memory[wound.boundary].astype(np.int64)
     region = wound.region[wound.outer >> 2] if len(wound.region) else np.zeros(len(rows), dtype=np.int64)
     lines, line_marks, still = line_cells(mesh)
-    marks, names = _marks(mesh, rows)
+    marks, names = _marks(mesh, rows, still)
     table, label = np.unique(np.column_stack([region, marks]), axis=0, return_inverse=True)
     return Facets(rows, label.reshape(-1), tuple(names[row] for row in table[:, 1].tolist()), lines, line_marks, still)
 
 
-def _marks(mesh: Mesh, rows: Longs) -> tuple[Longs, list[tuple[str, ...]]]:
-    """The set of marks of each facet as a number, and the names behind each number (``mark_sets``)."""
-    blocks = [block for block in mesh.cells if block.dimension == 2 and block.kind == "triangle" and len(block.nodes)]
-    if not blocks:
-        return np.zeros(len(rows), dtype=np.int64), [()]
-    faces = np.sort(np.concatenate([block.nodes for block in blocks]), axis=1)
-    marks = np.concatenate([block.regions for block in blocks])
-    keys, which = np.unique(np.vstack([np.sort(rows, axis=1), faces]), axis=0, return_inverse=True)
-    own, other = np.split(which.reshape(-1), [len(rows)])
-    facet = np.full(len(keys), -1, dtype=np.int64)
-    facet[own] = np.arange(len(rows))
-    owner: NDArray[np.int64] = facet[other]
-    return mark_sets(mesh, owner[owner >= 0], marks[owner >= 0], len(rows), 2)
+def _marks(mesh: Mesh, rows: Longs, still: Flags) -> tuple[Longs, list[tuple[str, ...]]]:
+    """The set of marks of each facet as a number, and the names behind each number (``mark_sets``).
+
+    Nodes of surface cells that are none of the facets become still.
+    """
+    faces, marks = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for block in mesh.cells:
+        if block.dimension == 2 and block.kind == "triangle":
+            faces.append(block.nodes)
+            marks.append(block.regions)
+        elif block.dimension == 2:
+            still[block.nodes] = True
+    cells, numbers = np.concatenate(faces), np.concatenate(marks)
+    which = facet_keys(np.concatenate([rows, cells]), len(mesh.points))
+    facet = np.full(int(which.max(initial=-1)) + 1, -1, dtype=np.int64)
+    facet[which[: len(rows)]] = np.arange(len(rows))
+    owner = facet[which[len(rows) :]]
+    still[cells[owner < 0]] = True
+    return mark_sets(mesh, owner[owner >= 0], numbers[owner >= 0], len(rows), 2)
+
+
+def facet_keys(rows: Longs, nodes: int) -> Longs:
+    """(F,) a number for each of some facets (F, 3), the same for those of the same nodes."""
+    low, middle, high = np.sort(rows, axis=1).T.astype(np.int64)
+    _, pair = np.unique(low * nodes + middle, return_inverse=True)
+    _, which = np.unique(pair.reshape(-1) * nodes + high, return_inverse=True)
+    numbers: Longs = which.reshape(-1)
+    return numbers

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 class Rows(NamedTuple):
-    """Of nodes (K,) that slide on things of one kind: which plane or line, and the facet or piece where each is."""
+    """Of nodes (K,) that slide on things of one kind: the frame of each, and the facet or piece where each is."""
 
     nodes: Longs
     kind: int
@@ -95,7 +95,7 @@ def _planes(patches: Patches, points: Floats, single: bool) -> tuple[Longs, tupl
 def _along_curves(
     curves: Curves, points: Floats, first: int
 ) -> tuple[list[Rows], tuple[Floats, Floats, Flags], Floats, Ints, Ints]:
-    """The nodes on each curve; the frames of lines, numbered from ``first`` on; cubic pieces and what follows them."""
+    """The nodes on each curve; their frames, numbered from ``first`` on; cubic pieces and what follows them."""
     found, frames, pieces, links, count = list[Rows](), list[tuple[Floats, Floats, Flags]](), list[Floats](), [], 0
     for c in range(len(curves)):
         nodes = curves.nodes_of(c)
@@ -105,13 +105,14 @@ def _along_curves(
         if not sliding.any():
             continue
         chosen, place, p = inner[sliding].astype(np.int64), place[sliding], points[nodes]
+        same, way = (p == p[0]).all(axis=0), p[-1] - p[0]
+        number = np.full(len(chosen), first + len(frames))
         if curves.straight[c]:
-            same, way = (p == p[0]).all(axis=0), p[-1] - p[0]
-            number = np.full(len(chosen), first + len(frames))
             frames.append((p[0], way / np.sqrt(dot(way[None], way[None])[0]), same))
             found.append(Rows(chosen, LINE, number, np.zeros_like(number)))
             continue
-        found.append(Rows(chosen, CURVE, np.zeros_like(chosen), count + place))
+        frames.append((p[0], np.zeros(3), same))
+        found.append(Rows(chosen, CURVE, number, count + place))
         pieces.append(_cubics(p, bool(curves.closed[c])))
         numbers = np.arange(count, count + len(p) - 1)
         links.append(_neighbours(numbers, bool(curves.closed[c])))

@@ -55,7 +55,8 @@ def patches_of(facets: Facets, points: Floats, feature_angle: float, single: boo
     one, other = order[first], order[first + two]  # numbers 3f + k; the same one where there is no other
     f, g = one // 3, other // 3
     cosine = (unit[f] * unit[g]).sum(axis=1)
-    smooth = two & (cosine >= math.cos(math.radians(feature_angle)) - SLACK) & (facets.label[f] == facets.label[g])
+    smooth = two & (area[f] > 0.0) & (area[g] > 0.0) & (facets.label[f] == facets.label[g])
+    smooth &= cosine >= math.cos(math.radians(feature_angle)) - SLACK
     line_keys = edge_keys(facets.lines[:, 0], facets.lines[:, 1], nodes)
     smooth &= ~np.isin(found, line_keys)
 

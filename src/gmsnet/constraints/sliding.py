@@ -24,12 +24,14 @@ REASON = "node of a curve that slides"  # why such nodes stand still while cells
 class Sliding:
     """curves: of the mesh. borders: of its regions. start: (N, 2) planar points of the input by ids.
 
-    nodes: (N,) bool by ids, those that slide. constraint: for the kernels; None where no node slides.
+    exponent: they are divided by this power of two. nodes: (N,) bool by ids, those that slide. constraint: for the
+    kernels; None where no node slides.
     """
 
     curves: Curves
     borders: Borders
     start: NDArray[np.float64]
+    exponent: int
     nodes: Flags
     constraint: Constraint | None
 
@@ -46,14 +48,15 @@ class Sliding:
         nodes[free] = True
         nodes &= curves.slides
         constraint = constraint_of(curves, points, memory, mesh.single, geometry, mesh.exponent)
-        return cls(curves, borders_of(mesh, points), points, nodes, constraint if nodes.any() else None)
+        return cls(curves, borders_of(mesh, points), points, mesh.exponent, nodes, constraint if nodes.any() else None)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:
         """What to say of it. mesh: as it has become. moved: (N,) bool."""
         if self.constraint is None:
             return "slide: no node of a boundary, interface or marker can move along a curve"
         slid, curves = int((self.nodes & moved).sum()), len(np.unique(self.curves.curve[self.nodes]))
-        change = float(np.abs(area_changes(self.borders, self.start, planar_points(mesh))).max(initial=0.0))
+        points = np.ldexp(planar_points(mesh), mesh.exponent - self.exponent)  # the two may differ
+        change = float(np.abs(area_changes(self.borders, self.start, points)).max(initial=0.0))
         return (
             f"slide: {slid:,} of {int(self.nodes.sum()):,} nodes have moved along {curves:,} "
             f"curve{'s' if curves != 1 else ''}; the area of no region changes by more than {change:.2g} of itself"

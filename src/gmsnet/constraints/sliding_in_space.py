@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +11,10 @@ from numpy.typing import NDArray
 from gmsnet.constraints.facets import Facets, boundary_of
 from gmsnet.constraints.features import may_slide
 from gmsnet.constraints.on_surface import surface_of
-from gmsnet.constraints.options import FEATURE_ANGLE, check_slide
+from gmsnet.constraints.options import FEATURE_ANGLE
 from gmsnet.constraints.outline import Flags
 from gmsnet.constraints.patches import Patches, patches_of
+from gmsnet.kernels.star.off_surface import farthest
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import space_points
@@ -24,14 +26,17 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSliding:
-    """facets, patches: of the boundary. start: (N, 3) points of the input by ids. nodes: (N,) bool, those that slide.
+    """facets, patches: of the boundary. start: (N, 3) points of the input by ids, over 2 to the power of ``exponent``.
 
-    constraint: for the kernels; None where no node slides.
+    memory: (N,) ids in memory order. nodes: (N,) bool by ids, those that slide. constraint: for the kernels; None where
+    no node slides.
     """
 
     facets: Facets
     patches: Patches
     start: Floats
+    exponent: int
+    memory: Ints
     nodes: Flags
     constraint: Surface | None
 
@@ -42,18 +47,20 @@ class SurfaceSliding:
         nodes = np.zeros(len(points), dtype=bool)
         nodes[free] = True
         nodes &= patches.slides | patches.curves.slides
-        return cls(facets, patches, points, nodes, surface_of(patches, points, memory, mesh.single))
+        constraint = surface_of(patches, points, memory, mesh.single) if nodes.any() else None
+        return cls(facets, patches, points, mesh.exponent, memory, nodes, constraint)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:
         """What to say of it. mesh: as it has become. moved: (N,) bool."""
-        count = int(self.nodes.sum())
-        if not count:
+        if self.constraint is None:
             return "slide: no node of the boundary can move along it"
-        before, after = (enclosed(points, self.facets) for points in (self.start, space_points(mesh)[:, :3]))
+        points = np.ldexp(mesh.points, -self.exponent)  # its own exponent may differ
+        before, after = enclosed(self.start, self.facets), enclosed(points, self.facets)
         change = abs(after - before) / abs(before) if before else 0.0
-        slid = int((self.nodes & moved).sum())
+        away = farthest(self.constraint, points[self.memory], moved[self.memory])
         return (
-            f"slide: {slid:,} of {count:,} nodes have moved along the boundary; "
+            f"slide: {int((self.nodes & moved).sum()):,} of {int(self.nodes.sum()):,} nodes have moved along the "
+            f"boundary, at most {away:.2g} of an edge from the input's facets; "
             f"the volume changes by {change:.2g} of itself"
         )
 
@@ -65,15 +72,15 @@ def enclosed(points: Floats, facets: Facets) -> float:
 
 
 def patches_to_slide_on(
-    mesh: Mesh, wound: Wound, slide: object, feature_angle: float = FEATURE_ANGLE, held: Flags | None = None
-) -> tuple[Facets, Patches] | None:
-    """The boundary of a mesh of tetrahedra and its patches; None where no node is to slide. held: (N,) bool.
+    mesh: Mesh, wound: Wound, names: Sequence[str] | None, feature_angle: float = FEATURE_ANGLE,
+    held: Flags | None = None,
+) -> tuple[Facets, Patches] | None:  # fmt: skip
+    """The boundary of a mesh of tetrahedra and its patches; None where no node is to slide.
 
-    Raises InputError as ``check_slide``.
+    names: as ``check_slide`` gives them. held: (N,) bool.
     """
-    if slide is None or slide is False:
+    if names == ():
         return None
-    names = check_slide(mesh, slide, feature_angle)
     facets = boundary_of(mesh, wound)
     points = space_points(mesh)[:, :3].copy()
     return facets, patches_of(facets, points, feature_angle, mesh.single, may_slide(mesh, names, held))

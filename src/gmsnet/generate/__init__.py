@@ -9,6 +9,7 @@ from gmsnet.generate.good import good_mesh
 from gmsnet.generate.graded import graded_mesh
 from gmsnet.generate.hybrid import hybrid_mesh
 from gmsnet.generate.layered import layered_mesh
+from gmsnet.generate.layered_volumes import layered_volume
 from gmsnet.generate.outline import SHAPES
 from gmsnet.generate.random import random_mesh
 from gmsnet.generate.recombine import random_quad_mesh, recombine, split_into_quads
@@ -30,6 +31,7 @@ __all__ = [
     "kershaw_mesh",
     "lattice_volume",
     "layered_mesh",
+    "layered_volume",
     "moved_hole_mesh",
     "on_circle",
     "part_volume",

@@ -48,7 +48,7 @@ def random_volume(nodes: int, *, size: float = 1.0, seed: int = 0) -> Mesh:
     points = np.concatenate([outer, margin + (1.0 - 2.0 * margin) * rng.random((nodes, 3))])
     weight = np.zeros(len(points))
     weight[: len(outer)] = WEIGHT / count**2 * rng.random(len(outer))
-    return _marked(points, _regular(points, weight, 1e-12 / count**3), _on_sides, SIDES, size)
+    return marked(points, _regular(points, weight, 1e-12 / count**3), on_sides, SIDES, size)
 
 
 def lattice_volume(cells: int, *, size: float = 1.0) -> Mesh:
@@ -58,7 +58,7 @@ def lattice_volume(cells: int, *, size: float = 1.0) -> Mesh:
     ``disturb`` throws the nodes out of place. Region, markers and errors are as in ``random_volume``.
     """
     cells = whole_number(cells, "the number of cells", 1)
-    return _marked(*_lattice(cells), _on_sides, SIDES, positive(size, "the size"))
+    return marked(*_lattice(cells), on_sides, SIDES, positive(size, "the size"))
 
 
 def part_volume(cells: int, *, size: float = 1.0) -> Mesh:
@@ -90,7 +90,7 @@ def part_volume(cells: int, *, size: float = 1.0) -> Mesh:
         for nodes, towards in holes:
             shift[nodes] = towards(points[nodes])[0]
         points += _halved(points, shift, rows, least)
-    return _marked(points, rows, lambda points, faces: of, (*SIDES, "cylinder", "sphere"), size)
+    return marked(points, rows, lambda points, faces: of, (*SIDES, "cylinder", "sphere"), size)
 
 
 def boundary_faces(tetrahedra: Ints) -> Ints:
@@ -167,7 +167,7 @@ def _radial(spoke: Floats, radius: float) -> tuple[Floats, Floats]:
     return spoke * (radius / np.maximum(length, 1e-300) - 1.0)[:, None], length - radius
 
 
-def _on_sides(points: Floats, faces: Ints) -> Ints:
+def on_sides(points: Floats, faces: Ints) -> Ints:
     """(B,) which side of the unit cube each face lies in, 6 for none."""
     corners = points[faces]
     on = np.stack([(corners[:, :, k // 2] == k % 2).all(axis=1) for k in range(6)])
@@ -177,7 +177,7 @@ def _on_sides(points: Floats, faces: Ints) -> Ints:
 
 def _on_part(points: Floats, faces: Ints) -> Ints:
     """The same, 6 for the cylinder and 7 for the sphere: where no side, the nearer of the two."""
-    side, centre = _on_sides(points, faces), points[faces].mean(axis=1)
+    side, centre = on_sides(points, faces), points[faces].mean(axis=1)
     sphere = np.abs(_from_sphere(centre)[1]) < np.abs(_from_cylinder(centre)[1])
     found: Ints = side + ((side == len(SIDES)) & sphere)
     return found
@@ -193,7 +193,7 @@ def _halved(points: Floats, shift: Floats, rows: Ints, least: Floats) -> Floats:
     return np.zeros_like(shift)
 
 
-def _marked(
+def marked(
     points: Floats, rows: Ints, side_of: Callable[[Floats, Ints], Ints], markers: tuple[str, ...], size: float
 ) -> Mesh:
     """The mesh of some tetrahedra in the region "domain" and of the faces around them by marker."""

@@ -40,7 +40,7 @@ def table_blocks(
     """
     present = distinct(codes)
     for code in present:
-        expected = CELLS[kinds[code].name].nodes
+        expected = CELLS[kinds[code].name].nodes if kinds[code].name in CELLS else None
         if expected is None:
             continue
         wrong = np.flatnonzero((codes == code) & (sizes != expected))

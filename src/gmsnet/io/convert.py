@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import CELLS
 from gmsnet.errors import FormatError
 from gmsnet.io.cells import distinct
 from gmsnet.io.pieces import Piece
@@ -15,6 +16,7 @@ from gmsnet.kernels.text import text as kernels
 from gmsnet.kernels.text.decimals import WIDEST
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.plane import exponent_of
 
 _PIECE = 1 << 20  # bytes that are made at once
 
@@ -69,6 +71,35 @@ def lost_data(mesh: Mesh, title: str, kept: Collection[str] = (), regions: bool 
 
 def _says_regions(mesh: Mesh, name: str) -> bool:
     return all(np.array_equal(a, b.regions) for a, b in zip(mesh.cell_data[name], mesh.cells, strict=True))
+
+
+def lost_digits(mesh: Mesh, points: NDArray[np.float64], kept: NDArray[np.float64], title: str) -> list[str]:
+    """By how much points (N × 3) change that a format keeps in fields too short for them. Raises FormatError where a
+    corner simplex that was positive, or negative, is not so any more.
+    """
+    most = float(np.abs(kept - points).max(initial=0.0))
+    if most == 0.0:
+        return []
+    for block in mesh.cells:
+        simplices = block.cell.simplices if block.kind in CELLS else ()
+        for simplex in simplices if block.dimension == (3 if mesh.has_volumes else 2) else ():
+            before, after = (_signs(mesh, each, block.nodes[:, list(simplex)]) for each in (points, kept))
+            if len(turned := np.flatnonzero((before != 0.0) & (before != after))):
+                raise FormatError(
+                    f"{title} has too few digits for this mesh: {len(turned)} {block.kind} cells would be inverted "
+                    "or flat: write another format, such as .vtu"
+                )
+    return [f"{title} has fields too short for all digits: coordinates were rounded, by at most {most:.2g}"]
+
+
+def _signs(mesh: Mesh, points: NDArray[np.float64], simplices: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(n,) the signs of triangles in the plane of a mesh, or of tetrahedra; 1 for faces in space."""
+    if simplices.shape[1] == 3:
+        if mesh.plane is None:
+            return np.ones(len(simplices))
+        points = points[:, list(mesh.plane)]
+    points = np.ldexp(points, -exponent_of(points, None, single=False))
+    return np.linalg.slogdet(points[simplices[:, 1:]] - points[simplices[:, :1]])[0]  # type: ignore[no-any-return]
 
 
 def lost_order(mesh: Mesh, title: str) -> list[str]:

@@ -14,6 +14,7 @@ from gmsnet.io.pieces import Pieces
 from gmsnet.io.splice import Slots
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.rounding import Rounding
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,7 @@ class Parsed:
 
     unread: what else the file holds, in words; it stays in the file, but no conversion can keep it. matched: (pairs, 2)
     nodes that the file says to be images of each other, such as those of periodic boundaries; None where it has none.
+    node_sets, rounding: see Mesh.
     """
 
     points: NDArray[np.float64]
@@ -33,6 +35,8 @@ class Parsed:
     single: bool = False
     unread: Sequence[str] = ()
     matched: NDArray[np.int64] | None = None
+    node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+    rounding: Rounding | None = None
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,17 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.atomic import reason, refuse_folder, replace_files
 from gmsnet.io.cells import sealed
 from gmsnet.io.contents import Data, is_open_pipe, load, refuse_unless_regular
 from gmsnet.io.convert import listed
 from gmsnet.io.document import Parsed
-from gmsnet.io.formats import FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
+from gmsnet.io.formats import BY_SUFFIX, FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
+from gmsnet.io.packed import MAGIC, is_packed, packed, split_name, unpacked
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import FileSource
 from gmsnet.io.stamps import Stamp, Stamps
@@ -25,9 +29,9 @@ from gmsnet.mesh.mesh import Mesh, Source
 def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     """The mesh in a file; ``mesh.source`` keeps the file, so that ``write`` can put new coordinates into it.
 
-    path: the file; ``-`` is the standard input. Of Triangle's pair either file may be named. format: a name of the
-    table of formats (su2, gmsh, vtk, vtu, medit, triangle, stl, obj, off, ply); by default the suffix tells, or the
-    contents where there is none to tell (standard input, pipes).
+    path: the file; ``-`` is the standard input. Of Triangle's pair either file may be named. A file whose name ends
+    with ``.gz`` is unpacked. format: a name of the table of formats (``gmsnet.io.FORMATS``: su2, gmsh, vtk, …); by
+    default the suffix tells, or the contents where there is none to tell (standard input, pipes).
 
     Raises InputError where the file cannot be opened or is no regular file, where others change it while it is read,
     or where the format is unknown; FormatError (naming the line) where it is damaged or not of that format.
@@ -75,7 +79,7 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
             raise InputError(f"{shown}: its format cannot be seen; name it with --format ({', '.join(FORMATS)})")
         entry = FORMATS[key]
         return entry, {entry.suffixes[0]: opened}
-    entry = entry_of(format) if format is not None else FORMATS[format_of_suffix(name, os.path.splitext(name)[1])]
+    entry = entry_of(format) if format is not None else FORMATS[format_of_suffix(name, split_name(name)[1])]
     if len(entry.suffixes) == 1:
         return entry, {entry.suffixes[0]: _loaded(name)}
     if stream:
@@ -85,7 +89,14 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
 
 def _loaded(name: str) -> tuple[str, Data, Stamp | None]:
     try:
-        return name, *load(name)
+        data, stamp = load(name)
+        if is_packed(name):
+            return name, unpacked(data, name), stamp
+        if data[: len(MAGIC)] == MAGIC:
+            raise FormatError("this is compressed with gzip: add .gz to the name of the file, or unpack it first")
+        return name, data, stamp
+    except FormatError as error:
+        raise FormatError(f"{name}: {error}") from None
     except FileNotFoundError:
         raise InputError(f"{name}: there is no such file") from None
     except IsADirectoryError:
@@ -97,11 +108,11 @@ def _loaded(name: str) -> tuple[str, Data, Stamp | None]:
 
 
 def _beside(name: str, suffix: str) -> str:
-    """The name of a companion file, its suffix in capitals if that of ``name`` is."""
-    stem, given = os.path.splitext(name)
-    known_suffix = any(given.lower() in entry.suffixes for entry in FORMATS.values())
-    stem, given = (stem, given) if known_suffix else (name, "")
-    return stem + (suffix.upper() if given.isupper() else suffix)
+    """The name of a companion file, its suffix in capitals if that of ``name`` is, and compressed if that is."""
+    stem, given, gz = split_name(name)
+    if given.lower() not in BY_SUFFIX:
+        stem, given = stem + given, ""
+    return stem + (suffix.upper() if given.isupper() else suffix) + gz
 
 
 def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamps) -> Mesh:
@@ -116,12 +127,15 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamp
         parsed.point_data,
         parsed.cell_data,
         parsed.single,
+        node_sets=parsed.node_sets,
+        rounding=parsed.rounding,
     )
     main = entry.suffixes[0]
     companions = {suffix: data for suffix, data in files.items() if suffix != main}
     source = FileSource(
         entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions,
         mesh.region_names, mesh.point_data, mesh.cell_data, tuple(parsed.unread), stamps, parsed.matched,
+        mesh.node_sets,
     )  # fmt: skip
     return replace(mesh, source=source)
 
@@ -130,7 +144,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     """Writes a mesh to a file and returns, in words, what the target's format could not hold.
 
     A mesh that was read from a file of the same format, and differs from it in coordinates alone, is written as that
-    file with the new coordinates in the places of the old ones; then nothing is lost. Any other is converted.
+    file with the new coordinates in the places of the old ones; then nothing is lost. Any other is converted. A file
+    whose name ends with ``.gz`` is compressed; what is promised byte for byte is what it unpacks to.
 
     path: the file; ``-`` is the standard output, and pipes and devices are written straight. Everything else is
     replaced in one step, once all is on the disk. format: as in ``read``; by default the suffix tells, or the format
@@ -148,7 +163,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     lost: list[str] = []
     try:
         if isinstance(source, FileSource) and source.format == entry.key and source.fits(mesh):
-            files = source.splice(mesh.points)
+            points, lost = _as_kept(mesh, source)
+            files = source.splice(points)
         else:
             written = entry.load().write(mesh)
             files, lost = dict(written.files), [*written.lost, *_unread(source)]
@@ -157,6 +173,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     except InputError as error:
         raise FormatError(f"{shown}: {error}") from None
     pieces = {suffix: _with_memory(shown, part) for suffix, part in files.items()}
+    if is_packed(name):
+        pieces = {suffix: packed(part) for suffix, part in pieces.items()}
     if name in STANDARD_OUTPUT:
         _to_standard_output(*pieces.values())
     else:
@@ -164,6 +182,18 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
         several = len(files) > 1
         replace_files({_beside(name, suffix) if several else name: part for suffix, part in pieces.items()}, stamps)
     return lost
+
+
+def _as_kept(mesh: Mesh, source: FileSource) -> tuple[NDArray[np.float64], list[str]]:
+    """The points as the file that was read can keep them; and, in words, by how much they differ, if they do.
+
+    What ``smooth`` returns is so already.
+    """
+    if mesh.rounding is None:
+        return mesh.points, []
+    points = mesh.rounding.kept(source.points, mesh.points)
+    most = float(np.abs(points - mesh.points).max(initial=0.0))
+    return points, [f"coordinates were rounded to {mesh.rounding.words}, by at most {most:.2g}"] * (most > 0.0)
 
 
 def _unread(source: Source | None) -> Iterator[str]:
@@ -196,7 +226,7 @@ def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
     elif stream:
         raise InputError(f"{shown}: name the format with --format ({', '.join(FORMATS)})")
     else:
-        entry = FORMATS[format_of_suffix(path, os.path.splitext(path)[1], reading=False)]
+        entry = FORMATS[format_of_suffix(path, split_name(path)[1], reading=False)]
     if stream and len(entry.suffixes) > 1:
         raise InputError(f"{shown}: {entry.title} takes several files and cannot be written to a stream")
     return entry

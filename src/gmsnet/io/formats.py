@@ -17,12 +17,13 @@ class Entry:
     """A format in the table.
 
     key: the name that ``--format`` takes. title: what messages call it. suffixes: lower case, the first is that of the
-    file with the coordinates.
+    file with the coordinates. aliases: other suffixes of that file.
     """
 
     key: str
     title: str
     suffixes: tuple[str, ...]
+    aliases: tuple[str, ...] = ()
 
     def load(self) -> Format:
         """The module that reads and writes the format, imported on first use."""
@@ -42,21 +43,23 @@ FORMATS = {
         Entry("obj", "OBJ", (".obj",)),
         Entry("off", "OFF", (".off",)),
         Entry("ply", "PLY", (".ply",)),
+        Entry("abaqus", "Abaqus", (".inp",)),
+        Entry("nastran", "Nastran", (".bdf",), (".nas", ".fem", ".dat")),
     )
 }
-BY_SUFFIX = {suffix: key for key, entry in FORMATS.items() for suffix in entry.suffixes}
+BY_SUFFIX = {suffix: key for key, entry in FORMATS.items() for suffix in (*entry.suffixes, *entry.aliases)}
 
 MENDS = {  # files that one may well have, but that are not read
     ".meshb": "binary Medit is not read: convert it to text (.mesh)",
     ".poly": "a .poly file is the input of Triangle: run Triangle on it and give the .node file",
     ".cgns": "CGNS is not read: convert it to .su2, .vtu or .msh",
     ".geo": "a .geo file is a geometry: mesh it with Gmsh and give the .msh file",
-    ".gz": "unpack it first",
     ".zip": "unpack it first",
 }
 
 # What files begin with, comments (a pattern that is taken out first) and white space aside.
 NONE, HASH, PERCENT, XML = rb"(?!)", rb"#[^\r\n]*", rb"%[^\r\n]*", rb"(?s)<\?.*?\?>|<!--.*?-->"
+STARS, DOLLAR = rb"\*\*[^\r\n]*", rb"\$[^\r\n]*"
 SIGNS = {
     "gmsh": (NONE, rb"\$(MeshFormat|Comments|NOD|Nodes|PhysicalNames)\b"),
     "vtk": (NONE, rb"#\s*vtk DataFile Version"),
@@ -66,6 +69,12 @@ SIGNS = {
     "medit": (HASH, rb"MeshVersionFormatted\b"),
     "off": (HASH, rb"(ST)?C?N?4?n?OFF\b"),
     "su2": (PERCENT, rb"(NDIME|NZONE|NELEM|NPOIN|NMARK|IZONE|NCHUNK|AOA|FFD_NBOX)\s*="),
+    "abaqus": (STARS, rb"\*[ \t]*[A-Za-z][A-Za-z \t]*(,|[\r\n])"),
+    "nastran": (
+        DOLLAR,
+        rb"(?i)(NASTRAN|SOL|ID|INIT|ASSIGN)[ \t]+\w|CEND\b|BEGIN[ \t]+BULK\b"
+        rb"|(GRID|CTRIA\w|CQUAD\w|CTETRA|CHEXA|CPENTA|CPYRAM?|PSHELL|PSOLID|MAT1|PARAM)[ \t,*]",
+    ),
     "obj": (HASH, rb"((mtllib|o|g|usemtl|s)[ \t]+\S+[ \t]*[\r\n]\s*)*v[nt]?[ \t]+[-+.\deE]+[ \t]+[-+.\d]"),
 }
 # Known by sight, but not read.
@@ -73,9 +82,7 @@ STRANGERS = {
     "an MFEM mesh": rb"MFEM (NC )?mesh v",
     "a VTK file of another kind (not an UnstructuredGrid)": rb"(<\?xml[^>]*>\s*)?<VTKFile\b",
     "an HDF5 file (CGNS, XDMF or the like)": rb"\x89HDF\r\n",
-    "an Abaqus or CalculiX file": rb"\*(Heading|Node|Part)\b",
     "a zip archive": rb"PK\x03\x04",
-    "compressed with gzip": rb"\x1f\x8b",
     "a binary Medit mesh": rb"\x01\0\0\0[\x01-\x04]\0\0\0\x03\0\0\0|\0\0\0\x01\0\0\0[\x01-\x04]\0\0\0\x03",
 }
 HEAD = 4096  # bytes that are looked at
@@ -84,7 +91,7 @@ MAY_BE_BINARY = ("gmsh", "vtk", "vtu", "stl", "ply")
 
 def known() -> str:
     """The suffixes that are read and written, in words."""
-    return ", ".join(suffix for entry in FORMATS.values() for suffix in entry.suffixes)
+    return ", ".join(BY_SUFFIX)
 
 
 def entry_of(key: str) -> Entry:

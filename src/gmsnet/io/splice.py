@@ -123,10 +123,10 @@ class FileSource:
     """The bytes that a mesh was read from (the Source of a Mesh).
 
     format: its name in the table of formats. data: the file that holds the coordinates, under the suffix ``main``.
-    points, cells, region_names, point_data, cell_data: as read (see Mesh). companions: other files of the same mesh by
-    suffix, which never change (Triangle's ``.ele``). unread: what else there is in the file (see Parsed). stamps: of
-    the files, so that what others write into them meanwhile is not overwritten. matched: (pairs, 2) nodes that the file
-    says to be images of each other (see Parsed), read-only.
+    points, cells, region_names, point_data, cell_data, node_sets: as read (see Mesh). companions: other files of the
+    same mesh by suffix, which never change (Triangle's ``.ele``). unread: what else there is in the file (see Parsed).
+    stamps: of the files, so that what others write into them meanwhile is not overwritten. matched: (pairs, 2) nodes
+    that the file says to be images of each other (see Parsed), read-only.
     """
 
     format: str
@@ -142,6 +142,7 @@ class FileSource:
     unread: tuple[str, ...] = ()
     stamps: Stamps = field(default_factory=Stamps, repr=False)
     matched: NDArray[np.int64] | None = field(default=None, repr=False)
+    node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle: the bytes of the files themselves."""
@@ -149,17 +150,15 @@ class FileSource:
         names, fields, cell_fields = (dict(each) for each in (self.region_names, self.point_data, self.cell_data))
         return FileSource, (
             self.format, self.main, self.data[:], self.points, self.slots, self.cells, files,
-            names, fields, cell_fields, self.unread, self.stamps, self.matched,
+            names, fields, cell_fields, self.unread, self.stamps, self.matched, dict(self.node_sets),
         )  # fmt: skip
 
     def fits(self, mesh: Mesh) -> bool:
-        """Whether the file can stand for a mesh once its coordinates are replaced: everything else is as it was read.
-
-        No file has node sets of its own, so a mesh with some does not fit.
-        """
+        """Whether the file can stand for a mesh once its coordinates are replaced: all else is as it was read."""
         return (
             mesh.points.shape == self.points.shape
-            and not mesh.node_sets
+            and mesh.node_sets.keys() == self.node_sets.keys()
+            and all(_same(nodes, self.node_sets[name]) for name, nodes in mesh.node_sets.items())
             and dict(mesh.region_names) == dict(self.region_names)
             and _same_cells(mesh.cells, self.cells)
             and mesh.point_data.keys() == self.point_data.keys()

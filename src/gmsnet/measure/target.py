@@ -10,49 +10,75 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.methods.below import missed
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
+from gmsnet.kernels.simplex.tetra_measures import LOW, SHAPE
 from gmsnet.measure.cells import MeasuredCells
+from gmsnet.measure.dihedral import SHARE, columns_of, most_shape_below, ratios_of
 from gmsnet.measure.report import QualityReport
-from gmsnet.topology.ordering import planar_points
+from gmsnet.measure.volumes import MeasuredTetrahedra
+from gmsnet.topology.ordering import planar_points, space_points
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Rows = NDArray[np.int32]
 
 SURE = 1.0 + 1e-12  # times the target: what is above it is so however it is measured
 
 
 @dataclass(frozen=True)
 class Target:
-    """What every cell is to reach. quality: the minimum 1/q. angle: the minimum angle in degrees. None: no matter."""
+    """What every cell is to reach. quality: the minimum 1/q, of tetrahedra η. angle: the minimum angle in degrees.
+
+    dihedral: the minimum dihedral angle of tetrahedra. None: no matter.
+    """
 
     quality: float | None = None
     angle: float | None = None
+    dihedral: float | None = None
 
     def __post_init__(self) -> None:
         """Takes any number for a float64: of single precision, SURE would be 1."""
-        for name in ("quality", "angle"):
+        for name in ("quality", "angle", "dihedral"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, float(getattr(self, name)))
 
     def __bool__(self) -> bool:
-        return self.quality is not None or self.angle is not None
+        return self.quality is not None or self.least_angle is not None
 
     @property
-    def words(self) -> str:
-        """What is asked for."""
-        asked = [] if self.quality is None else [f"1/q of {self.quality:g} or more"]
-        return " and ".join([*asked, *([] if self.angle is None else [f"angles of {self.angle:g}° or more"])])
+    def least_angle(self) -> float | None:
+        """The minimum angle of a cell in degrees, of whichever kind."""
+        return self.angle if self.dihedral is None else self.dihedral
+
+    def words(self, symbol: str) -> str:
+        """What is asked for. symbol: what the quality of the cells is called."""
+        kinds = ((symbol, self.quality, ""), ("angles", self.angle, "°"), ("dihedral angles", self.dihedral, "°"))
+        return " and ".join(f"{kind} of {least:g}{unit} or more" for kind, least, unit in kinds if least is not None)
 
     def missed(self, shape: Floats, min_angle: Floats) -> Flags:
-        """Which cells miss it, by their 1/q and their smallest angles in degrees."""
+        """Which cells miss it, by their 1/q and their smallest angles (of tetrahedra, dihedral ones) in degrees."""
         missed: Flags = np.zeros(len(shape), dtype=bool)
         if self.quality is not None:
             missed |= ~(shape >= self.quality)
-        if self.angle is not None:
-            missed |= ~((min_angle >= self.angle) & (shape > 0.0))
+        if self.least_angle is not None:
+            missed |= ~((min_angle >= self.least_angle) & (shape > 0.0))
         return missed
 
+    def tetrahedra_missing(self, points: Floats, cells: Tetrahedra, share: float = SURE) -> tuple[Rows, Floats]:
+        """The rows of the tetrahedra that miss it, and their η. share: times the target that they are to reach.
+
+        points: (N, 3 or 4).
+        """
+        limit = most_shape_below(share * self.dihedral, 0.0) if self.dihedral is not None else 0.0
+        limit = max(limit, share * SHARE * (self.quality or 0.0))
+        rows = np.flatnonzero(~(ratios_of(points, cells) < 432.0 / limit**3)).astype(np.int32)
+        columns = columns_of(points, cells, rows)
+        wanted = Target(*(None if each is None else share * each for each in (self.quality, None, self.dihedral)))
+        chosen = wanted.missed(columns[SHAPE], columns[LOW])
+        return rows[chosen], columns[SHAPE][chosen]
+
     def missed_in(self, report: QualityReport) -> NDArray[np.int32]:
-        """The rows of the cells of a planar mesh that miss it.
+        """The rows of the cells of a planar mesh, or of the tetrahedra, that miss it.
 
         What the report says of a cell decides; of those that are clear of the target it need not be asked.
         """
@@ -61,6 +87,9 @@ class Target:
     def _missed_in(self, report: QualityReport) -> tuple[NDArray[np.int32], Floats]:
         """And their 1/q."""
         triangles = report.cells
+        if isinstance(triangles, MeasuredTetrahedra):
+            cells = Tetrahedra(triangles.corners, triangles.orientation)
+            return self.tetrahedra_missing(space_points(triangles), cells, 1.0)
         assert isinstance(triangles, MeasuredCells)
         if triangles.order is not None:
             low, _, shape, _ = triangles.columns()
@@ -101,7 +130,10 @@ class Target:
 
     @property
     def shape(self) -> float:
-        """The minimum 1/q that a cell has which meets it: of all triangles with angles of α or more, (α, α, π − 2α)."""
+        """The minimum 1/q that a cell has which meets it: of all triangles with angles of α or more, (α, α, π − 2α).
+
+        Of tetrahedra with a minimum dihedral angle it is not known: then that of the quality that was asked for.
+        """
         least = self.quality or 0.0
         if self.angle is not None:
             alpha = math.radians(self.angle)

@@ -27,7 +27,7 @@ from gmsnet.mesh.array_forms import (
 from gmsnet.mesh.arrays import coordinates
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.mesh.region_fields import combined, names_a_region
+from gmsnet.mesh.region_fields import NAMES, combined, names_a_region, names_of_rows
 from gmsnet.mesh.triangulations import from_delaunay, from_skfem, from_triangulation
 from gmsnet.mesh.vtk_types import POLYLINE, POLYVERTEX, STRIP, VTK_KINDS, VTK_ORDERS
 
@@ -89,7 +89,7 @@ def _from_meshio(thing: Any) -> tuple[Mesh, Restore]:
         if arrays and not any(array is None for array in arrays)
     }
     names = {
-        name: (int(np.ravel(value)[1]), int(np.ravel(value)[0]))  # meshio keeps (tag, dimension)
+        (int(np.ravel(value)[1]), int(np.ravel(value)[0])): name  # meshio keeps (tag, dimension)
         for name, value in (thing.field_data or {}).items()
         if np.size(value) == 2 and np.asarray(value).dtype.kind in "iu"
     }
@@ -145,8 +145,9 @@ def _from_pyvista(thing: Any) -> tuple[Mesh, Restore]:
     taken = np.concatenate(source) if source else np.zeros(0, dtype=np.int64)
     cell_data = {name: np.asarray(values)[taken] for name, values in thing.cell_data.items()}
     point_data = {name: np.asarray(values) for name, values in thing.point_data.items()}
+    names = names_of_rows(np.ravel(thing.field_data[NAMES])) if NAMES in thing.field_data else {}
     points = np.asarray(thing.points)
-    return _mesh(points, blocks, cell_data, point_data), _refill(lambda: thing.copy(deep=True), points)
+    return _mesh(points, blocks, cell_data, point_data, names), _refill(lambda: thing.copy(deep=True), points)
 
 
 def _mesh(
@@ -154,11 +155,14 @@ def _mesh(
     blocks: Sequence[tuple[str, NDArray[np.int64]]],
     cell_data: Mapping[str, NDArray[Any]] | None = None,
     point_data: Mapping[str, NDArray[Any]] | None = None,
-    names: Mapping[str, tuple[int, int]] | None = None,
+    names: Mapping[tuple[int, int], str] | None = None,
     cell_sets: Mapping[str, NDArray[np.int64]] | None = None,
     node_sets: Mapping[str, NDArray[np.int64]] | None = None,
 ) -> Mesh:
-    """cell_data: one array over all cells. names: name → (dimension, tag of gmsh:physical). cell_sets: name → cells."""
+    """cell_data: one array over all cells. cell_sets: name → cells.
+
+    names: (dimension, tag) → name; tags are those of the cell data gmsh:physical, or region without these.
+    """
     array = coordinates(points)
     cell_data, node_sets = cell_data or {}, dict(node_sets or {})
     counts = [len(nodes) for _, nodes in blocks]
@@ -168,16 +172,16 @@ def _mesh(
         region = np.zeros(len(region), dtype=np.int64)
         dimensions = [dimension_of(kind) for kind, _ in blocks]
         dimension = np.repeat(dimensions, counts).astype(np.int64)
-        physical = cell_data.get("gmsh:physical")
+        tags = cell_data.get("gmsh:physical", cell_data.get("region"))
         for dim in np.unique(dimension).tolist():
             of_dim = np.flatnonzero(dimension == dim)
             fields = [values[of_dim] for name, values in cell_data.items() if names_a_region(name)]
             # The outline of a named set of faces is a shape that the user has drawn, as much as the one of a region.
             fields += [np.isin(of_dim, cells) for cells in (cell_sets or {}).values()] if dim == 2 else []
             region[of_dim] = combined(fields, len(of_dim))
-            for name, (named_dim, tag) in (names or {}).items():
-                if physical is not None and named_dim == dim:
-                    tagged = of_dim[np.ravel(physical[of_dim]) == tag]
+            for (named_dim, tag), name in (names or {}).items():
+                if tags is not None and named_dim == dim:
+                    tagged = of_dim[np.ravel(tags[of_dim]) == tag]
                     region_names.update({(dim, number): name for number in np.unique(region[tagged]).tolist()})
     region.flags.writeable = False  # so that it need not be copied
     breaks = np.cumsum(counts)[:-1].tolist()

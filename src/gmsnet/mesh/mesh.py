@@ -26,6 +26,7 @@ from gmsnet.mesh.checks import (
 )
 from gmsnet.mesh.display import amount, html_table, listed
 from gmsnet.mesh.plane import exponent_of
+from gmsnet.mesh.rounding import Rounding
 
 
 class Source(Protocol):
@@ -49,7 +50,8 @@ class Mesh:
     dimension 1 for markers made of lines, 2 for regions made of faces. point_data: name → (N, …). cell_data: name →
     one array per block. single: the file keeps coordinates in single precision, so results must be exact in float32.
     source: the file it was read from, None if it was made in memory. node_sets: name → node ids, named groups of nodes
-    beside those that the cells make (meshio's point sets).
+    beside those that the cells make (meshio's point sets). rounding: what the file keeps of new coordinates where that
+    is less than float64, but not single precision.
 
     All arrays are read-only and share no memory with anything writable; those that are so already are not copied. So a
     mesh is its own copy. It can be pickled, its file with it.
@@ -66,6 +68,7 @@ class Mesh:
     single: bool = False
     source: Source | None = field(default=None, repr=False)
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
+    rounding: Rounding | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         points = finite_points(self.points)
@@ -128,7 +131,7 @@ class Mesh:
         """For pickle: the mesh is made, and checked, anew."""
         fields = (
             self.points, self.cells, dict(self.region_names), dict(self.point_data), dict(self.cell_data), self.single,
-            self.source, dict(self.node_sets),
+            self.source, dict(self.node_sets), self.rounding,
         )  # fmt: skip
         return Mesh, fields, None if self.cells else {"plane": self.plane, "has_volumes": self.has_volumes}
 

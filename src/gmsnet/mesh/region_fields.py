@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from typing import Any
 
@@ -13,6 +14,7 @@ WORDS = (  # FreeFEM writes Label, deal.II MaterialID, MFEM attribute, Gmsh Cell
     *("mat", "material", "region", "zone", "domain", "subdomain", "physical", "attribute"),
     *("entity", "ref", "tag", "part", "block", "group", "label", "marker", "geometry", "family"),
 )
+NAMES = "gmsnet:region_names"  # the field data that names the numbers of the cell field "region": rows of texts
 NUMBERED = 64  # cells: where so many or more all have different values, these number cells and tell no regions apart
 OTHER_NAMES = frozenset(("familyidcell", "med:familyidcell", "objectid"))  # of Salome, and of Exodus files
 REGION_NAMES = OTHER_NAMES | frozenset(
@@ -59,6 +61,17 @@ def combined(fields: Sequence[NDArray[Any]], count: int) -> NDArray[np.int64]:
         which = np.unique(rows, axis=0, return_inverse=True)[1].reshape(count)
         region = np.unique(region * (int(which.max()) + 1) + which, return_inverse=True)[1].reshape(count)
     return region + 1
+
+
+def named_rows(names: Mapping[tuple[int, int], str]) -> list[str]:
+    """Names of regions, (dimension, region) → name, as a text each."""
+    return [f"{dimension} {region} {name}" for (dimension, region), name in names.items()]
+
+
+def names_of_rows(rows: Iterable[Any]) -> dict[tuple[int, int], str]:
+    """The names that ``named_rows`` wrote. Texts of another form name nothing: others may use the same field."""
+    found = (re.fullmatch(r"(\d) (-?\d+) (.+)", str(row)) for row in rows)
+    return {(int(match[1]), int(match[2])): match[3] for match in found if match}
 
 
 def _numbers_cells(values: NDArray[Any]) -> bool:

@@ -143,6 +143,21 @@ def by_colour(
     return tally
 
 
+def over_stars(
+    visit: Callable[[SpaceBlocks, int, int, Tally], None], stars: Stars, points: NDArray[np.float64], executor: Executor
+) -> Tally:
+    """The same over some stars in space, by what visits a range of blocks and adds to a tally."""
+    blocks = stars.blocks
+    assert isinstance(blocks, SpaceBlocks)
+
+    def counted(first: int, last: int) -> Tally:
+        counts = np.zeros(3, dtype=np.int64)
+        visit(blocks, first, last, counts)
+        return counts
+
+    return by_colour(executor, counted, stars, points)
+
+
 @dataclass(frozen=True)
 class MethodOptions:
     """What a user may tell a method.

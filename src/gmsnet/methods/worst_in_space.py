@@ -11,15 +11,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.simplex.tetra_measures import cubed_ratios
-from gmsnet.kernels.star.guard import Guard
 from gmsnet.kernels.star.space import SpaceBlocks
-from gmsnet.methods.base import Field, Smoother, Tally, by_colour
+from gmsnet.measure.dihedral import ratios_of
+from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.parallel.executor import Executor
-from gmsnet.topology.stars import Stars
 from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
@@ -45,8 +42,12 @@ class WorstInSpace(Smoother):
             nodes = np.unique(cells.rows[_largest(ratios, max(FEWEST, math.ceil(share * len(ratios))))])
             stars = topology.stars_of(nodes[topology.near_free[nodes]].astype(np.int64))
             power = Power3.of(number, min(after / K3, 1e30))
+
+            def visit(blocks: SpaceBlocks, first: int, last: int, counts: Tally, power: Power3 = power) -> None:
+                sweep3(field.points, blocks, first, last, guard, power, 1.0, counts)
+
             for _ in range(sweeps):
-                tally += _sweep(field.points, stars, power, guard, executor)
+                tally += over_stars(visit, stars, field.points, executor)
             ratios = _ratios(field.points, cells, topology.near_free, executor)
             after = float(ratios.max(initial=K3))
         least = (K3 / after) ** (1.0 / 3.0)
@@ -54,19 +55,6 @@ class WorstInSpace(Smoother):
         few = _largest(ratios, WATCHED)
         field.floor.watch(few, 1.0 / np.maximum(ratios[few], 1.0))
         return tally
-
-
-def _sweep(points: Floats, stars: Stars, power: Power3, guard: Guard, executor: Executor) -> Tally:
-    """One sweep over some stars."""
-    blocks = stars.blocks
-    assert isinstance(blocks, SpaceBlocks)
-
-    def visit(first: int, last: int) -> Tally:
-        counts = np.zeros(3, dtype=np.int64)
-        sweep3(points, blocks, first, last, guard, power, 1.0, counts)
-        return counts
-
-    return by_colour(executor, visit, stars, points)
 
 
 def _largest(values: Floats, count: int) -> NDArray[np.int32]:
@@ -80,12 +68,7 @@ def _ratios(points: Floats, cells: Tetrahedra, free: NDArray[np.bool_], executor
 
     free: (N,) which nodes are.
     """
-    out = np.empty(len(cells.rows))
-
-    def look(first: int, last: int) -> None:
-        cubed_ratios(points, cells.rows, cells.orientation, first * LANES, min(last * LANES, len(out)), out)
-
-    executor.map(look, 0, -(-len(out) // LANES))
+    out = ratios_of(points, cells, executor)
     inverted = np.isinf(out)
     if inverted.any():
         movable = free.copy()

@@ -12,10 +12,12 @@ from gmsnet.errors import InputError
 from gmsnet.measure.report import SHAPE
 from gmsnet.measure.signs import exact_signs
 from gmsnet.measure.target import Target
+from gmsnet.measure.volumes import exact_signs3
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.banded import BAND, Kept
 from gmsnet.preserve.anchored import split
-from gmsnet.preserve.layers import stretched_layers
+from gmsnet.preserve.columns import layers_of_volume
+from gmsnet.preserve.layers import Layers, stretched_layers
 from gmsnet.preserve.survey import Survey
 from gmsnet.preserve.walls import near_walls
 from gmsnet.topology.topology import Topology
@@ -81,9 +83,8 @@ def protected(
     near: ``near_points(mesh, topology)``. firm: only nodes that are certainly meant, near walls those of cells without
     damage, in layers those that hang on nodes away from inverted cells.
     """
-    notes: list[str] = []
     if not len(topology.free):
-        return Protection(topology, notes)
+        return Protection(topology, [])
     survey = Survey.of(mesh, topology, near)
     found, elsewhere = stretched_layers(mesh, topology, survey), None
     if found and not fix_layers:
@@ -91,18 +92,10 @@ def protected(
     layers = found.nodes if found and (fix_layers or preserve not in (METRIC, NONE)) else None
     if firm and layers is not None:
         layers = _certain(layers, topology, near)
-    protection = Protection(topology, notes, layers)
-    if layers is not None:
-        why = "fix_layers" if preserve in (METRIC, NONE) else f"preserve={preserve!r}"
-        mend = "leave fix_layers out" if fix_layers else "preserve='none' lets them move"
-        amount = _amount(len(protection.outer.held.get(LAYER, ())))
-        notes.append(f"{found.summary}; {amount} held for that ({why}); if it is not meant, {mend}")
-    elif found and preserve != METRIC:
-        notes.append(f"{found.summary}; nothing is held for that (preserve={preserve!r})")
+    protection = _with_layers(topology, found, layers, preserve, fix_layers)
+    notes = protection.notes
     if elsewhere and preserve != METRIC:
         notes.append(f"{elsewhere.away_from_walls}; if they are meant, fix_layers holds them")
-    if fix_layers and not found:
-        notes.append("fix_layers: no stretched layers were found, so none are held")
     if preserve != SHAPE:
         return protection
     outer = protection.outer
@@ -111,6 +104,35 @@ def protected(
     walls = walls.firm if firm else walls
     walled = Protection(topology, notes, layers, walls)
     return walled if walls.nodes.any() and WALL in walled.topology.held else protection
+
+
+def protected_volume(topology: Volume, preserve: str, fix_layers: bool, near: Floats, *, firm: bool) -> Protection:
+    """The same of a mesh of tetrahedra: its stretched layers. near: (N, 4). firm: not nodes of inverted cells."""
+    found = layers_of_volume(topology, near)
+    layers = found.nodes if found and (fix_layers or preserve not in (METRIC, NONE)) else None
+    if firm and layers is not None:
+        layers = layers.copy()
+        inverted = exact_signs3(near, topology.near, topology.near_orientation) <= 0
+        layers[topology.memory[topology.near[inverted]]] = False
+    return _with_layers(topology, found, layers, preserve, fix_layers)
+
+
+def _with_layers(
+    topology: Topology | Volume, found: Layers, layers: Flags | None, preserve: str, fix_layers: bool
+) -> Protection:
+    """The protection of layers and what to say of it. layers: (N,) by id, which nodes are to be held."""
+    notes: list[str] = []
+    protection = Protection(topology, notes, layers)
+    if layers is not None:
+        why = "fix_layers" if preserve in (METRIC, NONE) else f"preserve={preserve!r}"
+        mend = "leave fix_layers out" if fix_layers else "preserve='none' lets them move"
+        amount = _amount(len(protection.outer.held.get(LAYER, ())))
+        notes.append(f"{found.summary}; {amount} held for that ({why}); if it is not meant, {mend}")
+    elif found and preserve != METRIC:
+        notes.append(f"{found.summary}; nothing is held for that (preserve={preserve!r})")
+    if fix_layers and not found:
+        notes.append("fix_layers: no stretched layers were found, so none are held")
+    return protection
 
 
 def _certain(layers: Flags, topology: Topology, near: Floats) -> Flags:

@@ -35,7 +35,7 @@ class Account:
     def target(self) -> Target:
         """What every cell was to reach."""
         asked = self.result.asked
-        return Target(asked.get("target_quality"), asked.get("target_angle"))
+        return Target(asked.get("target_quality"), asked.get("target_angle"), asked.get("target_dihedral"))
 
     @property
     def method(self) -> str:
@@ -58,7 +58,7 @@ class Account:
         after = self.result.after
         if not self.target:
             return np.empty(0, dtype=np.int64)
-        missed = np.flatnonzero(self.target.missed(after.shape, after.min_angle))
+        missed = np.flatnonzero(self.target.missed(after.shape, after.column(after.angles[0])))
         return missed[np.argsort(after.shape[missed], kind="stable")]
 
     @property
@@ -83,10 +83,11 @@ class Account:
         figures, wanted = [], self.target
         if wanted.quality is not None and self.least < wanted.quality:
             gap = wanted.quality - self.least
-            figures.append(f"the minimum 1/q is {self.least:.4g}, {gap:.4g} below {wanted.quality:g}")
-        angle = float(after.min_angle.min(initial=math.inf))
-        if wanted.angle is not None and angle < wanted.angle:
-            figures.append(f"the minimum angle is {angle:.4g}°, {wanted.angle - angle:.4g}° below {wanted.angle:g}°")
+            figures.append(f"the minimum {after.symbol} is {self.least:.4g}, {gap:.4g} below {wanted.quality:g}")
+        least, angle = wanted.least_angle, float(after.column(after.angles[0]).min(initial=math.inf))
+        if least is not None and angle < least:
+            kind = "angle" if wanted.dihedral is None else "dihedral angle"
+            figures.append(f"the minimum {kind} is {angle:.4g}°, {least - angle:.4g}° below {least:g}°")
         cells = self.missed[:NAMED]
         why = self.result.limits.reasons(cells, self.target.shape)
         miss = "misses it" if len(self.missed) == 1 else "miss it"
@@ -202,6 +203,7 @@ class Account:
             "stop_reason": result.stop_reason,
             "target_quality": self.target.quality,
             "target_angle": self.target.angle,
+            "target_dihedral": self.target.dihedral,
             "target_met": self.target_met if self.target else None,
             "below_target": len(self.missed),
             "ceiling": result.limits.ceiling,

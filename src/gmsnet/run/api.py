@@ -31,6 +31,7 @@ def smooth(
     threads: int | None = None,
     target_quality: float | None = None,
     target_angle: float | None = None,
+    target_dihedral: float | None = None,
     fixed: Any = None,
     preserve: str = "shape",
     fix_layers: bool = False,
@@ -58,7 +59,8 @@ def smooth(
     so many sweeps; in most, each node is visited once, in those of ``worst-first`` some nodes are often. threads:
     at most so many (default: the processors at hand); the result is the same bits for any number. target_quality,
     target_angle: the minimum 1/q, in (0, 1], and the minimum angle, in (0, 60] degrees, that every cell is to have:
-    only cells that miss it and what is around them are smoothed, until none misses it. fixed: nodes to hold besides
+    only cells that miss it and what is around them are smoothed, until none misses it. target_dihedral: the minimum
+    dihedral angle of tetrahedra, in (0, 70.5] degrees; target_quality is of their η. fixed: nodes to hold besides
     boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. preserve: "shape" holds the
     nodes of stretched layers along walls, "size" besides weighs the areas of cells, without a bound, "none" neither;
     "metric" holds nothing, and moves nodes towards a smooth metric that is recovered from the cells as they are.
@@ -82,9 +84,10 @@ def smooth(
     """
     options = SmoothOptions(
         method=method, variant=variant, objective=objective, max_sweeps=max_sweeps, threads=threads,
-        target_quality=target_quality, target_angle=target_angle, preserve=preserve, fix_layers=fix_layers,
-        untangle=untangle, guard=guard, seed=seed, callback=callback, weights=weights, best_by=best_by,
-        slide=slide, feature_angle=feature_angle, geometry=geometry, metric=metric, size=size,
+        target_quality=target_quality, target_angle=target_angle, target_dihedral=target_dihedral,
+        preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, callback=callback,
+        weights=weights, best_by=best_by, slide=slide, feature_angle=feature_angle, geometry=geometry,
+        metric=metric, size=size,
     )  # fmt: skip
     return smooth_with(mesh, options, fixed)
 

@@ -21,6 +21,8 @@ from gmsnet.preserve.protection import METRIC, PRESERVE, method_for
 from gmsnet.run.metric_options import check_adapting
 from gmsnet.run.sweep import Sweep
 
+MOST_DIHEDRAL = 70.5  # degrees; those of a regular tetrahedron are 70.53
+
 
 @dataclass(frozen=True, kw_only=True)
 class SmoothOptions:
@@ -38,6 +40,7 @@ class SmoothOptions:
     threads: int | None = None
     target_quality: float | None = None
     target_angle: float | None = None
+    target_dihedral: float | None = None
     preserve: str = SHAPE
     fix_layers: bool = False
     untangle: bool = True
@@ -65,6 +68,11 @@ class SmoothOptions:
                 "target_angle is the minimum angle of a cell in degrees and must lie in (0, 60], "
                 f"got {self.target_angle!r}"
             )
+        if self.target_dihedral is not None and not _is_number(self.target_dihedral, MOST_DIHEDRAL):
+            raise InputError(
+                "target_dihedral is the minimum dihedral angle of a tetrahedron in degrees and must lie in "
+                f"(0, {MOST_DIHEDRAL}], got {self.target_dihedral!r}"
+            )
         _check_whole("seed", self.seed, 0)
         if self.callback is not None and not callable(self.callback):
             raise InputError(f"callback must be a function that takes a Sweep, got {self.callback!r}")
@@ -82,7 +90,7 @@ class SmoothOptions:
     @property
     def target(self) -> Target:
         """What every cell is to reach; false where nothing is asked for."""
-        return Target(self.target_quality, self.target_angle)
+        return Target(self.target_quality, self.target_angle, self.target_dihedral)
 
     @property
     def thread_count(self) -> int:

@@ -133,6 +133,10 @@ def outcome(
     assert plane is not None
     points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
     count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)
+    if count and mesh.rounding is not None:
+        points, exact = mesh.rounding.kept(mesh.points, points), False
+        moved &= (points != mesh.points).any(axis=1)
+        count = int(np.count_nonzero(moved))
     if count:
         points.flags.writeable = False  # so that the mesh need not copy them
         whole = totals  # unless they are of the cells with a free node alone

@@ -184,4 +184,9 @@ def merit(sweep: Sweep) -> float:
 
 def precision_of(mesh: Mesh) -> Precision:
     """How exactly the coordinates of a mesh are known, in the units of ``planar_points``."""
-    return Precision.of(single=mesh.single, exponent=mesh.exponent)
+    precision = Precision.of(single=mesh.single, exponent=mesh.exponent)
+    return (
+        precision
+        if mesh.rounding is None
+        else precision.coarser(mesh.rounding.unit, math.ldexp(mesh.rounding.grain, -mesh.exponent))
+    )

@@ -26,7 +26,7 @@ from gmsnet.methods.cells import check_cells
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
-from gmsnet.preserve.protection import Protection, protected
+from gmsnet.preserve.protection import Protection, protected, protected_volume
 from gmsnet.run.metric_stage import check_given
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.second_order import second_order_of
@@ -70,7 +70,7 @@ def first_state(
     sliding = None
     if curves is not None:
         sliding = Sliding.of(given, curves, topology.memory, topology.free, options.geometry)
-    remarks += held_anyway(asked, topology, fixed)
+    remarks += held_anyway(asked, topology, fixed, options.slides)
     second = second_order_of(given, topology, options)
     if options.adapts and second is not None:
         raise InputError("a metric for second-order cells cannot be had so far: leave out metric, size and preserve")
@@ -117,9 +117,9 @@ def first_state(
     )
 
 
-def held_anyway(asked: NDArray[np.bool_], topology: Topology | Volume, fixed: Any) -> list[str]:
-    """Says so where all nodes that are to be held are held for other reasons."""
-    if not asked.any() or REASONS[CHOSEN] in topology.held:
+def held_anyway(asked: NDArray[np.bool_], topology: Topology | Volume, fixed: Any, slides: bool) -> list[str]:
+    """Says so where all nodes that are to be held are held for other reasons. slides: else some might slide."""
+    if slides or not asked.any() or REASONS[CHOSEN] in topology.held:
         return []
     count = np.count_nonzero(asked)
     named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
@@ -132,39 +132,47 @@ def _first_of_volume(
     options: SmoothOptions, executor: Executor,
 ) -> State:  # fmt: skip
     """The same of a mesh of tetrahedra."""
-    check_slide(given, options.slide, options.feature_angle, options.geometry)
+    names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     wound, sliding = Wound.of(given, asked), None
-    surface = patches_to_slide_on(given, wound, options.slide, options.feature_angle, asked)
+    surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked)
     if surface is None:
         topology = Volume.made(wound)
     else:
         topology = Volume.made(wound, surface[1].slides | surface[1].curves.slides)
         sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free)
-    remarks = held_anyway(asked, topology, fixed)
-    if options.fix_layers:
-        remarks.append("fix_layers: stretched layers of volumes are not looked for yet, so none are held")
+    remarks = held_anyway(asked, topology, fixed, options.slides)
     if others := unmeasured(given):
         remarks.append(f"not measured, and their nodes are held: {others}")
     given = given.without_cells()
     start = taken(space_points(given), topology.memory)
     before = measure(given, topology, start, executor.for_blocks(0))
-    protection, nothing = Protection(topology, []), np.empty(0, dtype=np.float32)
+    nothing = np.empty(0, dtype=np.float32)
+    protection = protected_volume(topology, options.preserved, options.fix_layers, start, firm=before.inverted > 0)
     return State(given, restore, smoother, before, protection, start, start, nothing, tuple(remarks), sliding=sliding)
 
 
 def check_volume(options: SmoothOptions) -> None:
     """InputError for what cannot be asked of volumes yet."""
-    if options.target:
-        raise InputError("a target cannot be asked of volumes yet: leave out target_quality and target_angle")
     if options.adapts:
         raise InputError("volumes cannot be smoothed towards a metric yet: leave out metric and size")
     if options.best_by == ASPECT:
         raise InputError("volumes have no aspect ratio by which meshes could be compared: leave out best_by")
 
 
+def check_target(mesh: Mesh, target: Target) -> None:
+    """InputError for a minimum angle that cells of this mesh do not have."""
+    if mesh.has_volumes and target.angle is not None:
+        raise InputError(
+            "target_angle is of the angles of triangles and quads, and this mesh has volumes: give target_dihedral"
+        )
+    if not mesh.has_volumes and target.dihedral is not None:
+        raise InputError("target_dihedral is of tetrahedra, and this mesh has none: give target_angle")
+
+
 def check_mesh(mesh: Mesh, target: Target) -> None:
     """InputError for curved surfaces, which cannot be smoothed yet, and targets of no triangle."""
-    others = unmeasured(mesh) if target else ""
+    check_target(mesh, target)
+    others = unmeasured(mesh) if target and not mesh.has_volumes else ""
     if others and not any(len(block.nodes) for block in mesh.cells if measured(mesh, block)):
         raise InputError(
             f"a target is asked of triangles and quads, and this mesh has none: {others} cannot be measured so far"

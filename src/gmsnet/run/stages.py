@@ -1,4 +1,4 @@
-"""What ``smooth`` does one after the other: untangling, sweeps, the cells near walls, second-order cells."""
+"""What ``smooth`` does one after the other: untangling, sweeps, angles, cells near walls, second-order cells."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Protocol
 
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
+from gmsnet.run.dihedral_stage import improve_dihedrals
 from gmsnet.run.metric_stage import take_metric
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import write_back
@@ -29,8 +30,8 @@ class Stage(Protocol):
 
 
 STAGES: tuple[Stage, ...] = (
-    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_near_walls, untangle_second_order,
-    smooth_corners, make_room,
+    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_dihedrals, improve_near_walls,
+    untangle_second_order, smooth_corners, make_room,
 )  # fmt: skip
 
 

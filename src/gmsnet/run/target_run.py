@@ -11,18 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.methods.below import missed
+from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.kernels.topology.patch import around
 from gmsnet.measure.target import Target
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods.auto import Auto, for_target
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
+from gmsnet.run.dihedral_stage import floor_for_angles
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run, Start
 from gmsnet.run.score import Score
 from gmsnet.run.state import State
 from gmsnet.run.stop import MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -32,6 +35,7 @@ NARROW = (1, 2, 4)  # those where the method looks for the cells itself
 LARGE, SMALL = 0.25, 1000  # no larger patches around the cells that are left: of all free nodes, or so many
 SINGLE = 1.0 + 1e-6  # times a 1/q: what is above it in single precision is above it
 FEW = 0.02  # of the cells that missed it at first: for so few that are left, the largest patches are tried
+LEAST_SHARE = 0.7  # of the least η must be left when smallest dihedral angles are to reach a target
 FEWER, IDLE = 0.9, 2  # a round that leaves more of the cells below the target is idle; so many in a row are the last
 
 
@@ -41,6 +45,8 @@ def reach_target(state: State, options: SmoothOptions, executor: Executor) -> St
     ``auto`` has a plan for each set of patches; another method is made anew for each. A patch's result is taken if
     fewer of its cells are inverted, or as many and fewer miss the target, or as many and the worst of them is better.
     """
+    if state.stop_reason:
+        return state
     try:
         with interruptible():
             for reached in _rounds(state, options, executor):
@@ -54,7 +60,7 @@ def reach_target(state: State, options: SmoothOptions, executor: Executor) -> St
 
 def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterator[State]:
     """The state after each set of patches; the last one has a reason to stop."""
-    target, topology, own_plan = options.target, state.planar, isinstance(state.smoother, Auto)
+    target, topology, own_plan = options.target, state.topology, isinstance(state.smoother, Auto)
     corners, clear = cells_missing(state, target)
     if not len(corners):
         yield state.ended(TARGET_REACHED)
@@ -64,6 +70,7 @@ def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterato
     corners = corners[changeable]
     idle, at_first, precision = 0, len(corners), state.precision
     positive = state.before.signs is None
+    floor = _floor_in_space(state, options, executor) if isinstance(topology, Volume) else None
     for rings in NARROW if own_plan else RINGS:
         if not len(corners):
             yield state.ended(NO_PROGRESS if state.history else NOTHING_TO_MOVE)
@@ -73,7 +80,8 @@ def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterato
             break
         patch = topology.restricted(active)
         fraction = len(corners) / len(patch.near)
-        smoother = for_target(target, fraction, rings=rings) if own_plan else options.smoother()
+        planned = for_target(target, fraction, rings=rings, floor=floor) if own_plan else None
+        smoother = planned or options.smoother()
         missing = partial(corners_missing, topology=patch, target=target)
         measure = partial(totals_of, state.points, patch.scored)
         before = Score(measure, options.best_by, corners if clear else missing(state.points), positive)
@@ -104,9 +112,20 @@ def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterato
     yield state.ended(NO_PROGRESS)
 
 
+def _floor_in_space(state: State, options: SmoothOptions, executor: Executor) -> float:
+    """Of D/S^(3/2), while smallest dihedral angles gain: LEAST_SHARE of the least η, no less than that of the input."""
+    totals = totals_of(state.points, state.topology.scored, executor)
+    shape = 0.0 if totals is None else LEAST_SHARE * max(totals.shape_min, 0.0)
+    return floor_for_angles(state, LEVELS.index(options.guard), shape, executor)
+
+
 def cells_missing(state: State, target: Target) -> tuple[NDArray[np.int32], bool]:
-    """The corners (K, 3) of the cells that miss the target, and whether all of them do however they are measured."""
-    topology, points, before = state.planar, state.points, state.before
+    """The corners (K, 3 or 4) of the cells that miss the target; do all of them, however they are measured?"""
+    topology, points, before = state.topology, state.points, state.before
+    if isinstance(topology, Volume):
+        if points is not state.start:
+            return corners_missing(points, topology, target), True
+        return topology.places[topology.cells[target.missed_in(before)]], False
     rows = rows_missing(points, topology, target, state.shapes if points is state.start else None)
     corners = topology.near.take(rows, axis=0)
     if (
@@ -118,7 +137,7 @@ def cells_missing(state: State, target: Target) -> tuple[NDArray[np.int32], bool
     return topology.places[topology.triangles[target.missed_in(before)]], False
 
 
-def too_large(rings: int, active: Flags, left: float, topology: Topology) -> bool:
+def too_large(rings: int, active: Flags, left: float, topology: Topology | Volume) -> bool:
     """Do patches of so many active nodes take more than they bring? left: the share of the cells that still miss it."""
     count = np.count_nonzero(active)
     return bool(count > SMALL and (count > LARGE * len(topology.free) or (rings == NARROW[-1] and left > FEW)))
@@ -138,6 +157,8 @@ def rows_missing(
     return rows
 
 
-def corners_missing(points: Floats, topology: Topology, target: Target) -> NDArray[np.int32]:
-    """The corners (K, 3) of these."""
+def corners_missing(points: Floats, topology: Topology | Volume, target: Target) -> NDArray[np.int32]:
+    """The corners (K, 3 or 4) of these."""
+    if isinstance(topology, Volume):
+        return topology.near.take(target.tetrahedra_missing(points, topology.simplices)[0], axis=0)
     return topology.near.take(rows_missing(points, topology, target), axis=0)

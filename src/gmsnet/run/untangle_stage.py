@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gmsnet.constraints.sliding import REASON
 from gmsnet.measure.report import QualityReport
 from gmsnet.parallel.executor import Executor
-from gmsnet.preserve.protection import protected
+from gmsnet.preserve.protection import protected, protected_volume
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.topology.topology import Topology
@@ -41,7 +41,7 @@ def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> St
 def untangle_protected(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Lets go of protected nodes beside cells that could not be untangled, and tries once more."""
     freed = None
-    if state.reasons and isinstance(state.topology, Topology):
+    if state.reasons:
         freed = state.protection.released(beside(state.reasons, state.topology))
     if freed is None:
         return state
@@ -52,7 +52,13 @@ def untangle_protected(state: State, options: SmoothOptions, executor: Executor)
 def protect_untangled(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Protects what is there on purpose in the mesh as it is once it is untangled: tangles are no layers."""
     mesh, base = state.mesh, state.protection.base
-    if not state.untangling or isinstance(base, Volume):
+    if isinstance(base, Volume):
+        if not state.before.inverted:
+            return state
+        firm = bool(state.reasons)
+        found = protected_volume(base, options.preserved, options.fix_layers, state.points, firm=firm)
+        return replace(state, protection=found, untangled=state.points)
+    if not state.untangling:
         return state
     points = mesh.points.copy()
     points[base.memory[:, None], list(mesh.plane or ())] = np.ldexp(state.points, mesh.exponent)
@@ -88,14 +94,18 @@ def _noted(state: State, done: Untangled, topology: Topology | Volume) -> State:
     return replace(state, points=done.points, totals=None, untangling=(*state.untangling, note), reasons=reasons)
 
 
-def beside(reasons: Reasons, topology: Topology) -> NDArray[np.bool_]:
+def beside(reasons: Reasons, topology: Topology | Volume) -> NDArray[np.bool_]:
     """(N,) bool by id: the nodes of the cells that have a reason, and their neighbours."""
     chosen = np.zeros(len(topology.memory), dtype=bool)
     cells = np.array(list(reasons), dtype=np.int64)
-    for corners, index in ((topology.triangles, topology.cell), (topology.quads, topology.quad_cell)):
+    if isinstance(topology, Volume):
+        kinds = [(topology.cells, topology.cell)]
+    else:
+        kinds = [(topology.triangles, topology.cell), (topology.quads, topology.quad_cell)]
+    for corners, index in kinds:
         chosen[corners[np.isin(index, cells)]] = True
     around = chosen.copy()
-    for corners in (topology.triangles, topology.quads):
+    for corners, _ in kinds:
         around[corners[chosen[corners].any(axis=1)]] = True
     return around
 

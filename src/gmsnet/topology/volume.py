@@ -8,7 +8,7 @@ plane: by ids at the doors, and by places in memory inside.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -108,6 +108,30 @@ class Volume(Connectivity):
         found: NDArray[np.int64] = self.cell[self.near_origin[rows]]
         return found
 
+    @property
+    def near_start(self) -> NDArray[np.int64]:
+        """(N + 1,) where the neighbours of each node that has a star begin in ``near_ring``."""
+        return self.ring_start
+
+    @property
+    def near_ring(self) -> Ints:
+        """See ``near_start``."""
+        return self.ring
+
+    def restricted(self, active: Flags) -> Volume:
+        """The same with the active nodes (N,) by places in memory alone free, and only the cells around them.
+
+        For a while: ``held`` does not tell of the others, nor ``cells_of`` of which cells the rows are.
+        """
+        rows = np.flatnonzero(active[self.near].any(axis=1)).astype(np.int32)
+        around = self.simplices.take(rows)
+        inner = replace(
+            self, near=around.rows, near_orientation=around.orientation,
+            free=np.sort(self.memory[np.flatnonzero(active)]), near_free=active,
+        )  # fmt: skip
+        inner.__dict__["changeable"] = inner.simplices  # all of them
+        return inner
+
     @cached_property
     def simplices(self) -> Tetrahedra:
         """All of them, in memory order."""
@@ -116,7 +140,8 @@ class Volume(Connectivity):
     @cached_property
     def changeable(self) -> Tetrahedra:
         """Those that have a free node."""
-        return self.simplices.take(np.flatnonzero(self.near_free[self.near].any(axis=1)).astype(np.int32))
+        rows = connectivity.touching(self.near, self.near_free)
+        return self.simplices if len(rows) == len(self.near) else self.simplices.take(rows)
 
     @property
     def scored(self) -> Tetrahedra:

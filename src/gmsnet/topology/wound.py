@@ -57,26 +57,37 @@ class Wound:
         keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
         layout.morton_order3(points, keys, other, memory, position)
         place, origin = np.empty_like(cells), np.empty(len(cells), dtype=np.int32)
-        facets.order_cells(cells, position, np.zeros(nodes + 2, dtype=np.int32), place, origin)
+        used = np.zeros(nodes, dtype=np.bool_)
+        facets.order_cells(cells, position, np.zeros(nodes + 2, dtype=np.int32), place, origin, used)
         rows, region = place.take(origin, axis=0), region.take(origin) if len(region) else region
         marks = _known_marks(mesh, fixed, position)
         orientation = _wound(points[memory], rows, region, marks)
         others = np.uint16(connectivity.LINE | connectivity.UNSUPPORTED_CELL)
-        unused = (np.bincount(rows.ravel(), minlength=nodes) == 0) & (marks & others == 0)
-        marks[unused] |= np.uint16(connectivity.UNUSED)
+        marks[~used & (marks & others == 0)] |= np.uint16(connectivity.UNUSED)
         return cls(cell, cells, rows, orientation, region, origin, marks, memory, position)
 
     @cached_property
     def outer(self) -> NDArray[np.int64]:
         """(F,) the facets of one cell alone, 4t + k (kernels.topology.facets)."""
-        return np.flatnonzero(_matched(self.rows, len(self.marks)) == facets.ALONE)
+        at_boundary = self.marks & np.uint16(connectivity.BOUNDARY) != 0
+        near = np.flatnonzero(at_boundary[self.rows].sum(axis=1) >= 3)  # few: the others have none of these facets
+        part = self.rows[near]
+        alone = np.flatnonzero(_matched(part, len(self.marks)) == facets.ALONE)
+        alone = alone[at_boundary[self._corners(part, alone)].all(axis=1)]  # others have a cell that is not near
+        found: NDArray[np.int64] = 4 * near[alone >> 2] + (alone & 3)
+        return found
 
     @cached_property
     def boundary(self) -> Ints:
         """(F, 3) the nodes of these facets, counter-clockwise as seen from outside."""
-        cell, k = self.outer >> 2, self.outer & 3
-        corners: Ints = np.take_along_axis(self.rows[cell], facets.OPPOSITE[k], axis=1)
-        return np.where(self.orientation[cell, None] > 0, corners, corners[:, [0, 2, 1]])
+        corners = self._corners(self.rows, self.outer)
+        return np.where(self.orientation[self.outer >> 2, None] > 0, corners, corners[:, [0, 2, 1]])
+
+    @staticmethod
+    def _corners(rows: Ints, chosen: NDArray[np.int64]) -> Ints:
+        """(K, 3) the nodes of some facets 4t + k of rows."""
+        corners: Ints = np.take_along_axis(rows[chosen >> 2], facets.OPPOSITE[chosen & 3], axis=1)
+        return corners
 
 
 def refuse_flat(mesh: Mesh) -> None:
@@ -147,7 +158,7 @@ def _marked_alike(rows: Ints, region: NDArray[np.int64], marks: NDArray[np.uint1
     facets.scatter(places)
     own = np.empty(nodes if len(region) else 0, dtype=np.int64)
     facets.enclose(rows, region, places, area, own, marks, connectivity.INTERFACE)
-    outer = np.flatnonzero((area != 0)[rows].any(axis=1))
+    outer = connectivity.touching(rows, area != 0)
     part, alike = rows[outer], np.ones(len(outer), dtype=np.int8)
     if not facets.mark_facets(part, _matched(part, nodes), region[:0], alike, area, *BITS, marks):
         return False

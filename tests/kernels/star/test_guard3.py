@@ -82,10 +82,11 @@ def floor_near(place, ends, share):
     return min(ratios) * share
 
 
+@pytest.mark.parametrize("landed", [False, True])
 @some_stars
 @settings(max_examples=4 * EXAMPLES)
-def test_steps_that_are_certified_in_lanes(seed, flat, spiky, where, single):
-    """And the float32 margin is never off by more than its bound."""
+def test_steps_that_are_certified_in_lanes(landed, seed, flat, spiky, where, single):
+    """And the float32 margin is never off by more than its bound. landed: nodes go to places that steps only round."""
     rng = np.random.default_rng(seed)
     size, away = where
     points, topology = stars(
@@ -98,10 +99,19 @@ def test_steps_that_are_certified_in_lanes(seed, flat, spiky, where, single):
     step = (rng.normal(size=(3, LANES3)) * 10.0 ** rng.uniform(-6, -0.5, LANES3)).astype(np.float32)
     step[:, rng.random(LANES3) < 0.3] = 0
     share = rng.choice([0.0, 0.5, 0.99, 1.0001])
-    see_them(rng, points, topology, blocks, step, share, precision)
+    see_them(rng, points, topology, blocks, step, share, precision, landed)
 
 
-def see_them(rng, points, topology, blocks, step, share, precision):
+def landing(step, first, inverse, single):
+    """A place (3,) that a step nearly leads to, and the step to it as ``land3`` rounds it: by nearly half a unit."""
+    off = 1.0 + 0.999 * 2.0**-24 * np.array([1.0, -1.0, 1.0])
+    place = first + step.astype(float) * off / float(inverse)
+    if single:
+        place = np.float64(np.float32(place))
+    return place, ((place - first) * float(inverse)).astype(np.float32)
+
+
+def see_them(rng, points, topology, blocks, step, share, precision, landed=False):
     """Each lane's star by itself, against a floor of its own. Returns how many are certified, and the largest error."""
     certified, error = 0, 0.0
     for lane in range(int(blocks.filled[0])):
@@ -111,7 +121,9 @@ def see_them(rng, points, topology, blocks, step, share, precision):
         ring, first = points[nodes, :3], points[centre, :3]
         inverse = see(points, blocks, 0, -1, POWER.constants, step.ravel(), 0.0, 1.0, 0.0).inverse[lane]
         place = first + step[:, lane].astype(float) / float(inverse)
-        if precision.single:
+        if landed:
+            place, step[:, lane] = landing(step[:, lane], first, inverse, precision.single)
+        elif precision.single:
             place = np.float64(np.float32(place))
         floor = floor_near(exact(place)[0], [exact(ring[row]) for row in rows], share) if share else 0.0
         work = see(points, blocks, 0, -1, POWER.constants, step.ravel(), floor, precision.unit, precision.grain)
@@ -136,14 +148,15 @@ def see_them(rng, points, topology, blocks, step, share, precision):
     return certified, error
 
 
-def test_most_stars_of_ordinary_meshes_are_certified():
+@pytest.mark.parametrize("landed", [False, True])
+def test_most_stars_of_ordinary_meshes_are_certified(landed):
     """Else the test above would be of nothing."""
     rng = np.random.default_rng(0)
     certified, errors = 0, []
     for _ in range(5):
         points, topology = stars(rng, rng.integers(4, 9, 8), spiky_ball, spiky=0.3)
-        step = np.zeros((3, LANES3), dtype=np.float32)
-        found, error = see_them(rng, points, topology, topology.stars.blocks, step, 0.5, Precision())
+        step = np.float32(0.02 * landed) * rng.normal(size=(3, LANES3)).astype(np.float32)
+        found, error = see_them(rng, points, topology, topology.stars.blocks, step, 0.5, Precision(), landed)
         certified += found
         errors.append(error)
     assert certified >= 36  # of 40

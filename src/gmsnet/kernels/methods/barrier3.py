@@ -88,10 +88,10 @@ def propose3(sums, power, relaxation, step):
 
 @part
 def settle3(workspace, unit, grain, last):
-    """Which lanes may go as they are: certified, and F falls. Returns how many may not; their steps are halved.
+    """Which lanes may go as they are: certified, and F falls. Where F does not fall the step is halved; counts them.
 
-    last: there is no further trial. Steps by which F does not fall become zero; what is not certified may be so in
-    float64.
+    last: there is no further trial, and such steps become zero. What falls and is not certified may be so in float64:
+    halved, a sliver's step would be no more certain, and lead nowhere.
     """
     certify3(workspace, unit, grain)
     sums, step, refused = workspace.sums, workspace.step, 0
@@ -101,10 +101,9 @@ def settle3(workspace, unit, grain, last):
         inside = min(sums[LEAST * LANES3 + lane], sums[MARGIN * LANES3 + lane]) > np.float32(0.0)
         falls = (after < before) and inside
         still = step[lane] == 0.0 and step[LANES3 + lane] == 0.0 and step[2 * LANES3 + lane] == 0.0
-        allowed = workspace.allowed[lane] and falls
-        workspace.allowed[lane] = allowed
-        refused += not (allowed or still)
-        factor = np.float32(1.0) if allowed or (last and falls) else np.float32(0.0 if last else 0.5)
+        workspace.allowed[lane] = workspace.allowed[lane] and falls
+        refused += not (falls or still)
+        factor = np.float32(1.0) if falls else np.float32(0.0 if last else 0.5)
         for k in range(3):
             step[k * LANES3 + lane] *= factor
     return refused

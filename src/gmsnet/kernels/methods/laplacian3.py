@@ -12,20 +12,18 @@ from gmsnet.kernels.star.stars3 import certify3, derive3, fetch3, judge3, store3
 
 @part
 def to_mean(blocks, block, workspace):
-    """The step to the mean of the ring; a closed ball of F cells has F/2 + 2 nodes around it."""
-    step, count = workspace.step, blocks.cells
-    for k in range(3 * LANES3):
-        step[k] = 0.0
-    for j in range(np.int64(blocks.degree[block])):
-        for lane in range(LANES3):
-            around = count[block * LANES3 + lane] // 2 + 2
-            inside = np.float32(1.0 if j < around else 0.0)
-            for axis in range(3):
-                step[axis * LANES3 + lane] += inside * workspace.local[4 * (j * LANES3 + lane) + axis]
+    """The step to the mean of the ring; what repeats its first node is no more of it."""
+    step, ring, offset = workspace.step, blocks.ring, blocks.offset[block]
     for lane in range(LANES3):
-        share = np.float32(1.0) / np.float32(count[block * LANES3 + lane] // 2 + 2)
-        for axis in range(3):
-            step[axis * LANES3 + lane] *= share
+        x, y, z, around = np.float32(0.0), np.float32(0.0), np.float32(0.0), 0
+        for j in range(np.int64(blocks.degree[block])):
+            if j > 0 and ring[offset + j * LANES3 + lane] == ring[offset + lane]:
+                break
+            place = 4 * (j * LANES3 + lane)
+            x, y, z = x + workspace.local[place], y + workspace.local[place + 1], z + workspace.local[place + 2]
+            around += 1
+        share = np.float32(1.0) / np.float32(around)
+        step[lane], step[LANES3 + lane], step[2 * LANES3 + lane] = share * x, share * y, share * z
 
 
 @kernel

@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import inlined
+from gmsnet.kernels.simplex.cube_root import cube_root
 
 TINY = 1e-300  # stands in for a length of zero: the quotient is then zero, not a division by zero
 REGULAR = 6.0 * 2.0 ** (1.0 / 3.0)  # K of a tetrahedron
@@ -80,7 +81,7 @@ def square(x, y, z):
 @inlined
 def shape_of(double, lengths):
     """η of a tetrahedron, with the sign of D. lengths: the sum of its squared edges."""
-    size = np.cbrt(abs(double))
+    size = cube_root(abs(double))
     return math.copysign(REGULAR * size * size / max(lengths, TINY), double)
 
 

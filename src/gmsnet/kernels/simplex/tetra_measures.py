@@ -95,28 +95,44 @@ def summarise_tetrahedra(points, simplices, first, last, coarse, fine):
 
     coarse, fine: see ``measures.grids``; the sums of parts are exact in any order.
     """
+    rows, orientation = simplices.rows, simplices.orientation
+    work, sums = np.ones(10 * LANES), np.zeros(COUNT * LANES)
+    sums[MINIMUM * LANES : (MINIMUM + 1) * LANES] = np.inf
+    cells = 0
+    for start in range(first * LANES, min(last * LANES, len(rows)), LANES):
+        count = min(LANES, len(rows) - start)
+        gather(points, rows, orientation, start, count, work)
+        cells += count
+        for lane in range(LANES if count == LANES else count):
+            ax, ay, az = work[lane], work[LANES + lane], work[2 * LANES + lane]
+            bx, by, bz = work[3 * LANES + lane], work[4 * LANES + lane], work[5 * LANES + lane]
+            cx, cy, cz = work[6 * LANES + lane], work[7 * LANES + lane], work[8 * LANES + lane]
+            value, bound = determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, 0.0)
+            double = work[9 * LANES + lane] * value
+            shape = shape_of(double, squared_edges(ax, ay, az, bx, by, bz, cx, cy, cz))
+            high = (shape + coarse) - coarse
+            sums[COARSE * LANES + lane] += high
+            sums[FINE * LANES + lane] += ((shape - high) + fine) - fine
+            sums[MINIMUM * LANES + lane] = min(sums[MINIMUM * LANES + lane], shape)
+            sums[INVERTED * LANES + lane] += 1.0 if double <= 0.0 else 0.0
+            sums[UNCERTAIN * LANES + lane] += 1.0 if double <= bound else 0.0
     out = np.zeros(6)
     out[MINIMUM] = np.inf
-    rows, orientation = simplices.rows, simplices.orientation
-    for t in range(first * LANES, min(last * LANES, len(rows))):
-        ax, ay, az, bx, by, bz, cx, cy, cz = spokes_of(points, rows, t)
-        value, bound = determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, 0.0)
-        double = orientation[t] * value
-        at_a, at_b, at_c = square(ax, ay, az), square(bx, by, bz), square(cx, cy, cz)
-        u2, v2, w2 = (
-            square(bx - ax, by - ay, bz - az),
-            square(cx - bx, cy - by, cz - bz),
-            square(ax - cx, ay - cy, az - cz),
-        )
-        shape = shape_of(double, ((at_a + at_b) + (at_c + u2)) + (v2 + w2))
-        high = (shape + coarse) - coarse
-        out[COARSE] += high
-        out[FINE] += ((shape - high) + fine) - fine
-        out[MINIMUM] = min(out[MINIMUM], shape)
-        out[INVERTED] += 1.0 if double <= 0.0 else 0.0
-        out[UNCERTAIN] += 1.0 if double <= bound else 0.0
-        out[COUNT] += 1.0
+    for lane in range(LANES):
+        for k in (COARSE, FINE, INVERTED, UNCERTAIN):
+            out[k] += sums[k * LANES + lane]
+        out[MINIMUM] = min(out[MINIMUM], sums[MINIMUM * LANES + lane])
+    out[COUNT] = cells
     return out
+
+
+@inlined
+def squared_edges(ax, ay, az, bx, by, bz, cx, cy, cz):
+    """Their sum, of the tetrahedron with the spokes a, b, c; added up as in ``figures``."""
+    at_a, at_b, at_c = square(ax, ay, az), square(bx, by, bz), square(cx, cy, cz)
+    u2, v2 = square(bx - ax, by - ay, bz - az), square(cx - bx, cy - by, cz - bz)
+    w2 = square(ax - cx, ay - cy, az - cz)
+    return ((at_a + at_b) + (at_c + u2)) + (v2 + w2)
 
 
 @kernel

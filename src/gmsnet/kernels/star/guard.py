@@ -65,6 +65,10 @@ class Precision(NamedTuple):
         grain = math.ldexp(1.0, -1075 - exponent)
         return cls(grain=grain if grain > 1e-290 else 0.0)  # a subnormal one would only be slow
 
+    def coarser(self, unit: float, grain: float) -> Precision:
+        """Of coordinates that are rounded once more, by the relative and the absolute error at most, when written."""
+        return self._replace(unit=self.unit + unit, grain=self.grain + grain)
+
 
 class MeshGuard(NamedTuple):
     """What a sweep must keep. unit, grain, single: see Precision.

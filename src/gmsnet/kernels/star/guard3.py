@@ -35,6 +35,9 @@ def error_bound3(m, delta):
     S − 2t·s + 3|t|² by 895u·m² + 324m·δ; it is at most 72m², and c at most 1/√432, so that c·S^(3/2) is off by
     551m²(u·m + δ) and 88u·m³ for its own rounding. With the difference this is less than 1400m²(u·m + δ), and what is
     of second order in e is less than the rest, or the bound is more than any margin.
+
+    The step of a node that is free is what its place is made of: its u·m is not needed. A node that slides lands in
+    float64 (slide3.land3), and its step is rounded to float32 for it, by u·m at most; its place is not rounded again.
     """
     return 2048.0 * m * m * (COARSE3 * m + delta)
 

@@ -8,25 +8,48 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import part
+from gmsnet.kernels.jit.compile import inlined, part
 from gmsnet.kernels.star.space import GX, GY, GZ, ISO, LANES3, XX, XY, XZ, YY, YZ, ZZ
 from gmsnet.kernels.star.surface import directions_at, on_curves, snap3
 
 
+@inlined
+def find_rows(row, centre, block, rows):
+    """Writes the rows of the nodes of a block; returns whether one of them slides: few blocks have such nodes."""
+    found = False
+    for lane in range(LANES3):
+        rows[lane] = row[centre[block * LANES3 + lane]]
+        found |= rows[lane] >= 0
+    return found
+
+
+@inlined
+def confined(on_curve, u, v, w, gx, gy, gz, xx, yy, zz, xy, xz, yz):
+    """A gradient and a Hessian along a curve with the tangent (u, v, w), or along a patch with that normal.
+
+    With the normal n, H becomes PHP + (nᵀHn)nnᵀ, P = I − nnᵀ; with the tangent t, (tᵀHt)I.
+    """
+    p, q, r = xx * u + xy * v + xz * w, xy * u + yy * v + yz * w, xz * u + yz * v + zz * w
+    slope, bend = gx * u + gy * v + gz * w, u * p + v * q + w * r
+    if on_curve:
+        return slope * u, slope * v, slope * w, bend, bend, bend, 0.0 * bend, 0.0 * bend, 0.0 * bend
+    gx, gy, gz = gx - slope * u, gy - slope * v, gz - slope * w
+    xx, yy, zz = xx + 2.0 * u * (bend * u - p), yy + 2.0 * v * (bend * v - q), zz + 2.0 * w * (bend * w - r)
+    xy = xy + 2.0 * bend * u * v - u * q - v * p
+    xz = xz + 2.0 * bend * u * w - u * r - w * p
+    yz = yz + 2.0 * bend * v * w - v * r - w * q
+    return gx, gy, gz, xx, yy, zz, xy, xz, yz
+
+
 @part
 def restrict3(surface, blocks, block, isotropic, workspace):
-    """Makes gradients and Hessians those along the patch or curve, so that Newton's step is, too.
-
-    With the normal n, H becomes PHP + (nᵀHn)nnᵀ, P = I − nnᵀ; with the tangent t, (tᵀHt)I. isotropic: of ISO.
-    """
-    if surface is not None:
-        sums, half = workspace.sums, np.float32(0.5)
+    """Makes gradients and Hessians those along the patch or curve, so that Newton's step is, too. isotropic: of ISO."""
+    if surface is not None and find_rows(surface.row, blocks.centre, block, workspace.row):
+        sums, star, half = workspace.sums, workspace.star, np.float32(0.5)
         for lane in range(LANES3):
-            i = blocks.centre[block * LANES3 + lane]
-            row = surface.row[i]
+            row = workspace.row[lane]
             if row < 0:
                 continue
-            star = workspace.star
             u, v, w = directions_at(surface, row, star[4 * lane], star[4 * lane + 1], star[4 * lane + 2])
             u, v, w = np.float32(u), np.float32(v), np.float32(w)
             iso = np.float32(isotropic) * sums[ISO * LANES3 + lane]
@@ -34,17 +57,9 @@ def restrict3(surface, blocks, block, isotropic, workspace):
             zz = 2.0 * sums[ZZ * LANES3 + lane] + iso
             xy, xz, yz = sums[XY * LANES3 + lane], sums[XZ * LANES3 + lane], sums[YZ * LANES3 + lane]
             gx, gy, gz = sums[GX * LANES3 + lane], sums[GY * LANES3 + lane], sums[GZ * LANES3 + lane]
-            p, q, r = xx * u + xy * v + xz * w, xy * u + yy * v + yz * w, xz * u + yz * v + zz * w
-            slope, bend = gx * u + gy * v + gz * w, u * p + v * q + w * r
-            if on_curves(surface.kind[row]):
-                gx, gy, gz = slope * u, slope * v, slope * w
-                xx, yy, zz, xy, xz, yz = bend, bend, bend, 0.0 * bend, 0.0 * bend, 0.0 * bend
-            else:
-                gx, gy, gz = gx - slope * u, gy - slope * v, gz - slope * w
-                xx, yy, zz = xx + 2.0 * u * (bend * u - p), yy + 2.0 * v * (bend * v - q), zz + 2.0 * w * (bend * w - r)
-                xy += 2.0 * bend * u * v - u * q - v * p
-                xz += 2.0 * bend * u * w - u * r - w * p
-                yz += 2.0 * bend * v * w - v * r - w * q
+            gx, gy, gz, xx, yy, zz, xy, xz, yz = confined(
+                on_curves(surface.kind[row]), u, v, w, gx, gy, gz, xx, yy, zz, xy, xz, yz
+            )
             sums[GX * LANES3 + lane], sums[GY * LANES3 + lane], sums[GZ * LANES3 + lane] = gx, gy, gz
             sums[XX * LANES3 + lane], sums[YY * LANES3 + lane], sums[ZZ * LANES3 + lane] = (
                 half * xx,
@@ -58,11 +73,10 @@ def restrict3(surface, blocks, block, isotropic, workspace):
 @part
 def land3(surface, blocks, block, workspace):
     """Turns steps of nodes that slide into those to their places, which are kept in ``target`` and ``place``."""
-    if surface is not None:
+    if surface is not None and find_rows(surface.row, blocks.centre, block, workspace.row):
         star, step = workspace.star, workspace.step
         for lane in range(LANES3):
-            i = blocks.centre[block * LANES3 + lane]
-            row = surface.row[i]
+            row = workspace.row[lane]
             if row < 0:
                 continue
             inverse = np.float64(workspace.inverse[lane])
@@ -78,14 +92,12 @@ def land3(surface, blocks, block, workspace):
 
 
 @part
-def landed3(surface, node, workspace, lane, x, y, z):
-    """Where the node of a lane goes by a step that was judged: as ``land3`` found it, if it slides. Notes it."""
+def note_places(surface, workspace):
+    """Takes note of where nodes that slide will be, as ``land3`` found it, in the lanes that are allowed to move."""
     if surface is not None:
-        row = surface.row[node]
-        if row >= 0:
-            surface.place[row] = workspace.place[lane]
-            return workspace.target[4 * lane], workspace.target[4 * lane + 1], workspace.target[4 * lane + 2]
-    return x, y, z
+        for lane in range(LANES3):
+            if workspace.row[lane] >= 0 and workspace.allowed[lane]:
+                surface.place[workspace.row[lane]] = workspace.place[lane]
 
 
 @part

@@ -12,7 +12,7 @@ from gmsnet.kernels.simplex.orientation3 import largest_component
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.guard3 import certified, error_bound3
-from gmsnet.kernels.star.slide3 import land3, landed3, on_surface, take_place
+from gmsnet.kernels.star.slide3 import land3, note_places, on_surface, take_place
 from gmsnet.kernels.star.space import KEPT, LANES3, MARGIN, SUMS, derive, judge, relate
 
 WIDER = 1.0 + 2.0**-20
@@ -21,8 +21,8 @@ HALVINGS = 12  # of a step that is not allowed
 
 class Workspace3(NamedTuple):
     """The arrays that a sweep works in. star: the centres. size: of each star, inverse: 1/size in float32. width: the
-    largest component of each star, over its size. allowed: which lanes may be moved as they are. target, place: where
-    nodes that slide go (slide3.land3).
+    largest component of each star, over its size. allowed: which lanes may be moved as they are. row: of the nodes that
+    slide, else below 0; target, place: where these go (slide3).
     """
 
     star: NDArray[np.float64]
@@ -35,6 +35,7 @@ class Workspace3(NamedTuple):
     wide: NDArray[np.float32]
     width: NDArray[np.float32]
     allowed: NDArray[np.bool_]
+    row: NDArray[np.int32]
     target: NDArray[np.float64]
     place: NDArray[np.int64]
 
@@ -47,7 +48,7 @@ def workspace3_for(most, most_simplices):
         np.empty(4 * most * LANES3, dtype=np.float32), np.empty(KEPT * most_simplices * LANES3, dtype=np.float32),
         np.empty(SUMS * LANES3, dtype=np.float32), np.empty(3 * LANES3, dtype=np.float32),
         np.empty(4 * LANES3, dtype=np.float32), np.empty(LANES3, dtype=np.float32), np.empty(LANES3, dtype=np.bool_),
-        np.empty(4 * LANES3), np.empty(LANES3, dtype=np.int64),
+        np.empty(LANES3, dtype=np.int32), np.empty(4 * LANES3), np.empty(LANES3, dtype=np.int64),
     )  # fmt: skip
 
 
@@ -113,6 +114,8 @@ def certify3(workspace, unit, grain):
 def store3(points, blocks, block, workspace, guard, tally):
     """Moves the free nodes of the lanes that are allowed, and tries the others one by one."""
     star, step, count = workspace.star, workspace.step, blocks.filled[block]
+    if len(guard) != WITH_FLOORS:
+        note_places(guard.constraint, workspace)
     for lane in range(count):
         i = np.uint32(blocks.centre[block * LANES3 + lane])
         # 1/size in float32 is not quite 1/size: the step is of what was gathered
@@ -120,7 +123,8 @@ def store3(points, blocks, block, workspace, guard, tally):
         dx, dy, dz = size * step[lane], size * step[LANES3 + lane], size * step[2 * LANES3 + lane]
         if len(guard) != WITH_FLOORS and workspace.allowed[lane]:
             x, y, z = star[4 * lane] + dx, star[4 * lane + 1] + dy, star[4 * lane + 2] + dz
-            x, y, z = landed3(guard.constraint, i, workspace, lane, x, y, z)
+            if guard.constraint is not None and workspace.row[lane] >= 0:
+                x, y, z = workspace.target[4 * lane], workspace.target[4 * lane + 1], workspace.target[4 * lane + 2]
             if guard.single:
                 x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
             tally[MOVED] += (x != points[i, 0]) | (y != points[i, 1]) | (z != points[i, 2])

@@ -26,12 +26,13 @@ CENTRE, CONTROLS = 6, 7
 class Surface(NamedTuple):
     """What nodes slide on, and where they are; nodes by places in memory.
 
-    row: (N,) int32, the row of each node that slides, else −1. By rows (R,): kind int8; of int32, its plane or line,
-    which is not read of others; place int32, the facet or piece where it is, which changes as nodes move. Of planes
-    and lines (E,): origin, direction (E, 3), the unit normal or direction, same (E, 3) bool, which coordinates all its
-    points have in common. Of facets (F,): corner (F, 3, 3) points, normal (F, 3, 3), beside (F, 3) int32, the facet
-    across the edge from corner k to k + 1, NOWHERE at the rim, control (F, CONTROLS, 3). Of pieces (P,): piece
-    (P, 4, 3) control points, before, after (P,) int32. single: new coordinates are rounded to float32.
+    row: (N,) int32, the row of each node that slides, else −1. By rows (R,): kind int8; of int32, its plane, line or
+    curve, which is not read of curved patches; place int32, the facet or piece where it is, which changes as nodes
+    move. Of planes, lines and curves (E,): origin (E, 3); direction (E, 3), the unit normal or direction, 0 of curves;
+    same (E, 3) bool, which coordinates all its points have in common. Of facets (F,): corner (F, 3, 3) points, normal
+    (F, 3, 3), beside (F, 3) int32, the facet across the edge from corner k to k + 1, NOWHERE at the rim, control
+    (F, CONTROLS, 3). Of pieces (P,): piece (P, 4, 3) control points, before, after (P,) int32. single: new coordinates
+    are rounded to float32.
     """
 
     row: NDArray[np.int32]
@@ -182,8 +183,8 @@ def piece_tangent(piece, p, t):
 def snap3(surface, row, x, y, z):
     """Where the node of a row goes that would go to (x, y, z): x, y, z, and its facet or piece there.
 
-    On a plane or line, coordinates that all its points have in common keep their bits, and along an axis the others are
-    as they were asked for. Nothing is stored.
+    Coordinates that all points of a plane, line or curve have in common keep their bits; on a plane or line along an
+    axis the others are as they were asked for. Nothing is stored.
     """
     kind, place = surface.kind[row], np.int64(surface.place[row])
     if kind == CURVED:
@@ -198,7 +199,7 @@ def snap3(surface, row, x, y, z):
             on_piece(surface.piece, place, 1, t),
             on_piece(surface.piece, place, 2, t),
         )
-    else:
+    if kind != CURVED:
         e = surface.of[row]
         ox, oy, oz = surface.origin[e, 0], surface.origin[e, 1], surface.origin[e, 2]
         ux, uy, uz = surface.direction[e, 0], surface.direction[e, 1], surface.direction[e, 2]
@@ -208,7 +209,7 @@ def snap3(surface, row, x, y, z):
             if one or two or three:
                 along = 0.0  # a plane along two axes
             x, y, z = x - along * ux, y - along * uy, z - along * uz
-        elif np.int64(one) + np.int64(two) + np.int64(three) < 2:
+        elif kind == LINE and np.int64(one) + np.int64(two) + np.int64(three) < 2:
             x, y, z = ox + along * ux, oy + along * uy, oz + along * uz
         x, y, z = ox if one else x, oy if two else y, oz if three else z
     if surface.single:

@@ -40,14 +40,14 @@ EXPONENT[[2**c % 37 for c in range(COLOURS + 1)]] = range(COLOURS + 1)
 
 
 @kernel
-def touching(triangles, chosen):
-    """Rows (int32, ascending) of the triangles (T, 3) that have a chosen node. chosen: (N,) bool."""
-    rows = np.empty(len(triangles), dtype=np.int32)
+def touching(cells, chosen):
+    """Rows (int32, ascending) of the triangles (T, 3) or tetrahedra (T, 4) that have a chosen node. chosen: (N,)."""
+    rows = np.empty(len(cells), dtype=np.int32)
     count = 0
-    for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+    for t in range(len(cells)):
+        a, b, c, last = cells[t, 0], cells[t, 1], cells[t, 2], cells[t, -1]
         rows[count] = t
-        count += chosen[a] or chosen[b] or chosen[c]
+        count += chosen[a] or chosen[b] or chosen[c] or chosen[last]
     return rows[:count].copy()
 
 

@@ -17,15 +17,17 @@ FEW = 24  # facets of a node: more are sorted
 
 
 @kernel
-def order_cells(cells, position, begin, place, order):
+def order_cells(cells, position, begin, place, order, used):
     """Orders cells (T, 4), by node ids, by the lowest place of their nodes in memory, else as they are.
 
-    position: (N,). begin: (N + 2,) zeros. Writes place, the corners by their places in memory, and order (T,).
+    position: (N,). begin: (N + 2,) zeros. Writes place, the corners by their places in memory, order (T,), and used
+    (N,) bool, False before: which places the cells have.
     """
     for t in range(len(cells)):
         a, b = position[np.uint64(cells[t, 0])], position[np.uint64(cells[t, 1])]
         c, d = position[np.uint64(cells[t, 2])], position[np.uint64(cells[t, 3])]
         place[t, 0], place[t, 1], place[t, 2], place[t, 3] = a, b, c, d
+        used[np.uint64(a)] = used[np.uint64(b)] = used[np.uint64(c)] = used[np.uint64(d)] = True
         begin[np.uint64(min(min(a, b), min(c, d)) + 2)] += 1
     for k in range(2, len(begin)):
         begin[k] += begin[k - 1]

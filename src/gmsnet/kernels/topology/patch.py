@@ -9,17 +9,17 @@ from gmsnet.kernels.jit.prefetch import prefetch
 
 
 @kernel
-def around(triangles, rings, free, start, ring):
-    """(N,) bool: the free corners of the triangles (T, 3), and ``rings − 1`` rings of free nodes around.
+def around(cells, rings, free, start, ring):
+    """(N,) bool: the free corners of the cells (T, 3 or 4), and ``rings − 1`` rings of free nodes around.
 
     free: (N,) bool. start, ring: the rings of all nodes, in CSR form.
     """
     active = np.zeros(len(free), dtype=np.bool_)
     nodes = np.empty(len(free), dtype=np.int32)
     count = 0
-    for t in range(len(triangles)):
-        for corner in range(3):
-            i = triangles[t, corner]
+    for t in range(len(cells)):
+        for corner in range(cells.shape[1]):
+            i = cells[t, corner]
             if free[i] and not active[i]:
                 active[i] = True
                 nodes[count] = i

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from gmsnet.kernels.jit.watch import Compilation
-from gmsnet.mesh.display import visible
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
@@ -18,11 +18,16 @@ COMPILING = "compiling kernels, once; about 15 s"
 
 
 class Progress:
-    """What is being done, and how far the sweeps are. A context manager. compilation: what was compiled meanwhile."""
+    """What is being done, and how far the sweeps are. A context manager. compilation: what was compiled meanwhile.
 
-    def __init__(self, sweeps: int, *, enabled: bool) -> None:
+    sweeps: at most so many are made. enabled: whether anything is said. bar: whether a bar is shown (default: where
+    standard error is a terminal).
+    """
+
+    def __init__(self, sweeps: int, *, enabled: bool = True, bar: bool | None = None) -> None:
         self.compilation = Compilation(self._say_so if enabled else None)
-        self._bar = _bar() if enabled and sys.stderr.isatty() else None
+        shown = sys.stderr.isatty() if bar is None else bar
+        self._bar = _bar() if enabled and shown else None
         self._sweeps = sweeps
 
     def __enter__(self) -> Progress:
@@ -44,8 +49,8 @@ class Progress:
             self.begin(COMPILING)
 
     def begin(self, text: str) -> None:
-        """Say what begins now."""
-        self._update(description=visible(text), total=None, score="", refresh=True)
+        """Say what begins now; of text of others, what a terminal may show."""
+        self._update(description=text, total=None, score="", refresh=True)
 
     def sweep(self, sweep: Sweep) -> None:
         """The callback of ``smooth``: show the sweep and the mesh after it."""
@@ -56,6 +61,15 @@ class Progress:
             completed=sweep.index,
             score=f"1/q mean {sweep.mean_shape:.4f}, min {sweep.min_shape:.4f}{inverted}",
         )
+
+    def before(self, callback: Callable[[Sweep], bool | None] | None) -> Callable[[Sweep], bool | None]:
+        """A callback that shows each sweep and then asks another callback, if there is one."""
+
+        def look(sweep: Sweep) -> bool | None:
+            self.sweep(sweep)
+            return None if callback is None else callback(sweep)
+
+        return look
 
     def _update(self, **changes: Any) -> None:
         if self._bar is not None:

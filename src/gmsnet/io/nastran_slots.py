@@ -1,0 +1,70 @@
+"""Where the coordinates of Nastran's GRID cards stand, and how new ones are put into their fields."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.io.contents import Data
+from gmsnet.io.nastran_lines import LARGE, WIDTH, Bulk, Cards, Ints
+from gmsnet.io.nastran_numbers import fitted
+from gmsnet.io.pieces import Piece
+from gmsnet.io.splice import Points
+
+AXES = 3
+
+
+@dataclass(frozen=True)
+class FieldSlots:
+    """Fields of text. starts, ends: (N × dim) the bytes of each. widths: (N,) how many columns there are. free: (N,)
+    between commas.
+    """
+
+    starts: Ints
+    ends: Ints
+    widths: NDArray[np.int64]
+    free: NDArray[np.bool_]
+
+    def replace(self, data: Data, old: Points, new: Points) -> Iterator[Piece]:
+        """See Slots."""
+        node, axis = np.nonzero(old != new)
+        starts = self.starts[node, axis]
+        order = np.argsort(starts, kind="stable")
+        view, at = memoryview(data), 0
+        for k in order.tolist():
+            start, end = int(starts[k]), int(self.ends[node[k], axis[k]])
+            yield view[at:start]
+            yield self._field(bytes(view[start:end]), float(new[node[k], axis[k]]), int(node[k]))
+            at = end
+        yield view[at:]
+
+    def _field(self, old: bytes, value: float, node: int) -> bytes:
+        """A field with another number in it, at the side where the old one was."""
+        width = int(self.widths[node])
+        text = fitted(value, width).encode()
+        if self.free[node]:
+            word = old.strip()
+            return old.replace(word, text) if word else text
+        if len(old) < width:  # at the end of a line, which may become longer
+            return text.rjust(len(old)) if old[:1] == b" " and old.strip() else text
+        return text.rjust(width) if old[:1] == b" " and old[-1:] != b" " else text.ljust(width)
+
+
+def places_of_grids(bulk: Bulk, grids: list[Cards]) -> FieldSlots:
+    """The slots of all GRID cards, in their order here."""
+    starts, ends, widths, free = [], [], [], []
+    for cards in grids:
+        spans = [bulk.field(cards, 3 + axis) for axis in range(AXES)]
+        starts.append(np.stack([start for start, _ in spans], axis=1))
+        ends.append(np.stack([end for _, end in spans], axis=1))
+        usual = LARGE if cards.large else WIDTH
+        if cards.free:  # where longer numbers stand there is room for them
+            words = [len(bytes(bulk.data[a:b]).strip()) for a, b in zip(starts[-1].ravel().tolist(),
+                     ends[-1].ravel().tolist(), strict=True) if a >= 0]  # fmt: skip
+            usual = max(usual, *words) if words else usual
+        widths.append(np.full(len(cards.line), usual))
+        free.append(np.full(len(cards.line), cards.free))
+    return FieldSlots(*(np.concatenate(parts) for parts in (starts, ends, widths, free)))

@@ -1,0 +1,102 @@
+"""Which tetrahedra have the smallest dihedral angles, without a look at the angles of all.
+
+Of all tetrahedra with a dihedral angle of θ that symmetric about the edge and the edge opposite to it has the largest
+η. With t = tan(θ/2), the edge 2a long, and half the opposite one t, at a distance of 1 from it, D = 4at and S = 8a² +
+8t² + 4, so that η is largest for 8a² = 4t² + 2:
+
+    η ≤ 2·(t/(1 + 2t²))^(2/3),
+
+which grows up to a regular tetrahedron's θ and falls beyond. So cells whose η is above that need not be looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
+from gmsnet.kernels.simplex.tetra_measures import COLUMNS, HIGH, LOW, cubed_ratios, per_tetrahedron
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int32]
+
+REGULAR = math.degrees(math.acos(1.0 / 3.0))  # the dihedral angles of a regular tetrahedron
+WIDE = REGULAR / (180.0 - REGULAR)  # the weight of what an angle lacks to 180°: there both count alike
+MORE = 4  # times as many cells of the least η are looked at first
+SHARE = 1.0 + 1e-6  # times an η: for its rounding
+
+
+class Ranked(NamedTuple):
+    """Some cells of the least measure. rows: which. measure: (K,) degrees, ascending."""
+
+    rows: Rows
+    measure: Floats
+
+
+def most_shape_with(angle: float) -> float:
+    """The largest η of a tetrahedron one of whose dihedral angles is this, in degrees between 0 and 180."""
+    t = math.tan(math.radians(0.5 * angle))
+    return float(2.0 * (t / (1.0 + 2.0 * t * t)) ** (2.0 / 3.0))
+
+
+def most_shape_below(measure: float, wide: float) -> float:
+    """The largest η of one whose measure is at most this."""
+    if measure >= REGULAR:
+        return math.inf
+    greatest = 180.0 - measure / wide if wide > 0.0 else 180.0
+    return SHARE * max(most_shape_with(max(measure, 0.0)), most_shape_with(greatest) if greatest < 180.0 else 0.0)
+
+
+def columns_of(points: Floats, cells: Tetrahedra, rows: Rows | None = None) -> Floats:
+    """The measures (5, K) of some tetrahedra (kernels.simplex.tetra_measures). points: (N, 3 or 4)."""
+    some = cells if rows is None else cells.take(rows)
+    columns = np.empty((COLUMNS, len(some.rows)))
+    per_tetrahedron(points, some.rows, some.orientation, columns)
+    return columns
+
+
+def measures_of(columns: Floats, wide: float) -> Floats:
+    """(K,) the smallest dihedral angle of each, or what the largest lacks to 180°, times ``wide``, if that is less."""
+    found: Floats = columns[LOW]
+    return np.minimum(found, wide * (180.0 - columns[HIGH])) if wide > 0.0 else found
+
+
+def ratios_of(points: Floats, cells: Tetrahedra, executor: Executor = serial) -> Floats:
+    """(T,) 432·η⁻³ of each, infinite where the volume is not positive."""
+    out = np.empty(len(cells.rows))
+
+    def look(first: int, last: int) -> None:
+        cubed_ratios(points, cells.rows, cells.orientation, first * LANES, min(last * LANES, len(out)), out)
+
+    executor.map(look, 0, -(-len(out) // LANES))
+    return out
+
+
+def below(points: Floats, cells: Tetrahedra, measure: float, wide: float, executor: Executor = serial) -> Ranked:
+    """The cells whose measure is less than this, or that are inverted."""
+    ratios = ratios_of(points, cells, executor)
+    rows = np.flatnonzero(~(ratios < 432.0 / most_shape_below(measure, wide) ** 3)).astype(np.int32)
+    found = measures_of(columns_of(points, cells, rows), wide)
+    chosen = (found < measure) | np.isinf(ratios[rows])
+    order = np.argsort(found[chosen], kind="stable")
+    return Ranked(rows[chosen][order], found[chosen][order])
+
+
+def worst(points: Floats, cells: Tetrahedra, count: int, wide: float, executor: Executor = serial) -> Ranked:
+    """So many cells of the least measure, all if they are fewer; of valid meshes."""
+    ratios = ratios_of(points, cells, executor)
+    first = max(len(ratios) - MORE * count, 0)
+    rows = np.argpartition(ratios, first)[first:].astype(np.int32) if first else np.arange(len(ratios), dtype=np.int32)
+    found = measures_of(columns_of(points, cells, rows), wide)
+    if first:
+        limit = most_shape_below(float(np.partition(found, count - 1)[count - 1]), wide)
+        rows = np.flatnonzero(~(ratios < 432.0 / limit**3)).astype(np.int32)
+        found = measures_of(columns_of(points, cells, rows), wide)
+    order = np.argsort(found, kind="stable")[:count]
+    return Ranked(rows[order], found[order])

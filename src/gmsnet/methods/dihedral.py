@@ -1,0 +1,83 @@
+"""The smallest dihedral angles of a volume first: Newton's method on Σ(s/θ)^p at the free nodes of few cells.
+
+A cell's measure is the lesser of its smallest dihedral angle and of what its largest lacks to 180°, times a weight by
+which both are alike in a regular tetrahedron. A cycle takes the cells of the least measure, a share of all, and visits
+their nodes (kernels/methods/descent3.py), but those around which no cell is as bad as the best of these any more. The
+floor of the guard is part of the objective: along it angles can gain where straight against it they cannot.
+
+Powers of q do not do that, for a needle and a cap of the same η have different angles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gmsnet.kernels.methods.descent3 import sweep3
+from gmsnet.kernels.simplex.objectives3 import DIHEDRAL, Aim3
+from gmsnet.kernels.star.guard import STAR
+from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.measure.dihedral import WIDE, worst
+from gmsnet.methods.base import Field, Smoother, Tally, over_stars
+from gmsnet.parallel.executor import Executor
+from gmsnet.topology.volume import Volume
+
+NO_SIZES = np.empty(0)
+
+
+class Cycle(NamedTuple):
+    """share: of all cells. doublings: p = 2^doublings. sweeps: over their free nodes."""
+
+    share: float
+    doublings: int
+    sweeps: int
+
+
+CYCLES = (Cycle(0.001, 4, 4), Cycle(0.0005, 5, 8), Cycle(0.0003, 6, 12))
+FEWEST = 12  # cells
+
+
+class Dihedral(Smoother):
+    """One sweep is all cycles.
+
+    floor: of D/S^(3/2) in the place of the guard's, but at the level of stars. goal: a measure in degrees of which no
+    more is asked. wide: the weight of what angles lack to 180°.
+    """
+
+    phase = "dihedral angles"
+
+    def __init__(
+        self, cycles: Sequence[Cycle] = CYCLES, floor: float | None = None, goal: float = math.inf, wide: float = WIDE
+    ) -> None:
+        self.cycles, self.floor, self.goal, self.wide = cycles, floor, goal, wide
+
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
+        """See Smoother."""
+        topology, tally = field.topology, np.zeros(3, dtype=np.int64)
+        assert isinstance(topology, Volume)
+        guard, cells = field.guard(executor), topology.changeable
+        if self.floor is not None and field.level != STAR:
+            guard = guard._replace(floor=self.floor)
+        for cycle in self.cycles:
+            count = min(max(FEWEST, math.ceil(cycle.share * len(cells.rows))), len(cells.rows))
+            ranked = worst(field.points, cells, count, self.wide, executor)
+            chosen = ranked.rows[ranked.measure < self.goal]
+            if not len(chosen):
+                break
+            nodes = np.unique(cells.rows[chosen])
+            stars = topology.stars_of(nodes[topology.near_free[nodes]].astype(np.int64))
+            enough = min(float(ranked.measure[-1]), self.goal)
+            aim = Aim3(DIHEDRAL, cycle.doublings, self.wide, math.radians(enough), max(guard.floor, 0.0))
+
+            def visit(blocks: SpaceBlocks, first: int, last: int, counts: Tally, aim: Aim3 = aim) -> None:
+                sweep3(field.points, blocks, first, last, guard, aim, 1, NO_SIZES, counts)
+
+            for _ in range(cycle.sweeps):
+                found = over_stars(visit, stars, field.points, executor)
+                tally += found
+                if not found.any():
+                    break
+        return tally

@@ -1,0 +1,166 @@
+"""Layers of tetrahedra at walls: flat cells in columns of nodes that start at a boundary or an interface.
+
+The halves and thirds of prisms that were grown from a wall have their nodes in columns. A column starts at a node of a
+wall around which all cells are flat, as one, and along the wall. It goes on, from row to row, to the next node along
+its own direction, as long as the cells there are flat alike. Slivers are flat in directions of their own, which cancel
+out around a node, and a mesh that was squeezed has no rows. So columns count that have ROWS rows or more, FEWEST or
+more beside one another, whose cells are thinner at the wall than at their ends, or whose first rows have one height.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from gmsnet.kernels.topology import columns as kernels
+from gmsnet.kernels.topology import connectivity
+from gmsnet.preserve.layers import Layers
+from gmsnet.topology.polygons import Ints
+from gmsnet.topology.volume import Volume
+
+Flags = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+
+WALLS = ("boundary", "interface between regions")  # why the nodes of walls are held
+FLAT, STILL_FLAT = 2.5, 1.7  # how many times longer than thick cells are, in the mean around a node: at a wall, inside
+ALONG_WALL = 0.1  # of the squared length of the edges on a wall: what may lie across it
+TURN = math.cos(math.radians(30.0))  # of a column from row to row
+HIGHER = 2.5  # times as high as the row before it: no row of the same layer
+ROWS = 2  # nodes of a column above its wall
+FEWEST = 12  # columns
+GROWN = 1.25  # times as flat at the wall as at the end of the column, in the median
+EVEN = 0.03  # of its height: by how much that of a row differs from column to column, in the median
+DETERMINANT = 1.0 / 45.0  # of a moment of trace 1: less is flat by 2 or more
+
+
+def layers_of_volume(topology: Volume, points: Floats) -> Layers:
+    """The layers of a mesh of tetrahedra as it is now. points: (N, 4) in memory order."""
+    nodes, rows = len(points), topology.near
+    none = Layers(np.zeros(nodes, dtype=bool), np.zeros(len(rows), dtype=bool), 1.0, 1.0, 0)
+    wall = _wall_nodes(topology)
+    foot, normal, flatness = _feet(points, rows, wall)
+    if len(foot) < FEWEST:
+        return none
+    columns, heights, last = _grown(topology, points, foot, normal)
+    long: Flags = np.asarray((columns[:, ROWS : ROWS + 1] >= 0).any(axis=1))
+    chosen = long & _accepted(rows, columns, heights, flatness, last, long, wall)
+    if not chosen.any():
+        return none
+    inside = np.zeros(nodes, dtype=bool)
+    members = columns[chosen]
+    inside[members[members >= 0]] = True
+    cells = inside[rows].all(axis=1)
+    held = np.zeros(nodes, dtype=bool)
+    held[topology.memory] = inside & topology.near_free
+    of_file = np.zeros(len(rows), dtype=bool)
+    of_file[topology.near_origin] = cells
+    found = flatness[chosen]
+    return Layers(held, of_file, float(np.median(found)), float(found.max()), 0)
+
+
+def _wall_nodes(topology: Volume) -> Flags:
+    """(N,) by places in memory: nodes of boundaries and interfaces, whether they slide or not."""
+    wall = np.zeros(len(topology.memory), dtype=bool)
+    for reasons in (topology.held, topology.sliding):
+        for reason in WALLS:
+            wall[topology.places[reasons.get(reason, np.empty(0, dtype=np.int64))]] = True
+    return wall
+
+
+def _feet(points: Floats, rows: Ints, wall: Flags) -> tuple[Ints, Floats, Floats]:
+    """The nodes of walls where all cells are flat along the wall: places, unit normals (K, 3), flatness (K,)."""
+    moments, along = np.zeros((2, len(wall), kernels.MOMENTS))
+    count = np.zeros(len(wall), dtype=np.int32)
+    kernels.around_nodes(points, rows, wall, moments, along, count)
+    some = np.flatnonzero(wall & (count > 0))
+    mean = moments[some] / count[some, None]
+    few = _determinant(mean) < DETERMINANT
+    some, mean = some[few].astype(np.int32), mean[few]
+    flatness, normal = _flat(mean)
+    across = np.einsum("ki,kij,kj->k", normal, _tensors(along[some]), normal)
+    good = (flatness >= FLAT) & (across <= ALONG_WALL * along[some, :3].sum(axis=1))
+    return some[good], normal[good], flatness[good]
+
+
+def _grown(topology: Volume, points: Floats, foot: Ints, normal: Floats) -> tuple[Ints, Floats, Floats]:
+    """The columns: (C, R) places from the foot on, −1 behind their ends; heights (C, R − 1); flatness of the last."""
+    nodes, inner = len(points), topology.near_free & (np.diff(topology.start) > 0)
+    at, normal, last = foot.copy(), normal.copy(), np.full(len(foot), np.nan)
+    taken = np.zeros(nodes, dtype=bool)
+    taken[foot] = True
+    columns, heights = [foot], list[Floats]()
+    before = np.full(len(foot), np.inf)
+    while (at >= 0).any():
+        front = np.full(nodes, -1, dtype=np.int32)
+        front[at[at >= 0]] = np.flatnonzero(at >= 0)
+        near = topology.near[connectivity.touching(topology.near, front >= 0)]
+        to, height = np.full(len(foot), -1, dtype=np.int32), np.full(len(foot), TURN)
+        kernels.next_in_columns(points, near, front, normal, inner, taken, to, height)
+        to[height > HIGHER * before] = -1
+        _, first = np.unique(to, return_index=True)  # two columns may not go on to one node
+        alone = np.zeros(len(to), dtype=bool)
+        alone[first] = True
+        to[~alone] = -1
+        ahead = np.flatnonzero(to >= 0)
+        mean = np.empty((len(ahead), kernels.MOMENTS))
+        kernels.of_stars(points, to[ahead], topology.start, topology.local, topology.ring_start, topology.ring, mean)
+        flatness, direction = _flat(mean)
+        alike = (flatness >= STILL_FLAT) & (abs((direction * normal[ahead]).sum(axis=1)) >= TURN)
+        to[ahead[~alike]] = -1
+        going = ahead[alike]
+        last[going], normal[going] = flatness[alike], direction[alike]
+        before = np.where(to >= 0, height, before)
+        taken[to[going]] = True
+        columns.append(to)
+        heights.append(np.where(to >= 0, height, np.nan))
+        at = to
+    return np.stack(columns, axis=1), np.stack(heights, axis=1), last
+
+
+def _accepted(
+    rows: Ints, columns: Ints, heights: Floats, flatness: Floats, last: Floats, long: Flags, wall: Flags
+) -> Flags:
+    """(C,) which columns stand beside enough others and have grown, or are of rows of one height."""
+    number = np.full(len(wall), -1, dtype=np.int64)
+    number[columns[long, 0]] = np.flatnonzero(long)
+    beside = number[rows]
+    pairs = np.concatenate([beside[:, [a, b]] for a, b in kernels.EDGES])
+    pairs = pairs[(pairs >= 0).all(axis=1)]
+    shape = (len(columns), len(columns))
+    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=shape)
+    piece = connected_components(graph, directed=False)[1]
+    accepted = np.zeros(len(columns), dtype=bool)
+    first = heights[:, 0]
+    differ = abs(first[pairs[:, 0]] - first[pairs[:, 1]]) / np.maximum(first[pairs[:, 0]], first[pairs[:, 1]])
+    for name in np.unique(piece[long]).tolist():
+        own = long & (piece == name)
+        if own.sum() < FEWEST:
+            continue
+        grown = np.median(flatness[own]) >= GROWN * np.median(last[own])
+        even = np.median(differ[piece[pairs[:, 0]] == name], axis=None) <= EVEN
+        accepted[own] = grown or even
+    return accepted
+
+
+def _tensors(moments: Floats) -> Floats:
+    """(K, 3, 3)."""
+    tensors: Floats = moments[:, [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
+    return tensors
+
+
+def _determinant(moments: Floats) -> Floats:
+    xx, yy, zz, xy, xz, yz = moments.T
+    found: Floats = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+    return found
+
+
+def _flat(moments: Floats) -> tuple[Floats, Floats]:
+    """How many times longer than thick cells of these moments are (K,), and the direction in which they are thin."""
+    values, vectors = np.linalg.eigh(_tensors(moments))
+    values = np.maximum(values, 1e-30)
+    flatness: Floats = np.sqrt(np.sqrt(values[:, 1] * values[:, 2]) / values[:, 0])
+    return flatness, vectors[:, :, 0]

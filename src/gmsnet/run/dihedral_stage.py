@@ -1,0 +1,72 @@
+"""The last stage of ``auto`` on volumes: the smallest dihedral angles, for which a little of the least η may go."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from gmsnet.kernels.methods.barrier3 import K3
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
+from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
+from gmsnet.kernels.star.guard import LEVELS, VALID
+from gmsnet.kernels.star.surface import Surface, locate3
+from gmsnet.measure.dihedral import REGULAR, WIDE, worst
+from gmsnet.measure.totals import Totals, totals_of
+from gmsnet.methods.auto import Auto
+from gmsnet.methods.base import Field
+from gmsnet.methods.dihedral import Dihedral
+from gmsnet.methods.floor import Floor
+from gmsnet.parallel.executor import Executor
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.state import Floats, State
+from gmsnet.run.stop import CALLBACK, NO_PROGRESS
+from gmsnet.run.sweep import Sweep
+from gmsnet.topology.volume import Volume
+
+SPENT = 0.06  # by so much may the largest q = 1/η grow
+GAIN = 0.005  # in the merit: with less the mesh stays as it was
+
+
+def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """Makes the smallest dihedral angles larger where ``auto`` has ended of itself; a mesh with inverted cells stays.
+
+    No q = 1/η becomes more than the largest one and SPENT, nor, but at the level ``valid``, than the largest of the
+    input. The result is taken where the merit gains GAIN.
+    """
+    topology, sweeps = state.topology, state.history[-1].index if state.history else 0
+    ended = state.stop_reason == NO_PROGRESS and sweeps < options.max_sweeps
+    if not (isinstance(topology, Volume) and isinstance(state.smoother, Auto) and ended) or options.target:
+        return state
+    totals = totals_of(state.points, topology.scored, executor)
+    if totals is None or totals.uncertain:
+        return state
+    level = LEVELS.index(options.guard)
+    floor = floor_for_angles(state, level, 1.0 / (1.0 / totals.shape_min + SPENT), executor)
+    field = Field(state.points.copy(), topology, state.precision, level, constraint=state.constraint)
+    if isinstance(state.constraint, Surface):
+        locate3(state.constraint, field.points)
+    smoother = Dihedral(floor=floor)
+    tally = smoother.sweep(field, executor, lambda: False)
+    after = totals_of(field.points, topology.scored, executor)
+    assert after is not None
+    gained = merit(after, field.points, topology.scored) - merit(totals, state.points, topology.scored)
+    if gained < GAIN or after.uncertain:
+        return state
+    sweep = Sweep(
+        sweeps + 1, smoother.phase, int(tally[MOVED]), int(tally[TRUNCATED]), int(tally[DROPPED]), after.inverted,
+        after.qhat, after.shape_min, after.shape_mean,
+    )  # fmt: skip
+    state = replace(state, points=field.points, totals=after, history=(*state.history, sweep))
+    stopped = options.callback is not None and options.callback(sweep)
+    return state.ended(CALLBACK) if stopped else state
+
+
+def floor_for_angles(state: State, level: int, shape: float, executor: Executor) -> float:
+    """c of D/S^(3/2) for an η, or for the level of the guard to hold from the untangled input on, if that is more."""
+    start, floor = state.start if state.untangled is None else state.untangled, math.sqrt(shape**3 / K3)
+    return floor if level == VALID else max(floor, Floor().of(start, state.topology, state.precision, executor))
+
+
+def merit(totals: Totals, points: Floats, cells: Tetrahedra) -> float:
+    """The least η, the mean η, and the least measure of the dihedral angles over that of a regular tetrahedron."""
+    return totals.shape_min + totals.shape_mean + float(worst(points, cells, 1, WIDE).measure[0]) / REGULAR
