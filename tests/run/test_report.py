@@ -11,6 +11,7 @@ from support.pages import Page
 import gmsnet
 from gmsnet import InputError
 from gmsnet.generate import random_mesh
+from gmsnet.measure.target import Target
 from gmsnet.run.options import SmoothOptions
 
 
@@ -65,3 +66,8 @@ def test_what_was_asked_for_is_kept_as_plain_values():
     assert SmoothOptions(method="gmsnet", weights=Path("w.safetensors")).asked["weights"] == "w.safetensors"
     assert SmoothOptions(size=np.sin).asked == {"size": "sin"}
     assert SmoothOptions(slide=("a", "b")).asked == {"slide": ["a", "b"]}
+
+
+def test_what_a_target_asks_for_is_told_in_words():
+    assert Target(0.3, 20.0).words("1/q") == "1/q of 0.3 or more and angles of 20° or more"
+    assert Target(None, None, 12.5).words("η") == "dihedral angles of 12.5° or more"

@@ -50,11 +50,10 @@ class Target:
         """The minimum angle of a cell in degrees, of whichever kind."""
         return self.angle if self.dihedral is None else self.dihedral
 
-    @property
-    def words(self) -> str:
-        """What is asked for."""
-        asked = [] if self.quality is None else [f"1/q of {self.quality:g} or more"]
-        return " and ".join([*asked, *([] if self.angle is None else [f"angles of {self.angle:g}° or more"])])
+    def words(self, symbol: str) -> str:
+        """What is asked for. symbol: what the quality of the cells is called."""
+        kinds = ((symbol, self.quality, ""), ("angles", self.angle, "°"), ("dihedral angles", self.dihedral, "°"))
+        return " and ".join(f"{kind} of {least:g}{unit} or more" for kind, least, unit in kinds if least is not None)
 
     def missed(self, shape: Floats, min_angle: Floats) -> Flags:
         """Which cells miss it, by their 1/q and their smallest angles (of tetrahedra, dihedral ones) in degrees."""

@@ -17,7 +17,7 @@ def contents_of(account: Account, title: str, command: str, facts: Sequence[tupl
     result = account.result
     known, measured = [*facts], len(result.after.cell)
     if account.target:
-        known.append(("target", account.target.words))
+        known.append(("target", account.target.words(result.after.symbol)))
     if measured and account.free:
         known.append(("nearness", account.nearness()))
     if others := unmeasured(account.mesh):
