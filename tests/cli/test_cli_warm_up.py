@@ -35,14 +35,17 @@ def test_unknown_kinds_are_told_before_anything_is_compiled(run, monkeypatch):
 @pytest.mark.long
 def test_a_first_run_compiles_nothing_then(tmp_path):
     environment = {**os.environ, "GMSNET_CACHE": str(tmp_path / "cache")}
+    environment.pop("NUMBA_CACHE_DIR", None)  # which this process has set by its own GMSNET_CACHE
 
     def run(*arguments):
         command = [sys.executable, "-m", "gmsnet", *map(str, arguments)]
-        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return subprocess.run(command, env=environment, capture_output=True, text=True)
 
     assert "triangle: compiled in" in run("warm-up", "--cells", "triangle").stdout
     mesh = random_mesh(400, seed=9)
     gmsnet.write(mesh, tmp_path / "random.su2")
     gmsnet.write(disturb(mesh, range(300), 0.8, seed=2, keep_valid=False), tmp_path / "tangled.vtk")
     for name, *options in (("random.su2",), ("random.su2", "--slide", "all"), ("tangled.vtk", "--preserve", "none")):
-        assert COMPILING not in run("smooth", tmp_path / name, "--dry-run", *options).stderr
+        done = run("smooth", tmp_path / name, "--dry-run", *options)
+        assert done.returncode in (0, 1)  # the tangled one may keep an inverted cell at its boundary
+        assert COMPILING not in done.stderr
