@@ -18,7 +18,7 @@ import numpy as np
 
 from gmsnet.kernels.methods.descent3 import sweep3
 from gmsnet.kernels.simplex.objectives3 import DIHEDRAL, Aim3
-from gmsnet.kernels.star.guard import STAR
+from gmsnet.kernels.star.guard import STAR, Guard, MeshGuard
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.measure.dihedral import WIDE, worst
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
@@ -36,7 +36,7 @@ class Cycle(NamedTuple):
     sweeps: int
 
 
-CYCLES = (Cycle(0.001, 4, 4), Cycle(0.0005, 5, 8), Cycle(0.0003, 6, 12))
+CYCLES = (Cycle(0.001, 4, 3), Cycle(0.0005, 5, 4), Cycle(0.0003, 6, 6))
 FEWEST = 12  # cells
 
 
@@ -44,10 +44,11 @@ class Dihedral(Smoother):
     """One sweep is all cycles.
 
     floor: of D/S^(3/2) in the place of the guard's, but at the level of stars. goal: a measure in degrees of which no
-    more is asked. wide: the weight of what angles lack to 180°.
+    more is asked. wide: the weight of what angles lack to 180°. least: the least measure when a cycle began.
     """
 
     phase = "dihedral angles"
+    least = math.inf
 
     def __init__(
         self, cycles: Sequence[Cycle] = CYCLES, floor: float | None = None, goal: float = math.inf, wide: float = WIDE
@@ -58,12 +59,16 @@ class Dihedral(Smoother):
         """See Smoother."""
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
         assert isinstance(topology, Volume)
-        guard, cells = field.guard(executor), topology.changeable
-        if self.floor is not None and field.level != STAR:
-            guard = guard._replace(floor=self.floor)
+        cells = topology.changeable
+        guard: Guard
+        if self.floor is None or field.level == STAR:
+            guard = field.guard(executor)
+        else:
+            guard = MeshGuard(*field.precision, self.floor, field.constraint)
         for cycle in self.cycles:
             count = min(max(FEWEST, math.ceil(cycle.share * len(cells.rows))), len(cells.rows))
             ranked = worst(field.points, cells, count, self.wide, executor)
+            self.least = min(self.least, float(ranked.measure[0]))
             chosen = ranked.rows[ranked.measure < self.goal]
             if not len(chosen):
                 break

@@ -6,7 +6,6 @@ import math
 from dataclasses import replace
 
 from gmsnet.kernels.methods.barrier3 import K3
-from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.guard import LEVELS, VALID
 from gmsnet.kernels.star.surface import Surface, locate3
@@ -18,7 +17,7 @@ from gmsnet.methods.dihedral import Dihedral
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.state import Floats, State
+from gmsnet.run.state import State
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.volume import Volume
@@ -37,7 +36,7 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     ended = state.stop_reason == NO_PROGRESS and sweeps < options.max_sweeps
     if not (isinstance(topology, Volume) and isinstance(state.smoother, Auto) and ended) or options.target:
         return state
-    totals = totals_of(state.points, topology.scored, executor)
+    totals = state.totals or totals_of(state.points, topology.scored, executor)
     if totals is None or totals.uncertain:
         return state
     level = LEVELS.index(options.guard)
@@ -49,7 +48,8 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     tally = smoother.sweep(field, executor, lambda: False)
     after = totals_of(field.points, topology.scored, executor)
     assert after is not None
-    gained = merit(after, field.points, topology.scored) - merit(totals, state.points, topology.scored)
+    least = float(worst(field.points, topology.scored, 1, WIDE, executor).measure[0])
+    gained = merit(after, least) - merit(totals, smoother.least)
     if gained < GAIN or after.uncertain:
         return state
     sweep = Sweep(
@@ -67,6 +67,6 @@ def floor_for_angles(state: State, level: int, shape: float, executor: Executor)
     return floor if level == VALID else max(floor, Floor().of(start, state.topology, state.precision, executor))
 
 
-def merit(totals: Totals, points: Floats, cells: Tetrahedra) -> float:
+def merit(totals: Totals, least: float) -> float:
     """The least η, the mean η, and the least measure of the dihedral angles over that of a regular tetrahedron."""
-    return totals.shape_min + totals.shape_mean + float(worst(points, cells, 1, WIDE).measure[0]) / REGULAR
+    return totals.shape_min + totals.shape_mean + least / REGULAR
