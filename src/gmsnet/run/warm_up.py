@@ -58,7 +58,7 @@ def warm_up(kinds: Sequence[str] | None = None) -> Iterator[tuple[str, float]]:
 
 def _use(kind: str) -> None:
     meshes = _meshes(kind)
-    for mesh, ways in [(mesh, KINDS[kind]) for mesh in (meshes[0], _tangled(meshes[0]))] + [
+    for mesh, ways in [(mesh, KINDS[kind]) for mesh in (meshes[0], *_tangled(meshes[0]))] + [
         (mesh, KINDS[kind][:1]) for mesh in meshes[1:]
     ]:
         for way in ways:
@@ -71,9 +71,12 @@ def _use(kind: str) -> None:
             io.write(smooth(io.read(path), max_sweeps=2).mesh, path)
 
 
-def _tangled(mesh: Mesh) -> Mesh:
-    free = np.setdiff1d(np.arange(len(mesh.points)), smooth(mesh, max_sweeps=0).held["boundary"])
-    return disturb(mesh, free, FAR, seed=1, keep_valid=False)
+def _tangled(mesh: Mesh) -> list[Mesh]:
+    """Nodes inside are thrown, which is soon mended; and nodes of the boundary as well, so that cells stay inverted."""
+    every = np.arange(len(mesh.points))
+    free = np.setdiff1d(every, smooth(mesh, max_sweeps=0).held["boundary"])
+    most = every[: 3 * len(every) // 4]
+    return [disturb(mesh, nodes, far * FAR, seed=1, keep_valid=False) for nodes, far in ((free, 1.0), (most, 2.0))]
 
 
 def _meshes(kind: str) -> list[Mesh]:
