@@ -1,9 +1,9 @@
 """The smallest dihedral angles of a volume first: Newton's method on Σ(s/θ)^p at the free nodes of few cells.
 
-A cell's measure is the lesser of its smallest dihedral angle and of what its largest lacks to 180°, times a weight by
-which both are alike in a regular tetrahedron. A cycle takes the cells of the least measure, a share of all, and visits
-their nodes (kernels/methods/descent3.py), but those around which no cell is as bad as the best of these any more. The
-floor of the guard is part of the objective: along it angles can gain where straight against it they cannot.
+A cell's measure is the lesser of its smallest dihedral angle and of what its largest lacks to 180°, times a weight. A
+cycle takes the cells of the least measure, a share of all, and visits their nodes (kernels/methods/descent3.py), but
+those around which no cell is as bad as the best of these any more. The floor of the guard is part of the objective:
+along it angles can gain where straight against it they cannot.
 
 Powers of q do not do that, for a needle and a cap of the same η have different angles.
 """
