@@ -14,7 +14,7 @@ from format_samples import VARIANTS, Variant, points_of
 
 import gmsnet
 from gmsnet.errors import FormatError
-from gmsnet.io import FORMATS
+from gmsnet.io.formats import FORMATS as ALL_FORMATS
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -23,6 +23,8 @@ SOURCES = ("SU2", "Gmsh 2.2, text", "Gmsh 4.1, text", "VTK 4.2, text", "VTU, tex
            "Nastran, 16 columns", "UGRID, text")  # fmt: skip
 MEMORY = "memory"
 SILENT = "**silent**"
+
+FORMATS = {key: entry for key, entry in ALL_FORMATS.items() if not entry.folder}  # into which meshes are converted
 
 Items = set[object]
 Measured = tuple[str, str, bool, dict[str, str]]  # fact, source, is it in the mesh, target → outcome

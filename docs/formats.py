@@ -155,6 +155,23 @@ SU2's markers `SEND_RECEIVE` (periodic boundaries, parts of a partitioned mesh) 
 A file of any format may be compressed with gzip: its name then ends with `.gz` (`wing.su2.gz`). What it unpacks to is
 promised byte for byte. It is compressed anew (level 6, without a name or a time), so its packed bytes differ.
 
+A file of few digits (8 or 16 columns of Nastran, the 20 characters of a number that Abaqus and CalculiX read) gets new
+coordinates that fit. The guard judges what they become there, and the result is what is written. A conversion says by
+how much coordinates were rounded, and is refused where a cell would be inverted by it.
+
+OpenFOAM meshes are folders, and not among the samples below. `gmsnet smooth CASE --in-place` (or a copy of the case as
+output) splices `constant/polyMesh/points`, in text or binary, plain or `.gz`; no other file is written. One layer of
+cells between `empty` patches is read as the mesh of a plane, and both planes move together. Patches are markers, zones of
+cells regions; points of other zones are held. Polyhedra are read and held. No other format is converted into a case.
+
+What else these formats have:
+
+- Abaqus: `*PART` and `*INSTANCE` are read, each part in its own coordinates. `*INCLUDE`, `SYSTEM=` and generated nodes
+  are refused. Nodes in `*BOUNDARY`, `*CLOAD`, `*EQUATION` and `*MPC` are held; sets are names for `--fix`.
+- Nastran: nodes in another coordinate system (CP), INCLUDE and superelements are refused. Nodes of loads, supports,
+  rigid elements, springs, masses and unknown elements are held. Regions are properties.
+- UGRID: the form is part of the name (`.b8.ugrid`, `.lb8.ugrid`, `.r8.ugrid`, …; `.ugrid` is text).
+
 ## Smoothing: the same file with other coordinates
 
 The sample is made of the decimals of its points. It is read and written without smoothing: the same bytes. It is

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import gmsnet
 from fuzz.corpus import stored
-from fuzz.promises import MEMORY, PAIR, parts
+from fuzz.promises import MEMORY, NEXT, PAIR, parts
 from gmsnet.errors import InputError
 from gmsnet.io.formats import FORMATS
 
@@ -53,6 +53,7 @@ def bombs() -> Iterator[tuple[str, str, bytes, str]]:
     yield from _abaqus()
     yield from _nastran()
     yield from _ugrid()
+    yield from _openfoam()
 
 
 def _large_cells() -> Iterator[tuple[str, str, bytes, str]]:
@@ -155,6 +156,36 @@ def _ugrid() -> Iterator[tuple[str, str, bytes, str]]:
     )
 
 
+def _openfoam() -> Iterator[tuple[str, str, bytes, str]]:
+    head = b"FoamFile{format ascii;}\n"
+    two = (head + b"3((0 0 0)(1 0 0)(0 1 0))", head + b"2(3(0 1 2)3(0 2 1))", head + b"2(0 0)", head + b"0()")
+    walls = head + b"1(a{type wall;nFaces 2;startFace 0;})"
+    yield (
+        "openfoam",
+        "a list of one value",
+        NEXT.join((*two[:2], head + b"1000000000000{0}", two[3], walls)),
+        "more than the",
+    )
+    yield (
+        "openfoam",
+        "patches",
+        NEXT.join((*two, head + b"200000(" + b"a{nFaces 0;startFace 0;}" * 200_000 + b")")),
+        "200000",
+    )
+    many = head + b"1(a{" + b"{" * MANY + b"})"
+    yield "openfoam", "depth", NEXT.join((*two, many)), "has no startFace"
+    yield "openfoam", "remarks", NEXT.join((head + b"/*" * MANY, *two[1:], walls)), "a list such as"
+    yield (
+        "openfoam",
+        "brackets",
+        NEXT.join((two[0], head + b"1(" + b")" * 5 * MANY, *two[2:], walls)),
+        "announces 1 faces",
+    )
+    yield "openfoam", "remarks behind faces", NEXT.join((two[0], two[1] + b"\n//)" * MANY, *two[2:], walls)), ""
+    zone = b"a{type cellZone;cellLabels List<label> 0();}"
+    yield "openfoam", "zones", NEXT.join((*two, walls, head + zone * 200_000)), "more than 100000 zones"
+
+
 def _vtu() -> Iterator[tuple[str, str, bytes, str]]:
     yield "vtu", "depth", _grid(POINTS + CELLS + "<a>" * MANY + "</a>" * MANY), "more than 100 deep"
     yield "vtu", "a long tag", _grid(POINTS + CELLS + "<a" + " " * 5 * MANY + "/>"), READS
@@ -228,9 +259,17 @@ def with_little_memory(files: Sequence[tuple[str, bytes]]) -> list[tuple[str, fl
 
 def _write(folder: Path, stem: str, key: str, data: bytes) -> Path:
     files = parts(key, data)
+    path = _path(folder, stem, key)
+    path.parent.mkdir(exist_ok=True)
     for suffix, part in files.items():
-        (folder / f"{stem}{suffix}").write_bytes(part)
-    return folder / f"{stem}{next(iter(files))}"
+        (path.parent / (suffix if FORMATS[key].folder else f"{stem}{suffix}")).write_bytes(part)
+    return path
+
+
+def _path(folder: Path, stem: str, key: str) -> Path:
+    """Of the file that is read; that of a folder of files is its first."""
+    first = FORMATS[key].suffixes[0]
+    return folder / stem / first if FORMATS[key].folder else folder / f"{stem}{first}"
 
 
 def _read_all(folder: Path, keys: list[str]) -> None:
@@ -241,7 +280,7 @@ def _read_all(folder: Path, keys: list[str]) -> None:
                 gmsnet.read(_write(folder, "small", key, data), key)
     rows = []
     for k, key in enumerate(keys):
-        path = folder / f"{k}{FORMATS[key].suffixes[0]}"
+        path = _path(folder, f"{k}", key)
         have = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         room = have + MEMORY + path.stat().st_size
         resource.setrlimit(resource.RLIMIT_AS, (room, resource.getrlimit(resource.RLIMIT_AS)[1]))

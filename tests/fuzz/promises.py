@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import resource
+import shutil
 import time
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -23,6 +24,7 @@ SECONDS = 5.0  # of the processor, for one file
 MEMORY = 200_000_000  # bytes beyond the length of the file
 LONGEST = 500  # characters of a message, without the name of the file
 PAIR = b"\0"  # between the two files of Triangle, where both are one input
+NEXT = b"\0next file\0"  # between those of a folder
 
 
 # What is looked at together, so small that a file of a few lines has many seams; and any file counts as large.
@@ -33,7 +35,7 @@ SEAMS: dict[ModuleType, dict[str, int]] = {
     text: {"MOST_ROWS": 2},
     gmsh_sections: {"_TOGETHER": 8},
     stl: {"_TOGETHER": 2},
-    splice: {"_ROWS": 2, "_PIECE": 128},
+    splice: {"ROWS": 2, "_PIECE": 128},
 }
 
 
@@ -44,6 +46,10 @@ class Broken(AssertionError):
 def parts(key: str, data: bytes) -> dict[str, bytes]:
     """The files of an input by suffix."""
     suffixes = FORMATS[key].suffixes
+    if FORMATS[key].folder:
+        split = data.split(NEXT)
+        split += [b""] * (len(suffixes) - len(split))
+        return dict(zip((*suffixes, *FORMATS[key].optional), split, strict=False))
     return {suffixes[0]: data} if len(suffixes) == 1 else dict(zip(suffixes, (*data.split(PAIR, 1), b""), strict=False))
 
 
@@ -82,9 +88,15 @@ def _peak() -> int:
 
 
 def _write(files: Mapping[str, bytes], stem: Path) -> Path:
-    for suffix, part in files.items():
-        stem.with_suffix(suffix).write_bytes(part)
-    return stem.with_suffix(next(iter(files)))
+    if not next(iter(files)).startswith("."):  # a folder, with nothing of an earlier one in it
+        shutil.rmtree(stem, ignore_errors=True)
+        stem.mkdir()
+        stem = stem / "polyMesh"
+        stem.mkdir()
+    paths = [stem / name if stem.name == "polyMesh" else stem.with_suffix(name) for name in files]
+    for path, part in zip(paths, files.values(), strict=True):
+        path.write_bytes(part)
+    return paths[0]
 
 
 def _checked(message: str, path: Path) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fuzz.promises import PAIR
+from fuzz.promises import NEXT, PAIR
 from gmsnet.errors import FormatError
 from gmsnet.io.formats import FORMATS
 
@@ -21,6 +21,7 @@ import test_medit
 import test_nastran
 import test_obj
 import test_off
+import test_openfoam
 import test_ply
 import test_stl
 import test_su2
@@ -201,6 +202,11 @@ def seeds() -> Iterator[tuple[str, bytes]]:
     yield "ugrid", test_ugrid.PLAIN
     yield from (("ugrid", test_ugrid.in_form(key)) for key in test_ugrid.ugrid.FORMS)
     yield "ugrid", test_ugrid.in_form("b8") + b"more"
+    for lists in (test_openfoam.VOLUMES, test_openfoam.layer(2, 2)):
+        yield from (("openfoam", NEXT.join(make(lists).values())) for make in test_openfoam.FORMS.values())
+    zone = "1(a{type %sZone;%sLabels List<label> 1{0};})"
+    zones = [(test_openfoam.head("regIOobject", k) + zone % (k, k)).encode() for k in ("cell", "face", "point")]
+    yield "openfoam", NEXT.join((*test_openfoam.in_text(test_openfoam.VOLUMES).values(), *zones))
     yield from _written()
 
 

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.damage import facts, triangle_grid
+from support.formats import FILES
 
 from gmsnet import io
 from gmsnet.errors import InputError
@@ -36,7 +37,7 @@ def nudged(mesh: Mesh) -> Mesh:
     return mesh.with_points(points)
 
 
-@pytest.mark.parametrize("key", FORMATS)
+@pytest.mark.parametrize("key", FILES)
 def test_a_large_file_reads_and_writes_as_any_other(key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     suffix = FORMATS[key].suffixes[0]
     one, two, other = (tmp_path / f"{stem}{suffix}" for stem in ("one", "two", "other"))
@@ -53,7 +54,7 @@ def test_a_large_file_reads_and_writes_as_any_other(key: str, tmp_path: Path, mo
     assert two.read_bytes() == other.read_bytes()
 
 
-@pytest.mark.parametrize("key", FORMATS)
+@pytest.mark.parametrize("key", FILES)
 @pytest.mark.parametrize("meanwhile", ["truncated", "rewritten", "removed"])
 def test_what_happens_to_a_file_that_was_read_changes_nothing(key: str, meanwhile: str, tmp_path: Path) -> None:
     suffixes = FORMATS[key].suffixes
@@ -115,7 +116,7 @@ def test_a_file_that_changes_while_it_is_read_kills_no_process(moment: str, what
 
 
 def test_no_array_of_a_mesh_is_the_memory_of_its_file(tmp_path: Path) -> None:
-    for key, entry in FORMATS.items():
+    for key, entry in FILES.items():
         path = tmp_path / f"a{entry.suffixes[0]}"
         io.write(triangle_grid(), path)
         mesh = io.read(path)
@@ -226,9 +227,7 @@ def test_small_files_are_small(tmp_path: Path) -> None:
         contents.small(str(path), 4, "a list")
 
 
-@given(
-    st.lists(st.integers(0, 24), max_size=9), st.integers(48, 200), st.integers(1, 9), st.sampled_from(list(FORMATS))
-)
+@given(st.lists(st.integers(0, 24), max_size=9), st.integers(48, 200), st.integers(1, 9), st.sampled_from(list(FILES)))
 def test_files_are_written_in_pieces_of_any_size(moved: list[int], size: int, rows: int, key: str) -> None:
     module = FORMATS[key].load()
     files = {suffix: bytes(pieces) for suffix, pieces in module.write(triangle_grid()).files.items()}
@@ -238,7 +237,7 @@ def test_files_are_written_in_pieces_of_any_size(moved: list[int], size: int, ro
     whole = bytes(Pieces(lambda: parsed.slots.replace(data, parsed.points, points)))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(splice, "_PIECE", size)
-        patch.setattr(splice, "_ROWS", rows)
+        patch.setattr(splice, "ROWS", rows)
         patch.setattr(convert, "_PIECE", size)
         pieces = [bytes(piece) for piece in parsed.slots.replace(data, parsed.points, points)]
         again = {suffix: bytes(pieces) for suffix, pieces in module.write(triangle_grid()).files.items()}
@@ -246,12 +245,12 @@ def test_files_are_written_in_pieces_of_any_size(moved: list[int], size: int, ro
     assert again == files
 
 
-@pytest.mark.parametrize("key", FORMATS)
+@pytest.mark.parametrize("key", FILES)
 def test_writing_takes_no_memory_by_the_size_of_the_file(
     key: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(splice, "_PIECE", 1 << 12)
-    monkeypatch.setattr(splice, "_ROWS", 1 << 7)
+    monkeypatch.setattr(splice, "ROWS", 1 << 7)
     path, out = (tmp_path / f"{stem}{FORMATS[key].suffixes[0]}" for stem in ("in", "out"))
     io.write(triangle_grid(60), path)
     mesh = io.read(path)

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support.damage import damaged, triangle_grid
+from support.formats import FILES
 
 import gmsnet
 from gmsnet.errors import FormatError, InputError
@@ -32,7 +33,7 @@ def noisy() -> gmsnet.Mesh:
     return mesh.with_points(points)
 
 
-@pytest.mark.parametrize("key", FORMATS)
+@pytest.mark.parametrize("key", FILES)
 def test_a_packed_file_is_spliced_as_the_plain_one(key: str, tmp_path: Path) -> None:
     plain, inside = tmp_path / f"a{FORMATS[key].suffixes[0]}", [f"a{suffix}" for suffix in FORMATS[key].suffixes]
     gmsnet.write(noisy(), plain)

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.contracts import spliced
 from support.damage import triangle_grid
+from support.formats import FILES
 
 from gmsnet.io import FORMATS, read, write
 from gmsnet.io.places import Lattice, Places
@@ -115,7 +116,7 @@ def test_a_mesh_with_other_data_or_names_does_not_fit(change: dict) -> None:
     assert not source.fits(replace(mesh, **change))
 
 
-@pytest.mark.parametrize("key", FORMATS)
+@pytest.mark.parametrize("key", FILES)
 def test_new_coordinates_alone_are_spliced_in_every_format(key: str, tmp_path: Path) -> None:
     path, out = (tmp_path / (stem + FORMATS[key].suffixes[0]) for stem in ("in", "out"))
     write(triangle_grid(), path)

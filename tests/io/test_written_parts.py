@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.contracts import contents
 from support.damage import facts, triangle_grid
+from support.formats import FILES
 from support.gmsh_variants import VARIANTS
 
 from gmsnet.io import FORMATS, convert, gmsh, gmsh_sections, obj, places, stl, su2, text, vtk_cells
@@ -47,7 +48,7 @@ def mixed() -> Mesh:
 
 
 @pytest.mark.parametrize("most", [1, 2, 5])
-@pytest.mark.parametrize("key", FORMATS)
+@pytest.mark.parametrize("key", FILES)
 def test_every_format_in_parts(key: str, most: int) -> None:
     module = FORMATS[key].load()
     meshes = [triangle_grid(3)] if key in ("stl", "triangle") else [triangle_grid(3), mixed()]
@@ -81,7 +82,7 @@ def test_the_line_of_an_error_is_that_of_the_whole_file(module) -> None:  # type
             module.read({suffix: b"\n".join(lines)})
 
 
-@pytest.mark.parametrize("key", FORMATS)
+@pytest.mark.parametrize("key", FILES)
 def test_nothing_is_made_until_it_is_written(key: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise AssertionError

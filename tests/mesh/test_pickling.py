@@ -9,10 +9,11 @@ import weakref
 
 import numpy as np
 import pytest
+from support.formats import FILES
 
 import gmsnet
 from gmsnet.errors import InputError
-from gmsnet.io import FORMATS, contents, read, write
+from gmsnet.io import contents, read, write
 from gmsnet.io.formats import FORMATS as TABLE
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -75,7 +76,7 @@ def test_points_alone_stay_in_their_plane(full):
     assert again(bare).plane == bare.plane == (0, 2)
 
 
-@pytest.mark.parametrize("key", FORMATS)
+@pytest.mark.parametrize("key", FILES)
 @pytest.mark.parametrize("large", [False, True])
 def test_the_file_goes_along(key, large, tmp_path, monkeypatch):
     """What is written afterwards is the file with new coordinates, byte for byte; also if the file is gone."""

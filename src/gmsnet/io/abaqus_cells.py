@@ -15,6 +15,7 @@ from gmsnet.io.abaqus_sets import Ints, Numbers
 from gmsnet.io.abaqus_types import kind_of
 from gmsnet.io.cell_table import Kind
 from gmsnet.io.cells import joined
+from gmsnet.io.fields import short_in_abaqus
 from gmsnet.io.places import ranges
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Starts
@@ -95,7 +96,7 @@ class Contents:
         points, ends = deck.text.spans(starts)
         if (twice := self.nodes.repeated()) >= 0:
             deck.text.fail(int(starts[twice, 0]), "the number of this node was given to another one before")
-        return points, TextSlots(starts, ends)
+        return points, TextSlots(starts, ends, keep=short_in_abaqus)
 
     def connectivity(self, deck: Deck) -> Connectivity:
         """The nodes of all cells by their places. Raises FormatError for a number that is not there, or twice."""

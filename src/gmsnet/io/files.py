@@ -8,9 +8,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.atomic import reason, refuse_folder, replace_files
 from gmsnet.io.cells import sealed
@@ -21,7 +18,7 @@ from gmsnet.io.foam_case import file_in, mesh_folder
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
 from gmsnet.io.packed import MAGIC, is_packed, packed, split_name, unpacked
 from gmsnet.io.pieces import Piece, Pieces
-from gmsnet.io.splice import FileSource
+from gmsnet.io.splice import FileSource, most_rounded
 from gmsnet.io.stamps import Stamp, Stamps
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_output
 from gmsnet.mesh.mesh import Mesh, Source
@@ -203,8 +200,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     try:
         form = _form_for(source, entry, name)
         if isinstance(source, FileSource) and (source.format, source.form) == (entry.key, form) and source.fits(mesh):
-            points, lost = _as_kept(mesh, source)
-            files = source.splice(points)
+            lost = _rounded(mesh, source)
+            files = source.splice(mesh.points)
         else:
             written = entry.write(mesh, form)
             files, lost = dict(written.files), [*written.lost, *_unread(source)]
@@ -240,16 +237,12 @@ def _form_for(source: Source | None, entry: Entry, name: str) -> str:
     return source.form if isinstance(source, FileSource) and source.format == entry.key else ""
 
 
-def _as_kept(mesh: Mesh, source: FileSource) -> tuple[NDArray[np.float64], list[str]]:
-    """The points as the file that was read can keep them; and, in words, by how much they differ, if they do.
-
-    What ``smooth`` returns is so already.
-    """
-    if mesh.rounding is None:
-        return mesh.points, []
-    points = mesh.rounding.kept(source.points, mesh.points)
-    most = float(np.abs(points - mesh.points).max(initial=0.0))
-    return points, [f"coordinates were rounded to {mesh.rounding.words}, by at most {most:.2g}"] * (most > 0.0)
+def _rounded(mesh: Mesh, source: FileSource) -> list[str]:
+    """In words, by how much the file that was read keeps points differently. Those that ``smooth`` returns are so."""
+    most = most_rounded(mesh.rounding, source.points, mesh.points) if mesh.rounding else 0.0
+    return (
+        [f"coordinates were rounded to {mesh.rounding.words}, by at most {most:.2g}"] if mesh.rounding and most else []
+    )
 
 
 def _unread(source: Source | None) -> Iterator[str]:

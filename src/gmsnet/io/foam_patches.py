@@ -58,7 +58,8 @@ def patches(data: Data, faces: int, internal: int) -> list[Patch]:
         if patch.start != following:
             raise FormatError(f"boundary: the patch {patch.name[:24]!r} begins at face {patch.start}, not {following}")
         following += patch.faces
-    if uniform or len(found) != count or following != faces:
+    closed = at < len(words) and words[at].startswith(")")
+    if uniform or not closed or len(found) != count or following != faces:
         told = f"{len(found)} of {count} patches have {following - internal} of {faces - internal} faces"
         raise FormatError(f"boundary: {told}: is the file cut off?")
     return found

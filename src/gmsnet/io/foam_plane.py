@@ -21,10 +21,13 @@ NEAR = 1e-6  # of the extent: so near are two points of which one is behind the 
 
 
 class Plane(NamedTuple):
-    """points: (n,) those of the front plane; node: (N,) for which of them each point of the file stands."""
+    """points: (n,) those of the front plane; node: (N,) for which of them each point of the file stands; axes: of the
+    plane.
+    """
 
     points: Ints
     node: Ints
+    axes: tuple[int, int]
 
 
 def plane_of(points: NDArray[np.float64], faces: Faces, patches: list[Patch], cells: int) -> Plane | None:
@@ -42,20 +45,26 @@ def plane_of(points: NDArray[np.float64], faces: Faces, patches: list[Patch], ce
         spread = max(np.ptp(points[side, axis]) if side.any() else 0.0 for side in (back, ~back))
         if not back.any() or spread > NEAR * extent[axis] or back.sum() * 2 != len(points):
             continue
-        plane = _paired(points, np.delete(np.arange(3), axis), back, NEAR * float(extent.max()))
+        plane = _paired(points, ((1, 2), (0, 2), (0, 1))[axis], back, NEAR * float(extent.max()))
         if plane is not None and _is_one_layer(faces, plane, back, on_empty, cells):
             return plane
     return None
 
 
-def _paired(points: NDArray[np.float64], axes: Ints, back: NDArray[np.bool_], near: float) -> Plane | None:
+def _paired(points: NDArray[np.float64], axes: tuple[int, int], back: NDArray[np.bool_], near: float) -> Plane | None:
     front, behind = np.flatnonzero(~back), np.flatnonzero(back)
-    distance, mate = cKDTree(points[front][:, axes]).query(points[behind][:, axes])
-    if distance.max() > near or len(np.unique(mate)) != len(front):
-        return None
+    one, other = points[front][:, axes], points[behind][:, axes]
+    orders = np.lexsort(one.T), np.lexsort(other.T)
+    if np.array_equal(one[orders[0]], other[orders[1]]):
+        mate = np.empty_like(orders[0])
+        mate[orders[1]] = orders[0]
+    else:
+        distance, mate = cKDTree(one).query(other)
+        if distance.max() > near or len(np.unique(mate)) != len(front):
+            return None
     node = np.empty(len(points), dtype=np.int64)
     node[front], node[behind] = np.arange(len(front)), mate
-    return Plane(front, node)
+    return Plane(front, node, axes)
 
 
 def _is_one_layer(faces: Faces, plane: Plane, back: NDArray[np.bool_], on_empty: NDArray[np.bool_], cells: int) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.io import splice
 from gmsnet.io.contents import Data
 from gmsnet.io.nastran_lines import LARGE, WIDTH, Bulk, Cards, Ints
 from gmsnet.io.nastran_numbers import fitted
@@ -30,15 +31,18 @@ class FieldSlots:
 
     def replace(self, data: Data, old: Points, new: Points) -> Iterator[Piece]:
         """See Slots."""
-        node, axis = np.nonzero(old != new)
-        starts = self.starts[node, axis]
-        order = np.argsort(starts, kind="stable")
+        flat = self.starts.reshape(-1)
+        step = splice.ROWS if bool((flat[1:] > flat[:-1]).all()) else max(1, len(new))
         view, at = memoryview(data), 0
-        for k in order.tolist():
-            start, end = int(starts[k]), int(self.ends[node[k], axis[k]])
-            yield view[at:start]
-            yield self._field(bytes(view[start:end]), float(new[node[k], axis[k]]), int(node[k]))
-            at = end
+        for first in range(0, len(new), step):
+            some = slice(first, first + step)
+            node, axis = np.nonzero(old[some] != new[some])
+            for k in np.argsort(self.starts[some][node, axis], kind="stable").tolist():
+                where = first + int(node[k]), int(axis[k])
+                start, end = int(self.starts[where]), int(self.ends[where])
+                yield view[at:start]
+                yield self._field(bytes(view[start:end]), float(new[where]), where[0])
+                at = end
         yield view[at:]
 
     def _field(self, old: bytes, value: float, node: int) -> bytes:

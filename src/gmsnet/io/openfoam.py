@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gmsnet.cells.table import face_name
 from gmsnet.errors import FormatError
@@ -20,8 +19,8 @@ from gmsnet.io.document import Parsed, Written
 from gmsnet.io.foam_cells import Faces, Ints, volumes
 from gmsnet.io.foam_lists import coordinates, faces, head_of, labels
 from gmsnet.io.foam_patches import ZONES, Patch, patches, zones
-from gmsnet.io.foam_plane import cells_in, plane_of
-from gmsnet.io.places import ranges
+from gmsnet.io.foam_plane import Plane, cells_in, plane_of
+from gmsnet.io.places import Places, ranges
 from gmsnet.io.splice import BinarySlots, Slots, TextSlots
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -44,8 +43,8 @@ def read(files: Mapping[str, Data]) -> Parsed:
         back = np.ones(len(points), dtype=bool)
         back[plane.points] = False
         blocks = cells_in(plane, found, known, back, regions)
-        slots = _of_node(slots, plane.node)
-        points, held = sealed(points[plane.points]), np.unique(plane.node[held])
+        slots = _in_plane(slots, plane)
+        points, held = sealed(points[plane.points][:, plane.axes]), np.unique(plane.node[held])
     else:
         blocks = volumes(found, cells, regions) + _walls(found, known)
     dimension = 2 if plane is not None else 3
@@ -111,10 +110,16 @@ def _walls(found: Faces, known: list[Patch]) -> list[CellBlock]:
     return blocks
 
 
-def _of_node(slots: Slots, node: NDArray[np.int64]) -> Slots:
-    """The slots of all points where each stands for a node of the plane."""
-    assert isinstance(slots, (TextSlots, BinarySlots))
-    return replace(slots, node=sealed(node))
+def _in_plane(slots: Slots, plane: Plane) -> Slots:
+    """The slots of the two coordinates in a plane, where each point of the file stands for a node of it."""
+    node, axes = sealed(plane.node), list(plane.axes)
+    if isinstance(slots, TextSlots):
+        starts, ends = (np.ascontiguousarray(part[:, axes]) for part in (slots.starts, slots.ends))
+        return TextSlots(starts, ends, node)
+    assert isinstance(slots, BinarySlots)
+    columns = [replace(lattice, columns=tuple(lattice.columns[axis] for axis in axes)) for lattice in
+               slots.places.lattices]  # fmt: skip
+    return BinarySlots(Places(*columns), slots.dtype, node)
 
 
 def write(mesh: Mesh) -> Written:

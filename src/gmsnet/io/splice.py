@@ -22,9 +22,10 @@ from gmsnet.io.text import Starts, Text
 from gmsnet.kernels.text import text as kernels
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.rounding import Rounding
 
 _PIECE = 1 << 20  # bytes that are written at once
-_ROWS = 1 << 15  # of slots that are looked at together
+ROWS = 1 << 15  # of slots that are looked at together
 
 Points = NDArray[np.float64]
 
@@ -39,11 +40,14 @@ class Slots(Protocol):
 
 @dataclass(frozen=True)
 class TextSlots:
-    """Decimal numbers in a text. starts, ends: (rows × dim) byte span of each; node: (rows,) the node of each row."""
+    """Decimal numbers in a text. starts, ends: (rows × dim) byte span of each; node: (rows,) the node of each row.
+    keep: what the text may hold of points (n × dim) and their nodes, where that is not all (see Rounding).
+    """
 
     starts: Starts
     ends: Starts
     node: NDArray[np.int64] | None = None
+    keep: Callable[[Points, NDArray[np.int64]], Points] | None = None
 
     def replace(self, data: Data, old: Points, new: Points) -> Iterator[Piece]:
         """See Slots. Numbers are written as the shortest decimal that reads back as the same float64."""
@@ -64,20 +68,35 @@ class TextSlots:
         flat = self.starts.reshape(-1)
         ascending = bool((flat[1:] > flat[:-1]).all())
         rows, dim = self.starts.shape
-        step = _ROWS if ascending else max(1, rows)
+        step = ROWS if ascending else max(1, rows)
         differ = old != new
         for k in range(0, rows, step):
             some = slice(k, k + step)
             node = some if self.node is None else self.node[some]
             moved = differ[node, :dim]
-            starts, ends, values = self.starts[some][moved], self.ends[some][moved], new[node, :dim][moved]
+            points = new[node, :dim]
+            if self.keep is not None:
+                points = self.keep(points, np.arange(len(new))[node])
+            starts, ends, values = self.starts[some][moved], self.ends[some][moved], points[moved]
             order = slice(None) if ascending else np.argsort(starts)
             yield starts[order], ends[order], values[order]
 
 
+def most_rounded(rounding: Rounding, old: Points, new: Points) -> float:
+    """By how much the file that has the old points (N×dim) keeps one of the new ones differently, at most."""
+    most = 0.0
+    for k in range(0, len(new), ROWS):
+        some = slice(k, k + ROWS)
+        rounded = rounding.keep(new[some], np.arange(k, min(k + ROWS, len(new))))
+        most = max(most, float(np.abs(rounded - new[some])[old[some] != new[some]].max(initial=0.0)))
+    return most
+
+
 @dataclass(frozen=True)
 class BinarySlots:
-    """Binary floats. places: of all coordinates, three a row; dtype: '<f4', '>f8', …; node: (rows,) see TextSlots."""
+    """Binary floats. places: of all coordinates, as many a row as points have; dtype: '<f4', '>f8', …; node: (rows,)
+    see TextSlots.
+    """
 
     places: Places
     dtype: str
@@ -87,9 +106,9 @@ class BinarySlots:
         """See Slots."""
         at, row, size, differ = 0, 0, np.dtype(self.dtype).itemsize, old != new
         for lattice in self.places.lattices:
-            width = len(lattice.columns) // 3  # rows of slots in one of the lattice
-            for k in range(0, lattice.rows, _ROWS):
-                count = min(_ROWS, lattice.rows - k)
+            width = len(lattice.columns) // new.shape[1]  # rows of slots in one of the lattice
+            for k in range(0, lattice.rows, ROWS):
+                count = min(ROWS, lattice.rows - k)
                 some = slice(row, row + count * width)
                 row += count * width
                 node = some if self.node is None else self.node[some]
