@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import shutil
 
@@ -143,6 +144,7 @@ def test_a_dry_run_with_an_output_or_in_place_writes_neither(run, folder, tmp_pa
         (["{dir}", "-", "--out-dir", "{out}"], ["standard input has no name"]),
         (["{out}x*", "--out-dir", "{out}"], ["no file has such a name"]),
         (["{empty}", "--out-dir", "{out}"], ["no mesh files in this folder", ".su2"]),
+        (["{case}", "--out-dir", "{out}"], ["OpenFOAM case is smoothed by itself", "--in-place"]),
         (["{dir}/a.su2", "{copy}/a.su2", "--out-dir", "{out}"], ["would both be written to"]),
         (["{dir}/a.su2", "{dir}/a.vtk", "--out-dir", "{out}", "--output-format", "vtu"], ["both be written to"]),
         (["{dir}", "--out-dir", "{out}", "--output-format", "xyz"], ["unknown format 'xyz'"]),
@@ -153,7 +155,9 @@ def test_bad_usage_is_told_before_anything_is_read(run, folder, tmp_path, argume
     for name in ("empty", "copy"):
         (tmp_path / name).mkdir()
     shutil.copy(folder / "a.su2", tmp_path / "copy")
+    (tmp_path / "case" / "constant" / "polyMesh").mkdir(parents=True)
     places = {"dir": folder, "out": tmp_path / "out", "empty": tmp_path / "empty", "copy": tmp_path / "copy"}
+    places["case"] = tmp_path / "case"
     done = run("smooth", *(argument.format(**places) for argument in arguments))
     assert (done.code, done.out) == (2, "")
     assert all(word in done.err for word in words)
@@ -167,3 +171,11 @@ def test_a_folder_written_onto_itself_is_refused_file_by_file(run, folder):
     assert done.code == 2
     assert done.err.count("is the input") == 3
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_packed_files_of_a_folder_are_found(run, folder, tmp_path):
+    (tmp_path / "packed").mkdir()
+    (tmp_path / "packed" / "a.su2.gz").write_bytes(gzip.compress((folder / "a.su2").read_bytes()))
+    done = run("smooth", tmp_path / "packed", "--out-dir", tmp_path / "out")
+    assert done.code == 0, done.err
+    assert gzip.decompress((tmp_path / "out" / "a.su2.gz").read_bytes()) != (folder / "a.su2").read_bytes()

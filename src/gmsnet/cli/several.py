@@ -13,7 +13,9 @@ from gmsnet.cli.failure import BAD_INPUT, BUG, DONE, print_failure, told
 from gmsnet.cli.signals import Interrupted
 from gmsnet.errors import InputError
 from gmsnet.io.files import files_of
+from gmsnet.io.foam_case import mesh_folder
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, entry_of, known
+from gmsnet.io.packed import split_name
 from gmsnet.io.streams import STANDARD_INPUT
 from gmsnet.mesh.display import amount
 
@@ -76,7 +78,9 @@ def _expanded(name: str) -> list[str]:
     if os.path.isdir(name):
         suffixes = {entry.suffixes[0] for entry in FORMATS.values()}  # of pairs of files the one with the nodes
         inside = sorted(os.path.join(name, each) for each in os.listdir(name))
-        found = [path for path in inside if os.path.splitext(path)[1].lower() in suffixes and os.path.isfile(path)]
+        found = [path for path in inside if split_name(path)[1].lower() in suffixes and os.path.isfile(path)]
+        if not found and mesh_folder(name) is not None:
+            raise InputError(f"{name}: an OpenFOAM case is smoothed by itself: give --in-place, or a copy of it as OUT")
         if not found:
             raise InputError(f"{name}: there are no mesh files in this folder ({known()})")
         return found
