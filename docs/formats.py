@@ -159,10 +159,11 @@ A file of few digits (8 or 16 columns of Nastran, the 20 characters of a number 
 coordinates that fit. The guard judges what they become there, and the result is what is written. A conversion says by
 how much coordinates were rounded, and is refused where a cell would be inverted by it.
 
-OpenFOAM meshes are folders, and not among the samples below. `gmsnet smooth CASE --in-place` (or a copy of the case as
-output) splices `constant/polyMesh/points`, in text or binary, plain or `.gz`; no other file is written. One layer of
-cells between `empty` patches is read as the mesh of a plane, and both planes move together. Patches are markers, zones
-of cells regions; points of other zones are held. Polyhedra are read and held. No other format is converted into a case.
+OpenFOAM meshes are folders, and not among the samples below. `gmsnet smooth CASE --in-place` splices
+`constant/polyMesh/points`, in text or binary, plain or `.gz`; no other file is written. The output may also be a copy
+of the case. One layer of cells between `empty` patches is read as the mesh of a plane, and both planes move together.
+Patches are markers, zones of cells regions; points of other zones are held. Polyhedra are read and held. No other
+format is converted into a case.
 
 What else these formats have:
 

@@ -126,7 +126,10 @@ def fitted(value: float, width: int) -> str:
         value = min(max(value, -LARGEST), LARGEST)
         if value == 0.0:
             return "-0." if np.signbit(value) else "0."
-    plain, short = _plain(value, width), _scientific(value, width)
+    plain = _plain(value, width)
+    if plain is not None and 0.01 <= abs(value) < 10.0 ** (width - 3):  # an exponent would cost digits
+        return plain
+    short = _scientific(value, width)
     return min([short] if plain is None else [plain, short], key=lambda text: (abs(worth(text) - value), len(text)))
 
 
@@ -143,9 +146,11 @@ def worth(text: str) -> float:
 
 def _plain(value: float, width: int) -> str | None:
     """With a point and no exponent; None where there is no room."""
-    if abs(value) >= 10.0**width:
+    size = abs(value)
+    if size >= 10.0**width:
         return None
-    for places in range(min(width, 17 + max(0, 3)), -1, -1):
+    most = width - (value < 0.0) - 1 - (len(str(int(size))) if size >= 1.0 else 0)  # one less where all nines round up
+    for places in range(max(most, 0), -1, -1):
         text = _trimmed(f"{value:.{places}f}") if places else f"{value:.0f}."
         if len(text) <= width:
             return text if worth(text) != 0.0 else None
