@@ -29,6 +29,8 @@ EXCEPTIONS = {
     ("paper/units.py", "multiprocessing"),  # ``gmsnet reproduce`` shares its work among processes of its own
     ("paper/units.py", "multiprocessing.synchronize"),
     ("paper/units.py", "multiprocessing.synchronize.Event"),
+    ("gmsh/coordinates.py", "ctypes"),  # a function of the Gmsh that the user has loaded, called for each node
+    *(("gmsh/coordinates.py", f"ctypes.{name}") for name in ("addressof", "c_int", "cast", "CFUNCTYPE")),
 }
 CALLS = {
     "eval", "exec", "compile", "__import__", "breakpoint", "input", "os.system", "os.popen", "os.fork", "os.startfile",

@@ -100,8 +100,9 @@ def case_of(name: str, format: str | None) -> str | None:
 
     Raises InputError where this format is asked for and there is no such folder.
     """
-    folder = mesh_folder(name) if format is None or format.lower() == OPENFOAM else None
-    if folder is None and format is not None and format.lower() == OPENFOAM:
+    asked = isinstance(format, str) and format.lower() == OPENFOAM
+    folder = mesh_folder(name) if format is None or asked else None
+    if folder is None and asked:
         raise InputError(f"{name}: there is no mesh of an OpenFOAM case: give the folder that holds constant/polyMesh")
     return folder
 

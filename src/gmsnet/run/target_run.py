@@ -45,7 +45,7 @@ def reach_target(state: State, options: SmoothOptions, executor: Executor) -> St
     ``auto`` has a plan for each set of patches; another method is made anew for each. A patch's result is taken if
     fewer of its cells are inverted, or as many and fewer miss the target, or as many and the worst of them is better.
     """
-    if state.stop_reason:
+    if state.stop_reason and isinstance(state.topology, Volume):  # the sweeps before (sweep_stage) have ended it
         return state
     try:
         with interruptible():
