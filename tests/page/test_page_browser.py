@@ -138,6 +138,8 @@ def test_a_click_tells_the_cell_below_it(name, request, seen):
     found.page.click("#worst-after .go >> nth=2")
     if name == "volume":  # a plane that looks at the cell is drawn with others before it: any cell will do
         found.page.click("#whole")
+    else:  # the picture is drawn in its own time
+        found.page.wait_for_selector("#over path", state="attached")
     box = found.page.locator("#canvas").bounding_box()
     corners = found.page.evaluate(
         "(document.querySelector('#over path') || {getAttribute: () => ''}).getAttribute('d').match(/[-0-9.]+/g)"
