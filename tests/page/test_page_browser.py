@@ -121,6 +121,7 @@ def test_the_worst_cells_zoom_and_say_their_figures(name, request, seen):
     assert f" {worst['cell']} at " in said
     assert f"{worst['shape']:.3f} → " in said
     assert found.page.get_attribute("#worst-before .go >> nth=0", "aria-pressed") == "true"
+    found.page.wait_for_selector("#over path >> nth=1", state="attached")  # drawn in its own time
     assert found.page.locator("#over path").count() == 2
     assert changed(found.pixels(), whole) > 0.1
     found.page.click("#whole")
