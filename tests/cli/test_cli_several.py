@@ -141,6 +141,7 @@ def test_a_dry_run_with_an_output_or_in_place_writes_neither(run, folder, tmp_pa
         (["{dir}", "--out-dir", "{dir}/a.su2"], ["a.su2", "not a folder"]),
         (["{dir}", "--out-dir", "{out}", "--in-place"], ["--in-place is for one file"]),
         (["{dir}", "--out-dir", "{out}", "--plot", "{out}.png"], ["--plot is for one file"]),
+        (["{dir}", "--out-dir", "{out}", "--report", "{out}.html"], ["--report is for one file"]),
         (["{dir}", "-", "--out-dir", "{out}"], ["standard input has no name"]),
         (["{out}x*", "--out-dir", "{out}"], ["no file has such a name"]),
         (["{empty}", "--out-dir", "{out}"], ["no mesh files in this folder", ".su2"]),

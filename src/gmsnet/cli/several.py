@@ -28,18 +28,19 @@ class Job(NamedTuple):
     number: str
 
 
-def only_output(others: Sequence[str], out_dir: str | None, *, in_place: bool, plot: str | None) -> str | None:
+def only_output(others: Sequence[str], out_dir: str | None, given: Sequence[str]) -> str | None:
     """OUT of a call for one file, which is the one file beside IN; None of a call for several.
 
-    Raises InputError for options that are of no use with several files, and for several without a folder.
+    given: options that are for one file, of those that were given.
+
+    Raises InputError for these with several files, and for several without a folder.
     """
     if out_dir is None:
         if len(others) > 1:
             raise InputError("several inputs need a folder to be written to: give --out-dir FOLDER")
         return others[0] if others else None
-    if in_place or plot is not None:
-        option = "--in-place" if in_place else "--plot"
-        raise InputError(f"{option} is for one file: leave it out, or leave out --out-dir")
+    if given:
+        raise InputError(f"{given[0]} is for one file: leave it out, or leave out --out-dir")
     return None
 
 

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gmsnet.errors import InputError
-
 if TYPE_CHECKING:
     from gmsnet.cli.destination import Destination
     from gmsnet.mesh.mesh import Mesh
@@ -168,7 +166,8 @@ def smooth(
     from gmsnet.cli.destination import check_picture, check_report, destination_of, refuse_mixture
     from gmsnet.cli.several import Job, carry_out_each, jobs_of, only_output
 
-    output = only_output(others or [], out_dir, in_place=in_place, plot=plot)
+    single = {"--in-place": in_place, "--plot": plot is not None, "--report": report is not None}
+    output = only_output(others or [], out_dir, [option for option, given in single.items() if given])
     whole = None if out_dir is not None or (dry_run and output is None and not in_place) else destination_of(
         input, output, in_place, output_format
     )  # fmt: skip
@@ -177,8 +176,6 @@ def smooth(
     if plot is not None:
         check_picture(plot, input, whole)
     if report is not None:
-        if out_dir is not None:
-            raise InputError("--report shows one mesh: leave it out, or --out-dir")
         check_report(report, input, whole)
 
     # Heavy imports only now, when the command line is known to be in order.

@@ -14,7 +14,7 @@ from gmsnet.io.cells import sealed
 from gmsnet.io.contents import Data, is_open_pipe, load, refuse_unless_regular
 from gmsnet.io.convert import listed
 from gmsnet.io.document import Parsed
-from gmsnet.io.foam_case import file_in, mesh_folder
+from gmsnet.io.foam_case import OPENFOAM, case_of, file_in
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
 from gmsnet.io.packed import MAGIC, is_packed, packed, split_name, unpacked
 from gmsnet.io.pieces import Piece, Pieces
@@ -22,8 +22,6 @@ from gmsnet.io.splice import FileSource, most_rounded
 from gmsnet.io.stamps import Stamp, Stamps
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_output
 from gmsnet.mesh.mesh import Mesh, Source
-
-OPENFOAM = "openfoam"  # the format whose meshes are folders
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
@@ -93,18 +91,6 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
     if stream:
         raise InputError(f"{shown}: {entry.title} takes several files and cannot be read from a stream")
     return entry, {suffix: _loaded(_beside(name, suffix)) for suffix in entry.suffixes}
-
-
-def case_of(name: str, format: str | None) -> str | None:
-    """The folder of an OpenFOAM mesh that a path leads to; None where it is none, or another format is asked for.
-
-    Raises InputError where this format is asked for and there is no such folder.
-    """
-    asked = isinstance(format, str) and format.lower() == OPENFOAM
-    folder = mesh_folder(name) if format is None or asked else None
-    if folder is None and asked:
-        raise InputError(f"{name}: there is no mesh of an OpenFOAM case: give the folder that holds constant/polyMesh")
-    return folder
 
 
 def _is_stream(name: str) -> bool:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 
+from gmsnet.errors import InputError
+
 MESH = os.path.join("constant", "polyMesh")
 MAIN = "points"
 GZ = ".gz"
+OPENFOAM = "openfoam"  # the format whose meshes are folders
 
 
 def mesh_folder(path: str) -> str | None:
@@ -36,3 +39,15 @@ def file_in(folder: str, name: str, gz: bool = False) -> str:
     if os.path.exists(plain):
         return plain
     return plain + GZ if gz or os.path.exists(plain + GZ) else plain
+
+
+def case_of(name: str, format: str | None) -> str | None:
+    """The folder of an OpenFOAM mesh that a path leads to; None where it is none, or another format is asked for.
+
+    Raises InputError where this format is asked for and there is no such folder.
+    """
+    asked = isinstance(format, str) and format.lower() == OPENFOAM
+    folder = mesh_folder(name) if format is None or asked else None
+    if folder is None and asked:
+        raise InputError(f"{name}: there is no mesh of an OpenFOAM case: give the folder that holds constant/polyMesh")
+    return folder

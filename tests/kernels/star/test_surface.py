@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.surfaces import constraint, cylinder, sphere, turned
 
+from gmsnet.kernels.jit.compile import kernel
 from gmsnet.kernels.star.off_surface import farthest
 from gmsnet.kernels.star.surface import (
     CURVE,
@@ -20,9 +21,15 @@ from gmsnet.kernels.star.surface import (
     follow_curve,
     locate3,
     snap3,
-    snap_all,
     walk,
 )
+
+
+@kernel
+def snap_all(surface, rows, wanted, places):
+    """Where the nodes of rows (K,) go that would go to wanted (K, 3); into places (K, 3)."""
+    for i in range(len(rows)):
+        places[i, 0], places[i, 1], places[i, 2], _ = snap3(surface, rows[i], wanted[i, 0], wanted[i, 1], wanted[i, 2])
 
 
 def on_segments(p, a, b):

@@ -103,7 +103,7 @@ def summarise_tetrahedra(points, simplices, first, last, coarse, fine):
         count = min(LANES, len(rows) - start)
         gather(points, rows, orientation, start, count, work)
         cells += count
-        for lane in range(LANES if count == LANES else count):
+        for lane in range(count):
             ax, ay, az = work[lane], work[LANES + lane], work[2 * LANES + lane]
             bx, by, bz = work[3 * LANES + lane], work[4 * LANES + lane], work[5 * LANES + lane]
             cx, cy, cz = work[6 * LANES + lane], work[7 * LANES + lane], work[8 * LANES + lane]

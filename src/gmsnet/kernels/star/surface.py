@@ -245,10 +245,3 @@ def locate3(surface, points):
         if row >= 0:
             _, _, _, place = snap3(surface, row, points[node, 0], points[node, 1], points[node, 2])
             surface.place[row] = place
-
-
-@kernel
-def snap_all(surface, rows, wanted, places):
-    """Where the nodes of rows (K,) go that would go to wanted (K, 3); into places (K, 3)."""
-    for i in range(len(rows)):
-        places[i, 0], places[i, 1], places[i, 2], _ = snap3(surface, rows[i], wanted[i, 0], wanted[i, 1], wanted[i, 2])
