@@ -18,7 +18,7 @@ from gmsnet.measure.report import ASPECT, QualityReport, measure
 from gmsnet.measure.target import Target
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.display import plain
-from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured
+from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured, unmoved
 from gmsnet.mesh.selection import fixed_mask
 from gmsnet.methods import Smoother, StarSmoother
 from gmsnet.methods.auto import Auto
@@ -145,7 +145,7 @@ def _first_of_volume(
         topology = Volume.made(wound, surface[1].slides | surface[1].curves.slides)
         sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free)
     remarks = held_anyway(asked, topology, fixed, options.slides)
-    if others := unmeasured(given):
+    if others := unmoved(given):
         remarks.append(f"not measured, and their nodes are held: {others}")
     given = given.without_cells()
     start = taken(space_points(given), topology.memory)
