@@ -90,8 +90,8 @@ def propose3(sums, power, relaxation, step):
 def settle3(workspace, unit, grain, last, mixture=None):
     """Which lanes may go as they are: certified, and F falls. Where F does not fall the step is halved; counts them.
 
-    mixture: of the blocks. last: there is no further trial, and such steps become zero. What falls and is not certified may be so in float64:
-    halved, a sliver's step would be no more certain, and lead nowhere.
+    mixture: of the blocks. last: there is no further trial, and such steps become zero. What falls and is not certified
+    may be so in float64: halved, a sliver's step would be no more certain, and lead nowhere.
     """
     certify3(workspace, unit, grain, mixture)
     sums, step, refused = workspace.sums, workspace.step, 0

@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.methods.adam import BETA_1, BETA_2, EPSILON, GAIN
 from gmsnet.kernels.simplex.mean_ratio3 import determinant
 from gmsnet.kernels.simplex.objectives3 import (
@@ -56,8 +56,8 @@ FREE, ON_PATCH, ON_CURVE = range(3)  # where a node may go
 def keep_weights(weights, ends, k):
     """Writes them behind the spokes; those of tetrahedra need no place."""
     if weights is not None:
-        for j in range(6):
-            ends[k, 9 + j] = weights[j]
+        ends[k, 9], ends[k, 10], ends[k, 11] = weights.a, weights.b, weights.c
+        ends[k, 12], ends[k, 13], ends[k, 14] = weights.ab, weights.bc, weights.ca
 
 
 @inlined
@@ -70,7 +70,8 @@ def ends_for(mixture, most):
 
 @part
 def gather3(points, blocks, block, lane, ends):
-    """Writes where the spokes of the simplices of one lane end, from its node and over its radius, into (F, 9); (F, 15) with its weights.
+    """Writes where the spokes of the simplices of one lane end, from its node and over its radius, into (F, 9), or
+    with the weights of each into (F, 15).
 
     Returns F and the radius.
     """

@@ -11,7 +11,8 @@ With G = W⁻¹W⁻ᵀ they are w_ab = −G_ab and w_a = G_aa + G_ab + G_ac. The
 
 so that one floor serves all of them. The weights are 1 throughout where W is the corner of a regular tetrahedron, and
 2·2^(1/3) for the spokes alone at the corner of a cube. η is 12·(3V)^(2/3)/Σl² of a tetrahedron of volume V = D/6 (Liu,
-Joe: On the shape of tetrahedra from bisection, Mathematics of Computation 63, 1994). Seen from v, which moves, with the spokes to fixed places,
+Joe: On the shape of tetrahedra from bisection, Mathematics of Computation 63, 1994). Seen from v, which moves, with the
+spokes to fixed places,
 
     w = (b − a) × (c − a),  D = a·w,  ∇D = −w,  ∇²D = 0,
     s = w_a a + w_b b + w_c c,  σ = w_a + w_b + w_c,  ∇S = −2s,  ∇²S = 2σI.
@@ -51,6 +52,17 @@ WEIGHTS3 = np.array([
 WEIGHTS3.flags.writeable = False
 
 
+class Weights3(NamedTuple):
+    """Of the squared edges of a corner simplex: the spokes, and the edges opposite to them."""
+
+    a: float
+    b: float
+    c: float
+    ab: float
+    bc: float
+    ca: float
+
+
 class Tetrahedra(NamedTuple):
     """Corner simplices of cells in space.
 
@@ -79,8 +91,9 @@ class Tetrahedra(NamedTuple):
 
 
 class Solids(NamedTuple):
-    """Cells of all kinds. nodes: (T, 8), of positive sense, behind the corners the first one again. kind: (T,) as above.
+    """Cells of all kinds.
 
+    nodes: (T, 8), of positive sense, behind the corners the first one again. kind: (T,) as above.
     hexahedron, wedge: the forms of their Jacobian determinants (gmsnet.cells.jacobian).
     """
 
@@ -104,7 +117,7 @@ def weights_at(shapes, t):
     if shapes is None:
         return None
     w = shapes[t]
-    return WEIGHTS3[w, 0], WEIGHTS3[w, 1], WEIGHTS3[w, 2], WEIGHTS3[w, 3], WEIGHTS3[w, 4], WEIGHTS3[w, 5]
+    return Weights3(WEIGHTS3[w, 0], WEIGHTS3[w, 1], WEIGHTS3[w, 2], WEIGHTS3[w, 3], WEIGHTS3[w, 4], WEIGHTS3[w, 5])
 
 
 @inlined
@@ -161,7 +174,7 @@ def measured_as(ax, ay, az, bx, by, bz, cx, cy, cz, weights):
     if weights is None:
         return measured(ax, ay, az, bx, by, bz, cx, cy, cz)
     return measured_by(
-        ax, ay, az, bx, by, bz, cx, cy, cz, weights[0], weights[1], weights[2], weights[3], weights[4], weights[5]
+        ax, ay, az, bx, by, bz, cx, cy, cz, weights.a, weights.b, weights.c, weights.ab, weights.bc, weights.ca
     )
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import inlined, part
 from gmsnet.kernels.simplex.dihedral3 import dihedrals
-from gmsnet.kernels.simplex.mean_ratio3 import REGULAR, derivatives, measured_as
+from gmsnet.kernels.simplex.mean_ratio3 import REGULAR, Weights3, derivatives, measured_as
 
 METRIC, Q, Q2, DIHEDRAL = range(4)
 NAMES = ("metric", "q", "q2")  # that a user may choose from
@@ -46,7 +46,7 @@ def kept_weights(mixture, e):
     """Those behind the spokes; None for a tetrahedron."""
     if mixture is None:
         return None
-    return e[9], e[10], e[11], e[12], e[13], e[14]
+    return Weights3(e[9], e[10], e[11], e[12], e[13], e[14])
 
 
 @inlined
@@ -54,7 +54,7 @@ def sigma_of(weights):
     """σ."""
     if weights is None:
         return 3.0
-    return (weights[0] + weights[1]) + weights[2]
+    return (weights.a + weights.b) + weights.c
 
 
 @inlined

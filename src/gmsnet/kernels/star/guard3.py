@@ -18,10 +18,11 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.jit.vectors import WIDTH as LANES3
-from gmsnet.kernels.simplex.jacobian3 import certified_solid, solid_workspace
-from gmsnet.kernels.simplex.mean_ratio3 import HEXAHEDRON, same_cell3, square, weights_at
+from gmsnet.kernels.simplex.jacobian3 import solid_workspace
+from gmsnet.kernels.simplex.mean_ratio3 import same_cell3, square, weights_at
 from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, largest_component
 from gmsnet.kernels.simplex.predicates import UNIT
+from gmsnet.kernels.simplex.solid_measures import certainly_valid
 
 MIXED_BOUND = 2.0  # times ``error_bound3`` where cells are not all tetrahedra
 LARGEST3 = 0.0481126  # above D/S^(3/2) of a regular tetrahedron, 1/√432
@@ -67,7 +68,7 @@ def length_bounds_by(ax, ay, az, bx, by, bz, cx, cy, cz, delta, weights=None):
     """
     if weights is None:
         return length_bounds(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
-    wa, wb, wc, wab, wbc, wca = weights
+    wa, wb, wc, wab, wbc, wca = weights.a, weights.b, weights.c, weights.ab, weights.bc, weights.ca
     a, b, c = square(ax, ay, az), square(bx, by, bz), square(cx, cy, cz)
     ab, bc, ca = square(bx - ax, by - ay, bz - az), square(cx - bx, cy - by, cz - bz), square(ax - cx, ay - cy, az - cz)
     whole = ((a * wa + b * wb) + c * wc) + ((ab * wab + bc * wbc) + ca * wca)
@@ -167,12 +168,6 @@ def sound(mixture, points, i, x, y, z, unit, grain):
     if mixture is not None:
         solids, work = mixture.solids, solid_workspace()
         for k in range(mixture.at[i], mixture.at[i + 1]):
-            cell = mixture.around[k]
-            nodes = solids.nodes[cell]
-            if solids.kind[cell] == HEXAHEDRON:
-                certain = certified_solid(points, nodes, solids.hexahedron, 1.0, unit, grain, i, x, y, z, work)
-            else:
-                certain = certified_solid(points, nodes, solids.wedge, 1.0, unit, grain, i, x, y, z, work)
-            if not certain:
+            if not certainly_valid(points, solids, mixture.around[k], unit, grain, i, x, y, z, work):
                 return False
     return True

@@ -100,7 +100,7 @@ def weights_in_row(mixture, at, k):
     if mixture is None:
         return None
     w, exact = np.int64(mixture.role[at // (3 * LANES3) + k]), mixture.exact
-    return exact[w, 0], exact[w, 1], exact[w, 2], exact[w, 3], exact[w, 4], exact[w, 5]
+    return mean_ratio3.Weights3(exact[w, 0], exact[w, 1], exact[w, 2], exact[w, 3], exact[w, 4], exact[w, 5])
 
 
 @intrinsic
@@ -202,12 +202,13 @@ class _Rows:
 
     def weight(self, row: Any, first: int, last: int) -> list[Vector]:
         """Those of a mixture, by their places."""
-        role = self.builder.load(self.builder.gep(self.role, [self.builder.add(self.first, row)]))
-        place = self.builder.shl(self.builder.zext(role, INDEX), index(3))
+        builder = self.builder
+        role = builder.load(builder.gep(self.role, [builder.add(self.first, row)]))
+        place = builder.shl(builder.zext(role, INDEX), index(3))
         return [
-            broadcast(self.builder, self.builder.load(self.builder.gep(self.weights, [self.builder.add(place, index(k))])))
+            broadcast(builder, builder.load(builder.gep(self.weights, [builder.add(place, index(k))])))
             for k in range(first, last)
-        ]  # fmt: skip
+        ]
 
 
 @intrinsic
