@@ -42,6 +42,7 @@ _FAMILIES: dict[int, tuple[Any, tuple[Index, ...]]] = {
     8: (_LINES, tuple((*at, level) for level in (4, 5) for at in _SQUARE)),
     5: (_LINES[:2], _SQUARE),
 }
+_VOLUMES = {4: 1.0 / 6.0, 5: 1.0 / 3.0, 6: 0.5, 8: 1.0}  # by corners
 
 
 class JacobianForm(NamedTuple):
@@ -61,7 +62,8 @@ class JacobianForm(NamedTuple):
     vertices of all factors; at: (corners, 3) those of each corner, whose coordinates add up; −1 fills up.
 
     nodes: how many. spread: the largest sum of absolute weights of a row that is not scaled. deviation: roundings of a
-    row; roundings: of one coefficient at most, from the rows on; halving: of one halving.
+    row; roundings: of one coefficient at most, from the rows on; halving: of one halving. volume: of a cell whose
+    coefficients are all 1; a cell's volume is that times the mean coefficient.
     """
 
     ints: Ints
@@ -93,6 +95,7 @@ class JacobianForm(NamedTuple):
     deviation: float
     roundings: float
     halving: float
+    volume: float
 
 
 def has_form(name: str) -> bool:
@@ -130,9 +133,8 @@ def form_of(name: str) -> JacobianForm:
     sums = np.bincount(product.ravel()).max() + np.bincount(coefficient.ravel()).max()
     counts = [kind.nodes, len(u), len(v), len(w), len(crosses), len(found), len(at), len(cut), len(frame)]
     spread, deviation = float(max(np.abs(row).sum() for row in rows)), float(np.diff(start).max() + 2)
-    return JacobianForm._make(
-        [ints, floats, *first, *then, *counts, spread, deviation, float(sums + 8), float(max(top) + 1)]
-    )
+    bounds = [spread, deviation, float(sums + 8), float(max(top) + 1), _VOLUMES[kind.corners or 0]]
+    return JacobianForm._make([ints, floats, *first, *then, *counts, *bounds])
 
 
 def _packed(tables: tuple[Any, ...], dtype: type) -> tuple[NDArray[Any], list[Any]]:

@@ -25,7 +25,7 @@ def judge_volumes(
 ) -> tuple[Signs, Floats]:  # fmt: skip
     """(C,) the sign of orientation × det J throughout each cell, and (C, 3) where a cell is not valid.
 
-    points: (N, 3) float64, C-contiguous. cells: (C, n) of one kind in the order of VTK; ``name`` is meshio's.
+    points: (N, 3 or more) float64, C-contiguous. cells: (C, n) of one kind in the order of VTK; ``name`` is meshio's.
     The sign is VALID = 1 where det J is positive everywhere in the cell, corners included. INVALID = −1: it is not, at
     the place given in reference coordinates. UNDECIDED = 0: even exact arithmetic does not tell after ``depth``
     halvings of the cell, DEPTH at most. The place of a valid cell is nan. KeyError for kinds without a form, see
@@ -35,8 +35,9 @@ def judge_volumes(
     sign, place = np.zeros(len(cells), dtype=np.int8), np.full((len(cells), 3), np.nan)
     judge_solids(points, cells, form, orientation, precision.unit, precision.grain, depth, 0, len(cells), sign, place)
     doubtful = np.flatnonzero(sign == UNDECIDED)
-    for some in np.array_split(doubtful, -(-len(doubtful) // AT_ONCE) or 1):
-        sign[some], place[some] = exact_signs_of(points[cells[some]], form, orientation[some], depth)
+    for first in range(0, len(doubtful), AT_ONCE):
+        some = doubtful[first : first + AT_ONCE]
+        sign[some], place[some] = exact_signs_of(points[cells[some], :3], form, orientation[some], depth)
     return sign, place
 
 

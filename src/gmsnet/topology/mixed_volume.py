@@ -20,7 +20,7 @@ from gmsnet.kernels.topology import solids as kernels
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.held import AT_BOUNDARY, reasons_in_space, released, sorted_out
 from gmsnet.topology.polygons import Ints
-from gmsnet.topology.solids import WoundSolids, has_solids, roles, tables
+from gmsnet.topology.solids import KINDS, WoundSolids, has_solids, roles, tables
 from gmsnet.topology.stars import Colouring, Stars
 from gmsnet.topology.volume import MOST, Flags, Volume
 from gmsnet.topology.wound import Wound
@@ -34,7 +34,8 @@ class MixedVolume(Volume):
     else belongs to them. core, edges: (N,) how many of the nodes around a node are in its simplices, and how many are
     joined to it by an edge: the first of its ring. role, owner: (M,) of the simplices at nodes (kernels.star.space).
     order: (N,) by which stars stand beside one another. inexact_at, inexact: in CSR form the cells at each node that
-    may be invalid though their corner simplices are positive.
+    may be invalid though their corner simplices are positive. file_numbers: (T,) the kind of each cell in file order, a
+    number in file_kinds.
     """
 
     all_simplices: Tetrahedra
@@ -45,6 +46,8 @@ class MixedVolume(Volume):
     order: NDArray[np.int64]
     inexact_at: NDArray[np.int64]
     inexact: Ints
+    file_numbers: NDArray[np.uint8]
+    file_kinds = KINDS
 
     @classmethod
     def mixed(cls, wound: WoundSolids, slides: Flags | None = None) -> MixedVolume:
@@ -84,6 +87,8 @@ class MixedVolume(Volume):
         inexact_at = np.concatenate([[0], np.cumsum(np.bincount(node[chosen], minlength=count))])
         of_file = np.empty_like(wound.orientation)
         of_file[wound.origin] = wound.orientation
+        kinds = np.empty_like(kind)
+        kinds[wound.origin] = kind
         simplices = wound.simplices
         assert simplices.cells is not None
         padded = np.append(ring[:end], np.zeros(connectivity.WIDTH, dtype=np.int32))
@@ -91,8 +96,14 @@ class MixedVolume(Volume):
             wound.cell, wound.cells, of_file, simplices.rows, simplices.orientation, wound.origin[simplices.cells], own,
             local[:total].copy(), ring_start, ring[:end].copy(), Colouring(places, ring_start, padded), slid,
             simplices, core, edges, role[:total].copy(), owner[:total].copy(), order.astype(np.int64), inexact_at,
-            cell[chosen], held=held, free=free, memory=wound.memory, near_free=marks == 0,
+            cell[chosen], kinds, held=held, free=free, memory=wound.memory, near_free=marks == 0,
         )  # fmt: skip
+
+    @property
+    def inside_out(self) -> str:
+        """How many cells of which kinds are read in the other order, tetrahedra apart: "" if there are none."""
+        counts = np.bincount(self.file_numbers[self.orientation < 0], minlength=len(KINDS))[1:].tolist()
+        return ", ".join(f"{count:,} {name}" for name, count in zip(KINDS[1:], counts, strict=True) if count)
 
     @property
     def simplices(self) -> Tetrahedra:  # type: ignore[override]

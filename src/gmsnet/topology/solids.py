@@ -85,7 +85,8 @@ class WoundSolids:
 
     cell: (T,) the index of each among all cells of the mesh, and cells: (T, 8) their nodes, behind the corners the
     first one again, in file order. By places in memory: solids; corners (T,) how many; orientation (T,) int8, −1 for
-    what the file has inside out; region (T,), or none (0,) where all are the same; origin: the place in file order of each.
+    what the file has inside out; region (T,), or none (0,) where all are the same; origin: the place in file order
+    of each.
     twin: (6T,) the facet across each. marks, memory, position: as of Wound.
     """
 

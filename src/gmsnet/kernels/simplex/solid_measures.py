@@ -54,9 +54,8 @@ def summarise_solids(points, simplices, first, last, coarse, fine):
             t += 1
         invalid = shape <= 0.0
         if not doubtful:
-            doubtful = not certainly_valid(
-                points, simplices.solids, simplices.cells[here], 0.0, 0.0, -1, 0.0, 0.0, 0.0, work
-            )
+            cell = simplices.cells[here]
+            doubtful = not certainly_valid(points, solids, cell, 0.0, 0.0, -1, 0.0, 0.0, 0.0, work)
             invalid = doubtful
         high = (shape + coarse) - coarse
         out[COARSE] += high

@@ -222,3 +222,27 @@ def lower_bounds(points, cells, form, orientation, unit, grain, first, last, low
     for c in range(first, last):
         delta = unit * gather_solid(points, cells[c], form, -1, 0.0, 0.0, 0.0, work) + grain
         lower[c] = minimum_of_solid(form, expand_solid(form, orientation[c], delta, work), work)
+
+
+@kernel
+def volumes_of_solids(points, cells, form, volume):
+    """The signed volume of each cell of one kind (C, n), into ``volume`` (C,): the mean of det J's coefficients."""
+    work = solid_workspace()
+    for c in range(len(cells)):
+        gather_solid(points, cells[c], form, -1, 0.0, 0.0, 0.0, work)
+        expand_solid(form, 1.0, 0.0, work)
+        total = 0.0
+        for k in range(form.terms):
+            total += work[COEFFICIENTS + k]
+        volume[c] = form.volume * total / form.terms
+
+
+@kernel
+def corners_of_solids(points, cells, form, orientation, values):
+    """det J at the corners of each cell of one kind (C, n), into ``values`` (C, corners)."""
+    work = solid_workspace()
+    for c in range(len(cells)):
+        gather_solid(points, cells[c], form, -1, 0.0, 0.0, 0.0, work)
+        expand_solid(form, orientation[c], 0.0, work)
+        for k in range(form.corners):
+            values[c, k] = work[COEFFICIENTS + form.ints[form.corner + k]]
