@@ -34,6 +34,16 @@ def of_corners(points: Floats, nodes: NDArray[np.int32], kind: CellKind, orienta
     return found
 
 
+def straight_size(points: Floats, nodes: NDArray[np.int32], kind: CellKind) -> Floats:
+    """(C,) the mean of the determinants at the corners of cells with straight edges."""
+    total = np.zeros(len(nodes))
+    for first in range(0, len(nodes), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        at = points[nodes[some, : kind.corners], :3]
+        total[some] = np.mean([_determinant(_spokes(at, simplex)) for simplex in kind.simplices], axis=0)
+    return total
+
+
 def _of_some(at: Floats, kind: CellKind, orientation: Floats) -> Floats:
     """The same of the corners (C, corners, 3) of some."""
     low, high = np.full(len(at), np.inf), np.full(len(at), -np.inf)

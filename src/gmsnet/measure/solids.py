@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gmsnet.cells.jacobian import form_of, has_form
 from gmsnet.cells.table import CELLS
 from gmsnet.kernels.simplex.validity3 import INVALID, UNDECIDED, corners_of_solids, lower_bounds, volumes_of_solids
-from gmsnet.measure.corners import of_corners
+from gmsnet.measure.corners import of_corners, straight_size
 from gmsnet.measure.solid import judge_volumes
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.plane import exponent_of
@@ -57,7 +57,7 @@ class MeasuredSolids:
     def of(cls, mesh: Mesh) -> tuple[MeasuredSolids, NDArray[np.int64]]:
         """Those of a mesh, and the index of each among all its cells.
 
-        Cells of a kind are read inside out where det J is negative at the corners of most of them.
+        Cells of a kind are read inside out where most of them, with straight edges, have a negative size.
         """
         blocks, before = [], 0
         points = space_points(mesh)
@@ -65,7 +65,7 @@ class MeasuredSolids:
             if has_form(block.kind) and len(block.nodes):
                 nodes = block.nodes.astype(np.int32)
                 orientation = np.ones(len(nodes), dtype=np.int8)
-                corners = _at_corners(points, nodes, block.kind, orientation).sum(axis=1)
+                corners = straight_size(points, nodes, CELLS[block.kind])
                 if int((corners < 0.0).sum()) > int((corners > 0.0).sum()):
                     orientation *= -1
                 blocks.append(Solids(block.kind, nodes, np.arange(before, before + len(nodes)), orientation))
@@ -120,7 +120,10 @@ class MeasuredSolids:
 
     def at_corners(self, block: Solids) -> Floats:
         """(C, corners) det J at the corners of some cells, in units of their own; of pyramids at those of the base."""
-        return _at_corners(space_points(self), block.nodes, block.kind, block.orientation)
+        form = form_of(block.kind)
+        values = np.empty((len(block.nodes), form.corners))
+        corners_of_solids(space_points(self), block.nodes, form, block.orientation, values)
+        return values
 
     @cached_property
     def exponent(self) -> int:
@@ -191,10 +194,3 @@ class MeasuredSolids:
             corners = CELLS[block.kind].corners or 1
             found.append((self.points / corners)[block.nodes[:, :corners]].sum(axis=1))
         return self.in_order(np.concatenate(found).T).T
-
-
-def _at_corners(points: Floats, nodes: NDArray[np.int32], kind: str, orientation: Signs) -> Floats:
-    form = form_of(kind)
-    values = np.empty((len(nodes), form.corners))
-    corners_of_solids(points, nodes, form, orientation, values)
-    return values
