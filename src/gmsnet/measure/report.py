@@ -22,6 +22,7 @@ from gmsnet.mesh.display import html_table, text_table
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
+from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
 from gmsnet.topology.ordering import near_points, space_points, taken
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
@@ -324,14 +325,19 @@ def _of_any_volumes(mesh: Mesh) -> QualityReport:
 
 def connectivity_of(mesh: Mesh, fixed: NDArray[np.bool_] | None = None) -> Topology | Volume:
     """What follows from the connectivity of a mesh, of its volumes where it has any."""
-    return Volume.of(mesh, fixed) if mesh.has_volumes else Topology.of(mesh, fixed)
+    return volume_of(wound_of(mesh, fixed)) if mesh.has_volumes else Topology.of(mesh, fixed)
 
 
 def _of_volume(
     mesh: Mesh, topology: Volume, near: Floats | None, executor: Executor, totals: Totals | None
 ) -> QualityReport:
-    """``measure`` of a mesh of tetrahedra."""
-    cells, cell = MeasuredTetrahedra.of(mesh, topology)
+    """``measure`` of a mesh of volumes that a connectivity has."""
+    cells: MeasuredTetrahedra | MeasuredSolids
+    if isinstance(topology, MixedVolume):
+        kind, kinds = topology.file_numbers, topology.file_kinds
+        cells, cell = MeasuredSolids.of_table(mesh, topology.cells, kind, kinds, topology.cell, topology.orientation)
+    else:
+        cells, cell = MeasuredTetrahedra.of(mesh, topology)
     if not len(cell):
         return QualityReport(cell, None, cells, None)
     near = taken(space_points(mesh), topology.memory) if near is None else near

@@ -28,12 +28,14 @@ from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.stars import Stars
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
 CELLS = ("triangle", "quad")  # the kinds of cells whose nodes may move
-ALL_CELLS = (*CELLS, "tetra")
+TETRAHEDRA = (*CELLS, "tetra")
+ALL_CELLS = (*TETRAHEDRA, "hexahedron", "wedge", "pyramid")
 TRIANGLES = ("triangle",)
 Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.star.stars)
 
@@ -60,6 +62,8 @@ class Field:
 
     def guard(self, executor: Executor) -> Guard:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
+        if isinstance(self.topology, MixedVolume):
+            self.topology.lend_slack(self)
         if self.level == WORST:
             floor = self.floor.of(self.points, self.topology, self.precision, executor)
             return MeshGuard(*self.precision, floor, self.constraint)
