@@ -16,11 +16,12 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume
 
 ALIKE = 1.03  # times the median of 432·η⁻³: else sweeps go on for little
+FEW = 1000  # free nodes: of more the passes take longer than all else
 PASSES, STILL = 60, 1e-9  # and of the mesh's extent: what no node moves by in the last one
 
 
 class ToTheEnd(Smoother):
-    """One sweep is all passes; none where corners are not alike."""
+    """One sweep is all passes; none where corners are not alike, or nodes are many."""
 
     def sweep(self, field: Field, executor: Executor, test: object) -> Tally:
         """See Smoother."""
@@ -28,7 +29,7 @@ class ToTheEnd(Smoother):
         topology = field.topology
         assert isinstance(topology, Volume)
         ratios = ratios_of(field.points, topology.changeable, executor)
-        if not len(ratios) or ratios.max() > ALIKE * float(np.median(ratios)):
+        if not len(ratios) or len(topology.free) > FEW or ratios.max() > ALIKE * float(np.median(ratios)):
             return tally
         guard, stars = field.guard(executor), field.topology.stars
         extent = float(np.ptp(field.points[:, :3], axis=0).max())

@@ -5,10 +5,10 @@ has 27 Bernstein coefficients, 9 on a wedge, all of them means of determinants o
 component of an edge, and coordinates known up to ±δ, these are off by 128u·m³ + δ(80m² + δ(160m + 100δ)) at most: a
 determinant by 50u·m³ for its rounding and 36δm² + 72δ²m + 48δ³ (kernels.simplex.orientation3), their sums by as much.
 
-One node that goes by d changes each of U, V and W by d at most, times a factor, and det J is linear in d, for products
-with two of these changes vanish. So det J changes by 3L²|d| at most, L the longest edge, and while nodes go s in all,
-by 3(L + s)²s. With a lower bound b of det J, s = 0.9b/3(L + s₀)², s₀ = 0.9b/3L², is the *slack*: so far no node makes
-the cell invalid. The tenth left of b, and four times the error bound, cover the growth of that bound: s is below 0.3 L.
+An edge changes by 2e at most while no node has gone further than e in all, and so do U, V and W. det J then changes by
+(L + 2e)³ − L³ at most, L the longest edge before. With a lower bound b of det J the *slack* is the e at which that is
+0.9b: so far no node makes the cell invalid. The tenth left of b, and four times the error bound, cover the growth of
+that bound: L + 2e is below 1.24 L, the largest component below 1.43 times what it was.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import math
 import numpy as np
 
 from gmsnet.kernels.jit.compile import inlined, part
+from gmsnet.kernels.simplex.cube_root import cube_root
 from gmsnet.kernels.simplex.predicates import UNDERFLOW, UNIT
 
 # The ends and starts of edges along the axes: of U by V's and W's side, of V by U's and W's, of W by U's and V's.
@@ -126,5 +127,4 @@ def slack_of(points, nodes, is_hexahedron, unit, grain, moved, x, y, z, work):
     if not certain > 0.0:
         return 0.0
     length = math.sqrt(longest)
-    far = certain / (3.0 * longest) + length
-    return certain / (3.0 * far * far)
+    return 0.4999 * (cube_root(length * length * length + certain) - length)

@@ -169,24 +169,26 @@ def sound(mixture, points, i, x, y, z, unit, grain):
     """
     if mixture is not None:
         dx, dy, dz = x - points[i, 0], y - points[i, 1], z - points[i, 2]
-        away, slack, enough = WIDER * math.sqrt(square(dx, dy, dz)), mixture.slack, True
+        away, slack, gone, enough = WIDER * math.sqrt(square(dx, dy, dz)), mixture.slack, mixture.gone, True
         for k in range(mixture.at[i], mixture.at[i + 1]):
-            enough &= slack[mixture.around[k]] > away
+            corner = mixture.around[k]
+            enough &= slack[corner >> 3] >= gone[corner] + away
         if not enough and not renewed(mixture, points, i, x, y, z, unit, grain, away):
             return False
         for k in range(mixture.at[i], mixture.at[i + 1]):
-            own = slack[mixture.around[k]]
-            slack[mixture.around[k]] = -own if own < 0.0 else max(own - away, 0.0)
+            corner = mixture.around[k]
+            slack[corner >> 3] = abs(slack[corner >> 3])
+            gone[corner] += away
     return True
 
 
 @part
 def renewed(mixture, points, i, x, y, z, unit, grain, away):
     """Are those that have not slack enough certified? Theirs is made anew, with the other sign."""
-    solids, slack, work = mixture.solids, mixture.slack, np.empty(72)
+    solids, slack, gone, work = mixture.solids, mixture.slack, mixture.gone, np.empty(72)
     for k in range(mixture.at[i], mixture.at[i + 1]):
-        cell = mixture.around[k]
-        if slack[cell] > away:
+        cell = mixture.around[k] >> 3
+        if slack[cell] >= gone[mixture.around[k]] + away:
             continue
         nodes, kind = solids.nodes[cell], solids.kind[cell]
         found = slack_of(points, nodes, kind == HEXAHEDRON, unit, grain, i, x, y, z, work)
@@ -194,8 +196,10 @@ def renewed(mixture, points, i, x, y, z, unit, grain, away):
             form = solids.hexahedron if kind == HEXAHEDRON else solids.wedge
             if not certified_solid(points, nodes, form, 1.0, unit, grain, i, x, y, z, solid_workspace()):
                 for j in range(mixture.at[i], k):  # it does not go there
-                    slack[mixture.around[j]] = max(slack[mixture.around[j]], 0.0)
+                    slack[mixture.around[j] >> 3] = max(slack[mixture.around[j] >> 3], 0.0)
                 return False
             found = 0.0
-        slack[cell] = -found if found > 0.0 else 0.0
+        slack[cell] = -found
+        for corner in range(8 * cell, 8 * cell + 8):
+            gone[corner] = 0.0
     return True

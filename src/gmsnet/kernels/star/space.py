@@ -40,8 +40,9 @@ class Mixture(NamedTuple):
     (R, 6) the same in float64. present: uint16 by [block][row], the lanes that have such a simplex. owner: by
     [block][row][lane], the cell of each. edges: (B·LANES3,) how many nodes of the ring, from the first on, an edge
     joins to the free one. solids: all cells. at: (N + 1,), those at each node that are not valid just where their
-    corner simplices are positive begin there in ``around``. slack: (T,) of each cell
-    (kernels.simplex.slack3), for points that the guard alone has moved since it was set to 0.
+    corner simplices are positive begin there in ``around``. Their numbers are 8t + the
+    corner. slack: (T,) of each cell (kernels.simplex.slack3) and gone: (8T,) how far each corner has gone of it, for
+    points that the guard alone has moved since both were set to 0.
     """
 
     role: NDArray[np.uint8]
@@ -54,6 +55,7 @@ class Mixture(NamedTuple):
     at: NDArray[np.int64]
     around: NDArray[np.int32]
     slack: NDArray[np.float64]
+    gone: NDArray[np.float64]
 
 
 class SpaceBlocks(NamedTuple):

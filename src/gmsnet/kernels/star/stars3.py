@@ -150,26 +150,45 @@ def doubt_of(mixture):
     return WIDER * MIXED_BOUND
 
 
+@inlined
+def place_after(workspace, guard, lane):
+    """Where the free node of a lane that is allowed will be, as it is written."""
+    star, step = workspace.star, workspace.step
+    # 1/size in float32 is not quite 1/size: the step is of what was gathered
+    size = 1.0 / np.float64(workspace.inverse[lane])
+    dx, dy, dz = size * step[lane], size * step[LANES3 + lane], size * step[2 * LANES3 + lane]
+    x, y, z = star[4 * lane] + dx, star[4 * lane + 1] + dy, star[4 * lane + 2] + dz
+    if guard.constraint is not None and workspace.row[lane] >= 0:
+        x, y, z = workspace.target[4 * lane], workspace.target[4 * lane + 1], workspace.target[4 * lane + 2]
+    if guard.single:
+        x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
+    return x, y, z
+
+
+@part
+def look_inside(mixture, points, blocks, block, workspace, guard):
+    """Lanes a cell of which is not certified to be valid between its corners are no longer allowed."""
+    if mixture is not None:
+        for lane in range(blocks.filled[block]):
+            if workspace.allowed[lane]:
+                i = np.int64(blocks.centre[block * LANES3 + lane])
+                x, y, z = place_after(workspace, guard, lane)
+                workspace.allowed[lane] = sound(mixture, points, i, x, y, z, guard.unit, guard.grain)
+
+
 @part
 def store3(points, blocks, block, workspace, guard, tally):
     """Moves the free nodes of the lanes that are allowed, and tries the others one by one."""
-    star, step, count = workspace.star, workspace.step, blocks.filled[block]
+    step, count = workspace.step, blocks.filled[block]
     if len(guard) != WITH_FLOORS:
+        look_inside(blocks.mixture, points, blocks, block, workspace, guard)
         note_places(guard.constraint, workspace)
     for lane in range(count):
         i = np.uint32(blocks.centre[block * LANES3 + lane])
-        # 1/size in float32 is not quite 1/size: the step is of what was gathered
         size = 1.0 / np.float64(workspace.inverse[lane])
         dx, dy, dz = size * step[lane], size * step[LANES3 + lane], size * step[2 * LANES3 + lane]
         if len(guard) != WITH_FLOORS and workspace.allowed[lane]:
-            x, y, z = star[4 * lane] + dx, star[4 * lane + 1] + dy, star[4 * lane + 2] + dz
-            if guard.constraint is not None and workspace.row[lane] >= 0:
-                x, y, z = workspace.target[4 * lane], workspace.target[4 * lane + 1], workspace.target[4 * lane + 2]
-            if guard.single:
-                x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
-            if not sound(blocks.mixture, points, i, x, y, z, guard.unit, guard.grain):
-                truncate3(points, blocks, block, lane, 0.5 * dx, 0.5 * dy, 0.5 * dz, guard, tally)
-                continue
+            x, y, z = place_after(workspace, guard, lane)
             tally[MOVED] += (x != points[i, 0]) | (y != points[i, 1]) | (z != points[i, 2])
             points[i, 0], points[i, 1], points[i, 2] = x, y, z
         elif dx != 0.0 or dy != 0.0 or dz != 0.0:
