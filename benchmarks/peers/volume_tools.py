@@ -113,7 +113,8 @@ def mfem_tmop(metric: int, iterations: int) -> Callable[..., Found]:
         mesh.SetNodalFESpace(space)
         nodes, rule = mesh.GetNodes(), mfem.IntRules.Get(mfem.Geometry.TETRAHEDRON, 1)
         if not tetra:  # a hexahedron is judged by its corners
-            rule = mfem.IntegrationRules(0, mfem.Quadrature1D.GaussLobatto).Get(mfem.Geometry.CUBE, 1)
+            rules = mfem.IntegrationRules(0, mfem.Quadrature1D.GaussLobatto)  # the rule is a part of it
+            rule = rules.Get(mfem.Geometry.CUBE, 1)
         metric_of = getattr(tmop, f"TMOP_Metric_{metric}")()
         target = tmop.TargetConstructor(tmop.TargetConstructor.IDEAL_SHAPE_UNIT_SIZE)
         target.SetNodes(nodes)
