@@ -116,7 +116,7 @@ class MixedVolume(Volume):
         return ", ".join(f"{count:,} {name}" for name, count in zip(KINDS[1:], counts, strict=True) if count)
 
     @property
-    def simplices(self) -> Tetrahedra:  # type: ignore[override]
+    def simplices(self) -> Tetrahedra:
         """See Volume."""
         return self.all_simplices
 
@@ -125,7 +125,7 @@ class MixedVolume(Volume):
         simplices = self.all_simplices
         assert simplices.solids is not None
         assert simplices.cells is not None
-        cells = chosen[simplices.solids.nodes].any(axis=1)
+        cells = np.any(chosen[simplices.solids.nodes], axis=1)
         return np.flatnonzero(cells[simplices.cells]).astype(np.int32)
 
     @cached_property

@@ -40,8 +40,8 @@ BYTES_PER_CELL = 2_000  # that the set-up takes at most, of a hexahedron
 def tables() -> Tables:
     """What kernels know of the kinds."""
     kinds = [CELLS[name] for name in KINDS]
-    facets, simplices = np.full((4, FACETS, 4), NONE), np.full((4, 8, 4), NONE)
-    around = np.full((3, 4, 8, 4), NONE)
+    facets, simplices = np.full((4, FACETS, 4), NONE, dtype=np.int32), np.full((4, 8, 4), NONE, dtype=np.int32)
+    around = np.full((3, 4, 8, 4), NONE, dtype=np.int32)
     facets_at = np.zeros((4, 8), dtype=np.int32)
     for number, kind in enumerate(kinds):
         for k, facet in enumerate(kind.facets):
@@ -56,8 +56,7 @@ def tables() -> Tables:
             rest = sorted(set(range(kind.corners or 0)) - together)
             for turn, found in enumerate((joined, others, rest)):
                 around[turn, number, corner, : len(found)] = found
-    whole = [table.astype(np.int32) for table in (facets, around, simplices)]
-    return Tables(*whole, np.array([not kind.exact for kind in kinds]), facets_at)
+    return Tables(facets, around, simplices, np.array([not kind.exact for kind in kinds]), facets_at)
 
 
 @cache

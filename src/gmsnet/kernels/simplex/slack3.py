@@ -7,8 +7,8 @@ determinant by 50u·m³ for its rounding and 36δm² + 72δ²m + 48δ³ (kernels
 
 One node that goes by d changes each of U, V and W by d at most, times a factor, and det J is linear in d, for products
 with two of these changes vanish. So det J changes by 3L²|d| at most, L the longest edge, and while nodes go s in all,
-by 3(L + s)²s. With a lower bound b of det J, s = 0.9b/3(L + s₀)², s₀ = 0.9b/3L², is the *slack*: so far no node makes the
-cell invalid. The tenth left of b, and four times the error bound, cover the growth of that bound: s is below 0.3 L.
+by 3(L + s)²s. With a lower bound b of det J, s = 0.9b/3(L + s₀)², s₀ = 0.9b/3L², is the *slack*: so far no node makes
+the cell invalid. The tenth left of b, and four times the error bound, cover the growth of that bound: s is below 0.3 L.
 """
 
 from __future__ import annotations
