@@ -39,7 +39,7 @@ from gmsnet.methods.base import ALL_CELLS, Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.below_in_space import BelowInSpace
 from gmsnet.methods.creep import Creep
-from gmsnet.methods.phases import NEWTON, SMALL_PLAN, VOLUME_PLAN, WORST, Phase, plan_for
+from gmsnet.methods.phases import MIXED_PLAN, NEWTON, SMALL_PLAN, VOLUME_PLAN, WORST, Phase, plan_for
 from gmsnet.methods.whole_mesh import CLOSEST, SETTLED, WholeMesh
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
@@ -94,7 +94,7 @@ class Auto(Smoother):
             if not self.phases and field.level != STAR and isinstance(field.topology, Topology):
                 self.creep = Creep.of(field)
             self.phases = self.phases or plan_for(field.topology)
-            if self.phases is VOLUME_PLAN and len(field.topology.free) > LARGE_VOLUME:
+            if self._in_space and len(field.topology.free) > LARGE_VOLUME:
                 self.pass_gain = LARGE_GAIN
             self._enter(0, field)
         if self.at == len(self.phases):
@@ -112,6 +112,11 @@ class Auto(Smoother):
         if self.made == self._wanted or self.smoother.converged or not tally[MOVED]:
             self._end_round(field)
         return tally
+
+    @property
+    def _in_space(self) -> bool:
+        """Is it one of the plans for volumes as a whole?"""
+        return self.phases is VOLUME_PLAN or self.phases is MIXED_PLAN
 
     @property
     def _wanted(self) -> int:
@@ -146,7 +151,7 @@ class Auto(Smoother):
         """Is the worst cell to have another turn, once others have made room for it?"""
         self.passes += 1
         gains = smoother.least >= self.least + self.pass_gain
-        if self.passes == 1 and self.phases is not SMALL_PLAN and self.phases is not VOLUME_PLAN:
+        if self.passes == 1 and self.phases is not SMALL_PLAN and not self._in_space:
             gains = smoother.gained >= LAST_GAIN
         self.again = self.at if gains and self.passes < PASSES else -1
         self.least = smoother.least
@@ -190,7 +195,7 @@ class Auto(Smoother):
             goes_on = goes_on or self.slow
         target_reached = self.smoother.target_reached
         self.looks = self.rounds % phase.often == 0 if goes_on else phase.looks or target_reached
-        if isinstance(self.smoother, WorstFirst) and (self.creep is not None or self.phases is VOLUME_PLAN):
+        if isinstance(self.smoother, WorstFirst) and (self.creep is not None or self._in_space):
             self._look_at_worst(self.smoother)
         if not goes_on:
             is_ideal = isinstance(self.smoother, WorstFirst) and self.smoother.least >= self.smoother.enough

@@ -125,7 +125,7 @@ class MixedVolume(Volume):
         simplices = self.all_simplices
         assert simplices.solids is not None
         assert simplices.cells is not None
-        cells = np.any(chosen[simplices.solids.nodes], axis=1)
+        cells: Flags = np.asarray(chosen[simplices.solids.nodes].any(axis=1))
         return np.flatnonzero(cells[simplices.cells]).astype(np.int32)
 
     @cached_property
