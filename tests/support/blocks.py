@@ -70,13 +70,13 @@ def inner_nodes(mesh):
     return ((mesh.points > low) & (mesh.points < high)).all(axis=1)
 
 
-def cubed_shapes(mesh, points):
-    """[(nodes, η³ of the worst corner with the sign of D)] of each cell, in whole arithmetic."""
+def cubed_shapes(mesh, points, sense=1):
+    """[(nodes, η³ of the worst corner with the sign of D)] of each cell, read in a sense of ±1, in exact arithmetic."""
     found = []
     exact = [[Fraction(float(v)) for v in row] for row in points]
     for cells in mesh.cells:
         for nodes in cells.nodes.tolist():
-            worst = min(_cubed_shape([exact[nodes[k]] for k in simplex], cells.kind)
+            worst = min(sense * _cubed_shape([exact[nodes[k]] for k in simplex], cells.kind)
                         for simplex in CELLS[cells.kind].simplices)  # fmt: skip
             found.append((nodes, worst))
     return found
