@@ -231,7 +231,7 @@ def measured(mesh: Mesh, block: CellBlock) -> bool:
     corners. Where there are volumes: are they tetrahedra of first order?"""
     if mesh.has_volumes:
         return block.kind == "tetra"
-    return block.triangular or (block.dimension == 2 and block.corners == 4 and mesh.plane is not None)
+    return block.triangular or (block.dimension == 2 and block.corners == 4)
 
 
 def unknown_cells(mesh: Mesh) -> str:
