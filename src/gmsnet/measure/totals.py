@@ -15,6 +15,7 @@ from gmsnet.kernels.simplex import measures as kernels
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.shell_measures import summarise_shell, summarise_shell_cells
+from gmsnet.kernels.simplex.solid_measures import summarise_solids
 from gmsnet.kernels.simplex.tetra_measures import summarise_tetrahedra
 from gmsnet.kernels.star.shell import ShellSimplices
 from gmsnet.parallel.executor import Executor
@@ -121,7 +122,8 @@ def totals_of(
     if isinstance(simplices, Tetrahedra):
 
         def part_of_volume(first: int, last: int) -> Floats:
-            figures: Floats = summarise_tetrahedra(points, simplices, first, last, *grids)
+            summarise = summarise_tetrahedra if simplices.shapes is None else summarise_solids
+            figures: Floats = summarise(points, simplices, first, last, *grids)
             return figures
 
         return Totals.of_cells(executor.map(part_of_volume, 0, blocks), executor)

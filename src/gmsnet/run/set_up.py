@@ -19,7 +19,7 @@ from gmsnet.kernels.topology.connectivity import CHOSEN
 from gmsnet.measure.report import ASPECT, QualityReport, measure
 from gmsnet.measure.target import Target
 from gmsnet.mesh.adapters import to_mesh
-from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured
+from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured, unmoved
 from gmsnet.mesh.selection import fixed_mask
 from gmsnet.methods import Smoother, StarSmoother
 from gmsnet.methods.auto import Auto
@@ -34,10 +34,12 @@ from gmsnet.run.second_order import second_order_of
 from gmsnet.run.set_up_surface import first_of_surface
 from gmsnet.run.state import State
 from gmsnet.topology.held import REASONS
+from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
 from gmsnet.topology.ordering import space_points, taken
+from gmsnet.topology.solids import KINDS, has_solids
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
-from gmsnet.topology.wound import Wound, refuse_flat
+from gmsnet.topology.wound import refuse_flat
 
 Floats = NDArray[np.float64]
 
@@ -142,17 +144,19 @@ def _first_of_volume(
 ) -> State:  # fmt: skip
     """The same of a mesh of tetrahedra."""
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
-    wound, sliding = Wound.of(given, asked), None
+    wound, sliding = wound_of(given, asked), None
     surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked)
     if surface is None:
-        topology = Volume.made(wound)
+        topology = volume_of(wound)
     else:
-        topology = Volume.made(wound, surface[1].slides | surface[1].curves.slides)
+        topology = volume_of(wound, surface[1].slides | surface[1].curves.slides)
         tolerance = options.surface_tolerance or math.inf
         sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, tolerance)
     remarks = held_anyway(asked, topology, fixed, options.slides)
-    if others := unmeasured(given):
+    if others := unmoved(given):
         remarks.append(f"not measured, and their nodes are held: {others}")
+    if isinstance(topology, MixedVolume) and (turned := topology.inside_out):
+        remarks.append(f"read with their corners in the other order, for they are inside out: {turned}")
     given = given.without_cells()
     start = taken(space_points(given), topology.memory)
     before = measure(given, topology, start, executor.for_blocks(0))
@@ -175,6 +179,10 @@ def check_target(mesh: Mesh, target: Target) -> None:
         raise InputError(
             "target_angle is of the angles of triangles and quads, and this mesh has volumes: give target_dihedral"
         )
+    if mesh.has_volumes and target.dihedral is not None and has_solids(mesh):
+        raise InputError(
+            "target_dihedral is of meshes of tetrahedra alone, and this one has other volumes: give target_quality"
+        )
     if not mesh.has_volumes and target.dihedral is not None:
         raise InputError("target_dihedral is of tetrahedra, and this mesh has none: give target_angle")
 
@@ -188,9 +196,12 @@ def check_mesh(mesh: Mesh, target: Target) -> None:
             f"a target is asked of triangles and quads, and this mesh has none: {others} cannot be measured so far"
         )
     if mesh.has_volumes:
-        if not any(block.kind == "tetra" and len(block.nodes) for block in mesh.cells):
+        if not any(block.kind in KINDS and len(block.nodes) for block in mesh.cells):
             kinds = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
-            raise InputError(f"this is a mesh of {', '.join(kinds)} cells: of volumes, only tetrahedra move so far")
+            raise InputError(
+                f"this is a mesh of {', '.join(kinds)} cells: of volumes, only tetrahedra, hexahedra, wedges and "
+                "pyramids with straight edges move so far"
+            )
         refuse_flat(mesh)
         return
     if mesh.plane is None and (unknown := unknown_cells(mesh)):
