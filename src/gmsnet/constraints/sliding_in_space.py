@@ -43,18 +43,26 @@ class SurfaceSliding:
 
     @classmethod
     def of(
-        cls, mesh: Mesh, facets: Facets, patches: Patches, memory: Ints, free: Ints, tolerance: float = math.inf
+        cls,
+        mesh: Mesh,
+        facets: Facets,
+        patches: Patches,
+        memory: Ints,
+        free: Ints,
+        tolerance: float = math.inf,
+        normals: Floats | None = None,
     ) -> SurfaceSliding:
         """Of a mesh and the patches of its boundary; memory, free: of its topology.
 
-        tolerance: how far from the facets nodes may go, over the mean length of their edges.
+        tolerance: how far from the facets nodes may go, over the mean length of their edges. normals: see
+        ``surface_of``.
         """
         points = space_points(mesh)[:, :3].copy()
         nodes = np.zeros(len(points), dtype=bool)
         nodes[free] = True
         nodes &= patches.slides | patches.curves.slides
         limit = tolerance * edge_lengths(facets, points) if tolerance < math.inf else None
-        constraint = surface_of(patches, points, memory, mesh.single, limit) if nodes.any() else None
+        constraint = surface_of(patches, points, memory, mesh.single, limit, normals) if nodes.any() else None
         return cls(facets, patches, points, mesh.exponent, memory, nodes, constraint)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:

@@ -123,7 +123,10 @@ class StarSmoother(Smoother):
         """The same of stars of a surface in space, of methods that are for surfaces."""
         raise NotImplementedError
 
-    in_lanes = False  # stars of surfaces of triangles are visited in blocks
+    @property
+    def in_lanes(self) -> bool:
+        """Are stars of surfaces of triangles visited in blocks?"""
+        return False
 
     def visit_in_lanes(
         self, points: NDArray[np.float64], lanes: ShellBlocks, first: int, last: int, guard: Guard, tally: Tally

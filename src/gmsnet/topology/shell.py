@@ -94,7 +94,7 @@ class Shell(Topology):
         """The stars of the free nodes in blocks, of a surface of triangles alone."""
         if self.patterns is not None:
             return None
-        planar = Topology.stars.func(self)
+        planar = self.in_blocks()
         blocks = planar.blocks
         assert isinstance(blocks, Blocks)
         return Stars(ShellBlocks(blocks, self.stars_of(blocks.centre)), planar.first)
