@@ -240,7 +240,7 @@ def measured(mesh: Mesh, block: CellBlock) -> bool:
     corners. Where there are volumes: is their Jacobian determinant known in Bernstein form?"""
     if mesh.has_volumes:
         return has_form(block.kind)
-    return block.triangular or (block.dimension == 2 and block.corners == 4 and mesh.plane is not None)
+    return block.triangular or (block.dimension == 2 and block.corners == 4)
 
 
 def unknown_cells(mesh: Mesh) -> str:

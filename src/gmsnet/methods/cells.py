@@ -22,6 +22,11 @@ def check_cells(mesh: Mesh, name: str, choice: str | None = None) -> None:
     """
     method = method_named(name)
     choice = choice or method.default
+    if mesh.plane is None and not mesh.has_volumes and not method.moves_surfaces(choice):
+        others = ", ".join(each.name for each in METHODS.values() if each.surfaces)
+        raise InputError(
+            f"{name}{f' ({choice})' if method.surfaces else ''} is not for surfaces in space: choose {others}"
+        )
     for kind in ("tetra", "hexahedron", "wedge", "pyramid") if mesh.has_volumes else ("quad",):
         count = sum(len(block.nodes) for block in mesh.cells if block.kind == kind)
         if count and not method.moves(kind, choice):

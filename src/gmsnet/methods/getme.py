@@ -32,7 +32,7 @@ from gmsnet.kernels.methods import getme3, getme_simultaneous
 from gmsnet.kernels.methods.getme import Queue
 from gmsnet.kernels.methods.getme_elements import Elements, Transformation
 from gmsnet.kernels.simplex.mean_ratio2 import SQUARE, Simplices
-from gmsnet.kernels.star.block import MOVED
+from gmsnet.kernels.star.block import MOVED, Blocks
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.methods.base import CELLS, TETRAHEDRA, Field, Method, MethodOptions, Smoother, Tally, by_colour, over_stars
 from gmsnet.parallel.executor import Executor
@@ -95,6 +95,7 @@ class SimultaneousGetme(Smoother):
             return _in_space(field, executor)
         stars, guard = field.topology.stars, field.guard(executor)
         points, blocks = field.points, stars.blocks
+        assert isinstance(blocks, Blocks)
         shifts = np.empty((len(blocks.filled), 2 * LANES))
 
         def plan(first: int, last: int) -> None:
