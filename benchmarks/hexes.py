@@ -115,7 +115,6 @@ TOOLS = {
     "gmsnet": gmsnet_with(),
     "whole mesh": whole_mesh,
     "MFEM TMOP 303": mfem_tmop(303, 60),
-    "MFEM TMOP 313": mfem_tmop(313, 60),
     "Mesquite ShapeImprovementWrapper": mesquite("ShapeImprovementWrapper"),
     "Mesquite ShapeImprover": mesquite("ShapeImprover"),
     "Mesquite UntangleWrapper": mesquite("UntangleWrapper"),

@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS
 from gmsnet.measure.solids import MeasuredSolids
+from gmsnet.mesh.display import amount
 from gmsnet.topology.ordering import space_points
 
 Rows = NDArray[np.int64]
 
 NAMED = 10  # cells are named
-REPEATED = "cells that name a node twice"
+REPEATED = "cells with a node that stands in them twice"
 FLAT = "cells without volume at any corner"
 TURNED = "cells inside out at all corners"
 UNMATCHED = "cells with four-sided faces that meet two triangles"
@@ -40,12 +41,12 @@ def defects_of(cells: MeasuredSolids) -> dict[str, Rows]:
 def remarks_on(cells: MeasuredSolids) -> list[str]:
     """The same in words, and which cells are read inside out."""
     said = [
-        f"{len(numbers):,} {kind} cells are inside out in the file: they are read in the other order of their nodes"
+        f"{amount(len(numbers), f'{kind} cell')} inside out in the file: read in the other order of their nodes"
         for kind, numbers in cells.turned.items()
     ]
     for what, rows in defects_of(cells).items():
         named = ", ".join(map(str, rows[:NAMED].tolist())) + (", …" if len(rows) > NAMED else "")
-        said.append(f"{len(rows):,} {what} (numbers from 0: {named})")
+        said.append(f"{amount(len(rows), 'cell')} {what.removeprefix('cells ')} (numbers from 0: {named})")
     return said
 
 
