@@ -9,14 +9,16 @@ import numpy as np
 
 from gmsnet.kernels.methods.descent3 import sweep3
 from gmsnet.kernels.simplex.objectives3 import Aim3, Q
+from gmsnet.kernels.star.guard import WORST, plain_guard
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.measure.dihedral import ratios_of
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.parallel.executor import Executor
-from gmsnet.topology.volume import Volume
+from gmsnet.topology.mixed_volume import MixedVolume
 
 ALIKE = 1.03  # times the median of 432·η⁻³: else sweeps go on for little
 FEW = 1000  # free nodes: of more the passes take longer than all else
+SURE = 1e-12
 PASSES, STILL = 60, 1e-9  # and of the mesh's extent: what no node moves by in the last one
 
 
@@ -27,11 +29,13 @@ class ToTheEnd(Smoother):
         """See Smoother."""
         tally = np.zeros(3, dtype=np.int64)
         topology = field.topology
-        assert isinstance(topology, Volume)
+        assert isinstance(topology, MixedVolume)
         ratios = ratios_of(field.points, topology.changeable, executor)
         if not len(ratios) or len(topology.free) > FEW or ratios.max() > ALIKE * float(np.median(ratios)):
             return tally
-        guard, stars = field.guard(executor), field.topology.stars
+        guard, stars, start = field.guard(executor), topology.stars, field.points.copy()
+        if field.level == WORST:  # no proof that a cell is above the worst one is had where all are alike: see below
+            guard = plain_guard(field.precision, field.constraint)
         extent = float(np.ptp(field.points[:, :3], axis=0).max())
 
         def visit(blocks: SpaceBlocks, first: int, last: int, counts: Tally) -> None:
@@ -42,4 +46,14 @@ class ToTheEnd(Smoother):
             tally += over_stars(visit, stars, field.points, executor)
             if np.abs(field.points - before).max() <= STILL * extent:
                 break
+        if field.level == WORST and not self._gained(field, topology, float(ratios.max()), executor):
+            field.points[:] = start
+            tally[:] = 0
         return tally
+
+    def _gained(self, field: Field, topology: MixedVolume, before: float, executor: Executor) -> bool:
+        """Is the worst corner better, by more than rounding? What is known of the points is forgotten, if not."""
+        gained = float(ratios_of(field.points, topology.changeable, executor).max()) < (1.0 - SURE) * before
+        if not gained:
+            topology.lent[0] = None
+        return gained
