@@ -60,6 +60,15 @@ def test_the_file_itself_written_over(tmp_path: Path) -> None:
     assert gmsnet.read(tmp_path / "mesh.xdmf").points.tolist() == new.tolist()
 
 
+def test_the_numbers_of_what_was_read_are_not_written_over(tmp_path: Path) -> None:
+    path = _pair(tmp_path)
+    mesh = gmsnet.read(path)
+    with pytest.raises(InputError, match=r"mesh\.h5: holds the numbers of the mesh that was read"):
+        gmsnet.write(mesh.with_points(mesh.points * 2.0), tmp_path / "mesh.xdmf")
+    assert (tmp_path / "mesh.h5").read_bytes() == made.xdmf_h5()
+    assert not (tmp_path / "mesh.xdmf").exists()
+
+
 def test_other_libraries_read_the_pair(tmp_path: Path) -> None:
     meshio = pytest.importorskip("meshio")
     text = made.xdmf(inside=False).decode()
