@@ -125,8 +125,11 @@ TAGS = """<Grid Name="{name}">{include}<Topology TopologyType="{kind}" NumberOfE
 Center="Cell"><DataItem Dimensions="2 1" Format="XML" NumberType="Int">{values}</DataItem></Attribute>
 </Grid></Domain>"""
 
+FACETS = ("facets", "PolyLine", 2, "6 1 4 6", "8 9")
+CELLS = ("materials", "Triangle", 3, "7 2 3 6 0 1", "5 4")
 
-def _tagged(name: str, kind: str, width: int, cells: str, values: str) -> bytes:
+
+def tagged(name: str, kind: str, width: int, cells: str, values: str) -> bytes:
     triangles = " ".join(map(str, made.TRIANGLES.ravel().tolist()))
     plain = PLAIN.decode().replace("Mixed", "Triangle").replace(" ".join(map(str, made.xdmf_topology())), triangles)
     plain = plain.replace('Dimensions="29"', 'Dimensions="6 3"')
@@ -138,11 +141,11 @@ def _tagged(name: str, kind: str, width: int, cells: str, values: str) -> bytes:
 
 def test_tags_of_other_grids_as_dolfinx_writes_them() -> None:
     """Facets become markers, which hold their nodes; tags of cells become their regions, whatever their order."""
-    parsed = read(xdmf, _tagged("facets", "PolyLine", 2, "6 1 4 6", "8 9"))
+    parsed = read(xdmf, tagged(*FACETS))
     assert cells_of(parsed, "line") == [[6, 1], [4, 6]]
     assert regions_of(parsed, "line") == [8, 9]
     assert parsed.unread == []
-    parsed = read(xdmf, _tagged("materials", "Triangle", 3, "7 2 3 6 0 1", "5 4"))
+    parsed = read(xdmf, tagged(*CELLS))
     assert regions_of(parsed, "triangle") == [4, 0, 0, 0, 0, 5]
-    check_splice(xdmf, _tagged("facets", "PolyLine", 2, "6 1 4 6", "8 9"))
-    assert read(xdmf, _tagged("odd", "Triangle", 3, "7 2 3 6 0 2", "5 4")).unread == ["1 other grids"]
+    check_splice(xdmf, tagged(*FACETS))
+    assert read(xdmf, tagged("odd", "Triangle", 3, "7 2 3 6 0 2", "5 4")).unread == ["1 other grids"]
