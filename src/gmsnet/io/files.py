@@ -116,7 +116,10 @@ def _linked(entry: Entry, name: str, shown: str, data: Data, stream: bool) -> di
         return {}
     if stream:
         raise InputError(f"{shown}: {entry.title} that names another file cannot be read from a stream")
-    return {H5: _loaded(os.path.join(os.path.dirname(name), called))}
+    try:
+        return {H5: _loaded(os.path.join(os.path.dirname(name), called))}
+    except InputError as error:
+        raise type(error)(f"{shown}: the file that it names cannot be read: {error}") from None
 
 
 def _is_stream(name: str) -> bool:
