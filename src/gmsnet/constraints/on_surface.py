@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gmsnet.constraints.features import COLLINEAR, Curves, rounding_of
 from gmsnet.constraints.outline import Flags, Longs
 from gmsnet.constraints.patches import NOTHING, Patches
-from gmsnet.constraints.smooth_patches import controls_of, dot, handles, normals_of
+from gmsnet.constraints.smooth_patches import controls_of, dot, handles, normals_of, summed
 from gmsnet.kernels.star.surface import CONTROLS, CURVE, CURVED, FLAT, LINE, NOWHERE, Surface
 from gmsnet.topology.polygons import Ints
 
@@ -26,10 +26,18 @@ class Rows(NamedTuple):
     place: Longs
 
 
-def surface_of(patches: Patches, points: Floats, memory: Ints, single: bool) -> Surface | None:
+def surface_of(
+    patches: Patches,
+    points: Floats,
+    memory: Ints,
+    single: bool,
+    limit: Floats | None = None,
+    normals: Floats | None = None,
+) -> Surface | None:
     """The constraint for kernels, with the nodes where they are; None where none slides.
 
-    points: (N, 3) by node ids. memory: (N,) node ids in memory order.
+    points: (N, 3) by node ids. memory: (N,) node ids in memory order. limit: (N,) how far each may go from the facets
+    or edges; None: as far as the cubics are. normals: as ``normals_of`` finds them, where they are known.
     """
     slides = patches.slides | patches.curves.slides
     if not slides.any():
@@ -52,7 +60,7 @@ def surface_of(patches: Patches, points: Floats, memory: Ints, single: bool) -> 
     order = np.argsort(nodes)
     row = np.full(len(points), NOWHERE, dtype=np.int32)
     row[nodes[order]] = np.arange(len(nodes))
-    corners, normal = patches.rows[kept], normals_of(patches, points)[kept]
+    corners, normal = patches.rows[kept], (normals_of(patches, points) if normals is None else normals)[kept]
     beside = patches.beside[kept]
     origin, direction, same = (np.concatenate(parts) for parts in zip(frame, line_frame, strict=True))
     return Surface(
@@ -61,6 +69,7 @@ def surface_of(patches: Patches, points: Floats, memory: Ints, single: bool) -> 
         np.where(beside == NOTHING, NOWHERE, fewer[beside]).astype(np.int32),
         controls_of(points, corners, normal) if len(corners) else np.empty((0, CONTROLS, 3)),
         pieces, before, after, bool(single),
+        np.full(len(nodes), np.inf) if limit is None else limit[nodes[order]],
     )  # fmt: skip
 
 
@@ -71,8 +80,7 @@ def _columns(rows: Rows) -> tuple[Longs, Longs, Longs, Longs]:
 def _planes(patches: Patches, points: Floats, single: bool) -> tuple[Longs, tuple[Floats, Floats, Flags]]:
     """The number of the plane of each patch that is one, else NOTHING; origin, direction and common coordinates."""
     count = int(patches.patch.max(initial=-1)) + 1
-    normal = np.zeros((count, 3))
-    np.add.at(normal, patches.patch, patches.unit * patches.area[:, None])
+    normal = summed(patches.patch, patches.unit * patches.area[:, None], count)
     length = np.sqrt(dot(normal, normal))
     normal = np.divide(normal, length[:, None], out=np.zeros_like(normal), where=length[:, None] > 0.0)
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)

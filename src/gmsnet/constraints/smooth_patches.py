@@ -27,13 +27,13 @@ def normals_of(patches: Patches, points: Floats) -> Floats:
     _, owner = np.unique(patches.patch[:, None] * nodes + rows, return_inverse=True)
     owner = owner.reshape(rows.shape)  # a node in each of its patches
     count = int(owner.max(initial=-1)) + 1
-    total = np.zeros((count, 3))
-    corner = points[rows]
+    corner, weighted = points[rows], np.empty((3, len(rows), 3))
     for k in range(3):
         a, b = corner[:, (k + 1) % 3] - corner[:, k], corner[:, (k + 2) % 3] - corner[:, k]
         weight = dot(a, a) * dot(b, b)
         share = np.divide(patches.area, weight, out=np.zeros(len(rows)), where=weight > 0.0)
-        np.add.at(total, owner[:, k], patches.unit * share[:, None])
+        weighted[k] = patches.unit * share[:, None]
+    total = summed(owner.T.ravel(), weighted.reshape(-1, 3), count)
     plane, parts = _planes(patches, owner, count)
     total[plane != NOTHING] = parts[plane[plane != NOTHING]]
     length = np.sqrt(dot(total, total))
@@ -49,8 +49,7 @@ def _planes(patches: Patches, owner: Longs, count: int) -> tuple[Longs, Floats]:
     quad are none.
     """
     part = linked(patches.beside, patches.flat)
-    normals = np.zeros((int(part.max(initial=-1)) + 1, 3))
-    np.add.at(normals, part, patches.unit * patches.area[:, None])
+    normals = summed(part, patches.unit * patches.area[:, None], int(part.max(initial=-1)) + 1)
     low, high = np.full(count, len(part)), np.full(count, NOTHING)
     np.minimum.at(low, owner, part[:, None])
     np.maximum.at(high, owner, part[:, None])
@@ -58,6 +57,11 @@ def _planes(patches: Patches, owner: Longs, count: int) -> tuple[Longs, Floats]:
     plane = np.full(count, NOTHING, dtype=np.int64)
     plane[owner[inner]] = part[inner, None]
     return plane, normals
+
+
+def summed(owner: Longs, vectors: Floats, count: int) -> Floats:
+    """(count, 3) the sums of vectors (K, 3) by their owners (K,), in their order."""
+    return np.stack([np.bincount(owner, vectors[:, axis], count) for axis in range(3)], axis=1)
 
 
 def controls_of(points: Floats, rows: Longs, normals: Floats) -> Floats:

@@ -9,7 +9,10 @@ from typing import NamedTuple
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Smoother
 from gmsnet.methods.optimize import Newton
+from gmsnet.methods.to_the_end import ToTheEnd
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
+from gmsnet.topology.mixed_volume import MixedVolume
+from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -78,12 +81,24 @@ VOLUME_PLAN = (
     Phase("worst first", WorstFirst, 1, looks=False),
     Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0005),
 )
+# Of surfaces; what high powers take from the mean comes back last.
+SURFACE_PLAN = (
+    NEWTON._replace(looks=False),
+    WORST._replace(create=lambda: worst_first(3, IDEAL), looks=False),
+    MEAN._replace(gain=0.001),
+)
+
+
+# Of other volumes, grids among which have an ideal mesh.
+MIXED_PLAN = (*VOLUME_PLAN, Phase("Newton on q, in float64", ToTheEnd, 1))
 
 
 def plan_for(topology: Topology | Volume) -> Sequence[Phase]:
     """The phases for a mesh of this size and these cells."""
     if isinstance(topology, Volume):
-        return VOLUME_PLAN
+        return MIXED_PLAN if isinstance(topology, MixedVolume) else VOLUME_PLAN
+    if isinstance(topology, Shell):
+        return SURFACE_PLAN
     if len(topology.free) <= SMALL:
         return SMALL_PLAN
     return LARGE_PLAN if topology.near_shapes is None else QUADS_PLAN

@@ -32,7 +32,7 @@ class Surface(NamedTuple):
     same (E, 3) bool, which coordinates all its points have in common. Of facets (F,): corner (F, 3, 3) points, normal
     (F, 3, 3), beside (F, 3) int32, the facet across the edge from corner k to k + 1, NOWHERE at the rim, control
     (F, CONTROLS, 3). Of pieces (P,): piece (P, 4, 3) control points, before, after (P,) int32. single: new coordinates
-    are rounded to float32.
+    are rounded to float32. limit: (R,) how far from the facets, or edges, themselves each row may go.
     """
 
     row: NDArray[np.int32]
@@ -50,6 +50,7 @@ class Surface(NamedTuple):
     before: NDArray[np.int32]
     after: NDArray[np.int32]
     single: bool
+    limit: NDArray[np.float64]
 
 
 @inlined
@@ -179,6 +180,34 @@ def piece_tangent(piece, p, t):
     return x / length, y / length, z / length
 
 
+@inlined
+def within(limit, px, py, pz, x, y, z):
+    """(x, y, z), or the place on the way there from (px, py, pz) at this distance from it."""
+    if limit == np.inf:
+        return x, y, z
+    dx, dy, dz = x - px, y - py, z - pz
+    far = np.sqrt(dx * dx + dy * dy + dz * dz)
+    if far <= limit:
+        return x, y, z
+    share = limit / far
+    return px + share * dx, py + share * dy, pz + share * dz
+
+
+@inlined
+def over_facet(surface, row, f, a, b, c):
+    """The place of a row over facet f."""
+    corner = surface.corner
+    return within(
+        surface.limit[row],
+        a * corner[f, 0, 0] + b * corner[f, 1, 0] + c * corner[f, 2, 0],
+        a * corner[f, 0, 1] + b * corner[f, 1, 1] + c * corner[f, 2, 1],
+        a * corner[f, 0, 2] + b * corner[f, 1, 2] + c * corner[f, 2, 2],
+        on_cubic(corner, surface.control, f, 0, a, b, c),
+        on_cubic(corner, surface.control, f, 1, a, b, c),
+        on_cubic(corner, surface.control, f, 2, a, b, c),
+    )
+
+
 @part
 def snap3(surface, row, x, y, z):
     """Where the node of a row goes that would go to (x, y, z): x, y, z, and its facet or piece there.
@@ -189,16 +218,17 @@ def snap3(surface, row, x, y, z):
     kind, place = surface.kind[row], np.int64(surface.place[row])
     if kind == CURVED:
         place, a, b, c = walk(surface, place, x, y, z)
-        x = on_cubic(surface.corner, surface.control, place, 0, a, b, c)
-        y = on_cubic(surface.corner, surface.control, place, 1, a, b, c)
-        z = on_cubic(surface.corner, surface.control, place, 2, a, b, c)
+        x, y, z = over_facet(surface, row, place, a, b, c)
     elif kind == CURVE:
         place, t = follow_curve(surface, place, x, y, z)
-        x, y, z = (
-            on_piece(surface.piece, place, 0, t),
-            on_piece(surface.piece, place, 1, t),
-            on_piece(surface.piece, place, 2, t),
-        )
+        piece = surface.piece
+        x, y, z = within(
+            surface.limit[row],
+            piece[place, 0, 0] + t * (piece[place, 3, 0] - piece[place, 0, 0]),
+            piece[place, 0, 1] + t * (piece[place, 3, 1] - piece[place, 0, 1]),
+            piece[place, 0, 2] + t * (piece[place, 3, 2] - piece[place, 0, 2]),
+            on_piece(piece, place, 0, t), on_piece(piece, place, 1, t), on_piece(piece, place, 2, t),
+        )  # fmt: skip
     if kind != CURVED:
         e = surface.of[row]
         ox, oy, oz = surface.origin[e, 0], surface.origin[e, 1], surface.origin[e, 2]
@@ -217,6 +247,30 @@ def snap3(surface, row, x, y, z):
     return x, y, z, place
 
 
+@inlined
+def on_curves(kind):
+    """Does a row of this kind have one way to go, and not two?"""
+    return kind >= LINE
+
+
+@inlined
+def land_on(surface, row, x, y, z):
+    """As ``snap3``, and the unit normal there, which is zero on curves."""
+    kind = surface.kind[row]
+    if kind == CURVED:
+        place, a, b, c = walk(surface, np.int64(surface.place[row]), x, y, z)
+        u, v, w = normal_on(surface.normal, place, a, b, c)
+        x, y, z = over_facet(surface, row, place, a, b, c)
+        if surface.single:
+            x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
+        return x, y, z, place, u, v, w
+    x, y, z, place = snap3(surface, row, x, y, z)
+    if on_curves(kind):
+        return x, y, z, place, 0.0, 0.0, 0.0
+    e = surface.of[row]
+    return x, y, z, place, surface.direction[e, 0], surface.direction[e, 1], surface.direction[e, 2]
+
+
 @part
 def directions_at(surface, row, x, y, z):
     """The unit normal of the patch, or the unit tangent of the curve, of a row at (x, y, z)."""
@@ -229,12 +283,6 @@ def directions_at(surface, row, x, y, z):
         return piece_tangent(surface.piece, place, t)
     e = surface.of[row]
     return surface.direction[e, 0], surface.direction[e, 1], surface.direction[e, 2]
-
-
-@inlined
-def on_curves(kind):
-    """Does a row of this kind have one way to go, and not two?"""
-    return kind >= LINE
 
 
 @kernel
