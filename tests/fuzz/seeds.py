@@ -36,6 +36,7 @@ import test_volume_files
 import test_vtk
 import test_vtp
 import test_vtu
+import test_xdmf
 from support import binary_meshes, gmsh_variants
 from support.damage import triangle_grid
 from support.vtk_variants import grid_of, legacy_variants, mixed_mesh, polydata_of, vtu_variants
@@ -217,6 +218,7 @@ def seeds() -> Iterator[tuple[str, bytes]]:
     yield "netgen", test_netgen.PLAIN
     yield "vtp", test_vtp.PLAIN
     yield "xdmf", binary_meshes.xdmf()
+    yield from (("xdmf", test_xdmf.tagged(*each)) for each in (test_xdmf.FACETS, test_xdmf.CELLS))
     for packed in (False, True):
         yield "cgns", binary_meshes.cgns(packed)
         yield "med", binary_meshes.med(packed)

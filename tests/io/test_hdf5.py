@@ -238,3 +238,33 @@ def test_moved_points_keep_their_type() -> None:
     again = read(cgns, spliced(parsed.slots, made.cgns(kind=np.float32), parsed.points, new))
     assert again.single
     assert again.points.tolist() == new.tolist()
+
+
+@pytest.mark.skipif(not MESHES, reason="needs GMSNET_MESHES")
+def test_vtk_reads_real_cgns_and_exodus(tmp_path: Path) -> None:
+    """CGNS exactly; of Exodus files VTK keeps points in single precision."""
+    readers = {
+        "mesh_wedge_inv.cgns": pytest.importorskip("vtkmodules.vtkIOCGNSReader").vtkCGNSReader,
+        "systems_of_equations_ex9.exo": pytest.importorskip("vtkmodules.vtkIOExodus").vtkExodusIIReader,
+    }
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    for name, make in readers.items():
+        mesh = gmsnet.read(Path(MESHES) / "formats" / name)
+        new = mesh.points * 1.0625
+        gmsnet.write(mesh.with_points(new), tmp_path / name)
+        reader = make()
+        reader.SetFileName(str(tmp_path / name))
+        reader.UpdateInformation()
+        reader.Update()
+        found = np.concatenate([vtk_to_numpy(each.GetPoints().GetData()) for each in _leaves(reader.GetOutput())])
+        expected = new.astype(found.dtype)
+        assert sorted(map(tuple, found.tolist())) == sorted(map(tuple, expected.tolist()))
+
+
+def _leaves(thing: object) -> list[object]:
+    """The grids in blocks of blocks."""
+    if not hasattr(thing, "GetNumberOfBlocks"):
+        return [thing]
+    blocks = [thing.GetBlock(k) for k in range(thing.GetNumberOfBlocks())]
+    return [leaf for block in blocks if block is not None for leaf in _leaves(block)]

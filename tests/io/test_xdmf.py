@@ -60,6 +60,15 @@ def test_the_file_itself_written_over(tmp_path: Path) -> None:
     assert gmsnet.read(tmp_path / "mesh.xdmf").points.tolist() == new.tolist()
 
 
+def test_the_numbers_of_what_was_read_are_not_written_over(tmp_path: Path) -> None:
+    path = _pair(tmp_path)
+    mesh = gmsnet.read(path)
+    with pytest.raises(InputError, match=r"mesh\.h5: holds the numbers of the mesh that was read"):
+        gmsnet.write(mesh.with_points(mesh.points * 2.0), tmp_path / "mesh.xdmf")
+    assert (tmp_path / "mesh.h5").read_bytes() == made.xdmf_h5()
+    assert not (tmp_path / "mesh.xdmf").exists()
+
+
 def test_other_libraries_read_the_pair(tmp_path: Path) -> None:
     meshio = pytest.importorskip("meshio")
     text = made.xdmf(inside=False).decode()
@@ -108,3 +117,35 @@ def test_single_types_of_cells() -> None:
     parsed = read(xdmf, text)
     assert cells_of(parsed, "triangle") == made.TRIANGLES.tolist()
     assert np.array_equal(parsed.points, made.POINTS)
+
+
+INCLUDE = '<ns0:include xmlns:ns0="http://www.w3.org/2001/XInclude" xpointer="xpointer(//Grid/Geometry)"/>'
+TAGS = """<Grid Name="{name}">{include}<Topology TopologyType="{kind}" NumberOfElements="2" NodesPerElement="{width}">
+<DataItem Dimensions="2 {width}" NumberType="Int" Format="XML">{cells}</DataItem></Topology><Attribute Name="{name}"
+Center="Cell"><DataItem Dimensions="2 1" Format="XML" NumberType="Int">{values}</DataItem></Attribute>
+</Grid></Domain>"""
+
+FACETS = ("facets", "PolyLine", 2, "6 1 4 6", "8 9")
+CELLS = ("materials", "Triangle", 3, "7 2 3 6 0 1", "5 4")
+
+
+def tagged(name: str, kind: str, width: int, cells: str, values: str) -> bytes:
+    triangles = " ".join(map(str, made.TRIANGLES.ravel().tolist()))
+    plain = PLAIN.decode().replace("Mixed", "Triangle").replace(" ".join(map(str, made.xdmf_topology())), triangles)
+    plain = plain.replace('Dimensions="29"', 'Dimensions="6 3"')
+    head, _, rest = plain.partition("<Attribute")
+    plain = head + rest.partition("</Attribute>")[2]
+    more = TAGS.format(name=name, include=INCLUDE, kind=kind, width=width, cells=cells, values=values)
+    return plain.replace("</Domain>", more).encode()
+
+
+def test_tags_of_other_grids_as_dolfinx_writes_them() -> None:
+    """Facets become markers, which hold their nodes; tags of cells become their regions, whatever their order."""
+    parsed = read(xdmf, tagged(*FACETS))
+    assert cells_of(parsed, "line") == [[6, 1], [4, 6]]
+    assert regions_of(parsed, "line") == [8, 9]
+    assert parsed.unread == []
+    parsed = read(xdmf, tagged(*CELLS))
+    assert regions_of(parsed, "triangle") == [4, 0, 0, 0, 0, 5]
+    check_splice(xdmf, tagged(*FACETS))
+    assert read(xdmf, tagged("odd", "Triangle", 3, "7 2 3 6 0 2", "5 4")).unread == ["1 other grids"]

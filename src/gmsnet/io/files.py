@@ -116,7 +116,10 @@ def _linked(entry: Entry, name: str, shown: str, data: Data, stream: bool) -> di
         return {}
     if stream:
         raise InputError(f"{shown}: {entry.title} that names another file cannot be read from a stream")
-    return {H5: _loaded(os.path.join(os.path.dirname(name), called))}
+    try:
+        return {H5: _loaded(os.path.join(os.path.dirname(name), called))}
+    except InputError as error:
+        raise type(error)(f"{shown}: the file that it names cannot be read: {error}") from None
 
 
 def _is_stream(name: str) -> bool:
@@ -248,7 +251,10 @@ def _targets(name: str, entry: Entry, keys: list[str], stamps: Stamps | None) ->
     """Suffix → the path of each file that is written. Files of a case that were read and do not change are not."""
     folder = case_of(name, entry.key)
     if folder is None and H5 in keys:
-        return {key: split_name(name)[0] + H5 if key == H5 else name for key in keys}
+        beside, known = split_name(name)[0] + H5, stamps.known if stamps else {}
+        if os.path.abspath(beside) in known and os.path.abspath(name) not in known:
+            raise InputError(f"{beside}: holds the numbers of the mesh that was read: name another output")
+        return {key: beside if key == H5 else name for key in keys}
     if folder is None:
         return {key: _beside(name, key) if len(keys) > 1 else name for key in keys}
     paths = {key: file_in(folder, key, is_packed(name)) for key in keys}

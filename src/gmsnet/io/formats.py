@@ -102,6 +102,9 @@ for _key, _entry in FORMATS.items():
 MENDS = {  # files that one may well have, but that are not read
     ".meshb": "binary Medit is not read: convert it to text (.mesh)",
     ".poly": "a .poly file is the input of Triangle: run Triangle on it and give the .node file",
+    ".pvtu": "it names other files: smooth these, as in gmsnet smooth pieces/*.vtu --out-dir fixed",
+    ".pvtp": "it names other files: smooth these, as in gmsnet smooth pieces/*.vtp --out-dir fixed",
+    ".vtm": "it names other files: smooth these, as in gmsnet smooth blocks/*.vtu --out-dir fixed",
     ".geo": "a .geo file is a geometry: mesh it with Gmsh and give the .msh file",
     ".zip": "unpack it first",
 }

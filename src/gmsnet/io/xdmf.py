@@ -1,6 +1,7 @@
 """XDMF meshes: XML with the numbers inside, or in an HDF5 file beside it (needs h5py).
 
-Only the points are written again. The first grid with a geometry is read; others that include it (time steps) stay.
+Only the points are written again. The first grid with a geometry is read; of grids that include
+its points, as dolfinx writes tags, cells of fewer dimensions are markers, and tags of its own cells are regions.
 Source: the XDMF model and format, version 3.
 """
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from gmsnet.cells.table import nodes_of
 from gmsnet.errors import FormatError
-from gmsnet.io.cell_table import Kind, check_range, table_blocks
+from gmsnet.io.cell_table import check_range, table_blocks
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node
@@ -23,25 +24,16 @@ from gmsnet.io.places import ranges
 from gmsnet.io.splice import Points, Slots, TextSlots
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.io.text import Text
+from gmsnet.io.xdmf_tags import MIXED, SHORT, TABLE, TYPES, Mark, Tags
 from gmsnet.io.xdmf_xml import H5, Element, blame, check_plain, parse
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.mesh.region_fields import regions_of
+from gmsnet.mesh.region_fields import combined, regions_of
 
 name = "XDMF"
 suffixes = (".xdmf",)
 
 Ints = NDArray[np.int64]
 
-TYPES = {  # lower case, without underscores → its number in a list of mixed types, and the kind of cell
-    "polyvertex": (1, "vertex"), "polyline": (2, "line"), "polygon": (3, "polygon"), "triangle": (4, "triangle"),
-    "quadrilateral": (5, "quad"), "tetrahedron": (6, "tetra"), "pyramid": (7, "pyramid"), "wedge": (8, "wedge"),
-    "hexahedron": (9, "hexahedron"), "edge3": (34, "line3"), "quadrilateral9": (35, "quad9"),
-    "triangle6": (36, "triangle6"), "quadrilateral8": (37, "quad8"), "tetrahedron10": (38, "tetra10"),
-    "pyramid13": (39, "pyramid13"), "wedge15": (40, "wedge15"), "wedge18": (41, "wedge18"),
-    "hexahedron20": (48, "hexahedron20"), "hexahedron27": (50, "hexahedron27"),
-}  # fmt: skip
-SHORT = {"tri": "triangle", "quad": "quadrilateral", "tet": "tetrahedron", "hex": "hexahedron", "pyr": "pyramid"}
-MIXED = dict(TYPES.values())
 COUNTED = (1, 2, 3)  # in a list of mixed types the number of their nodes follows these
 
 
@@ -118,12 +110,31 @@ def read(files: Mapping[str, Data]) -> Parsed:
 
     check_range(nodes, len(points), fail)
     fields = [_fields(items, grid, center, count) for center, count in (("Node", len(points)), ("Cell", len(codes)))]
-    regions = regions_of(fields[1].items(), len(codes))
-    kinds = {code: Kind(kind) for code, kind in MIXED.items()}
-    cells, cell_data = table_blocks(kinds, codes, sizes, nodes, regions, fields[1])
-    others = len(list(root.all("Grid"))) - 1
-    unread = [f"{others} other grids"] * (others > 0)
+    regions, tags = regions_of(fields[1].items(), len(codes)), Tags(codes, sizes, nodes)
+    others = [other for other in root.all("Grid") if other is not grid]
+    marks = [mark for other in others if (mark := _mark(items, other, len(points))) is not None]
+    for mark in marks:
+        regions = tags.apply(mark, regions)
+    cells, cell_data = table_blocks(TABLE, codes, sizes, nodes, regions, fields[1])
+    cells += tags.lower
+    unread = [f"{len(others) - tags.used} other grids"] * (len(others) > tags.used)
     return Parsed(points, cells, slots, {}, fields[0], cell_data, single, unread, main="" if inside else H5)
+
+
+def _mark(items: Items, grid: Element, count: int) -> Mark | None:
+    """The cells of a grid that includes the points of another one, and the number that each has; None for others."""
+    if grid.of("Geometry") or not grid.of("include") or len(grid.of("Topology")) != 1:
+        return None
+    if not grid.of("Topology")[0].of("DataItem"):
+        return None
+    codes, sizes, nodes = _topology(items, grid.of("Topology")[0])
+
+    def fail(index: int, message: str) -> NoReturn:
+        blame(items.data, grid.of("Topology")[0], f"{message} (counted from 0)")
+
+    check_range(nodes, count, fail)
+    values = [field for field in _fields(items, grid, "Cell", len(codes)).values() if field.ndim == 1]
+    return Mark(codes, sizes, nodes, combined(values, len(codes)))
 
 
 def _called(data: Data, grid: Element) -> bytes:

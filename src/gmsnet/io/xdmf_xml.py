@@ -16,7 +16,10 @@ from gmsnet.io.text import fail
 H5 = ".h5"  # what the file beside it goes by in a mesh
 MOST_DEEP, MOST_ELEMENTS = 100, 200_000
 # The text of an item that is kept in HDF5: the name of the file, a colon, the path within it.
-REFERENCE = re.compile(rb"(>\s*)([^<>:\"/\\]{1,255}):(/[^<>]*?)(?=\s*</)")
+_HDF = rb"\bFormat\s{0,9}=\s{0,9}[\"']HDF[\"']"
+REFERENCE = re.compile(  # all lengths are bounded, so that no file takes long
+    rb"(<DataItem\b[^<>]{0,500}" + _HDF + rb"[^<>]{0,500}>\s{0,99})([^<>:\"/\\]{1,255}):(/[^<>]{0,999}?)(?=\s{0,99}</)"
+)
 
 
 @dataclass(eq=False)
@@ -119,7 +122,7 @@ def linked(data: Data) -> str | None:
     names = {unescape(found[2].decode("utf-8", "replace")).strip() for found in REFERENCE.finditer(data)}
     if len(names) > 1:
         raise FormatError(f"the items name {len(names)} HDF5 files: put the arrays into one")
-    if not names and re.search(rb"Format\s*=\s*[\"']HDF[\"']", data):
+    if not names and re.search(_HDF, data):
         raise FormatError("an item of Format HDF must name a file beside this one, as in mesh.h5:/points")
     return names.pop() if names else None
 

@@ -32,11 +32,12 @@ FAR = 0.6  # of a mesh that is to be tangled, nodes are thrown by up to so many 
 Way = Mapping[str, Any]
 SECOND_ORDER, SURFACE = "second-order", "surface"
 WAYS: Sequence[Way] = ({}, {"preserve": "none"}, {"slide": True}, {"guard": "star"})
-PLANAR: Sequence[Way] = (*WAYS, {"target_quality": 0.35}, {"target_angle": 25.0})
+PLANAR: Sequence[Way] = (*WAYS, {"preserve": "size"}, {"target_quality": 0.35}, {"target_angle": 25.0})
+SPACE: Sequence[Way] = (*WAYS, {"target_quality": 0.4}, {"target_dihedral": 20.0})
 KINDS: Mapping[str, Sequence[Way]] = {
     "triangle": PLANAR,
     "quad": PLANAR,
-    "tetra": WAYS,
+    "tetra": SPACE,
     SURFACE: ({}, {"slide": True}, {"guard": "star"}),
     SECOND_ORDER: ({}, {"preserve": "none"}),
 }
