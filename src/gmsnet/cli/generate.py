@@ -18,15 +18,16 @@ def generate(
         str,
         typer.Option(
             help="random, structured (rows and columns, or a body-centred lattice), o-grid (layers around a body), "
-            "adapted (to a front inside), kershaw (zigzag), layered (tetrahedra on a wall) or part (a cube of them "
-            "with two holes)."
+            "adapted (to a front inside), kershaw (zigzag), layered (tetrahedra on a wall), part (a cube of them "
+            "with two holes); surfaces, some of them volumes: sphere, torus, cylinder, cone, organic or "
+            "bracket (an L with fillets and holes)."
         ),
     ] = "random",
     cells: Annotated[
         str | None,
         typer.Option(
             help="triangle, quad, mixed or tetra.",
-            show_default="triangle if random or adapted, mixed if o-grid, tetra if layered or part, else quad",
+            show_default="triangle; mixed if o-grid, tetra if layered or part, quad if structured or kershaw",
         ),
     ] = None,
     shape: Annotated[
@@ -39,7 +40,9 @@ def generate(
     ] = None,
     nodes: Annotated[
         int | None,
-        typer.Option(help="Random nodes inside; of quads, grids and lattices about so many.", show_default="1000"),
+        typer.Option(
+            help="Random nodes inside; of quads, grids, lattices and surfaces about so many.", show_default="1000"
+        ),
     ] = None,
     size: Annotated[
         float, typer.Option(help="Side of the square around the shape; chord of the body; factor for --rings.")
@@ -76,7 +79,10 @@ def generate(
     body: Annotated[str | None, typer.Option(help="Of o-grid: airfoil or circle.", show_default="airfoil")] = None,
     seed: Annotated[int, typer.Option(help="The same seed makes the same mesh.")] = 0,
     jitter: Annotated[
-        float, typer.Option(help="Then throw each inner node up to this many of its edge lengths away.")
+        float,
+        typer.Option(
+            help="Then throw each inner node up to this many of its edge lengths away, on surfaces along them."
+        ),
     ] = 0.0,
     jitter_edge: Annotated[
         str | None, typer.Option(help="With --jitter: the node's mean or shortest edge.", show_default="mean")
@@ -92,7 +98,7 @@ def generate(
 
     from gmsnet.cli.patterns import chosen
     from gmsnet.errors import InputError
-    from gmsnet.generate import disturb
+    from gmsnet.generate import Shaped, disturb, disturb_on
     from gmsnet.io import write
     from gmsnet.io.streams import is_standard_output
 
@@ -110,9 +116,12 @@ def generate(
     kind, generator = chosen(pattern, cells, given)
     if rings is not None:
         given["rings"] = _read_rings(rings)
-    mesh = generator.make(given, size, seed)
+    made = generator.make(given, size, seed)
+    mesh = made.mesh if isinstance(made, Shaped) else made
     border = mesh.cells[-1]
-    if jitter:
+    if jitter and isinstance(made, Shaped):
+        mesh = disturb_on(made, jitter, seed=seed, keep_valid=not tangled, edge=jitter_edge or "mean").mesh
+    elif jitter:
         inner = np.ones(len(mesh.points), dtype=bool)
         inner[border.nodes] = False
         mesh = disturb(mesh, inner, jitter, seed=seed, keep_valid=not tangled, edge=jitter_edge or "mean")
@@ -121,10 +130,11 @@ def generate(
     domain = "cube" if mesh.has_volumes else "square"
     what = f"{pattern} {kind}" if pattern != "random" else str(rings or shape or domain)
     sort = f"{'marked' if interface else 'boundary'} {'faces' if mesh.has_volumes else 'edges'}"
-    counts = ", ".join(f"{len(block.nodes):,} {block.kind}s" for block in mesh.cells[:-1])
+    inner_blocks = mesh.cells[: -1 if len(mesh.cells) > 1 else None]
+    counts = ", ".join(f"{len(block.nodes):,} {block.kind}s" for block in inner_blocks)
+    counts += f" and {len(border.nodes):,} {sort}" if len(mesh.cells) > 1 else ""
     typer.echo(
-        f"{'standard output' if out == '-' else out}: {what} with {len(mesh.points):,} nodes, {counts} and "
-        f"{len(border.nodes):,} {sort} (seed {seed})",
+        f"{'standard output' if out == '-' else out}: {what} with {len(mesh.points):,} nodes, {counts} (seed {seed})",
         err=aside,
     )
     for loss in lost:
