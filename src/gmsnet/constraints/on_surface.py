@@ -60,8 +60,21 @@ def surface_of(patches: Patches, points: Floats, memory: Ints, single: bool) -> 
         origin, direction, same, points[corners], normal,
         np.where(beside == NOTHING, NOWHERE, fewer[beside]).astype(np.int32),
         controls_of(points, corners, normal) if len(corners) else np.empty((0, CONTROLS, 3)),
-        pieces, before, after, bool(single),
+        pieces, before, after, bool(single), *_around(patches, row, memory),
     )  # fmt: skip
+
+
+def _around(patches: Patches, row: Ints, memory: Ints) -> tuple[Ints, Ints, Floats]:
+    """The facets around the node of each row (``Surface``). row: (N,) by node ids."""
+    rows = patches.rows
+    around = np.concatenate([np.column_stack([rows[:, k], rows[:, k - 2], rows[:, k - 1]]) for k in range(3)])
+    chosen = np.flatnonzero(row[around[:, 0]] != NOWHERE)
+    chosen = chosen[np.argsort(row[around[chosen, 0]], kind="stable")]
+    start = np.zeros(int((row != NOWHERE).sum()) + 1, dtype=np.int32)
+    np.cumsum(np.bincount(row[around[chosen, 0]], minlength=len(start) - 1), out=start[1:])
+    place = np.empty(len(memory), dtype=np.int32)
+    place[memory] = np.arange(len(memory), dtype=np.int32)
+    return start, place[around[chosen, 1:]], np.tile(patches.unit, (3, 1))[chosen]
 
 
 def _columns(rows: Rows) -> tuple[Longs, Longs, Longs, Longs]:

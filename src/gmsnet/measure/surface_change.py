@@ -26,8 +26,8 @@ class SurfaceChange:
     largest, mean: distance of the nodes from the facets that the surface had. hausdorff: the larger of the largest
     distances of either surface from the other, sampled at the nodes and at places on facets. diagonal: of the box
     around the surface as it was; edge: the mean length of its edges. normal: the largest angle, in degrees, between a
-    facet's normal and that of the facet which was nearest to its middle. Of large surfaces, an even part of the places and
-    middles is looked at. area, volume: by what share of themselves they
+    facet's normal and that of the facet which was nearest to its middle. Of large surfaces an even part is looked at.
+    area, volume: by what share of themselves they
     have changed; the volume is None where the surface is not closed.
     """
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.jit.compile import part
 from gmsnet.kernels.simplex.orientation3 import largest_component
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
+from gmsnet.kernels.star.fold import folds, refuse_folds
 from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.guard3 import certified, error_bound3
 from gmsnet.kernels.star.slide3 import land3, note_places, on_surface, take_place
@@ -115,6 +116,7 @@ def store3(points, blocks, block, workspace, guard, tally):
     """Moves the free nodes of the lanes that are allowed, and tries the others one by one."""
     star, step, count = workspace.star, workspace.step, blocks.filled[block]
     if len(guard) != WITH_FLOORS:
+        refuse_folds(points, blocks, block, guard.constraint, workspace)
         note_places(guard.constraint, workspace)
     for lane in range(count):
         i = np.uint32(blocks.centre[block * LANES3 + lane])
@@ -148,7 +150,9 @@ def truncate3(points, blocks, block, lane, dx, dy, dz, guard, tally):
             tx, ty, tz = np.float64(np.float32(tx)), np.float64(np.float32(ty)), np.float64(np.float32(tz))
         if tx == x and ty == y and tz == z:
             break
-        if allowed3(points, blocks, block, lane, tx, ty, tz, guard):
+        if allowed3(points, blocks, block, lane, tx, ty, tz, guard) and not folds(
+            guard.constraint, i, points, place, tx, ty, tz
+        ):
             points[i, 0], points[i, 1], points[i, 2] = tx, ty, tz
             take_place(guard.constraint, i, place)
             tally[MOVED] += 1

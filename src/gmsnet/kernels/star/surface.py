@@ -32,7 +32,8 @@ class Surface(NamedTuple):
     same (E, 3) bool, which coordinates all its points have in common. Of facets (F,): corner (F, 3, 3) points, normal
     (F, 3, 3), beside (F, 3) int32, the facet across the edge from corner k to k + 1, NOWHERE at the rim, control
     (F, CONTROLS, 3). Of pieces (P,): piece (P, 4, 3) control points, before, after (P,) int32. single: new coordinates
-    are rounded to float32.
+    are rounded to float32. Of the facets of a volume's boundary around each row (M,), in CSR form by start (R + 1,):
+    ring (M, 2) int32, the other two nodes, seen counter-clockwise from outside; own (M, 3) its unit normal at first.
     """
 
     row: NDArray[np.int32]
@@ -50,6 +51,9 @@ class Surface(NamedTuple):
     before: NDArray[np.int32]
     after: NDArray[np.int32]
     single: bool
+    start: NDArray[np.int32]
+    ring: NDArray[np.int32]
+    own: NDArray[np.float64]
 
 
 @inlined
