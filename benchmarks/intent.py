@@ -12,10 +12,11 @@ the boundary. It passes if the defaults end at most 0.02 below the reference in 
 1/q, ``preserve="none"`` 0.01 and 0.02, both without an invalid cell.
 
 *layers*: the same meshes, every fourth thrown by 1 to 3 edges so that it is tangled; and as many with layers
-(``layered_mesh``: 10 to 30 rows, aspects of 5 to 1,000 at the wall), half of them with the nodes outside of the layers
-thrown by up to half an edge, a quarter by one edge so that cells are inverted there. Told is where layers are found and
-held. Of those that are there no spacing between rows may change by more than 2 %, and no area in the first two rows by
-more than 10 %, after smoothing with the defaults. A row counts whose cells have sides of a ratio of ASPECT or more.
+(``layered_mesh``, one in eight ``c_grid_mesh``: 10 to 30 rows, aspects of 5 to 1,000 at the wall), half of them with
+the nodes outside of the layers thrown by up to half an edge, a quarter by one edge so that cells are inverted there.
+Told is where layers are found and held. Of those that are there no spacing between rows may change by more than 2 %,
+and no area in the first two rows by more than 10 %, after smoothing with the defaults. A row counts whose cells have
+sides of a ratio of ASPECT or more.
 
 Each mesh follows from the seed and its number, and is told as what makes it; ``--only`` takes some by their numbers.
 """
@@ -35,6 +36,7 @@ from machine import describe
 
 import gmsnet
 from gmsnet.generate import (
+    c_grid_mesh,
     disturb,
     graded_mesh,
     kershaw_mesh,
@@ -81,8 +83,8 @@ def stretched(columns, rows, amount, factor, cells, seed):
 
 MAKERS = {
     function.__name__: function
-    for function in (disturb, graded_mesh, kershaw_mesh, layered_mesh, moved_hole_mesh, random_mesh, sheared_mesh,
-                     stretched, swirled_mesh, tangled, terrain_mesh, thrown, zigzag_mesh)
+    for function in (c_grid_mesh, disturb, graded_mesh, kershaw_mesh, layered_mesh, moved_hole_mesh, random_mesh,
+                     sheared_mesh, stretched, swirled_mesh, tangled, terrain_mesh, thrown, zigzag_mesh)
 }  # fmt: skip
 MAKERS["moved_hole_mesh"] = cache(moved_hole_mesh)  # it takes seconds
 
@@ -262,24 +264,27 @@ def layered_plan(count, begin):
         layers, around = int(draw.integers(10, 31)), int(draw.integers(60, 161))
         aspect = float(f"{10 ** draw.uniform(np.log10(5.0), 3.0):.1f}")
         cells, body = CELLS[number % 3], BODIES[draw.integers(len(BODIES))]
-        text = f"layered_mesh({layers}, {aspect}, {around}, cells={cells!r}, body={body!r})"
+        if number % 8 == 7:
+            text = (
+                f"c_grid_mesh({layers}, {aspect}, {around // 2 * 2}, cells={('quad', 'triangle')[number // 8 % 2]!r})"
+            )
+        else:
+            text = f"layered_mesh({layers}, {aspect}, {around}, cells={cells!r}, body={body!r})"
         yield text, layers, around, aspect, ("disturbed", "as it is", "disturbed", "tangled")[number // 3 % 4]
 
 
 def layered(text, layers, around, aspect, what, number):
     """One mesh with layers, after smoothing with the defaults."""
     mesh = made(text)
-    of_layers = (layers + 1) * around
-    outside = Topology.of(mesh).free
-    outside = outside[outside >= of_layers]
-    given = mesh
+    nodes = rows_of_c_grid(mesh, layers) if text.startswith("c_grid") else rows_of_o_grid(layers, around)
+    outside, given = np.setdiff1d(Topology.of(mesh).free, nodes), mesh
     if what != "as it is":
         amount, valid = (THROW, True) if what == "disturbed" else (TANGLE, False)
         edge = "shortest" if valid else "mean"
         given = disturb(mesh, outside, amount, seed=number, keep_valid=valid, edge=edge)
     result = gmsnet.smooth(given, threads=1)
     axes = list(mesh.plane)
-    was, now = (points[:of_layers, axes].reshape(layers + 1, around, 2) for points in (mesh.points, result.points))
+    was, now = (points[:, axes][nodes] for points in (mesh.points, result.points))
     space = np.abs(spacing(now) / spacing(was) - 1.0).max(axis=1)
     counts = aspect ** (1.0 - np.arange(layers) / layers) >= ASPECT
     row = {
@@ -291,13 +296,31 @@ def layered(text, layers, around, aspect, what, number):
     return row
 
 
+def rows_of_o_grid(layers, around):
+    """(layers + 1, around + 1) the nodes of the rows; the last is the first."""
+    rows = np.arange((layers + 1) * around).reshape(-1, around)
+    return np.hstack([rows, rows[:, :1]])
+
+
+def rows_of_c_grid(mesh, layers):
+    """(layers + 1, K) the nodes of the rows, from one side of the outlet to the other."""
+    quads = mesh.cells[0].nodes
+    if quads.shape[1] == 3:
+        one, two = np.split(quads, 2)
+        quads = np.hstack([one, two[:, 2:]])
+    columns = 1 + int(np.argmax(quads[1:, 0] == quads[0, 3]))
+    quads = quads.reshape(-1, columns, 4)[:layers]
+    below, above = np.hstack([quads[:, :, 0], quads[:, -1:, 1]]), np.append(quads[-1, :, 3], quads[-1, -1, 2])
+    return np.vstack([below, above])
+
+
 def spacing(rows):
     return np.linalg.norm(np.diff(rows, axis=0), axis=-1)
 
 
 def areas(rows):
     """Of the quads between rows of nodes (n, m, 2)."""
-    a, b, c, d = rows[:-1], np.roll(rows[:-1], -1, axis=1), np.roll(rows[1:], -1, axis=1), rows[1:]
+    a, b, c, d = rows[:-1, :-1], rows[:-1, 1:], rows[1:, 1:], rows[1:, :-1]
     one, two = c - a, d - b
     return 0.5 * np.abs(one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0])
 

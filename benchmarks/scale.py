@@ -2,6 +2,7 @@
 
     python benchmarks/scale.py [--nodes 1e4 1e5 1e6] [--threads 1 2] [--rounds 9] [--patience 60] [--json FILE]
     python benchmarks/scale.py --nodes 1e5 1e7 --keep FOLDER       # 1e7: five minutes for the mesh, 5 GB
+    python benchmarks/scale.py --volumes                           # of tetrahedra; 1e6: ten minutes for the mesh
 
 For each size: nanoseconds per node of one sweep of some methods and of a whole call of ``gmsnet.smooth`` (arrays in,
 arrays and both reports out), with each number of threads, all in turns; the least of the rounds is printed. The points
@@ -13,7 +14,8 @@ they use less than a twentieth, or when ``--patience`` seconds have passed; samp
 and the share that others had in the sample that is printed stands beside it.
 
 The meshes are random squares (Delaunay of uniform points), nodes and cells in random order; those of more than two
-million nodes are put together of squares of about a million. ``--keep`` keeps them for the next run.
+million nodes are put together of squares of about a million. ``--keep`` keeps them for the next run. ``--volumes``
+takes random cubes of tetrahedra instead, Delaunay of uniform points.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ import sys
 import tempfile
 import threading
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -34,15 +37,18 @@ from machine import describe, others_use
 from set_up import RESET, status
 
 import gmsnet
+from gmsnet.generate.volumes import random_volume
 from gmsnet.kernels.jit.compile import LANES, kernel
 from gmsnet.kernels.star.guard import Precision
+from gmsnet.kernels.star.space import LANES3, SpaceBlocks
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.methods import Field, smoother
 from gmsnet.parallel.threads import workers
-from gmsnet.topology.ordering import near_points
+from gmsnet.topology import ordering
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
-METHODS = ("laplacian", "barrier", "gmsnet")
+METHODS = {False: ("laplacian", "barrier", "gmsnet"), True: ("laplacian", "barrier")}  # in space?
 TILE, LINE = 10**6, 64  # nodes; bytes
 QUIET = 0.05  # of the machine
 ENOUGH = 4 * 10**6  # nodes in a sample of sweeps: a tenth of a second, for what others use is told in hundredths
@@ -73,13 +79,28 @@ def square(nodes, seed=1):
     return shuffled, cells
 
 
-def arrays_of(nodes, folder):
+def cube(nodes, seed=1):
+    """Points and cells of a random cube, in random order."""
+    mesh = random_volume(nodes, seed=seed)
+    order = np.random.default_rng(seed)
+    place = order.permutation(len(mesh.points))
+    points = np.empty_like(mesh.points)
+    points[place] = mesh.points
+    cells = place[next(block for block in mesh.cells if block.kind == "tetra").nodes]
+    order.shuffle(cells)
+    return points, [("tetra", cells)]
+
+
+def arrays_of(nodes, folder, volumes):
     """Points and cells, from the folder if they are there."""
-    files = [Path(folder) / f"{name}-{nodes}.npy" for name in ("points", "cells")]
+    made, prefix = (cube, "volume-") if volumes else (square, "")
+    files = [Path(folder) / f"{prefix}{name}-{nodes}.npy" for name in ("points", "cells")]
     if not all(file.exists() for file in files):
-        for file, array in zip(files, square(nodes), strict=True):
+        points, cells = made(nodes)
+        for file, array in zip(files, (points, cells[0][1] if volumes else cells), strict=True):
             np.save(file, array)
-    return tuple(np.load(file) for file in files)
+    points, cells = (np.load(file) for file in files)
+    return points, [("tetra", cells)] if volumes else cells
 
 
 class Samples:
@@ -112,15 +133,21 @@ class Samples:
 def sweeps(arrays, threads, rounds, patience):
     """(method, threads) → ns per node, others' share; and the bytes per node that the caches must exchange for one."""
     mesh, _ = to_mesh(arrays)
-    topology = Topology.of(mesh)
-    points, _ = near_points(mesh, topology), topology.stars  # made before, as in a call
+    volumes = mesh.has_volumes
+    topology = Volume.of(mesh) if volumes else Topology.of(mesh)
+    points = (
+        ordering.taken(ordering.space_points(mesh), topology.memory)
+        if volumes
+        else ordering.near_points(mesh, topology)
+    )
+    lanes, _ = LANES3 if volumes else LANES, topology.stars  # made before, as in a call
     del mesh
-    found, often = {}, math.ceil(ENOUGH / len(points))
-    for method in METHODS:
+    found, often = {}, math.ceil(ENOUGH / len(points) / (10 if volumes else 1))
+    for method in METHODS[volumes]:
         fields, jobs, pools = {}, {}, []
         for count in threads:
             pools.append(workers(count))
-            executor, chosen = pools[-1].__enter__().for_blocks(len(topology.free) // LANES), smoother(method)
+            executor, chosen = pools[-1].__enter__().for_blocks(len(topology.free) // lanes), smoother(method)
             field = fields[count] = Field(points.copy(), topology, Precision())
 
             def sweep(chosen=chosen, executor=executor, field=field):
@@ -138,13 +165,18 @@ def sweeps(arrays, threads, rounds, patience):
 
 def traffic(topology):
     """Bytes that a sweep moves if a colour finds no coordinates in the cache: their lines once each, and indices."""
-    stars, lines = topology.stars, 0
-    ends = np.append(stars.blocks.offset, len(stars.blocks.rings))
-    for first, last in zip(stars.first[:-1], stars.first[1:], strict=True):
-        centres = np.unique(stars.blocks.centre[first * 64 : last * 64] // (LINE // 16))
-        rings = np.unique(stars.blocks.rings[ends[first] : ends[last]] // (LINE // 16))
-        lines += len(np.union1d(centres, rings)) + len(centres)  # what is read, what is written back
-    return lines * LINE + stars.blocks.rings.nbytes + stars.blocks.centre.nbytes
+    blocks, first, lines = topology.stars.blocks, topology.stars.first, 0
+    if isinstance(blocks, SpaceBlocks):
+        rings, lanes, spokes = blocks.ring, LANES3, blocks.spoke.nbytes
+    else:
+        rings, lanes, spokes = blocks.rings, LANES, 0
+    nodes = LINE // (32 if spokes else 16)  # in a line
+    ends = np.append(blocks.offset, len(rings))
+    for start, end in pairwise(first):
+        centres = np.unique(blocks.centre[start * lanes : end * lanes] // nodes)
+        around = np.unique(rings[ends[start] : ends[end]] // nodes)
+        lines += len(np.union1d(centres, around)) + len(centres)  # what is read, what is written back
+    return lines * LINE + rings.nbytes + blocks.centre.nbytes + spokes
 
 
 def calls(arrays, threads, rounds, patience):
@@ -162,7 +194,9 @@ def calls(arrays, threads, rounds, patience):
 
 def peak(arrays, count):
     """Bytes per node at the peak of a call in this process; None where the system does not tell."""
-    gmsnet.smooth(square(1000), threads=count)  # little, lest memory be at hand that was used for it
+    gmsnet.smooth(
+        (cube if arrays[0].shape[1] == 3 else square)(1000), threads=count
+    )  # little, lest memory be at hand that was used for it
     if not RESET.exists():
         return None
     before = status("VmRSS")
@@ -211,22 +245,23 @@ def in_words(figures, unit):
     return "   ".join(f"{name}: {value:.1f} {unit} (others {share:.0%})" for name, (value, share) in figures.items())
 
 
-def report(sizes, threads, rounds, patience, folder, file):
+def report(sizes, threads, rounds, patience, folder, file, volumes):
     print(describe())
     streams = bandwidth(threads, rounds, patience)
     for name in ("copy", "triad"):
         print(f"{name}, threads  {in_words({n: streams[name, n] for n in threads}, 'GB/s')}")
     rows = []
     for nodes in sizes:
-        arrays = arrays_of(nodes, folder)
+        arrays = arrays_of(nodes, folder, volumes)
         count = len(arrays[0])
         found, moved = sweeps(arrays, threads, rounds, patience)
         whole = calls(arrays, threads, rounds if count < TILE else 3, patience)
         del arrays
-        command = [sys.executable, __file__, "--keep", str(folder), "--nodes", str(nodes), "--memory", "--threads"]
+        command = [sys.executable, __file__, "--keep", str(folder), "--nodes", str(nodes), "--memory"]
+        command += ["--volumes"] * volumes + ["--threads"]
         held = {n: json.loads(subprocess.check_output([*command, str(n)])) for n in threads}
         print(f"\n{count:,} nodes; ns per node, by threads")
-        for method in METHODS:
+        for method in METHODS[volumes]:
             own = {n: found[method, n] for n in threads}
             gain = own[threads[0]][0] / own[threads[-1]][0]
             rates = ", ".join(f"{moved / own[n][0]:.1f}" for n in threads)
@@ -257,16 +292,18 @@ def main():
     parser.add_argument("--patience", type=float, default=60.0)
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--json")
+    parser.add_argument("--volumes", action="store_true", help="tetrahedra")
     parser.add_argument("--memory", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     sizes = [int(nodes) for nodes in options.nodes]
     if options.memory:
-        print(json.dumps(peak(arrays_of(sizes[0], options.keep), options.threads[0])))
+        print(json.dumps(peak(arrays_of(sizes[0], options.keep, options.volumes), options.threads[0])))
         return
     with tempfile.TemporaryDirectory() as folder:
         if options.keep:
             options.keep.mkdir(parents=True, exist_ok=True)
-        report(sizes, options.threads, options.rounds, options.patience, options.keep or Path(folder), options.json)
+        folder = options.keep or Path(folder)
+        report(sizes, options.threads, options.rounds, options.patience, folder, options.json, options.volumes)
 
 
 if __name__ == "__main__":

@@ -71,7 +71,7 @@ def _examine(key: str, data: bytes, folder: Path) -> str:
     try:
         mesh = gmsnet.read(path, key)
     except InputError as error:
-        said = _checked(str(error), path)
+        said = _checked(str(error), path, files)
     else:
         said = ""
         _check_splice(mesh, files, folder, np.random.default_rng(len(data)))
@@ -99,9 +99,10 @@ def _write(files: Mapping[str, bytes], stem: Path) -> Path:
     return paths[0]
 
 
-def _checked(message: str, path: Path) -> str:
-    name = f"{path}: "
-    if not message.startswith(name):
+def _checked(message: str, path: Path, files: Mapping[str, bytes]) -> str:
+    beside = (path.with_suffix(suffix) for suffix in files if path.stem == "mesh")
+    name = next((f"{one}: " for one in (path, *beside) if message.startswith(f"{one}: ")), "")
+    if not name:
         raise Broken(f"the message does not begin with the file: {message[:200]!r}")
     message = message.removeprefix(name)
     if len(message) > LONGEST or not message.isprintable():

@@ -14,6 +14,7 @@ from gmsnet.cli.generate import generate
 from gmsnet.errors import InputError
 from gmsnet.generate import (
     adapted_mesh,
+    c_grid_mesh,
     disturb,
     hybrid_mesh,
     kershaw_mesh,
@@ -72,6 +73,9 @@ def run(*arguments):
         ("--pattern kershaw --columns 6 --rows 4 --flatness 0.1", lambda: kershaw_mesh(6, 4, flatness=0.1)),
         ("--pattern kershaw", lambda: kershaw_mesh(33)),
         ("--pattern adapted --nodes 200 --aspect 3", lambda: adapted_mesh(200, 3.0)),
+        ("--pattern c-grid --layers 4 --aspect 50 --around 40", lambda: c_grid_mesh(4, 50.0, 40)),
+        ("--pattern c-grid --layers 4 --around 40 --cells triangle --aspect 9",
+         lambda: c_grid_mesh(4, 9.0, 40, cells="triangle")),
         ("--pattern o-grid --layers 4 --aspect 50 --around 40", lambda: layered_mesh(4, 50.0, 40, cells="mixed")),
         ("--pattern o-grid --layers 2 --around 30 --cells quad --body circle --aspect 9",
          lambda: layered_mesh(2, 9.0, 30, cells="quad", body="circle")),
@@ -95,8 +99,8 @@ def test_command_makes_what_the_functions_make(tmp_path, options, expected):
     [
         (
             "--pattern zigzag",
-            "unknown pattern 'zigzag'; there are random, structured, o-grid, adapted, kershaw, layered, part, sphere, "
-            "torus, cylinder, cone, organic, bracket",
+            "unknown pattern 'zigzag'; there are random, structured, o-grid, c-grid, adapted, kershaw, layered, part, "
+            "sphere, torus, cylinder, cone, organic, bracket",
         ),
         ("--cells hex", "--pattern random makes --cells triangle or quad or mixed or tetra, not 'hex'"),
         ("--pattern kershaw --cells mixed", "--pattern kershaw makes --cells quad, not 'mixed'"),

@@ -183,7 +183,9 @@ def test_faces_and_lines_of_a_volume_are_not_measured():
     report = measure(mesh)
     assert report.summary()["tetrahedra"] == len(report.cell) == len(cells)
     assert isinstance(connectivity_of(mesh), Volume)
-    only_others = gmsnet.Mesh(np.eye(4)[:, :3] + 1, (volumes.block("tetra10", [[0, 1, 2, 3, 0, 1, 2, 3, 0, 1]]),))
+    only_others = gmsnet.Mesh(
+        np.eye(4)[:, :3] + 1, (volumes.block("pyramid13", [[0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0]]),)
+    )
     assert len(measure(only_others).cell) == 0
     assert measure(only_others).totals is None
 

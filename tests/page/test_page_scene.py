@@ -129,11 +129,20 @@ def test_layers_that_are_thinner_than_single_precision_can_tell_are_drawn(thin):
     assert np.abs(steps / thin - 1.0).max() < 1e-2
 
 
-def test_cells_whose_quality_is_not_known_are_drawn_as_such():
+def test_volumes_of_several_kinds_are_drawn_with_their_measures():
     scene = scene_of(alone(bricks()))
     assert scene.known["volumes"]
-    assert (scene.arrays["shape-now"] == scene.known["unknown"]).all()
+    assert scene.arrays["shape-now"].tolist() == [756] * 4 + [1000] * 8 + [901]
+    assert not len(scene.arrays["invalid-now"])
     assert [group["kind"] for group in scene.known["groups"]] == ["pyramid", "hexahedron", "wedge"]
+
+
+def test_cells_whose_quality_is_not_known_are_drawn_as_such():
+    mesh = bricks()
+    curved = np.array([[*mesh.cells[0].nodes[0], *range(8)]])
+    scene = scene_of(alone(replace(mesh, cells=(CellBlock("pyramid13", curved, np.zeros(1, int)),))))
+    assert (scene.arrays["shape-now"] == scene.known["unknown"]).all()
+    assert [group["kind"] for group in scene.known["groups"]] == ["pyramid13"]
 
 
 def test_cells_of_a_kind_that_is_not_known_are_named():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gmsnet.generate import (
+    c_grid_mesh,
     disturb,
     kershaw_mesh,
     layered_mesh,
@@ -54,6 +55,8 @@ LAYERS = {
     "quads": lambda: layered_mesh(cells="quad"),
     "mixed": lambda: layered_mesh(cells="mixed"),
     "circle": lambda: layered_mesh(30, 100, body="circle"),
+    "C-grid": lambda: c_grid_mesh(20, 300),
+    "C-grid of triangles": lambda: c_grid_mesh(10, 50, cells="triangle"),
     "few thick ones": lambda: layered_mesh(10, 5),
     "hardly any": lambda: layered_mesh(10, 3),
 }

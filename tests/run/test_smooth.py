@@ -212,13 +212,6 @@ def test_what_cannot_be_used_is_refused(square, options, message):
         gmsnet.smooth(square, **options)
 
 
-def test_curved_surfaces_are_refused():
-    rng = np.random.default_rng(0)
-    points = rng.random((10, 3))
-    with pytest.raises(InputError, match="curved surface"):
-        gmsnet.smooth((points, np.array([[0, 1, 2], [1, 2, 3]])))
-
-
 @pytest.mark.parametrize("size", [4e-310, 1e-200, 1e200, 1.5e308])
 def test_coordinates_at_the_ends_of_the_range(square, size):
     mesh = Mesh(square.points * size, square.cells)

@@ -18,6 +18,7 @@ def generate(
         str,
         typer.Option(
             help="random, structured (rows and columns, or a body-centred lattice), o-grid (layers around a body), "
+            "c-grid (and along its wake), "
             "adapted (to a front inside), kershaw (zigzag), layered (tetrahedra on a wall), part (a cube of them "
             "with two holes); surfaces, some of them volumes: sphere, torus, cylinder, cone, organic or "
             "bracket (an L with fillets and holes)."
@@ -67,15 +68,17 @@ def generate(
         bool, typer.Option("--interface", help="Of structured mixed: the patch is a region of its own.")
     ] = False,
     layers: Annotated[
-        int | None, typer.Option(help="Of o-grid and layered: rows of stretched cells.", show_default="20; 8")
+        int | None, typer.Option(help="Of o-grid, c-grid and layered: rows of stretched cells.", show_default="20; 8")
     ] = None,
     aspect: Annotated[
         float | None,
         typer.Option(
-            help="Of o-grid: ratio of the sides at the wall (1000), of layered (50). Of adapted: at the front (10)."
+            help="Of o-grid, c-grid: ratio of sides at the wall (1000), of layered (50). Of adapted: at its front (10)."
         ),
     ] = None,
-    around: Annotated[int | None, typer.Option(help="Of o-grid: nodes on the wall.", show_default="120")] = None,
+    around: Annotated[
+        int | None, typer.Option(help="Of o-grid and c-grid: nodes on the wall.", show_default="120")
+    ] = None,
     body: Annotated[str | None, typer.Option(help="Of o-grid: airfoil or circle.", show_default="airfoil")] = None,
     seed: Annotated[int, typer.Option(help="The same seed makes the same mesh.")] = 0,
     jitter: Annotated[

@@ -62,13 +62,13 @@ def _hybrid(given: Given, size: float, seed: int) -> Mesh:
     return hybrid_mesh(given.get("nodes", NODES), size=size, seed=seed, **_named(given, "share", "interface"))
 
 
-def _o_grid(cells: str) -> Callable[[Given, float, int], Mesh]:
+def _around_body(name: str, cells: str) -> Callable[[Given, float, int], Mesh]:
     def make(given: Given, size: float, seed: int) -> Mesh:
-        from gmsnet.generate import layered_mesh
+        from gmsnet import generate
         from gmsnet.generate.arguments import positive
 
         positive(size, "the size")
-        mesh = layered_mesh(cells=cells, **_named(given, "layers", "aspect", "around", "body"))
+        mesh: Mesh = getattr(generate, name)(cells=cells, **_named(given, "layers", "aspect", "around", "body"))
         return mesh.with_points(mesh.points * size)
 
     return make
@@ -141,9 +141,13 @@ PATTERNS: dict[str, dict[str, Generator]] = {  # pattern → its cells, the defa
         "tetra": Generator(_lattice("lattice_volume"), frozenset({"nodes", "columns"})),
     },
     "o-grid": {
-        "mixed": Generator(_o_grid("mixed"), LAYERS),
-        "quad": Generator(_o_grid("quad"), LAYERS),
-        "triangle": Generator(_o_grid("triangle"), LAYERS),
+        "mixed": Generator(_around_body("layered_mesh", "mixed"), LAYERS),
+        "quad": Generator(_around_body("layered_mesh", "quad"), LAYERS),
+        "triangle": Generator(_around_body("layered_mesh", "triangle"), LAYERS),
+    },
+    "c-grid": {
+        "quad": Generator(_around_body("c_grid_mesh", "quad"), LAYERS - {"body"}),
+        "triangle": Generator(_around_body("c_grid_mesh", "triangle"), LAYERS - {"body"}),
     },
     "adapted": {"triangle": Generator(_adapted, frozenset({"nodes", "aspect"}))},
     "kershaw": {"quad": Generator(_kershaw, GRID | {"flatness"})},

@@ -25,7 +25,9 @@ def quality(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
 ) -> None:
-    """Measure the triangles and quads, or the tetrahedra, of a mesh: angles, 1/q or η, inverted, the worst.
+    """Measure the triangles and quads, or the volumes, of a mesh: angles, 1/q or η, inverted, the worst.
+
+    Hexahedra, wedges and pyramids count as inverted unless they are valid everywhere in them.
 
     Two meshes are measured side by side; how far nodes have moved is told as well where both have the same cells.
     """
@@ -94,6 +96,8 @@ def quality(
             console.print("there are no triangles or quads to measure")
         if others and len(found.cell):
             console.print(f"not measured: {others}")
+        for remark in found.remarks:
+            console.print(remark)
         if mesh.plane is None and not mesh.has_volumes:
             console.print("the mesh is a surface in space: its cells have no sign, none counts as inverted")
         if plot is not None:

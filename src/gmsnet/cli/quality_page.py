@@ -23,6 +23,7 @@ def write_quality_page(
     facts = [("read", shown(source))]
     if others := unmeasured(mesh):
         facts.append(("not measured", others))
+    facts += [("cells", remark) for remark in found.remarks]
     contents = Contents(
         title=os.path.basename(shown(source)), verdict=_verdict(mesh, found), mesh=mesh, after=found, document=document,
         command=command, worst_after=worst_cells(mesh, found, count=WORST), facts=facts,

@@ -113,6 +113,14 @@ def smooth(
             help="With --slide: curves end, and edges of surfaces are sharp, where they turn by more degrees than this."
         ),
     ] = 30.0,
+    surface_tolerance: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X",
+            help="How far nodes of surfaces may go from the input's facets, over the length of their edges (default: "
+            "0.05 of surface meshes; of volumes no bound).",
+        ),
+    ] = None,
     threads: Annotated[
         int | None,
         typer.Option(min=1, help="Use at most so many processors (default: all). Same result for any number."),
@@ -195,7 +203,7 @@ def smooth(
         preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, weights=weights,
         best_by=best_by,
         slide=True if slide and "all" in slide else slide or None, feature_angle=feature_angle,
-        **values_at_nodes(metric, size),
+        surface_tolerance=surface_tolerance, **values_at_nodes(metric, size),
     )  # fmt: skip
 
     def one(job: Job, destination: Destination | None) -> tuple[int, bool]:

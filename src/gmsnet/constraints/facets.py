@@ -1,14 +1,20 @@
-"""The facets of a surface in space whose nodes may slide on it: the boundary of a mesh of tetrahedra."""
+"""The facets of a surface in space on which nodes slide: the boundary of tetrahedra, or a mesh of its own."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gmsnet.constraints.features import lengths_of
 from gmsnet.constraints.outline import Flags, Longs, line_cells, mark_sets
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.held import SMOOTHED
+from gmsnet.topology.topology import Topology
 from gmsnet.topology.wound import Wound
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +23,9 @@ class Facets:
 
     rows: (F, 3) node ids, counter-clockwise as seen from outside. label: (F,), equal for facets of the same region with
     the same marks; names: label → the names of the marks. lines: (L, 2) node ids, the ends of line cells; line_marks
-    (L,). still: (N,) bool, nodes that stay whatever lies around them.
+    (L,). still: (N,) bool, nodes that stay whatever lies around them. closed: an edge of one facet is a mistake; else
+    it is the boundary of the surface. halves: how many of the last rows are halves of quads: first those with the
+    corners 0, 1 and 2 of each, then those with 0, 2 and 3.
     """
 
     rows: Longs
@@ -26,6 +34,8 @@ class Facets:
     lines: Longs
     line_marks: Longs
     still: Flags
+    closed: bool = True
+    halves: int = 0
 
 
 def boundary_of(mesh: Mesh, wound: Wound) -> Facets:
@@ -36,6 +46,23 @@ def boundary_of(mesh: Mesh, wound: Wound) -> Facets:
     marks, names = _marks(mesh, rows, still)
     table, label = np.unique(np.column_stack([region, marks]), axis=0, return_inverse=True)
     return Facets(rows, label.reshape(-1), tuple(names[row] for row in table[:, 1].tolist()), lines, line_marks, still)
+
+
+def surface_itself(mesh: Mesh, topology: Topology) -> Facets:
+    """The triangles of a mesh in no plane, wound alike, and then two of each quad."""
+    rows = np.where(topology.orientation[:, None] > 0, topology.triangles, topology.triangles[:, [0, 2, 1]])
+    quads = np.where(topology.quad_orientation[:, None] > 0, topology.quads, topology.quads[:, [0, 3, 2, 1]])
+    halves = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    lines, line_marks, still = line_cells(mesh)
+    for block in mesh.cells:
+        if block.dimension in (None, 2, 3) and block.kind not in SMOOTHED:
+            still[block.nodes] = True
+    cells = np.concatenate([topology.cell, topology.quad_cell, topology.quad_cell])
+    region = np.concatenate([np.zeros(0, dtype=np.int64), *(block.regions for block in mesh.cells)])[cells]
+    numbers, label = np.unique(region, return_inverse=True)
+    names = tuple((mesh.region_names.get((2, number), str(number)),) for number in numbers.tolist())
+    every = np.concatenate([rows, halves]).astype(np.int64)
+    return Facets(every, label.reshape(-1).astype(np.int64), names, lines, line_marks, still, False, len(halves))
 
 
 def _marks(mesh: Mesh, rows: Longs, still: Flags) -> tuple[Longs, list[tuple[str, ...]]]:
@@ -57,6 +84,22 @@ def _marks(mesh: Mesh, rows: Longs, still: Flags) -> tuple[Longs, list[tuple[str
     owner = facet[which[len(rows) :]]
     still[cells[owner < 0]] = True
     return mark_sets(mesh, owner[owner >= 0], numbers[owner >= 0], len(rows), 2)
+
+
+def edge_lengths(facets: Facets, points: Floats) -> Floats:
+    """(N,) the mean length of the edges of cells at each node; inside of a surface each counts twice."""
+    real = np.ones((len(facets.rows), 3), dtype=bool)  # of the edge from corner k to the next one
+    quads = facets.halves // 2
+    real[len(real) - 2 * quads : len(real) - quads, 2] = real[len(real) - quads :, 0] = False
+    total, count = np.zeros(len(points)), np.zeros(len(points), dtype=np.int64)
+    for k in range(3):
+        one, other = facets.rows[real[:, k], k], facets.rows[real[:, k], (k + 1) % 3]
+        length = lengths_of(points[other] - points[one])
+        for end in (one, other):
+            total += np.bincount(end, length, len(points))
+            count += np.bincount(end, minlength=len(points))
+    lengths: Floats = total / np.maximum(count, 1)
+    return lengths
 
 
 def facet_keys(rows: Longs, nodes: int) -> Longs:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.options import FEATURE_ANGLE, SlideChoice, check_slide
 from gmsnet.constraints.outline import Flags, Outline, outline_of
+from gmsnet.errors import InputError
 from gmsnet.kernels.topology import chains
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.held import SMOOTHED
@@ -79,6 +80,8 @@ def curves_of(
     Raises InputError for a mesh that is not planar, unknown markers and angles out of range.
     """
     names = check_slide(mesh, slide, feature_angle)
+    if mesh.plane is None:
+        raise InputError("curves are of meshes in a plane: of one in space they follow from its patches")
     return curves_along(outline_of(mesh), planar_points(mesh), mesh.single, feature_angle, may_slide(mesh, names, held))
 
 

@@ -26,10 +26,13 @@ class Rows(NamedTuple):
     place: Longs
 
 
-def surface_of(patches: Patches, points: Floats, memory: Ints, single: bool) -> Surface | None:
+def surface_of(
+    patches: Patches, points: Floats, memory: Ints, single: bool, limit: Floats | None = None
+) -> Surface | None:
     """The constraint for kernels, with the nodes where they are; None where none slides.
 
-    points: (N, 3) by node ids. memory: (N,) node ids in memory order.
+    points: (N, 3) by node ids. memory: (N,) node ids in memory order. limit: (N,) how far each may go from the facets
+    or edges; None: as far as the cubics are.
     """
     slides = patches.slides | patches.curves.slides
     if not slides.any():
@@ -60,7 +63,9 @@ def surface_of(patches: Patches, points: Floats, memory: Ints, single: bool) -> 
         origin, direction, same, points[corners], normal,
         np.where(beside == NOTHING, NOWHERE, fewer[beside]).astype(np.int32),
         controls_of(points, corners, normal) if len(corners) else np.empty((0, CONTROLS, 3)),
-        pieces, before, after, bool(single), *_around(patches, row, memory),
+        pieces, before, after, bool(single),
+        np.full(len(nodes), np.inf) if limit is None else limit[nodes[order]],
+        *_around(patches, row, memory),
     )  # fmt: skip
 
 

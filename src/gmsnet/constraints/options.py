@@ -30,10 +30,8 @@ def check_slide(
     """
     check_sliding(feature_angle, geometry)
     names = _names_of(mesh, slide)
-    if names != () and mesh.plane is None and not mesh.has_volumes:
-        raise InputError("nodes of surfaces in space cannot slide yet: leave slide out")
-    if names != () and mesh.has_volumes and geometry is not None:
-        raise InputError("a geometry cannot be given for volumes yet: leave geometry out")
+    if geometry is not None and mesh.plane is None:
+        raise InputError("a geometry cannot be given for meshes in space yet: leave geometry out")
     return names
 
 

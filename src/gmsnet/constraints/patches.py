@@ -52,8 +52,9 @@ def patches_of(facets: Facets, points: Floats, feature_angle: float, single: boo
     two = count == 2
     one, other = order[first], order[first + two]  # numbers 3f + k; the same one where there is no other
     f, g = one // 3, other // 3
-    cosine = (unit[f] * unit[g]).sum(axis=1)
-    smooth = two & (area[f] > 0.0) & (area[g] > 0.0) & (facets.label[f] == facets.label[g])
+    turning, size = _of_cells(facets, normal, unit, area)
+    cosine = (turning[f] * turning[g]).sum(axis=1)
+    smooth = two & (size[f] > 0.0) & (size[g] > 0.0) & (facets.label[f] == facets.label[g])
     smooth &= cosine >= math.cos(math.radians(feature_angle)) - SLACK
     line_keys = edge_keys(facets.lines[:, 0], facets.lines[:, 1], nodes)
     smooth &= ~np.isin(found, line_keys)
@@ -67,7 +68,8 @@ def patches_of(facets: Facets, points: Floats, feature_angle: float, single: boo
 
     sharp = np.flatnonzero(~smooth)
     still = facets.still.copy()
-    for chosen in (found[~two], np.setdiff1d(line_keys, found)):  # edges of one facet or many; lines elsewhere
+    apart = ~two if facets.closed else count > 2
+    for chosen in (found[apart], np.setdiff1d(line_keys, found)):  # edges of one facet or many; lines elsewhere
         still[chosen // nodes] = still[chosen % nodes] = True
     outline = _outline(facets, found[sharp], f[sharp], g[sharp], line_keys, still)
     curves = curves_along(outline, points, single, feature_angle, may)
@@ -79,6 +81,17 @@ def patches_of(facets: Facets, points: Floats, feature_angle: float, single: boo
     return Patches(
         curves, slides, rows, linked(beside.reshape(-1, 3)), beside.reshape(-1, 3), unit, area, flat.reshape(-1, 3)
     )
+
+
+def _of_cells(facets: Facets, normal: Floats, unit: Floats, area: Floats) -> tuple[Floats, Floats]:
+    """The unit normals of facets and their lengths before; of halves of quads those of the quads."""
+    if not facets.halves:
+        return unit, area
+    begin, half = len(normal) - facets.halves, facets.halves // 2
+    whole = np.tile(normal[begin : begin + half] + normal[begin + half :], (2, 1))
+    length = lengths_of(whole)
+    of_quads = np.divide(whole, length[:, None], out=np.zeros_like(whole), where=length[:, None] > 0.0)
+    return np.concatenate([unit[:begin], of_quads]), np.concatenate([area[:begin], length])
 
 
 def linked(beside: Longs, chosen: Flags | None = None) -> Longs:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.constraints.facets import Facets, boundary_of
-from gmsnet.constraints.features import may_slide
+from gmsnet.constraints.facets import Facets, boundary_of, edge_lengths
+from gmsnet.constraints.features import lengths_of, may_slide
 from gmsnet.constraints.on_surface import surface_of
 from gmsnet.constraints.options import FEATURE_ANGLE
 from gmsnet.constraints.outline import Flags
@@ -41,27 +42,35 @@ class SurfaceSliding:
     constraint: Surface | None
 
     @classmethod
-    def of(cls, mesh: Mesh, facets: Facets, patches: Patches, memory: Ints, free: Ints) -> SurfaceSliding:
-        """Of a mesh and the patches of its boundary; memory, free: of its topology."""
+    def of(
+        cls, mesh: Mesh, facets: Facets, patches: Patches, memory: Ints, free: Ints, tolerance: float = math.inf
+    ) -> SurfaceSliding:
+        """Of a mesh and the patches of its boundary; memory, free: of its topology.
+
+        tolerance: how far from the facets nodes may go, over the mean length of their edges.
+        """
         points = space_points(mesh)[:, :3].copy()
         nodes = np.zeros(len(points), dtype=bool)
         nodes[free] = True
         nodes &= patches.slides | patches.curves.slides
-        constraint = surface_of(patches, points, memory, mesh.single) if nodes.any() else None
+        limit = tolerance * edge_lengths(facets, points) if tolerance < math.inf else None
+        constraint = surface_of(patches, points, memory, mesh.single, limit) if nodes.any() else None
         return cls(facets, patches, points, mesh.exponent, memory, nodes, constraint)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:
         """What to say of it. mesh: as it has become. moved: (N,) bool."""
+        closed = self.facets.closed
         if self.constraint is None:
-            return "slide: no node of the boundary can move along it"
+            return "slide: no node of the boundary can move along it" if closed else "surface: no node can move on it"
         points = np.ldexp(mesh.points, -self.exponent)  # its own exponent may differ
-        before, after = enclosed(self.start, self.facets), enclosed(points, self.facets)
+        measured = enclosed if closed else area_of
+        before, after = measured(self.start, self.facets), measured(points, self.facets)
         change = abs(after - before) / abs(before) if before else 0.0
         away = farthest(self.constraint, points[self.memory], moved[self.memory])
         return (
-            f"slide: {int((self.nodes & moved).sum()):,} of {int(self.nodes.sum()):,} nodes have moved along the "
-            f"boundary, at most {away:.2g} of an edge from the input's facets; "
-            f"the volume changes by {change:.2g} of itself"
+            f"{'slide' if closed else 'surface'}: {int((self.nodes & moved).sum()):,} of {int(self.nodes.sum()):,} "
+            f"nodes have moved {'along the boundary' if closed else 'on it'}, at most {away:.2g} of an edge from the "
+            f"input's facets; the {'volume' if closed else 'area'} changes by {change:.2g} of itself"
         )
 
 
@@ -69,6 +78,12 @@ def enclosed(points: Floats, facets: Facets) -> float:
     """The volume that facets enclose."""
     a, b, c = (points[facets.rows[:, k]] - points.mean(axis=0) for k in range(3))
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def area_of(points: Floats, facets: Facets) -> float:
+    """The area of facets."""
+    a, b, c = (points[facets.rows[:, k]] for k in range(3))
+    return float(lengths_of(np.cross(b - a, c - a)).sum() / 2.0)
 
 
 def patches_to_slide_on(

@@ -1,6 +1,7 @@
 """Test meshes: random, good, curved, adapted ones, layers, grids, deformed, surfaces, tetrahedra, thrown nodes."""
 
 from gmsnet.generate.adapted import Front, adapted_mesh
+from gmsnet.generate.c_grid import c_grid_mesh
 from gmsnet.generate.curved import disc_of_quads, on_circle, second_order, throw, waved
 from gmsnet.generate.curves import Curve
 from gmsnet.generate.deformed import moved_hole_mesh, sheared_mesh, swirled_mesh, terrain_mesh, zigzag_mesh
@@ -29,6 +30,7 @@ __all__ = [
     "adapted_mesh",
     "ball_volume",
     "bracket",
+    "c_grid_mesh",
     "cone_surface",
     "cylinder",
     "disc_of_quads",

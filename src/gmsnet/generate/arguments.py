@@ -23,6 +23,13 @@ def number_between(value: float, name: str, low: float, high: float) -> float:
     return float(value)
 
 
+def at_least(value: float, name: str, low: float) -> float:
+    """The value as a float. Raises InputError unless it is finite and not below ``low``."""
+    if not (np.isfinite(value) and value >= low):
+        raise InputError(f"{name} must be a number of at least {low:g}, got {value!r}")
+    return float(value)
+
+
 def positive(value: float, name: str) -> float:
     """The value as a float. Raises InputError unless it is positive and finite."""
     if not (np.isfinite(value) and value > 0):

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gmsnet.errors import InputError
-from gmsnet.generate.arguments import one_of, whole_number
+from gmsnet.generate.arguments import at_least, one_of, whole_number
 from gmsnet.generate.curves import Curve
 from gmsnet.generate.good import good_mesh
 from gmsnet.generate.marked import marked
@@ -42,11 +41,10 @@ def layered_mesh(
     """
     whole_number(layers, "layers", 1)
     whole_number(around, "around", 20)
-    if not (np.isfinite(aspect) and aspect >= 1.0):
-        raise InputError(f"the aspect must be a number of at least 1, got {aspect!r}")
+    aspect = at_least(aspect, "the aspect", 1.0)
     one_of(cells, "cells", CELLS)
     one_of(body, "body", BODIES)
-    rows = _rows(int(layers), float(aspect), int(around), body, to_far_field=cells == "quad")
+    rows = _rows(int(layers), aspect, int(around), body, to_far_field=cells == "quad")
     wall = np.arange(rows.shape[1])
     if cells == "quad":
         last = wall + rows[:-1].size // 2

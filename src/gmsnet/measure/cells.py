@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.simplex import cell_measures
+from gmsnet.kernels.simplex import cell_measures, shell_measures
 from gmsnet.kernels.simplex import measures as kernels
 from gmsnet.measure.signs import exact_signs
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.plane import exponent_of
-from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.ordering import planar_points, space_points
 from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
@@ -50,8 +50,6 @@ class MeasuredCells:
         """Those of a mesh, and the index of each among all its cells."""
         cell, order = topology.cell, None
         quads, quad_orientation = topology.quads, topology.quad_orientation
-        if mesh.plane is None:  # of quads that need not be plane nothing is known yet
-            quads, quad_orientation = quads[:0], quad_orientation[:0]
         if len(quads):
             cell = np.concatenate([cell, topology.quad_cell])
             order = np.argsort(cell, kind="stable")
@@ -92,7 +90,10 @@ class MeasuredCells:
 
     def _of_quads(self) -> Floats:
         found = np.empty((4, len(self.quads)))
-        cell_measures.per_quad(planar_points(self), self.quads, self.quad_orientation, found)
+        if self.plane is None:
+            shell_measures.per_quad_in_space(space_points(self), self.quads, self.quad_orientation, found)
+        else:
+            cell_measures.per_quad(planar_points(self), self.quads, self.quad_orientation, found)
         return found
 
     def scaled_jacobian(self) -> Floats:

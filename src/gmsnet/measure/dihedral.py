@@ -74,7 +74,9 @@ def ratios_of(points: Floats, cells: Tetrahedra, executor: Executor = serial) ->
     out = np.empty(len(cells.rows))
 
     def look(first: int, last: int) -> None:
-        cubed_ratios(points, cells.rows, cells.orientation, first * LANES, min(last * LANES, len(out)), out)
+        cubed_ratios(
+            points, cells.rows, cells.orientation, cells.shapes, first * LANES, min(last * LANES, len(out)), out
+        )
 
     executor.map(look, 0, -(-len(out) // LANES))
     return out

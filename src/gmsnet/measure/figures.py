@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 
 FIGURES = (  # of QualityReport.summary(): label, path, number of decimals
     ("inverted cells", ("inverted",), 0),
+    ("of these, with positive corners", ("invalid_inside",), 0),
+    ("of these, undecided", ("undecided",), 0),
     ("1/q, least", ("shape", "min"), 4),
     ("1/q, 1st percentile", ("shape", "p1"), 4),
     ("1/q, mean", ("shape", "mean"), 4),
@@ -15,6 +17,7 @@ FIGURES = (  # of QualityReport.summary(): label, path, number of decimals
     ("scaled Jacobian, mean", ("scaled_jacobian", "mean"), 4),
     ("1/q_V, least", ("aspect", "min"), 4),
     ("1/q_V, mean", ("aspect", "mean"), 4),
+    ("det J over its mean in curved cells, least", ("curved", "min"), 4),
     ("min angle, least", ("min_angle", "min"), 2),
     ("min angle, mean", ("min_angle", "mean"), 2),
     ("max angle, greatest", ("max_angle", "max"), 2),
@@ -39,8 +42,8 @@ class Figure(NamedTuple):
 
 
 def figures_of(summaries: Sequence[Mapping[str, Any]]) -> list[Figure]:
-    """The rows that any of some summaries has; of tetrahedra, what stands for 1/q is η."""
-    symbol = "η" if "tetrahedra" in summaries[0] else "1/q"
+    """The rows that any of some summaries has; of volumes, what stands for 1/q is η."""
+    symbol = "η" if "min_dihedral" in summaries[0] else "1/q"
     rows = [
         Figure(label.replace("1/q", symbol), path, [_text(at(summary, path), decimals) for summary in summaries])
         for label, path, decimals in FIGURES

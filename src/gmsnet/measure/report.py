@@ -10,18 +10,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.jacobian import has_form
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex import measures as kernels
 from gmsnet.measure.cells import MeasuredCells
+from gmsnet.measure.defects import defects_of, remarks_on
+from gmsnet.measure.solids import MeasuredSolids
 from gmsnet.measure.totals import NOWHERE, Totals, totals_of
 from gmsnet.measure.volumes import MeasuredTetrahedra
 from gmsnet.mesh.display import html_table, text_table
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
+from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
 from gmsnet.topology.ordering import near_points, space_points, taken
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
+from gmsnet.topology.wound import refuse_flat
 
 SHAPE, ASPECT = "shape", "aspect"  # with which 1/q meshes on the way are compared: the loss's or Verdict's
 
@@ -32,6 +37,7 @@ THRESHOLDS = {
     "min_dihedral": (5.0, 10.0, 20.0, 30.0), "max_dihedral": (150.0, 165.0, 175.0),
 }  # fmt: skip
 BEST_IS_LOW = ("max_angle", "max_dihedral")
+NAMED = 10  # cells with a defect are named
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +57,17 @@ class QualityReport:
     min_dihedral, max_dihedral: (T,) degrees; volume: (T,); scaled_jacobian: (T,) √2·6V over the largest product of the
     three edges at a corner (Verdict). They have no min_angle, max_angle, aspect and q̂.
 
+    Of hexahedra, wedges, pyramids, and tetrahedra beside them or of second order, shape is η of the worst corner,
+    scaled_jacobian is Verdict's, and dihedral angles are those at corners. sign is 1 where the Jacobian determinant is
+    positive everywhere in the cell, −1 where it is not, and 0 where that is undecided, which counts as invalid, too.
+
     ``inverted`` and q̂ are known from the beginning, and so are the totals: means and extremes, None where there are no
     triangles. The columns are made when one of them is first asked for, of the triangles as they were measured.
     """
 
     cell: NDArray[np.int64]
     totals: Totals | None = field(repr=False)
-    cells: MeasuredCells | MeasuredTetrahedra = field(repr=False)
+    cells: MeasuredCells | MeasuredTetrahedra | MeasuredSolids = field(repr=False)
     signs: NDArray[np.int8] | None = field(repr=False)  # None where all are certainly positive
 
     def __repr__(self) -> str:
@@ -73,8 +83,10 @@ class QualityReport:
         counts = [("cells", f"{len(self.cell):,}"), ("inverted", f"{self.inverted:,}")]
         if self.totals is None:
             return counts
-        if isinstance(self.cells, MeasuredTetrahedra):
-            return [*counts, *_of_tetrahedra(self)]
+        if self.undecided:
+            counts.append(("undecided", f"{self.undecided:,}"))
+        if not isinstance(self.cells, MeasuredCells):
+            return [*counts, *_of_volumes(self)]
         known = [
             ("1/q, least", self.totals.shape_min, 4),
             ("1/q, mean", self.totals.shape_mean, 4),
@@ -86,8 +98,18 @@ class QualityReport:
 
     @property
     def inverted(self) -> int:
-        """How many triangles have an area of zero or less."""
+        """How many cells are not valid: triangles with an area of zero or less. Undecided ones are among them."""
         return 0 if self.signs is None else int((self.signs <= 0).sum())
+
+    @property
+    def undecided(self) -> int:
+        """How many cells are neither valid nor invalid for certain."""
+        return self.cells.undecided if isinstance(self.cells, MeasuredSolids) else 0
+
+    @property
+    def remarks(self) -> list[str]:
+        """What else is to be known of the cells, in words: defects of the file, with the numbers of the first."""
+        return remarks_on(self.cells) if isinstance(self.cells, MeasuredSolids) else []
 
     @property
     def qhat(self) -> float:
@@ -174,9 +196,9 @@ class QualityReport:
     @cached_property
     def scaled_jacobian(self) -> Floats:
         """(T,) of each cell's worst corner."""
-        if isinstance(self.cells, MeasuredTetrahedra):
-            return self.column("scaled_jacobian")
-        return self.cells.scaled_jacobian()
+        if isinstance(self.cells, MeasuredCells):
+            return self.cells.scaled_jacobian()
+        return self.column("scaled_jacobian")
 
     def worst(self, count: int) -> NDArray[np.int64]:
         """Rows of the ``count`` triangles of minimum shape, the worst first."""
@@ -209,10 +231,27 @@ class QualityReport:
             for limit in THRESHOLDS.get(name, ()):
                 beyond = values > limit if best_is_low else values < limit
                 document[name][f"{'above' if best_is_low else 'below'}_{limit:g}"] = int(np.count_nonzero(beyond))
+        if isinstance(self.cells, MeasuredSolids):
+            document |= _of_solids(self.cells)
         return {**document, "qhat": self.qhat, "qhat_aspect": self.qhat_aspect} if planar else document
 
 
-def _of_tetrahedra(report: QualityReport) -> list[tuple[str, str]]:
+def _of_solids(cells: MeasuredSolids) -> dict[str, Any]:
+    """What else there is to say of volumes of any kinds, as plain numbers."""
+    defects = defects_of(cells).items()
+    document: dict[str, Any] = {
+        "undecided": cells.undecided,
+        "invalid_inside": len(cells.invalid_inside),
+        "read_inside_out": {kind: len(numbers) for kind, numbers in cells.turned.items()},
+        "defects": {what: {"count": len(rows), "cells": rows[:NAMED].tolist()} for what, rows in defects},
+    }
+    bounds = cells.curved_bounds()
+    if len(bounds):
+        document["curved"] = {"min": float(bounds.min()), "mean": float(bounds.mean())}
+    return document
+
+
+def _of_volumes(report: QualityReport) -> list[tuple[str, str]]:
     """The same as ``figures``, after the counts."""
     totals = report.totals
     assert totals is not None
@@ -239,10 +278,14 @@ def measure(
 ) -> QualityReport:  # fmt: skip
     """The measures of a mesh; ``topology`` saves building it again (it must belong to the same connectivity).
 
+    With a topology of volumes, those of the cells that it has; without, those of all cells that can be measured.
+
     The signs are those of the topology's winding, so a report on moved points sees what has turned over. near:
     ``near_points(mesh, topology)``, where they are known; totals: of a planar mesh, where they are. shapes: see
     ``totals_of``.
     """
+    if topology is None and _has_solids(mesh):
+        return _of_any_volumes(mesh)
     topology = topology or connectivity_of(mesh)
     if isinstance(topology, Volume):
         return _of_volume(mesh, topology, near, executor, totals)
@@ -262,16 +305,39 @@ def measure(
     return QualityReport(cell, totals, cells, cells.signs() if totals.uncertain else None)
 
 
+def _has_solids(mesh: Mesh) -> bool:
+    """Are there volumes that can be measured, besides tetrahedra of first order?"""
+    return any(has_form(block.kind) and block.kind != "tetra" and len(block.nodes) for block in mesh.cells)
+
+
+def _of_any_volumes(mesh: Mesh) -> QualityReport:
+    """``measure`` of a mesh of volumes of any kinds."""
+    refuse_flat(mesh)
+    cells, cell = MeasuredSolids.of(mesh)
+    columns, signs = cells.columns(), cells.signs()
+    nan, shape, bad = math.nan, columns[cells.names.index(SHAPE)], int((signs <= 0).sum())
+    mean = math.fsum(shape) / len(shape)
+    totals = Totals(nan, nan, nan, nan, mean, float(shape.min()), nan, nan, bad, bad)
+    report = QualityReport(cell, totals, cells, signs if bad else None)
+    report.__dict__["_columns"] = columns
+    return report
+
+
 def connectivity_of(mesh: Mesh, fixed: NDArray[np.bool_] | None = None) -> Topology | Volume:
     """What follows from the connectivity of a mesh, of its volumes where it has any."""
-    return Volume.of(mesh, fixed) if mesh.has_volumes else Topology.of(mesh, fixed)
+    return volume_of(wound_of(mesh, fixed)) if mesh.has_volumes else Topology.of(mesh, fixed)
 
 
 def _of_volume(
     mesh: Mesh, topology: Volume, near: Floats | None, executor: Executor, totals: Totals | None
 ) -> QualityReport:
-    """``measure`` of a mesh of tetrahedra."""
-    cells, cell = MeasuredTetrahedra.of(mesh, topology)
+    """``measure`` of a mesh of volumes that a connectivity has."""
+    cells: MeasuredTetrahedra | MeasuredSolids
+    if isinstance(topology, MixedVolume):
+        kind, kinds = topology.file_numbers, topology.file_kinds
+        cells, cell = MeasuredSolids.of_table(mesh, topology.cells, kind, kinds, topology.cell, topology.orientation)
+    else:
+        cells, cell = MeasuredTetrahedra.of(mesh, topology)
     if not len(cell):
         return QualityReport(cell, None, cells, None)
     near = taken(space_points(mesh), topology.memory) if near is None else near

@@ -15,6 +15,7 @@ from gmsnet.kernels.simplex.tetra_measures import LOW, SHAPE
 from gmsnet.measure.cells import MeasuredCells
 from gmsnet.measure.dihedral import SHARE, columns_of, most_shape_below, ratios_of
 from gmsnet.measure.report import QualityReport
+from gmsnet.measure.solids import MeasuredSolids
 from gmsnet.measure.volumes import MeasuredTetrahedra
 from gmsnet.topology.ordering import planar_points, space_points
 
@@ -69,6 +70,8 @@ class Target:
 
         points: (N, 3 or 4).
         """
+        if cells.shapes is not None:
+            return self._corners_missing(points, cells, share)
         limit = most_shape_below(share * self.dihedral, 0.0) if self.dihedral is not None else 0.0
         limit = max(limit, share * SHARE * (self.quality or 0.0))
         rows = np.flatnonzero(~(ratios_of(points, cells) < 432.0 / limit**3)).astype(np.int32)
@@ -76,6 +79,17 @@ class Target:
         wanted = Target(*(None if each is None else share * each for each in (self.quality, None, self.dihedral)))
         chosen = wanted.missed(columns[SHAPE], columns[LOW])
         return rows[chosen], columns[SHAPE][chosen]
+
+    def _corners_missing(self, points: Floats, cells: Tetrahedra, share: float) -> tuple[Rows, Floats]:
+        """The same of cells of any kinds: the worst corner simplex of each cell that misses it."""
+        assert cells.cells is not None
+        ratios = ratios_of(points, cells)
+        shape = np.where(np.isinf(ratios), -1.0, np.cbrt(432.0 / np.maximum(ratios, 432.0)))
+        rows = np.flatnonzero(~(shape >= share * (self.quality or 0.0)))
+        rows = rows[np.lexsort((shape[rows], cells.cells[rows]))]
+        first = np.append(True, np.diff(cells.cells[rows]) != 0)[: len(rows)]
+        chosen = np.sort(rows[first]).astype(np.int32)
+        return chosen, shape[chosen]
 
     def missed_in(self, report: QualityReport) -> NDArray[np.int32]:
         """The rows of the cells of a planar mesh, or of the tetrahedra, that miss it.
@@ -90,6 +104,10 @@ class Target:
         if isinstance(triangles, MeasuredTetrahedra):
             cells = Tetrahedra(triangles.corners, triangles.orientation)
             return self.tetrahedra_missing(space_points(triangles), cells, 1.0)
+        if isinstance(triangles, MeasuredSolids):
+            shape = report.shape
+            every = np.flatnonzero(self.missed(shape, report.min_dihedral)).astype(np.int32)
+            return every, shape[every]
         assert isinstance(triangles, MeasuredCells)
         if triangles.order is not None:
             low, _, shape, _ = triangles.columns()

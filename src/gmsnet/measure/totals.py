@@ -14,7 +14,10 @@ from gmsnet.kernels.simplex import cell_measures as cells
 from gmsnet.kernels.simplex import measures as kernels
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
+from gmsnet.kernels.simplex.shell_measures import summarise_shell, summarise_shell_cells
+from gmsnet.kernels.simplex.solid_measures import summarise_solids
 from gmsnet.kernels.simplex.tetra_measures import summarise_tetrahedra
+from gmsnet.kernels.star.shell import ShellSimplices
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 
@@ -77,9 +80,12 @@ class Totals:
         """From the measures (4, T) of each triangle, at least one."""
         low, high, shape, aspect = columns
         bad = int((shape <= 0.0).sum())
+        mean, least, nan = float(shape.mean()), float(shape.min()), math.nan
+        if np.isnan(aspect).any():  # of quads
+            return cls(nan, nan, nan, nan, mean, least, nan, nan, bad, bad)
         return cls(
-            float(low.mean()), float(low.min()), float(high.mean()), float(high.max()), float(shape.mean()),
-            float(shape.min()), float(aspect.mean()), float(aspect.min()), bad, bad,
+            float(low.mean()), float(low.min()), float(high.mean()), float(high.max()), mean, least,
+            float(aspect.mean()), float(aspect.min()), bad, bad,
         )  # fmt: skip
 
     @property
@@ -100,7 +106,7 @@ class Totals:
 
 def totals_of(
     points: Floats,
-    simplices: Simplices | Tetrahedra,
+    simplices: Simplices | Tetrahedra | ShellSimplices,
     executor: Executor = serial,
     shapes: NDArray[np.float32] = NOWHERE,
 ) -> Totals | None:
@@ -116,10 +122,20 @@ def totals_of(
     if isinstance(simplices, Tetrahedra):
 
         def part_of_volume(first: int, last: int) -> Floats:
-            figures: Floats = summarise_tetrahedra(points, simplices, first, last, *grids)
+            summarise = summarise_tetrahedra if simplices.shapes is None else summarise_solids
+            figures: Floats = summarise(points, simplices, first, last, *grids)
             return figures
 
         return Totals.of_cells(executor.map(part_of_volume, 0, blocks), executor)
+    if isinstance(simplices, ShellSimplices):
+        summarised = summarise_shell if simplices.shapes is None else summarise_shell_cells
+
+        def part_of_surface(first: int, last: int) -> Floats:
+            figures: Floats = summarised(points, simplices, first, last, *grids)
+            return figures
+
+        parts = executor.map(part_of_surface, 0, blocks)
+        return Totals.of(parts, count, executor) if simplices.shapes is None else Totals.of_cells(parts, executor)
     if simplices.shapes is not None:
 
         def part_of_cells(first: int, last: int) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.measure.report import QualityReport
+from gmsnet.measure.solids import MeasuredSolids
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 
@@ -30,11 +31,22 @@ def worst_cells(
             "inverted": not report.valid[row],
             "centre": report.centre[row].tolist(),
         }
+        place = invalid_place(report, row)
+        if place is not None:
+            found["invalid_at"] = place
         if held is not None:
             found["held_corners"] = int(held[corners_of(mesh, cell)].sum())
             found["corners"] = len(corners_of(mesh, cell))
         rows.append(found)
     return rows
+
+
+def invalid_place(report: QualityReport, row: int) -> list[float] | None:
+    """Where in the reference cell a volume cell is not valid; None where it is, or is known by its corners alone."""
+    if not isinstance(report.cells, MeasuredSolids) or report.valid[row]:
+        return None
+    place: list[float] = report.cells.judged[1][row].tolist()
+    return place
 
 
 def worst_rows(cells: Sequence[Mapping[str, Any]]) -> list[list[str]]:

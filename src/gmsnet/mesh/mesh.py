@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.jacobian import has_form
 from gmsnet.errors import InputError
 from gmsnet.mesh.arrays import plain_array
 from gmsnet.mesh.cell_block import CellBlock, cells_in_words
@@ -219,19 +220,27 @@ def counts(mesh: Mesh) -> str:
 def unmeasured(mesh: Mesh) -> str:
     """How many cells of which kind are no triangles and no plane quads, in words: no quality is known of them.
 
-    Where there are volumes, of these those that are no tetrahedra. "" if there are none. Those of a kind that is not
-    known count among them, as they may be faces, or volumes; vertices and lines do not.
+    Where there are volumes, of these polyhedra and pyramids of second order. "" if there are none. Those of a kind that
+    is not known count among them, as they may be faces, or volumes; vertices and lines do not.
     """
     dimension = 3 if mesh.has_volumes else 2
     return _counted(block for block in mesh.cells if block.dimension in (dimension, None) and not measured(mesh, block))
 
 
+MOVED = ("tetra", "hexahedron", "wedge", "pyramid")  # the volumes whose nodes may move
+
+
+def unmoved(mesh: Mesh) -> str:
+    """How many volumes are of kinds whose nodes are held, in words. "" if there are none."""
+    return _counted(block for block in mesh.cells if block.dimension in (3, None) and block.kind not in MOVED)
+
+
 def measured(mesh: Mesh, block: CellBlock) -> bool:
     """Is the quality of these cells known: are they triangles, or quads in a plane? Second-order ones by their
-    corners. Where there are volumes: are they tetrahedra of first order?"""
+    corners. Where there are volumes: is their Jacobian determinant known in Bernstein form?"""
     if mesh.has_volumes:
-        return block.kind == "tetra"
-    return block.triangular or (block.dimension == 2 and block.corners == 4 and mesh.plane is not None)
+        return has_form(block.kind)
+    return block.triangular or (block.dimension == 2 and block.corners == 4)
 
 
 def unknown_cells(mesh: Mesh) -> str:

@@ -31,6 +31,7 @@ import numpy as np
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.measures import mean_shape_of_sample
+from gmsnet.kernels.simplex.shell_measures import mean_shape_of_shell
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import STAR
 from gmsnet.measure.target import Target
@@ -39,10 +40,11 @@ from gmsnet.methods.base import ALL_CELLS, Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.below_in_space import BelowInSpace
 from gmsnet.methods.creep import Creep
-from gmsnet.methods.phases import NEWTON, SMALL_PLAN, VOLUME_PLAN, WORST, Phase, plan_for
+from gmsnet.methods.phases import NEWTON, SMALL_PLAN, SURFACE_PLAN, VOLUME_PLAN, WORST, Phase, plan_for
 from gmsnet.methods.whole_mesh import CLOSEST, SETTLED, WholeMesh
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 
 SAMPLE = 32  # blocks of cells
@@ -58,6 +60,7 @@ WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
 GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
 EXACT = 20_000  # free nodes: up to so many, all nodes of such a mesh go to the minimum of Σq, which is near
+IN_SPACE = (VOLUME_PLAN, SURFACE_PLAN)
 NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
 
 
@@ -91,7 +94,8 @@ class Auto(Smoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if self.at < 0:
-            if not self.phases and field.level != STAR and isinstance(field.topology, Topology):
+            planar = isinstance(field.topology, Topology) and not isinstance(field.topology, Shell)
+            if not self.phases and field.level != STAR and planar:
                 self.creep = Creep.of(field)
             self.phases = self.phases or plan_for(field.topology)
             if self.phases is VOLUME_PLAN and len(field.topology.free) > LARGE_VOLUME:
@@ -146,7 +150,7 @@ class Auto(Smoother):
         """Is the worst cell to have another turn, once others have made room for it?"""
         self.passes += 1
         gains = smoother.least >= self.least + self.pass_gain
-        if self.passes == 1 and self.phases is not SMALL_PLAN and self.phases is not VOLUME_PLAN:
+        if self.passes == 1 and self.phases is not SMALL_PLAN and self.phases not in IN_SPACE:
             gains = smoother.gained >= LAST_GAIN
         self.again = self.at if gains and self.passes < PASSES else -1
         self.least = smoother.least
@@ -190,7 +194,7 @@ class Auto(Smoother):
             goes_on = goes_on or self.slow
         target_reached = self.smoother.target_reached
         self.looks = self.rounds % phase.often == 0 if goes_on else phase.looks or target_reached
-        if isinstance(self.smoother, WorstFirst) and (self.creep is not None or self.phases is VOLUME_PLAN):
+        if isinstance(self.smoother, WorstFirst) and (self.creep is not None or self.phases in IN_SPACE):
             self._look_at_worst(self.smoother)
         if not goes_on:
             is_ideal = isinstance(self.smoother, WorstFirst) and self.smoother.least >= self.smoother.enough
@@ -206,6 +210,8 @@ def mean_shape(field: Field) -> float:
     if isinstance(simplices, Tetrahedra):
         totals = totals_of(field.points, simplices.take(np.arange(0, len(simplices.rows), stride, dtype=np.int32)))
         return math.nan if totals is None else totals.shape_mean
+    if isinstance(field.topology, Shell):
+        return float(mean_shape_of_shell(field.points, simplices, stride))
     return float(mean_shape_of_sample(field.points, simplices, stride))
 
 
@@ -247,5 +253,6 @@ METHOD = Method(
     source="this package; docs/auto.md",
     create=lambda options: Auto(),
     slides=True,
+    surfaces=True,
     cells=ALL_CELLS,
 )

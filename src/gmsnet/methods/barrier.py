@@ -21,10 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.methods import barrier as kernels
+from gmsnet.kernels.methods import shell
 from gmsnet.kernels.methods.barrier3 import Power3, sweep3
 from gmsnet.kernels.methods.barrier_star import Power
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
+from gmsnet.kernels.star.shell import ShellStars
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, Field, Method, StarSmoother, Tally
 from gmsnet.parallel.executor import Executor
@@ -47,6 +49,7 @@ class Barrier(StarSmoother):
         self, objective: str, relaxation: float = RELAXATION, relaxed: int = RELAXED, means: int = MEANS
     ) -> None:
         self.power, self.power3 = Power.of(POWERS[objective]), Power3.of(IN_SPACE[objective])
+        self.doublings = POWERS[objective].bit_length() - 1
         self.relaxation, self.relaxed, self.means = relaxation, relaxed, means
         self.sweeps = 0
 
@@ -65,6 +68,14 @@ class Barrier(StarSmoother):
         relaxation = min(self.relaxation, IN_SPACE_MOST) if self.sweeps < self.relaxed else 1.0
         sweep3(points, blocks, first, last, guard, self.power3, relaxation, tally)
 
+    def visit_on_surface(
+        self, points: NDArray[np.float64], stars: ShellStars, first: int, last: int, guard: Guard, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        relaxation = self.relaxation if self.sweeps < self.relaxed else 1.0
+        stretch = STRETCH if self.sweeps < self.means else 0.0
+        shell.sweep(points, stars, first, last, guard, self.doublings, relaxation, stretch, tally)
+
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         tally = super().sweep(field, executor, test)
@@ -79,5 +90,6 @@ METHOD = Method(
     create=lambda options: Barrier(options.objective),
     objectives=tuple(POWERS),
     slides=True,
+    surfaces=True,
     cells=ALL_CELLS,
 )

@@ -24,16 +24,19 @@ from gmsnet.kernels.star.guard import (
     star_floors,
 )
 from gmsnet.kernels.star.guard3 import star_floors3
+from gmsnet.kernels.star.shell import ShellStars, star_floors_of_shell
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.shell import Shell
 from gmsnet.topology.stars import Stars
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
 CELLS = ("triangle", "quad")  # the kinds of cells whose nodes may move
-ALL_CELLS = (*CELLS, "tetra")
+TETRAHEDRA = (*CELLS, "tetra")
+ALL_CELLS = (*TETRAHEDRA, "hexahedron", "wedge", "pyramid")
 TRIANGLES = ("triangle",)
 Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.star.stars)
 
@@ -56,6 +59,7 @@ class Field:
     def planar(self) -> Topology:
         """The topology of a mesh in a plane, for what is done in a plane alone."""
         assert isinstance(self.topology, Topology)
+        assert not isinstance(self.topology, Shell)
         return self.topology
 
     def guard(self, executor: Executor) -> Guard:
@@ -68,6 +72,7 @@ class Field:
             floors = np.empty(len(self.points))
             ringed = self.topology.near_ringed
             of_stars = star_floors3 if isinstance(self.topology, Volume) else star_floors
+            of_stars = star_floors_of_shell if isinstance(self.topology, Shell) else of_stars
             of_stars(self.points, self.topology.changeable, ringed, guard.unit, guard.grain, floors)
             return StarGuard(*guard, floors)
         return guard
@@ -112,6 +117,12 @@ class StarSmoother(Smoother):
         """The same of stars in space, of methods that have "tetra" among their cells."""
         raise NotImplementedError
 
+    def visit_on_surface(
+        self, points: NDArray[np.float64], stars: ShellStars, first: int, last: int, guard: Guard, tally: Tally
+    ) -> None:
+        """The same of stars of a surface in space, of methods that are for surfaces."""
+        raise NotImplementedError
+
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         stars, guard = field.topology.stars, field.guard(executor)
@@ -121,6 +132,8 @@ class StarSmoother(Smoother):
             counts = np.zeros(3, dtype=np.int64)
             if isinstance(blocks, SpaceBlocks):
                 self.visit_in_space(field.points, blocks, first, last, guard, counts)
+            elif isinstance(blocks, ShellStars):
+                self.visit_on_surface(field.points, blocks, first, last, guard, counts)
             else:
                 self.visit(field.points, blocks, first, last, guard, counts)
             return counts
@@ -178,7 +191,7 @@ class Method:
 
     variants, objectives: the names that may be chosen from, the default first. weighted: it takes weights. cells: the
     kinds of cells whose nodes it moves; limits: of objectives or variants with which it moves fewer kinds, those.
-    slides: it can let nodes slide along curves.
+    slides: it can let nodes slide along curves. surfaces: it moves nodes of surfaces in space.
     """
 
     name: str
@@ -189,12 +202,17 @@ class Method:
     objectives: tuple[str, ...] = ()
     weighted: bool = False
     slides: bool = False
+    surfaces: bool = False
     cells: tuple[str, ...] = CELLS
     limits: Mapping[str, tuple[str, ...]] = field(default_factory=dict, hash=False)
 
     def moves(self, kind: str, choice: str | None = None) -> bool:
         """Does it move the nodes of cells of this kind, with this objective or variant (None: the default one)?"""
         return kind in self.limits.get(choice or self.default, self.cells)
+
+    def moves_surfaces(self, choice: str | None = None) -> bool:
+        """Does it move nodes of surfaces in space, with this objective or variant?"""
+        return self.surfaces and (choice or self.default) not in self.limits
 
     @property
     def default(self) -> str:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import NoReturn
+
 from gmsnet.errors import InputError
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import METHODS, method_named
-from gmsnet.methods.base import TRIANGLES
+from gmsnet.methods.base import TRIANGLES, Method
 
-NAMES = {"quad": ("quad", "quads"), "tetra": ("tetrahedron", "tetrahedra")}
+NAMES = {
+    "quad": ("quad", "quads"), "tetra": ("tetrahedron", "tetrahedra"), "hexahedron": ("hexahedron", "hexahedra"),
+    "wedge": ("wedge", "wedges"), "pyramid": ("pyramid", "pyramids"),
+}  # fmt: skip
 
 
 def check_cells(mesh: Mesh, name: str, choice: str | None = None) -> None:
@@ -17,12 +22,24 @@ def check_cells(mesh: Mesh, name: str, choice: str | None = None) -> None:
     """
     method = method_named(name)
     choice = choice or method.default
-    kind = "tetra" if mesh.has_volumes else "quad"
-    count = sum(len(block.nodes) for block in mesh.cells if block.kind == kind)
-    if not count or method.moves(kind, choice):
-        return
+    if mesh.plane is None and not mesh.has_volumes and not method.moves_surfaces(choice):
+        others = ", ".join(each.name for each in METHODS.values() if each.surfaces)
+        raise InputError(
+            f"{name}{f' ({choice})' if method.surfaces else ''} is not for surfaces in space: choose {others}"
+        )
+    for kind in ("tetra", "hexahedron", "wedge", "pyramid") if mesh.has_volumes else ("quad",):
+        count = sum(len(block.nodes) for block in mesh.cells if block.kind == kind)
+        if count and not method.moves(kind, choice):
+            _refuse(method, choice, kind, count)
+
+
+def _refuse(method: Method, choice: str, kind: str, count: int) -> NoReturn:
+    """InputError that says what else to choose."""
+    name = method.name
     one, many = NAMES[kind]
     moves = "moves triangles alone" if method.cells == TRIANGLES or kind == "quad" else "moves cells in a plane alone"
+    if method.moves("tetra", choice):
+        moves = "moves cells in a plane and tetrahedra alone"
     cells = f"1 {one}" if count == 1 else f"{count:,} {many}"
     others = ", ".join(each.name for each in METHODS.values() if each.moves(kind) and each is not method)
     what = "objective" if choice in method.objectives else "variant"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.curved.commit import follow
 from gmsnet.kernels.curved.stars import CurvedMesh
 from gmsnet.kernels.jit.compile import LANES
-from gmsnet.kernels.star.block import MOVED
+from gmsnet.kernels.star.block import MOVED, Blocks
 from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
@@ -76,5 +76,6 @@ class Corners(Smoother):
 def visited(topology: Topology) -> NDArray[np.int64]:
     """The free nodes in the order in which a sweep visits them, by places in memory."""
     blocks = topology.stars.blocks
+    assert isinstance(blocks, Blocks)
     real = np.arange(LANES) < blocks.filled[:, None]
     return blocks.centre.reshape(-1, LANES)[real].astype(np.int64)

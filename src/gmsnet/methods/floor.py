@@ -14,6 +14,7 @@ from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.block import DROPPED, TRUNCATED
 from gmsnet.kernels.star.guard import Precision, ratio_upper_bounds
 from gmsnet.kernels.star.guard3 import ratio_upper_bounds3
+from gmsnet.kernels.star.shell import ShellSimplices, ratio_upper_bounds_of_shell
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
@@ -80,7 +81,7 @@ class Floor:
 
 def _least(
     points: NDArray[np.float64],
-    simplices: Simplices | Tetrahedra,
+    simplices: Simplices | Tetrahedra | ShellSimplices,
     blocks: NDArray[np.int32],
     precision: Precision,
     executor: Executor,
@@ -89,6 +90,7 @@ def _least(
     least = np.empty(len(blocks))
 
     bounds = ratio_upper_bounds3 if isinstance(simplices, Tetrahedra) else ratio_upper_bounds
+    bounds = ratio_upper_bounds_of_shell if isinstance(simplices, ShellSimplices) else bounds
 
     def look(first: int, last: int) -> None:
         bounds(points, simplices, blocks, precision.unit, precision.grain, first, last, least)

@@ -32,9 +32,9 @@ from gmsnet.kernels.methods import getme3, getme_simultaneous
 from gmsnet.kernels.methods.getme import Queue
 from gmsnet.kernels.methods.getme_elements import Elements, Transformation
 from gmsnet.kernels.simplex.mean_ratio2 import SQUARE, Simplices
-from gmsnet.kernels.star.block import MOVED
+from gmsnet.kernels.star.block import MOVED, Blocks
 from gmsnet.kernels.star.space import SpaceBlocks
-from gmsnet.methods.base import ALL_CELLS, CELLS, Field, Method, MethodOptions, Smoother, Tally, by_colour, over_stars
+from gmsnet.methods.base import CELLS, TETRAHEDRA, Field, Method, MethodOptions, Smoother, Tally, by_colour, over_stars
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
@@ -95,6 +95,7 @@ class SimultaneousGetme(Smoother):
             return _in_space(field, executor)
         stars, guard = field.topology.stars, field.guard(executor)
         points, blocks = field.points, stars.blocks
+        assert isinstance(blocks, Blocks)
         shifts = np.empty((len(blocks.filled), 2 * LANES))
 
         def plan(first: int, last: int) -> None:
@@ -196,6 +197,6 @@ METHOD = Method(
     source="Vartziotis, Wipper: The GETMe Mesh Smoothing Framework (2018); with Schwald of tetrahedra (2009)",
     create=create,
     variants=tuple(TRANSFORMATIONS),
-    cells=ALL_CELLS,
+    cells=TETRAHEDRA,
     limits=dict.fromkeys((name for name in TRANSFORMATIONS if name != "simultaneous"), CELLS),
 )

@@ -21,11 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.methods import laplacian as kernels
-from gmsnet.kernels.methods import laplacian_plain
+from gmsnet.kernels.methods import laplacian_plain, shell
 from gmsnet.kernels.methods.barrier3 import Power3
 from gmsnet.kernels.methods.laplacian3 import sweep3
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
+from gmsnet.kernels.star.shell import ShellStars
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, CELLS, Method, StarSmoother, Tally
 
@@ -61,6 +62,12 @@ class Laplacian(StarSmoother):
         """See StarSmoother."""
         sweep3(points, blocks, first, last, guard, IN_SPACE, self.variant is not None, tally)
 
+    def visit_on_surface(
+        self, points: NDArray[np.float64], stars: ShellStars, first: int, last: int, guard: Guard, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        shell.average(points, stars, first, last, guard, self.variant is not None, tally)
+
 
 METHOD = Method(
     name="laplacian",
@@ -69,6 +76,7 @@ METHOD = Method(
     create=lambda options: Laplacian(options.variant),
     variants=tuple(VARIANTS),
     slides=True,
+    surfaces=True,
     cells=ALL_CELLS,
     limits=dict.fromkeys(("inverse-length", "area"), CELLS),
 )

@@ -10,6 +10,7 @@ from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Smoother
 from gmsnet.methods.optimize import Newton
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
+from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -78,12 +79,20 @@ VOLUME_PLAN = (
     Phase("worst first", WorstFirst, 1, looks=False),
     Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0005),
 )
+# Of surfaces; what high powers take from the mean comes back last.
+SURFACE_PLAN = (
+    NEWTON._replace(looks=False),
+    WORST._replace(create=lambda: worst_first(3, IDEAL), looks=False),
+    MEAN._replace(gain=0.001),
+)
 
 
 def plan_for(topology: Topology | Volume) -> Sequence[Phase]:
     """The phases for a mesh of this size and these cells."""
     if isinstance(topology, Volume):
         return VOLUME_PLAN
+    if isinstance(topology, Shell):
+        return SURFACE_PLAN
     if len(topology.free) <= SMALL:
         return SMALL_PLAN
     return LARGE_PLAN if topology.near_shapes is None else QUADS_PLAN

@@ -21,9 +21,13 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import ranking
 from gmsnet.kernels.methods import worst_first_cycles as kernels
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
+from gmsnet.kernels.simplex.shell_measures import shell_shapes
+from gmsnet.kernels.star.shell import ShellSimplices
 from gmsnet.methods.base import ALL_CELLS, Field, Method, MethodOptions, Smoother, Tally
 from gmsnet.methods.worst_in_space import WorstInSpace
+from gmsnet.methods.worst_on_surface import cycles_on_surface
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.shell import Shell
 from gmsnet.topology.volume import Volume
 
 
@@ -82,10 +86,13 @@ class WorstFirst(Smoother):
         chosen = LAST if goes_on else self.cycles[self.next : self.next + self.at_once]
         count = simplices.cell_count
         plan = [(max(FEWEST, math.ceil(cycle.share * count)), cycle.power, cycle.sweeps) for cycle in chosen]
-        before, late, after = kernels.cycles(
-            field.points, simplices, self.cells, topology.near_free, topology.memory, topology.links,
-            field.guard(executor), np.array(plan), tally,
-        )  # fmt: skip
+        if isinstance(topology, Shell):
+            before, late, after = cycles_on_surface(field, topology, self.cells, field.guard(executor), plan, tally)
+        else:
+            before, late, after = kernels.cycles(
+                field.points, simplices, self.cells, topology.near_free, topology.memory, topology.links,
+                field.guard(executor), np.array(plan), tally,
+            )  # fmt: skip
         self.next += len(chosen)
         self.converged = goes_on and after < before + GAIN
         self.least, self.gained = after, after - late
@@ -105,11 +112,12 @@ def candidates(field: Field, executor: Executor) -> tuple[NDArray[np.int32], flo
     The floor of the guard is told of the worst of these.
     """
     simplices = field.topology.changeable
-    assert isinstance(simplices, Simplices)
+    assert isinstance(simplices, Simplices | ShellSimplices)
     shape = np.empty(len(simplices.rows), dtype=np.float32)
+    shapes = shell_shapes if isinstance(simplices, ShellSimplices) else ranking.shapes
 
     def look(first: int, last: int) -> None:
-        ranking.shapes(field.points, simplices, first, last, shape)
+        shapes(field.points, simplices, first, last, shape)
 
     executor.map(look, 0, -(-len(shape) // LANES))
     wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * simplices.cell_count))
@@ -129,5 +137,6 @@ METHOD = Method(
     source="Freitag, Plassmann: Local optimization-based simplicial mesh untangling and improvement (2000), its aim",
     create=create,
     slides=True,
+    surfaces=True,
     cells=ALL_CELLS,
 )

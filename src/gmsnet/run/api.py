@@ -44,6 +44,7 @@ def smooth(
     slide: Any = None,
     feature_angle: float = 30.0,
     geometry: Any = None,
+    surface_tolerance: float | None = None,
     metric: Any = None,
     size: Any = None,
 ) -> SmoothResult:
@@ -74,7 +75,9 @@ def smooth(
     the paper's tables are formed). slide: whether nodes of boundaries, interfaces and line cells move along their
     curves, boundary nodes of tetrahedra on their surface: None (they stay), True, or names of markers whose nodes may.
     feature_angle: degrees; curves end, and edges of surfaces are sharp, where they turn by more. geometry: what to
-    slide on in the plane instead of arcs through the input's nodes (docs/sliding.md).
+    slide on in the plane instead of arcs through the input's nodes (docs/sliding.md). surface_tolerance: how far from
+    the input's facets nodes of surfaces may go, over the mean length of their edges (default: 0.05 of a surface mesh,
+    without a bound at the boundary of a volume).
     metric: the tensors of which the cells are to be unit cells, by shape and size (docs/metric.md): an array (N, 3) of
     m11, m12, m22 at the nodes, or a function from points (n, 2) to such an array. size: the same for lengths h of
     edges: an array (N,), or a function from points (n, 2) to one (n,); its metric is h⁻²·I.
@@ -88,7 +91,7 @@ def smooth(
         target_quality=target_quality, target_angle=target_angle, target_dihedral=target_dihedral,
         preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, callback=callback,
         weights=weights, best_by=best_by, slide=slide, feature_angle=feature_angle, geometry=geometry,
-        metric=metric, size=size,
+        surface_tolerance=surface_tolerance, metric=metric, size=size,
     )  # fmt: skip
     return smooth_with(mesh, options, fixed)
 

@@ -129,6 +129,8 @@ def check_deformable(mesh: Mesh) -> None:
     check_mesh(mesh, Target(None, None))
     if mesh.has_volumes:
         raise InputError("boundaries of volumes cannot be moved yet: deform takes meshes in a plane")
+    if mesh.plane is None:
+        raise InputError("boundaries of surfaces in space cannot be moved yet: deform takes meshes in a plane")
     kinds = sorted({block.kind for block in mesh.cells if block.kind in NAMES and len(block.nodes)})
     if kinds:
         raise InputError(

@@ -37,7 +37,7 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     if not (isinstance(topology, Volume) and isinstance(state.smoother, Auto) and ended) or options.target:
         return state
     totals = state.totals or totals_of(state.points, topology.scored, executor)
-    if totals is None or totals.uncertain:
+    if totals is None or totals.uncertain or topology.scored.shapes is not None:  # the angles are those of tetrahedra
         return state
     level = LEVELS.index(options.guard)
     floor = floor_for_angles(state, level, 1.0 / (1.0 / totals.shape_min + SPENT), executor)

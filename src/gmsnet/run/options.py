@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
@@ -52,6 +53,7 @@ class SmoothOptions:
     slide: SlideChoice = None
     feature_angle: float = FEATURE_ANGLE
     geometry: Geometry | None = None
+    surface_tolerance: float | None = None
     metric: Any = field(default=None, compare=False)
     size: Any = field(default=None, compare=False)
 
@@ -84,6 +86,11 @@ class SmoothOptions:
         _check_flag("fix_layers", self.fix_layers)
         _check_flag("untangle", self.untangle)
         check_sliding(self.feature_angle, self.geometry)
+        if self.surface_tolerance is not None and not _is_number(self.surface_tolerance, math.inf):
+            raise InputError(
+                "surface_tolerance is how far from the input's surface nodes may go, over the length of their edges, "
+                f"and must be above 0, got {self.surface_tolerance!r}"
+            )
         self._method()
         check_adapting(self)
 

@@ -139,8 +139,7 @@ def outcome(
     """
     if start is None:
         start = near_points(mesh, topology)
-    plane, factors = (0, 1, 2) if mesh.has_volumes else mesh.plane, _factors(mesh.exponent)
-    assert plane is not None
+    plane, factors = mesh.plane or (0, 1, 2), _factors(mesh.exponent)
     points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
     count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)
     if count and mesh.rounding is not None:

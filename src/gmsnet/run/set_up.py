@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -17,8 +19,7 @@ from gmsnet.kernels.topology.connectivity import CHOSEN
 from gmsnet.measure.report import ASPECT, QualityReport, measure
 from gmsnet.measure.target import Target
 from gmsnet.mesh.adapters import to_mesh
-from gmsnet.mesh.display import plain
-from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured
+from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured, unmoved
 from gmsnet.mesh.selection import fixed_mask
 from gmsnet.methods import Smoother, StarSmoother
 from gmsnet.methods.auto import Auto
@@ -30,12 +31,15 @@ from gmsnet.preserve.protection import Protection, protected, protected_volume
 from gmsnet.run.metric_stage import check_given
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.second_order import second_order_of
+from gmsnet.run.set_up_surface import first_of_surface
 from gmsnet.run.state import State
 from gmsnet.topology.held import REASONS
+from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
 from gmsnet.topology.ordering import space_points, taken
+from gmsnet.topology.solids import KINDS, has_solids
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
-from gmsnet.topology.wound import Wound, refuse_flat
+from gmsnet.topology.wound import refuse_flat
 
 Floats = NDArray[np.float64]
 
@@ -56,13 +60,16 @@ def first_state(
     given, restore = to_mesh(mesh)
     check_mesh(given, target)
     check_cells(given, options.method_name, options.objective or options.variant)
-    if given.has_volumes:
-        check_volume(options)
+    if given.plane is None:
+        check_in_space(options)
     remarks = []
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     asked = fixed_mask(given, fixed)
     if given.has_volumes:
         return _first_of_volume(given, restore, asked, fixed, smoother, options, executor)
+    if given.plane is None:
+        state, shell = first_of_surface(given, restore, asked, smoother, options, executor)
+        return replace(state, remarks=(*state.remarks, *held_anyway(asked, shell, fixed, options.slides)))
     threads = options.thread_count if len(given.points) >= MANY else 1
     still = asked if moved is None else asked | moved
     curves = curves_to_slide_on(given, options.slide, options.feature_angle, still)
@@ -137,16 +144,19 @@ def _first_of_volume(
 ) -> State:  # fmt: skip
     """The same of a mesh of tetrahedra."""
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
-    wound, sliding = Wound.of(given, asked), None
+    wound, sliding = wound_of(given, asked), None
     surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked)
     if surface is None:
-        topology = Volume.made(wound)
+        topology = volume_of(wound)
     else:
-        topology = Volume.made(wound, surface[1].slides | surface[1].curves.slides)
-        sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free)
+        topology = volume_of(wound, surface[1].slides | surface[1].curves.slides)
+        tolerance = options.surface_tolerance or math.inf
+        sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, tolerance)
     remarks = held_anyway(asked, topology, fixed, options.slides)
-    if others := unmeasured(given):
+    if others := unmoved(given):
         remarks.append(f"not measured, and their nodes are held: {others}")
+    if isinstance(topology, MixedVolume) and (turned := topology.inside_out):
+        remarks.append(f"read with their corners in the other order, for they are inside out: {turned}")
     given = given.without_cells()
     start = taken(space_points(given), topology.memory)
     before = measure(given, topology, start, executor.for_blocks(0))
@@ -155,12 +165,12 @@ def _first_of_volume(
     return State(given, restore, smoother, before, protection, start, start, nothing, tuple(remarks), sliding=sliding)
 
 
-def check_volume(options: SmoothOptions) -> None:
-    """InputError for what cannot be asked of volumes yet."""
+def check_in_space(options: SmoothOptions) -> None:
+    """InputError for what cannot be asked of volumes and surfaces yet."""
     if options.adapts:
-        raise InputError("volumes cannot be smoothed towards a metric yet: leave out metric and size")
+        raise InputError("meshes in space cannot be smoothed towards a metric yet: leave out metric and size")
     if options.best_by == ASPECT:
-        raise InputError("volumes have no aspect ratio by which meshes could be compared: leave out best_by")
+        raise InputError("best_by is of meshes in a plane: leave it out for one in space")
 
 
 def check_target(mesh: Mesh, target: Target) -> None:
@@ -169,12 +179,16 @@ def check_target(mesh: Mesh, target: Target) -> None:
         raise InputError(
             "target_angle is of the angles of triangles and quads, and this mesh has volumes: give target_dihedral"
         )
+    if mesh.has_volumes and target.dihedral is not None and has_solids(mesh):
+        raise InputError(
+            "target_dihedral is of meshes of tetrahedra alone, and this one has other volumes: give target_quality"
+        )
     if not mesh.has_volumes and target.dihedral is not None:
         raise InputError("target_dihedral is of tetrahedra, and this mesh has none: give target_angle")
 
 
 def check_mesh(mesh: Mesh, target: Target) -> None:
-    """InputError for curved surfaces, which cannot be smoothed yet, and targets of no triangle."""
+    """InputError for meshes that cannot be smoothed, and targets of no triangle."""
     check_target(mesh, target)
     others = unmeasured(mesh) if target and not mesh.has_volumes else ""
     if others and not any(len(block.nodes) for block in mesh.cells if measured(mesh, block)):
@@ -182,20 +196,18 @@ def check_mesh(mesh: Mesh, target: Target) -> None:
             f"a target is asked of triangles and quads, and this mesh has none: {others} cannot be measured so far"
         )
     if mesh.has_volumes:
-        if not any(block.kind == "tetra" and len(block.nodes) for block in mesh.cells):
+        if not any(block.kind in KINDS and len(block.nodes) for block in mesh.cells):
             kinds = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
-            raise InputError(f"this is a mesh of {', '.join(kinds)} cells: of volumes, only tetrahedra move so far")
+            raise InputError(
+                f"this is a mesh of {', '.join(kinds)} cells: of volumes, only tetrahedra, hexahedra, wedges and "
+                "pyramids with straight edges move so far"
+            )
         refuse_flat(mesh)
         return
     if mesh.plane is None and (unknown := unknown_cells(mesh)):
         raise InputError(
             f"the mesh varies in x, y and z and has cells of a type that gmsnet does not know ({unknown}): "
-            "only planar meshes can be smoothed so far"
+            "whether it is a surface or a volume cannot be told"
         )
-    if mesh.plane is None:
-        extent = np.ptp(mesh.points, axis=0)
-        raise InputError(
-            "this is a curved surface (x, y and z all vary, by "
-            + ", ".join(plain(e) for e in extent)
-            + "): only meshes in a plane of constant x, y or z can be smoothed so far"
-        )
+    if mesh.plane is None and target:
+        raise InputError("a target cannot be asked of surfaces in space yet: leave it out")

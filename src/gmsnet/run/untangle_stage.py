@@ -15,6 +15,7 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.preserve.protection import protected, protected_volume
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
+from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -33,8 +34,8 @@ class StillInvertedCell(NamedTuple):
 
 def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Moves the free nodes so that fewer cells are inverted; those of second-order cells have a stage of their own."""
-    if state.second_order is not None and not len(state.topology.free):
-        return state
+    if isinstance(state.topology, Shell) or (state.second_order is not None and not len(state.topology.free)):
+        return state  # of surfaces, sweeps bring back what shows the other side
     return _untangled(state, executor) if options.untangle and state.before.inverted else state
 
 

@@ -30,13 +30,14 @@ NODES = 150  # of a small mesh
 FAR = 0.6  # of a mesh that is to be tangled, nodes are thrown by up to so many edges
 
 Way = Mapping[str, Any]
-SECOND_ORDER = "second-order"
+SECOND_ORDER, SURFACE = "second-order", "surface"
 WAYS: Sequence[Way] = ({}, {"preserve": "none"}, {"slide": True}, {"guard": "star"})
 PLANAR: Sequence[Way] = (*WAYS, {"target_quality": 0.35}, {"target_angle": 25.0})
 KINDS: Mapping[str, Sequence[Way]] = {
     "triangle": PLANAR,
     "quad": PLANAR,
     "tetra": WAYS,
+    SURFACE: ({}, {"slide": True}, {"guard": "star"}),
     SECOND_ORDER: ({}, {"preserve": "none"}),
 }
 
@@ -58,7 +59,8 @@ def warm_up(kinds: Sequence[str] | None = None) -> Iterator[tuple[str, float]]:
 
 def _use(kind: str) -> None:
     meshes = _meshes(kind)
-    for mesh, ways in [(mesh, KINDS[kind]) for mesh in (meshes[0], *_tangled(meshes[0]))] + [
+    tangled = [] if kind == SURFACE else _tangled(meshes[0])
+    for mesh, ways in [(mesh, KINDS[kind]) for mesh in (meshes[0], *tangled)] + [
         (mesh, KINDS[kind][:1]) for mesh in meshes[1:]
     ]:
         for way in ways:
@@ -84,6 +86,8 @@ def _meshes(kind: str) -> list[Mesh]:
     if kind == "tetra":
         return [random_volume(NODES, seed=1)]
     quads = random_quad_mesh(NODES, cells="mixed", seed=1)
+    if kind == SURFACE:
+        return [_bent(random_mesh(NODES, seed=1)), _bent(quads)]
     if kind == SECOND_ORDER:
         return [second_order(random_mesh(NODES, seed=1)), second_order(quads)]
     if kind == "quad":
@@ -93,3 +97,9 @@ def _meshes(kind: str) -> list[Mesh]:
     square = Curve(4.0 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]), "square")
     refined = good_mesh([[square], [hole]], lambda p: 0.01 + 0.25 * np.abs(np.hypot(*p.T) - 0.5))
     return [random_mesh(NODES, seed=1), layered_mesh(cells="triangle"), refined, sheared_mesh(24)]
+
+
+def _bent(mesh: Mesh) -> Mesh:
+    """The same in space, on a paraboloid."""
+    x, y = mesh.points[:, :2].T
+    return Mesh(np.column_stack([x, y, 0.3 * (x * x + y * y)]), mesh.cells)

@@ -41,6 +41,7 @@ def reasons_in_space(most: int) -> dict[int, str]:
         **REASONS,
         marks_of.NON_MANIFOLD: "non-manifold facet",
         marks_of.ZERO_AREA: "part of zero volume, which has no positive side",
+        marks_of.MISMATCHED: "facet against others of other nodes",
         marks_of.NOT_A_DISK: "star is not one closed ball",
         marks_of.HIGH_VALENCE: f"more than {most} neighbours",
     }

@@ -24,7 +24,8 @@ def memory_order(points: NDArray[np.float64]) -> tuple[Ints, Ints]:
     nodes = len(points)
     memory, position = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
     keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
-    layout.morton_order(points, keys, other, memory, position)
+    order = layout.morton_order if points.shape[1] == 2 else layout.morton_order3
+    order(points, keys, other, memory, position)
     return memory, position
 
 
@@ -79,8 +80,8 @@ class Ordered(Protocol):
 
 
 def near_points(mesh: Flat, topology: Ordered) -> NDArray[np.float64]:
-    """The same by places in memory."""
-    return taken(planar_points(mesh), topology.memory)
+    """The same by places in memory; of a mesh that is not planar, ``space_points``."""
+    return taken(planar_points(mesh) if mesh.plane else space_points(mesh), topology.memory)
 
 
 def taken(points: NDArray[np.float64], memory: Ints) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.shell import ShellStars
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.kernels.topology import connectivity
 from gmsnet.topology.polygons import Offsets
@@ -23,10 +24,10 @@ Flags = NDArray[np.bool_]
 class Stars:
     """The stars in blocks of one colour; those of colour c are first[c] … first[c + 1] − 1.
 
-    In a plane a block has 64 stars of one degree, in space 16.
+    In a plane a block has 64 stars of one degree, in space 16, on a surface 1.
     """
 
-    blocks: Blocks | SpaceBlocks
+    blocks: Blocks | SpaceBlocks | ShellStars
     first: Ints
 
     @property

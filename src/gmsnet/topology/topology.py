@@ -26,7 +26,7 @@ from gmsnet.topology.connectivity import Connectivity
 from gmsnet.topology.fans import closed_fans
 from gmsnet.topology.held import MOST_NEIGHBOURS, known_marks, released, sorted_out
 from gmsnet.topology.links import Links
-from gmsnet.topology.ordering import memory_order, planar_points, taken
+from gmsnet.topology.ordering import memory_order, planar_points, space_points, taken
 from gmsnet.topology.polygons import Faces, Offsets, check_size
 from gmsnet.topology.stars import Colouring, Flags, Ints, Stars
 
@@ -87,7 +87,7 @@ class Topology(Connectivity):
         """The same, and the mesh's ``near_points``, which were needed for it."""
         nodes, corners = len(mesh.points), check_size(mesh)
         refuse_unless_free(nodes * PER_NODE + corners * PER_CORNER, f"the connectivity of {nodes:,} nodes")
-        planar = planar_points(mesh)
+        planar = planar_points(mesh) if mesh.plane else space_points(mesh)
         (memory, position), written = side_by_side(threads, partial(memory_order, planar), partial(Faces.of, mesh))
         faces, planar = side_by_side(threads, partial(written.renumbered, position), partial(taken, planar, memory))
         marks = known_marks(mesh, fixed, position)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.kernels.simplex import orientation3
-from gmsnet.kernels.topology import connectivity, facets, layout
+from gmsnet.kernels.topology import connectivity, facets
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.topology.fans import Marks
-from gmsnet.topology.ordering import space_points
+from gmsnet.topology.ordering import memory_order, space_points
 from gmsnet.topology.polygons import Ints
 
 Flags = NDArray[np.bool_]
@@ -53,9 +53,7 @@ class Wound:
         nodes = len(mesh.points)
         refuse_unless_free(len(cells) * BYTES_PER_CELL, f"the connectivity of {len(cells):,} tetrahedra")
         points = space_points(mesh)
-        memory, position = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
-        keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
-        layout.morton_order3(points, keys, other, memory, position)
+        memory, position = memory_order(points)
         place, origin = np.empty_like(cells), np.empty(len(cells), dtype=np.int32)
         used = np.zeros(nodes, dtype=np.bool_)
         facets.order_cells(cells, position, np.zeros(nodes + 2, dtype=np.int32), place, origin, used)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.methods.barrier3 import Power3
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.kernels.star.space import SpaceBlocks
-from gmsnet.kernels.untangle.space import find_bad, soften
+from gmsnet.kernels.untangle.space import find_bad, find_bad_inside, soften
 from gmsnet.measure.volumes import exact_signs3
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume
@@ -49,9 +49,16 @@ class Attempt:
 
     def look(self) -> int:
         """Measures all cells; how many are bad."""
-        near, orientation = self.topology.near, self.topology.near_orientation
+        simplices = self.topology.simplices
         unit, grain = self.precision.unit, self.precision.grain
-        self.left = int(find_bad(self.points, near, orientation, unit, grain, self.bad, self.inverted, self.ratio))
+        self.left = int(
+            find_bad(
+                self.points, simplices.rows, simplices.orientation, unit, grain, self.bad, self.inverted, self.ratio,
+                simplices.shapes,
+            )
+        )  # fmt: skip
+        if simplices.shapes is not None:
+            self.left = int(find_bad_inside(self.points, simplices, unit, grain, self.bad, self.inverted))
         return self.left
 
     @property
@@ -199,5 +206,12 @@ def untangle_volume(
         )
     )  # fmt: skip
     made = tuple(step for step in steps if step.nodes)
-    signs = exact_signs3(attempt.points, topology.near[left], topology.near_orientation[left])
-    return Untangled(attempt.points, before, int((signs <= 0).sum()), taken, why, made, unmended)
+    return Untangled(attempt.points, before, _inverted(attempt, left), taken, why, made, unmended)
+
+
+def _inverted(attempt: Attempt, bad: NDArray[np.int64]) -> int:
+    """How many cells are, of those with these rows that are not certainly valid."""
+    topology, cells = attempt.topology, attempt.topology.simplices.cells
+    if cells is not None:  # exact signs of their corners do not tell
+        return len(np.unique(cells[bad]))
+    return int((exact_signs3(attempt.points, topology.near[bad], topology.near_orientation[bad]) <= 0).sum())

@@ -87,13 +87,13 @@ def propose3(sums, power, relaxation, step):
 
 
 @part
-def settle3(workspace, unit, grain, last):
+def settle3(workspace, unit, grain, last, mixture=None):
     """Which lanes may go as they are: certified, and F falls. Where F does not fall the step is halved; counts them.
 
-    last: there is no further trial, and such steps become zero. What falls and is not certified may be so in float64:
-    halved, a sliver's step would be no more certain, and lead nowhere.
+    mixture: of the blocks. last: there is no further trial, and such steps become zero. What falls and is not certified
+    may be so in float64: halved, a sliver's step would be no more certain, and lead nowhere.
     """
-    certify3(workspace, unit, grain)
+    certify3(workspace, unit, grain, mixture)
     sums, step, refused = workspace.sums, workspace.step, 0
     for lane in range(LANES3):
         before, after = sums[VALUE * LANES3 + lane], sums[AFTER * LANES3 + lane]
@@ -121,6 +121,6 @@ def sweep3(points, blocks, first, last, guard, power, relaxation, tally):
         propose3(workspace.sums, power, relaxation, workspace.step)
         for trial in range(TRIALS):
             judge3(blocks, block, power, None, floor, workspace, guard.constraint)
-            if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1) == 0:
+            if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1, blocks.mixture) == 0:
                 break
         store3(points, blocks, block, workspace, guard, tally)

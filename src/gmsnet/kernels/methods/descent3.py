@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.methods.adam import BETA_1, BETA_2, EPSILON, GAIN
 from gmsnet.kernels.simplex.mean_ratio3 import determinant
 from gmsnet.kernels.simplex.objectives3 import (
@@ -40,7 +40,7 @@ from gmsnet.kernels.simplex.objectives3 import (
     evaluate3,
 )
 from gmsnet.kernels.star.slide3 import confined
-from gmsnet.kernels.star.space import LANES3
+from gmsnet.kernels.star.space import LANES3, is_present, rows_in, weights_in_row
 from gmsnet.kernels.star.stars3 import truncate3
 from gmsnet.kernels.star.surface import directions_at, on_curves
 
@@ -52,22 +52,43 @@ MOST = 0.5  # of angles, the inverse of how much longer a step can become: more 
 FREE, ON_PATCH, ON_CURVE = range(3)  # where a node may go
 
 
+@inlined
+def keep_weights(weights, ends, k):
+    """Writes them behind the spokes; those of tetrahedra need no place."""
+    if weights is not None:
+        ends[k, 9], ends[k, 10], ends[k, 11] = weights.a, weights.b, weights.c
+        ends[k, 12], ends[k, 13], ends[k, 14] = weights.ab, weights.bc, weights.ca
+
+
+@inlined
+def ends_for(mixture, most):
+    """Room for the spokes of so many simplices, and for their weights where they differ."""
+    if mixture is None:
+        return np.empty((most, 9))
+    return np.empty((most, 15))
+
+
 @part
 def gather3(points, blocks, block, lane, ends):
-    """Writes where the spokes of the simplices of one lane end, from its node and over its radius, into (F, 9).
+    """Writes where the spokes of the simplices of one lane end, from its node and over its radius, into (F, 9), or
+    with the weights of each into (F, 15).
 
     Returns F and the radius.
     """
     at, offset, i = blocks.at[block], blocks.offset[block], np.uint32(blocks.centre[block * LANES3 + lane])
-    count, total = blocks.cells[block * LANES3 + lane], 0.0
-    for k in range(count):
-        row = at + 3 * k * LANES3 + lane
+    count, total, k = blocks.cells[block * LANES3 + lane], 0.0, 0
+    for number in range(rows_in(blocks.mixture, blocks, block, lane)):
+        if not is_present(blocks.mixture, at, number, lane):
+            continue
+        row = at + 3 * number * LANES3 + lane
         for j in range(3):
             end = np.uint32(blocks.ring[offset + blocks.spoke[row + j * LANES3] * LANES3 + lane])
             for axis in range(3):
                 away = points[end, axis] - points[i, axis]
                 ends[k, 3 * j + axis] = away
                 total += away * away
+        keep_weights(weights_in_row(blocks.mixture, at, number), ends, k)
+        k += 1
     radius = math.sqrt(total / (3 * count))
     inverse = 1.0 / radius if radius > 0.0 else 0.0
     for k in range(count):
@@ -134,7 +155,7 @@ def newton_step3(sums):
 
 
 @part
-def newton3(aim, scale, way, ends, count, steps, lowest, sums):
+def newton3(aim, scale, way, ends, count, steps, lowest, sums, mixture):
     """Where so many Newton steps lead from the origin. sums: as ``evaluate3`` leaves them there, with derivatives."""
     x, y, z = 0.0, 0.0, 0.0
     for _ in range(steps):
@@ -151,14 +172,14 @@ def newton3(aim, scale, way, ends, count, steps, lowest, sums):
         share = min(1.0, REACH / length)
         for _ in range(TRIALS):
             tx, ty, tz = x + share * dx, y + share * dy, z + share * dz
-            inside = evaluate3(aim, scale, ends, count, tx, ty, tz, lowest, False, sums)
+            inside = evaluate3(aim, scale, ends, count, tx, ty, tz, lowest, False, sums, mixture)
             if inside and sums[VALUE] <= value + ARMIJO * share * slope:
                 x, y, z, taken = tx, ty, tz, True
                 break
             share *= 0.5
         if not taken:
             break
-        evaluate3(aim, scale, ends, count, x, y, z, lowest, True, sums)
+        evaluate3(aim, scale, ends, count, x, y, z, lowest, True, sums, mixture)
     return x, y, z
 
 
@@ -175,12 +196,12 @@ def onto(way, place):
 
 
 @part
-def adam3(aim, scale, way, ends, count, sizes, lowest, sums):
+def adam3(aim, scale, way, ends, count, sizes, lowest, sums, mixture):
     """The best of the places that Adam steps of these sizes visit from the origin."""
     place, best, m, v = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     least, factor, first, second = np.inf, 1.0, 1.0, 1.0
     for step in range(len(sizes) + 1):
-        inside = evaluate3(aim, scale, ends, count, place[0], place[1], place[2], lowest, True, sums)
+        inside = evaluate3(aim, scale, ends, count, place[0], place[1], place[2], lowest, True, sums, mixture)
         if inside and sums[VALUE] < GAIN * least:
             least = sums[VALUE]
             best[:] = place
@@ -203,7 +224,7 @@ def adam3(aim, scale, way, ends, count, sizes, lowest, sums):
 @kernel
 def sweep3(points, blocks, first, last, guard, aim, steps, sizes, tally):
     """Visits the blocks first…last (of one colour) once. steps: of Newton, if there are no sizes of Adam steps."""
-    ends, sums = np.empty((blocks.most_simplices, 9)), np.empty(SUMS)
+    ends, sums = ends_for(blocks.mixture, blocks.most_simplices), np.empty(SUMS)
     for block in range(first, last):
         for lane in range(blocks.filled[block]):
             count, radius = gather3(points, blocks, block, lane, ends)
@@ -212,15 +233,15 @@ def sweep3(points, blocks, first, last, guard, aim, steps, sizes, tally):
                 continue
             scale = 1.0
             if aim.kind == DIHEDRAL:
-                evaluate3(aim, scale, ends, count, 0.0, 0.0, 0.0, lowest, False, sums)
+                evaluate3(aim, scale, ends, count, 0.0, 0.0, 0.0, lowest, False, sums, blocks.mixture)
                 scale = sums[LEAST]
                 if not 0.0 < scale < aim.enough:
                     continue
-            evaluate3(aim, scale, ends, count, 0.0, 0.0, 0.0, lowest, True, sums)
+            evaluate3(aim, scale, ends, count, 0.0, 0.0, 0.0, lowest, True, sums, blocks.mixture)
             way = way_of(guard.constraint, points, np.uint32(blocks.centre[block * LANES3 + lane]))
             if len(sizes):
-                x, y, z = adam3(aim, scale, way, ends, count, sizes, lowest, sums)
+                x, y, z = adam3(aim, scale, way, ends, count, sizes, lowest, sums, blocks.mixture)
             else:
-                x, y, z = newton3(aim, scale, way, ends, count, steps, lowest, sums)
+                x, y, z = newton3(aim, scale, way, ends, count, steps, lowest, sums, blocks.mixture)
             if x != 0.0 or y != 0.0 or z != 0.0:
                 truncate3(points, blocks, block, lane, radius * x, radius * y, radius * z, guard, tally)

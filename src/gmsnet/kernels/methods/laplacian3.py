@@ -4,20 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.methods.barrier3 import TRIALS, settle3
 from gmsnet.kernels.star.space import LANES3
 from gmsnet.kernels.star.stars3 import certify3, derive3, fetch3, judge3, store3, workspace3_for
 
 
+@inlined
+def is_beyond(mixture, ring, offset, block, j, lane):
+    """Is row j of the ring none of an edge of the lane's star?"""
+    if mixture is None:
+        return j > 0 and ring[offset + j * LANES3 + lane] == ring[offset + lane]
+    return j >= mixture.edges[block * LANES3 + lane]
+
+
 @part
 def to_mean(blocks, block, workspace):
-    """The step to the mean of the ring; what repeats its first node is no more of it."""
+    """The step to the mean of the nodes that an edge joins; what repeats the first one is no more of the ring."""
     step, ring, offset = workspace.step, blocks.ring, blocks.offset[block]
     for lane in range(LANES3):
         x, y, z, around = np.float32(0.0), np.float32(0.0), np.float32(0.0), 0
         for j in range(np.int64(blocks.degree[block])):
-            if j > 0 and ring[offset + j * LANES3 + lane] == ring[offset + lane]:
+            if is_beyond(blocks.mixture, ring, offset, block, j, lane):
                 break
             place = 4 * (j * LANES3 + lane)
             x, y, z = x + workspace.local[place], y + workspace.local[place + 1], z + workspace.local[place + 2]
@@ -38,8 +46,8 @@ def sweep3(points, blocks, first, last, guard, power, smart, tally):
         for trial in range(TRIALS):
             judge3(blocks, block, power, None, floor, workspace, guard.constraint)
             if not smart:
-                certify3(workspace, guard.unit, guard.grain)
+                certify3(workspace, guard.unit, guard.grain, blocks.mixture)
                 break
-            if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1) == 0:
+            if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1, blocks.mixture) == 0:
                 break
         store3(points, blocks, block, workspace, guard, tally)

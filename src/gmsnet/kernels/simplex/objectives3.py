@@ -18,7 +18,7 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import inlined, part
 from gmsnet.kernels.simplex.dihedral3 import dihedrals
-from gmsnet.kernels.simplex.mean_ratio3 import REGULAR, derivatives, measured
+from gmsnet.kernels.simplex.mean_ratio3 import REGULAR, Weights3, derivatives, measured_as
 
 METRIC, Q, Q2, DIHEDRAL = range(4)
 NAMES = ("metric", "q", "q2")  # that a user may choose from
@@ -42,14 +42,30 @@ class Aim3(NamedTuple):
 
 
 @inlined
-def add_shape(double, lengths, wx, wy, wz, sx, sy, sz, value, alpha, m, slopes, sums):
+def kept_weights(mixture, e):
+    """Those behind the spokes; None for a tetrahedron."""
+    if mixture is None:
+        return None
+    return Weights3(e[9], e[10], e[11], e[12], e[13], e[14])
+
+
+@inlined
+def sigma_of(weights):
+    """σ."""
+    if weights is None:
+        return 3.0
+    return (weights.a + weights.b) + weights.c
+
+
+@inlined
+def add_shape(double, lengths, wx, wy, wz, sx, sy, sz, value, alpha, m, slopes, sums, weights):
     """Adds a multiple of S^α/D^m, which has this value, of a simplex as ``measured``."""
     sums[VALUE] += value
     if slopes:
         gx, gy, gz, xx, yy, zz, xy, xz, yz = derivatives(
             value, 2.0 * alpha / lengths, m / double, wx, wy, wz, sx, sy, sz, 0.5 * (1.0 + 1.0 / m), 1.0 - 1.0 / alpha
         )
-        even = 6.0 * alpha / lengths * value
+        even = 2.0 * sigma_of(weights) * alpha / lengths * value
         sums[GX] -= gx
         sums[GY] -= gy
         sums[GZ] -= gz
@@ -86,10 +102,11 @@ def add_angle(angle, gx, gy, gz, scale, doublings, slopes, sums):
 
 
 @part
-def evaluate3(aim, scale, ends, count, x, y, z, lowest, slopes, sums):
+def evaluate3(aim, scale, ends, count, x, y, z, lowest, slopes, sums, mixture=None):
     """The sums of a star with its node at (x, y, z), the derivatives if ``slopes``. Is D of each simplex above a least?
 
-    scale: s in radians, of DIHEDRAL. ends: (F, 9), where the spokes of each simplex end.
+    scale: s in radians, of DIHEDRAL. ends: (F, 9), where the spokes of each simplex end. mixture: None for
+    tetrahedra; else ``ends`` has the weights of each, too (F, 15).
     """
     for k in range(SUMS):
         sums[k] = 0.0
@@ -98,7 +115,8 @@ def evaluate3(aim, scale, ends, count, x, y, z, lowest, slopes, sums):
         e = ends[k]
         ax, ay, az, bx, by, bz = e[0] - x, e[1] - y, e[2] - z, e[3] - x, e[4] - y, e[5] - z
         cx, cy, cz = e[6] - x, e[7] - y, e[8] - z
-        double, lengths, wx, wy, wz, sx, sy, sz = measured(ax, ay, az, bx, by, bz, cx, cy, cz)
+        weights = kept_weights(mixture, e)
+        double, lengths, wx, wy, wz, sx, sy, sz = measured_as(ax, ay, az, bx, by, bz, cx, cy, cz, weights)
         if not double > lowest:
             return False
         if aim.kind == DIHEDRAL:
@@ -115,16 +133,16 @@ def evaluate3(aim, scale, ends, count, x, y, z, lowest, slopes, sums):
                 for _ in range(SHAPES):
                     near *= near
                     p *= 2.0
-                add_shape(double, lengths, wx, wy, wz, sx, sy, sz, near, 1.5 * p, p, slopes, sums)
+                add_shape(double, lengths, wx, wy, wz, sx, sy, sz, near, 1.5 * p, p, slopes, sums, weights)
         else:
             size = np.cbrt(double)
             eta = REGULAR * size * size / lengths
             if aim.kind == METRIC:
                 sums[VALUE] += 1.0
-                add_shape(double, lengths, wx, wy, wz, sx, sy, sz, -eta, -1.0, -2.0 / 3.0, slopes, sums)
+                add_shape(double, lengths, wx, wy, wz, sx, sy, sz, -eta, -1.0, -2.0 / 3.0, slopes, sums, weights)
             elif aim.kind == Q:
-                add_shape(double, lengths, wx, wy, wz, sx, sy, sz, 1.0 / eta, 1.0, 2.0 / 3.0, slopes, sums)
+                add_shape(double, lengths, wx, wy, wz, sx, sy, sz, 1.0 / eta, 1.0, 2.0 / 3.0, slopes, sums, weights)
             else:
                 q = 1.0 / (eta * eta)
-                add_shape(double, lengths, wx, wy, wz, sx, sy, sz, q, 2.0, 4.0 / 3.0, slopes, sums)
+                add_shape(double, lengths, wx, wy, wz, sx, sy, sz, q, 2.0, 4.0 / 3.0, slopes, sums, weights)
     return True

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel
-from gmsnet.kernels.simplex.mean_ratio3 import TINY, determinant, measured, shape_of, square
+from gmsnet.kernels.simplex.mean_ratio3 import TINY, determinant, measured_as, shape_of, square, weights_at
 from gmsnet.kernels.simplex.measures import degrees
 from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, spokes_of
 
@@ -136,10 +136,11 @@ def squared_edges(ax, ay, az, bx, by, bz, cx, cy, cz):
 
 
 @kernel
-def cubed_ratios(points, rows, orientation, first, last, out):
-    """S³/D² of the cells first…last, 432·η⁻³, into out (T,); infinite where the volume is not positive."""
+def cubed_ratios(points, rows, orientation, shapes, first, last, out):
+    """S³/D² of the corner simplices first…last, 432·η⁻³, into out (T,); infinite where the volume is not positive."""
     for t in range(first, last):
         ax, ay, az, bx, by, bz, cx, cy, cz = spokes_of(points, rows, t)
-        double, lengths, _, _, _, _, _, _ = measured(ax, ay, az, bx, by, bz, cx, cy, cz)
+        weights = weights_at(shapes, t)
+        double, lengths, _, _, _, _, _, _ = measured_as(ax, ay, az, bx, by, bz, cx, cy, cz, weights)
         double *= orientation[t]
         out[t] = lengths * lengths * lengths / (double * double) if double > 0.0 else np.inf

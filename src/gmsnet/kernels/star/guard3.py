@@ -16,11 +16,15 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import LANES, inlined, kernel
-from gmsnet.kernels.simplex.mean_ratio3 import square
+from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
+from gmsnet.kernels.jit.vectors import WIDTH as LANES3
+from gmsnet.kernels.simplex.jacobian3 import solid_workspace
+from gmsnet.kernels.simplex.mean_ratio3 import same_cell3, square, weights_at
 from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, largest_component
 from gmsnet.kernels.simplex.predicates import UNIT
+from gmsnet.kernels.simplex.solid_measures import certainly_valid
 
+MIXED_BOUND = 2.0  # times ``error_bound3`` where cells are not all tetrahedra
 LARGEST3 = 0.0481126  # above D/S^(3/2) of a regular tetrahedron, 1/√432
 COARSE3 = 2.0**-24
 
@@ -38,6 +42,10 @@ def error_bound3(m, delta):
 
     The step of a node that is free is what its place is made of: its u·m is not needed. A node that slides lands in
     float64 (slide3.land3), and its step is rounded to float32 for it, by u·m at most; its place is not rounded again.
+
+    Of other corner simplices the weights of S add up to 9 at most, without their signs. S − 2t·s + σ|t|² is then off by
+    2500u·m² + 650m·δ, is at most 108m², and c·S^(3/2) is off by 1900u·m³ + 490m²·δ and 220u·m³: with D less than
+    2800m²(u·m + δ). MIXED_BOUND times the bound is 4096m²(u·m + δ).
     """
     return 2048.0 * m * m * (COARSE3 * m + delta)
 
@@ -53,22 +61,41 @@ def length_bounds(ax, ay, az, bx, by, bz, cx, cy, cz, delta):
 
 
 @inlined
-def certified(ax, ay, az, bx, by, bz, cx, cy, cz, delta, floor):
+def length_bounds_by(ax, ay, az, bx, by, bz, cx, cy, cz, delta, weights=None):
+    """The same by six weights, which add up to 9 at most without their signs; None: of a tetrahedron.
+
+    A squared edge opposite to the spokes is less than twice the sum of those of its two spokes, of which it is made.
+    """
+    if weights is None:
+        return length_bounds(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
+    wa, wb, wc, wab, wbc, wca = weights.a, weights.b, weights.c, weights.ab, weights.bc, weights.ca
+    a, b, c = square(ax, ay, az), square(bx, by, bz), square(cx, cy, cz)
+    ab, bc, ca = square(bx - ax, by - ay, bz - az), square(cx - bx, cy - by, cz - bz), square(ax - cx, ay - cy, az - cz)
+    whole = ((a * wa + b * wb) + c * wc) + ((ab * wab + bc * wbc) + ca * wca)
+    around = ((a * abs(wa) + b * abs(wb)) + c * abs(wc)) + 2.0 * (
+        ((a + b) * abs(wab) + (b + c) * abs(wbc)) + (c + a) * abs(wca)
+    )
+    m = largest_component(ax, ay, az, bx, by, bz, cx, cy, cz)
+    return whole, 32.0 * UNIT * around + delta * (240.0 * m + 120.0 * delta)
+
+
+@inlined
+def certified(ax, ay, az, bx, by, bz, cx, cy, cz, delta, floor, weights=None):
     """Is the tetrahedron with these spokes certified above a floor that is not negative?"""
     value, bound = determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
     value -= bound
     if floor > 0.0:
-        lengths, error = length_bounds(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
+        lengths, error = length_bounds_by(ax, ay, az, bx, by, bz, cx, cy, cz, delta, weights)
         most = lengths + error
         value -= floor * (most * math.sqrt(most)) * (1.0 + 8.0 * UNIT) * (1.0 + 4.0 * UNIT)
     return value > 0.0
 
 
 @inlined
-def ratio_upper_bound3(ax, ay, az, bx, by, bz, cx, cy, cz, delta):
+def ratio_upper_bound3(ax, ay, az, bx, by, bz, cx, cy, cz, delta, weights=None):
     """The most that D/S^(3/2) can be in exact arithmetic; 0 for what is certainly not positive, as floors need it."""
     value, bound = determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
-    lengths, error = length_bounds(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
+    lengths, error = length_bounds_by(ax, ay, az, bx, by, bz, cx, cy, cz, delta, weights)
     least = lengths - error
     if value + bound <= 0.0:
         return 0.0
@@ -88,7 +115,8 @@ def ratio_of_row3(points, simplices, t, unit, grain):
     cx, cy, cz = points[c, 0] - x, points[c, 1] - y, points[c, 2] - z
     reach = max(max(abs(x), abs(y)), abs(z))
     m = largest_component(ax, ay, az, bx, by, bz, cx, cy, cz)
-    return ratio_upper_bound3(ax, ay, az, bx, by, bz, cx, cy, cz, unit * (reach + m) + grain)
+    weights = weights_at(simplices.shapes, t)
+    return ratio_upper_bound3(ax, ay, az, bx, by, bz, cx, cy, cz, unit * (reach + m) + grain, weights)
 
 
 @kernel
@@ -108,7 +136,38 @@ def star_floors3(points, simplices, ringed, unit, grain, floors):
     rows = simplices.rows
     for i in range(len(floors)):
         floors[i] = np.inf if ringed[i] else -np.inf
-    for t in range(len(rows)):
-        ratio = ratio_of_row3(points, simplices, t, unit, grain)
-        for corner in range(4):
-            floors[rows[t, corner]] = min(floors[rows[t, corner]], ratio)
+    t = 0
+    while t < len(rows):
+        ratio, end = ratio_of_row3(points, simplices, t, unit, grain), t + 1
+        while same_cell3(simplices.cells, t, end):
+            ratio = min(ratio, ratio_of_row3(points, simplices, end, unit, grain))
+            end += 1
+        for k in range(t, end):
+            for corner in range(4):
+                floors[rows[k, corner]] = min(floors[rows[k, corner]], ratio)
+        t = end
+
+
+@inlined
+def floor_at(mixture, floors, centre, a, b, c, at, k, lane):
+    """The floor of a simplex: the largest of the nodes of its cell."""
+    floor = max(max(floors[a], floors[b]), max(floors[c], floors[centre]))
+    if mixture is not None:
+        nodes, owner = mixture.solids.nodes, mixture.owner[at // 3 + k * LANES3 + lane]
+        for j in range(8):
+            floor = max(floor, floors[nodes[owner, j]])
+    return floor
+
+
+@part
+def sound(mixture, points, i, x, y, z, unit, grain):
+    """Are the cells at node i certified to be valid everywhere with it at (x, y, z)?
+
+    Those of which corner simplices do not tell: hexahedra and wedges.
+    """
+    if mixture is not None:
+        solids, work = mixture.solids, solid_workspace()
+        for k in range(mixture.at[i], mixture.at[i + 1]):
+            if not certainly_valid(points, solids, mixture.around[k], unit, grain, i, x, y, z, work):
+                return False
+    return True

@@ -17,6 +17,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit import vectors
+from gmsnet.kernels.jit.compile import inlined
 from gmsnet.kernels.jit.vectors import INDEX, NUMBER, REAL, Sum, Vector, as_written, broadcast, index
 from gmsnet.kernels.simplex import mean_ratio3
 
@@ -31,6 +32,28 @@ FAR_ABOVE = 1e30  # for simplices that a lane does not have
 SCALE, ROOT_OF_SCALE, TWO_P, M, MIXED, SQUARED = range(6)
 
 
+class Mixture(NamedTuple):
+    """What blocks have beside where cells are not all tetrahedra: the rows of a block then have one role each.
+
+    The role of a simplex is which ideal shape it has and which of its vertices is free. role: uint8 by [block][row], a
+    row of ``weights``: (R, 8) float32 those of |a|², |b|², |c|², |b − a|², |c − b|², |a − c|², then σ and σ/3. exact:
+    (R, 6) the same in float64. present: uint16 by [block][row], the lanes that have such a simplex. owner: by
+    [block][row][lane], the cell of each. edges: (B·LANES3,) how many nodes of the ring, from the first on, an edge
+    joins to the free one. solids: all cells. at: (N + 1,), those at each node that are not valid just where their
+    corner simplices are positive begin there in ``around``.
+    """
+
+    role: NDArray[np.uint8]
+    weights: NDArray[np.float32]
+    exact: NDArray[np.float64]
+    present: NDArray[np.uint16]
+    owner: NDArray[np.int32]
+    edges: NDArray[np.int32]
+    solids: mean_ratio3.Solids
+    at: NDArray[np.int64]
+    around: NDArray[np.int32]
+
+
 class SpaceBlocks(NamedTuple):
     """The free nodes in blocks of LANES3 of one colour.
 
@@ -38,7 +61,7 @@ class SpaceBlocks(NamedTuple):
     degree (B,) its rows: those of a lane that has fewer repeat its first. spoke: uint8 by [block][simplex][3][lane],
     the rows of the ring in which the spokes end; at (B,) where a block begins; simplices (B,) the most of a lane,
     cells (B·LANES3,) those of each. filled: (B,) how many lanes hold stars of their own; the others repeat the last.
-    most, most_simplices: the largest of all blocks.
+    most, most_simplices: the largest of all blocks. mixture: None where all cells are tetrahedra.
     """
 
     centre: NDArray[np.int32]
@@ -52,6 +75,32 @@ class SpaceBlocks(NamedTuple):
     filled: NDArray[np.int32]
     most: int
     most_simplices: int
+    mixture: Mixture | None = None
+
+
+@inlined
+def rows_in(mixture, blocks, block, lane):
+    """How many rows of a block to go through for the simplices of a lane."""
+    if mixture is None:
+        return blocks.cells[block * LANES3 + lane]
+    return blocks.simplices[block]
+
+
+@inlined
+def is_present(mixture, at, k, lane):
+    """Has the lane a simplex in row k? at: where its block begins in ``spoke``."""
+    if mixture is None:
+        return True
+    return (np.int64(mixture.present[at // (3 * LANES3) + k]) >> lane) & 1 == 1
+
+
+@inlined
+def weights_in_row(mixture, at, k):
+    """The weights of the simplices in row k; None for tetrahedra."""
+    if mixture is None:
+        return None
+    w, exact = np.int64(mixture.role[at // (3 * LANES3) + k]), mixture.exact
+    return mean_ratio3.Weights3(exact[w, 0], exact[w, 1], exact[w, 2], exact[w, 3], exact[w, 4], exact[w, 5])
 
 
 @intrinsic
@@ -132,22 +181,55 @@ def _present(builder: Any, counts: Any, row: Any) -> Any:
     return builder.icmp_signed("<", each, counts)
 
 
+class _Rows:
+    """Which lanes have a simplex in a row, and its weights: of tetrahedra, or of a mixture in the last arguments."""
+
+    def __init__(self, context: Any, builder: Any, kinds: Any, arguments: Any, counts: Any, at: Any) -> None:
+        self.builder, self.mixed, self.counts = builder, not isinstance(kinds[0], types.NoneType), counts
+        if self.mixed:
+            self.role, self.present, self.weights = (
+                vectors.data_of(context, builder, kind, argument)
+                for kind, argument in zip(kinds, arguments, strict=True)
+            )
+            self.first = builder.udiv(at, index(3 * LANES3))
+
+    def lanes(self, row: Any) -> Any:
+        """A mask."""
+        if not self.mixed:
+            return _present(self.builder, self.counts, row)
+        bits = self.builder.load(self.builder.gep(self.present, [self.builder.add(self.first, row)]))
+        return self.builder.bitcast(bits, ir.VectorType(ir.IntType(1), LANES3))
+
+    def weight(self, row: Any, first: int, last: int) -> list[Vector]:
+        """Those of a mixture, by their places."""
+        builder = self.builder
+        role = builder.load(builder.gep(self.role, [builder.add(self.first, row)]))
+        place = builder.shl(builder.zext(role, INDEX), index(3))
+        return [
+            broadcast(builder, builder.load(builder.gep(self.weights, [builder.add(place, index(k))])))
+            for k in range(first, last)
+        ]
+
+
 @intrinsic
 def derive(
     _context: Any, local: Any, spoke: Any, at: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any,
-    soft: Any, kept: Any, sums: Any,
+    soft: Any, kept: Any, sums: Any, role: Any, present: Any, weights: Any,
 ) -> Any:  # fmt: skip
     """Writes what is kept of each simplex, and the sums VALUE to LEAST over them.
 
     local: as ``relate`` leaves it. spoke: from ``at`` on, so many rows; count: those of each lane, from block·LANES3
     on. power: k, constants: (SQUARED + 1,) float32, those named above. soft: (LANES3,) ε of each lane, over the cube of
     its size, or None: in f, D is then χ(D) = (D + √(ε² + D²))/2, which is positive for any D (Garanzha et al.:
-    Foldover-free maps in 50 lines of code, 2021), and the Hessian is that without the term of χ''.
+    Foldover-free maps in 50 lines of code, 2021), and the Hessian is that without the term of χ''. role, present,
+    weights: those of a Mixture, or None.
     """
     signature = types.void(
-        local, spoke, types.int64, types.int64, count, types.int64, types.int64, constants, soft, kept, sums
-    )
+        local, spoke, types.int64, types.int64, count, types.int64, types.int64, constants, soft, kept, sums, role,
+        present, weights,
+    )  # fmt: skip
     measured, derivatives = as_written(mean_ratio3.measured), as_written(mean_ratio3.derivatives)
+    measured_by = as_written(mean_ratio3.measured_by)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 1, 4, 7, 9, 10)}
@@ -155,6 +237,7 @@ def derive(
         constants = _constants(builder, data[7])
         first = builder.mul(arguments[5], index(LANES3))
         counts = vectors.load(builder, data[4], first, vectors.NUMBERS)
+        lay = _Rows(context, builder, signature.args[11:], arguments[11:], counts, arguments[2])
         four = ir.VectorType(REAL, 4)
         found = [Sum(builder, FAR_ABOVE if k == LEAST else 0.0) for k in range(LEAST + 1)]
         with cgutils.for_range(builder, arguments[3]) as loop:
@@ -167,8 +250,12 @@ def derive(
                     there = builder.add(builder.mul(builder.zext(row, INDEX), index(LANES3)), index(lane))
                     ends.append(vectors.load(builder, data[0], builder.shl(there, index(2)), four))
                 spokes += vectors.transposed(builder, ends)
-            on = _present(builder, counts, loop.index)
-            double, lengths, wx, wy, wz, sx, sy, sz = measured(*spokes)
+            on = lay.lanes(loop.index)
+            if lay.mixed:
+                double, lengths, wx, wy, wz, sx, sy, sz = measured_by(*spokes, *lay.weight(loop.index, 0, 6))
+                lengths = lengths.where(on, 1.0)
+            else:
+                double, lengths, wx, wy, wz, sx, sy, sz = measured(*spokes)
             double = double.where(on, FAR_ABOVE)
             wx, wy, wz = wx.where(on, 0.0), wy.where(on, 0.0), wz.where(on, 0.0)
             to = builder.mul(loop.index, index(KEPT * LANES3))
@@ -182,7 +269,8 @@ def derive(
                 f, of_s * constants[TWO_P], of_d * constants[M], wx, wy, wz, sx, sy, sz, constants[MIXED],
                 constants[SQUARED],
             )  # fmt: skip
-            for k, term in enumerate((f, *terms, f * of_s)):
+            even = f * of_s * lay.weight(loop.index, 7, 8)[0] if lay.mixed else f * of_s
+            for k, term in enumerate((f, *terms, even)):
                 found[k].add(term)
             found[LEAST].lower(double)
         for k, total in enumerate(found):
@@ -195,22 +283,24 @@ def derive(
 @intrinsic
 def judge(
     _context: Any, kept: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any, soft: Any, step: Any,
-    floor: Any, sums: Any,
+    floor: Any, sums: Any, at: Any, role: Any, present: Any, weights: Any,
 ) -> Any:  # fmt: skip
     """Writes the sums AFTER and MARGIN after a step (3·LANES3,), [axis][lane].
 
-    floor: c, of D/S^(3/2). soft: as in ``derive``.
+    floor: c, of D/S^(3/2). soft, at, role, present, weights: as in ``derive``.
     """
     signature = types.void(
-        kept, types.int64, count, types.int64, types.int64, constants, soft, step, types.float32, sums
-    )
-    moved = as_written(mean_ratio3.moved)
+        kept, types.int64, count, types.int64, types.int64, constants, soft, step, types.float32, sums, types.int64,
+        role, present, weights,
+    )  # fmt: skip
+    moved, moved_by = as_written(mean_ratio3.moved), as_written(mean_ratio3.moved_by)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 2, 5, 7, 9)}
         softness = _softness(context, builder, signature.args[6], arguments[6])
         constants = _constants(builder, data[5])
         counts = vectors.load(builder, data[2], builder.mul(arguments[3], index(LANES3)), vectors.NUMBERS)
+        lay = _Rows(context, builder, signature.args[11:], arguments[11:], counts, arguments[10])
         way = [Vector(builder, vectors.load(builder, data[7], index(k * LANES3))) for k in range(3)]
         floor = broadcast(builder, arguments[8])
         after, margin = Sum(builder, 0.0), Sum(builder, FAR_ABOVE)
@@ -219,8 +309,11 @@ def judge(
             w = [
                 Vector(builder, vectors.load(builder, data[0], builder.add(at, index(k * LANES3)))) for k in range(KEPT)
             ]
-            double, lengths = moved(w[3], w[7], *w[:3], *w[4:7], *way)
-            on = _present(builder, counts, loop.index)
+            if lay.mixed:
+                double, lengths = moved_by(w[3], w[7], *w[:3], *w[4:7], *way, *lay.weight(loop.index, 6, 7))
+            else:
+                double, lengths = moved(w[3], w[7], *w[:3], *w[4:7], *way)
+            on = lay.lanes(loop.index)
             f, high = value_of(builder, lengths, _inverses(double, softness)[0], arguments[4], constants)
             after.add(f.where(on, 0.0))
             margin.lower((double - high * floor).where(on, FAR_ABOVE))

@@ -7,14 +7,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.jit.compile import part
+from gmsnet.kernels.jit.compile import inlined, part
 from gmsnet.kernels.simplex.orientation3 import largest_component
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.fold import folds, refuse_folds
 from gmsnet.kernels.star.guard import WITH_FLOORS
-from gmsnet.kernels.star.guard3 import certified, error_bound3
+from gmsnet.kernels.star.guard3 import MIXED_BOUND, certified, error_bound3, floor_at, sound
 from gmsnet.kernels.star.slide3 import land3, note_places, on_surface, take_place
-from gmsnet.kernels.star.space import KEPT, LANES3, MARGIN, SUMS, derive, judge, relate
+from gmsnet.kernels.star.space import (
+    KEPT,
+    LANES3,
+    MARGIN,
+    SUMS,
+    derive,
+    is_present,
+    judge,
+    relate,
+    rows_in,
+    weights_in_row,
+)
 
 WIDER = 1.0 + 2.0**-20
 HALVINGS = 12  # of a step that is not allowed
@@ -80,35 +91,65 @@ def fetch3(points, blocks, block, workspace):
 @part
 def derive3(blocks, block, power, soft, workspace):
     """The sums of a block that has been fetched. power: a Power3; soft: see ``derive``."""
+    _derive(blocks.mixture, blocks, block, power, soft, workspace)
+
+
+@part
+def _derive(mixture, blocks, block, power, soft, workspace):
     rows = np.int64(blocks.simplices[block])
-    derive(
-        workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants, soft,
-        workspace.kept, workspace.sums,
-    )  # fmt: skip
+    if mixture is None:
+        derive(
+            workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
+            soft, workspace.kept, workspace.sums, None, None, None,
+        )  # fmt: skip
+    else:
+        derive(
+            workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
+            soft, workspace.kept, workspace.sums, mixture.role, mixture.present, mixture.weights,
+        )  # fmt: skip
 
 
 @part
 def judge3(blocks, block, power, soft, floor, workspace, surface=None):
     """What follows of them after the step. floor: c, of D/S^(3/2). surface: what nodes slide on."""
     land3(surface, blocks, block, workspace)
-    rows = np.int64(blocks.simplices[block])
-    judge(
-        workspace.kept, rows, blocks.cells, block, power.number, power.constants, soft, workspace.step, floor,
-        workspace.sums,
-    )  # fmt: skip
+    _judge(blocks.mixture, blocks, block, power, soft, floor, workspace)
 
 
 @part
-def certify3(workspace, unit, grain):
+def _judge(mixture, blocks, block, power, soft, floor, workspace):
+    rows, at = np.int64(blocks.simplices[block]), blocks.at[block]
+    if mixture is None:
+        judge(
+            workspace.kept, rows, blocks.cells, block, power.number, power.constants, soft, workspace.step, floor,
+            workspace.sums, at, None, None, None,
+        )  # fmt: skip
+    else:
+        judge(
+            workspace.kept, rows, blocks.cells, block, power.number, power.constants, soft, workspace.step, floor,
+            workspace.sums, at, mixture.role, mixture.present, mixture.weights,
+        )  # fmt: skip
+
+
+@part
+def certify3(workspace, unit, grain, mixture):
     """``allowed``: which lanes are certified above the floor that their row MARGIN was made with, after their step."""
-    star, step = workspace.star, workspace.step
+    star, step, doubt = workspace.star, workspace.step, doubt_of(mixture)
     for lane in range(LANES3):
         far = max(abs(step[lane]), max(abs(step[LANES3 + lane]), abs(step[2 * LANES3 + lane])))
         m = np.float64(max(workspace.width[lane], far))
         size = workspace.size[lane]
         reach = max(abs(star[4 * lane]), max(abs(star[4 * lane + 1]), abs(star[4 * lane + 2]))) + size * m
         delta = WIDER * (unit * reach + grain) / size
-        workspace.allowed[lane] = workspace.sums[MARGIN * LANES3 + lane] > WIDER * error_bound3(m, delta)
+        workspace.allowed[lane] = workspace.sums[MARGIN * LANES3 + lane] > doubt * error_bound3(m, delta)
+
+
+@inlined
+def doubt_of(mixture):
+    """By how much the bound of tetrahedra is multiplied."""
+    if mixture is None:
+        return WIDER
+    return WIDER * MIXED_BOUND
 
 
 @part
@@ -129,6 +170,9 @@ def store3(points, blocks, block, workspace, guard, tally):
                 x, y, z = workspace.target[4 * lane], workspace.target[4 * lane + 1], workspace.target[4 * lane + 2]
             if guard.single:
                 x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
+            if not sound(blocks.mixture, points, i, x, y, z, guard.unit, guard.grain):
+                truncate3(points, blocks, block, lane, 0.5 * dx, 0.5 * dy, 0.5 * dz, guard, tally)
+                continue
             tally[MOVED] += (x != points[i, 0]) | (y != points[i, 1]) | (z != points[i, 2])
             points[i, 0], points[i, 1], points[i, 2] = x, y, z
         elif dx != 0.0 or dy != 0.0 or dz != 0.0:
@@ -165,23 +209,24 @@ def truncate3(points, blocks, block, lane, dx, dy, dz, guard, tally):
 @part
 def allowed3(points, blocks, block, lane, x, y, z, guard):
     """May the free node of one lane go to (x, y, z)? Are all its simplices certified above their floors there?"""
-    at, offset = blocks.at[block], blocks.offset[block]
+    at, offset, mixture = blocks.at[block], blocks.offset[block], blocks.mixture
     centre = blocks.centre[block * LANES3 + lane]
     reach = max(abs(x), max(abs(y), abs(z)))
-    for k in range(blocks.cells[block * LANES3 + lane]):
+    for k in range(rows_in(mixture, blocks, block, lane)):
+        if not is_present(mixture, at, k, lane):
+            continue
         row = at + 3 * k * LANES3 + lane
         a = np.uint32(blocks.ring[offset + blocks.spoke[row] * LANES3 + lane])
         b = np.uint32(blocks.ring[offset + blocks.spoke[row + LANES3] * LANES3 + lane])
         c = np.uint32(blocks.ring[offset + blocks.spoke[row + 2 * LANES3] * LANES3 + lane])
         floor = max(guard.floor, 0.0)
         if len(guard) == WITH_FLOORS:
-            floors = guard.floors
-            floor = max(max(floor, max(floors[a], floors[b])), max(floors[c], floors[centre]))
+            floor = max(floor, floor_at(mixture, guard.floors, centre, a, b, c, at, k, lane))
         ax, ay, az = points[a, 0] - x, points[a, 1] - y, points[a, 2] - z
         bx, by, bz = points[b, 0] - x, points[b, 1] - y, points[b, 2] - z
         cx, cy, cz = points[c, 0] - x, points[c, 1] - y, points[c, 2] - z
         m = largest_component(ax, ay, az, bx, by, bz, cx, cy, cz)
         delta = guard.unit * (reach + m) + guard.grain
-        if not certified(ax, ay, az, bx, by, bz, cx, cy, cz, delta, floor):
+        if not certified(ax, ay, az, bx, by, bz, cx, cy, cz, delta, floor, weights_in_row(mixture, at, k)):
             return False
-    return True
+    return sound(mixture, points, np.int64(centre), x, y, z, guard.unit, guard.grain)

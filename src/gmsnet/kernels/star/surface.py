@@ -32,8 +32,9 @@ class Surface(NamedTuple):
     same (E, 3) bool, which coordinates all its points have in common. Of facets (F,): corner (F, 3, 3) points, normal
     (F, 3, 3), beside (F, 3) int32, the facet across the edge from corner k to k + 1, NOWHERE at the rim, control
     (F, CONTROLS, 3). Of pieces (P,): piece (P, 4, 3) control points, before, after (P,) int32. single: new coordinates
-    are rounded to float32. Of the facets of a volume's boundary around each row (M,), in CSR form by start (R + 1,):
-    ring (M, 2) int32, the other two nodes, seen counter-clockwise from outside; own (M, 3) its unit normal at first.
+    are rounded to float32. limit: (R,) how far from the facets, or edges, themselves each row may go. Of facets of a
+    volume's boundary around each row (M,), in CSR form by start (R + 1,): ring (M, 2) int32, the other two nodes, seen
+    counter-clockwise from outside; own (M, 3) its unit normal at first.
     """
 
     row: NDArray[np.int32]
@@ -51,6 +52,7 @@ class Surface(NamedTuple):
     before: NDArray[np.int32]
     after: NDArray[np.int32]
     single: bool
+    limit: NDArray[np.float64]
     start: NDArray[np.int32]
     ring: NDArray[np.int32]
     own: NDArray[np.float64]
@@ -183,6 +185,19 @@ def piece_tangent(piece, p, t):
     return x / length, y / length, z / length
 
 
+@inlined
+def within(limit, px, py, pz, x, y, z):
+    """(x, y, z), or the place on the way there from (px, py, pz) at this distance from it."""
+    if limit == np.inf:
+        return x, y, z
+    dx, dy, dz = x - px, y - py, z - pz
+    far = np.sqrt(dx * dx + dy * dy + dz * dz)
+    if far <= limit:
+        return x, y, z
+    share = limit / far
+    return px + share * dx, py + share * dy, pz + share * dz
+
+
 @part
 def snap3(surface, row, x, y, z):
     """Where the node of a row goes that would go to (x, y, z): x, y, z, and its facet or piece there.
@@ -193,16 +208,26 @@ def snap3(surface, row, x, y, z):
     kind, place = surface.kind[row], np.int64(surface.place[row])
     if kind == CURVED:
         place, a, b, c = walk(surface, place, x, y, z)
-        x = on_cubic(surface.corner, surface.control, place, 0, a, b, c)
-        y = on_cubic(surface.corner, surface.control, place, 1, a, b, c)
-        z = on_cubic(surface.corner, surface.control, place, 2, a, b, c)
+        corner = surface.corner
+        x, y, z = within(
+            surface.limit[row],
+            a * corner[place, 0, 0] + b * corner[place, 1, 0] + c * corner[place, 2, 0],
+            a * corner[place, 0, 1] + b * corner[place, 1, 1] + c * corner[place, 2, 1],
+            a * corner[place, 0, 2] + b * corner[place, 1, 2] + c * corner[place, 2, 2],
+            on_cubic(corner, surface.control, place, 0, a, b, c),
+            on_cubic(corner, surface.control, place, 1, a, b, c),
+            on_cubic(corner, surface.control, place, 2, a, b, c),
+        )
     elif kind == CURVE:
         place, t = follow_curve(surface, place, x, y, z)
-        x, y, z = (
-            on_piece(surface.piece, place, 0, t),
-            on_piece(surface.piece, place, 1, t),
-            on_piece(surface.piece, place, 2, t),
-        )
+        piece = surface.piece
+        x, y, z = within(
+            surface.limit[row],
+            piece[place, 0, 0] + t * (piece[place, 3, 0] - piece[place, 0, 0]),
+            piece[place, 0, 1] + t * (piece[place, 3, 1] - piece[place, 0, 1]),
+            piece[place, 0, 2] + t * (piece[place, 3, 2] - piece[place, 0, 2]),
+            on_piece(piece, place, 0, t), on_piece(piece, place, 1, t), on_piece(piece, place, 2, t),
+        )  # fmt: skip
     if kind != CURVED:
         e = surface.of[row]
         ox, oy, oz = surface.origin[e, 0], surface.origin[e, 1], surface.origin[e, 2]

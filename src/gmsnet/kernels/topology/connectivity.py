@@ -29,7 +29,8 @@ from gmsnet.kernels.topology.layout import span
     NOT_A_DISK,
     HIGH_VALENCE,
     SECOND_ORDER,
-) = (1 << k for k in range(12))
+    MISMATCHED,
+) = (1 << k for k in range(13))
 
 WIDTH = 8  # neighbours: also of nodes with fewer, loops make so many rounds, so that processors foresee their end
 AHEAD = 256  # nodes whose corners are listed at a time

@@ -6,8 +6,10 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import kernel, part
 from gmsnet.kernels.methods.barrier3 import propose3
-from gmsnet.kernels.simplex.mean_ratio3 import measured
+from gmsnet.kernels.simplex.jacobian3 import solid_workspace
+from gmsnet.kernels.simplex.mean_ratio3 import measured_as, same_cell3, weights_at
 from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, largest_component, spokes_of
+from gmsnet.kernels.simplex.solid_measures import certainly_valid
 from gmsnet.kernels.star.space import AFTER, LANES3, VALUE
 from gmsnet.kernels.star.stars3 import derive3, fetch3, judge3, workspace3_for
 
@@ -55,7 +57,30 @@ def soften(points, blocks, first, last, softness, single, power):
 
 
 @kernel
-def find_bad(points, rows, orientation, unit, grain, bad, inverted, ratio):
+def find_bad_inside(points, simplices, unit, grain, bad, inverted):
+    """Marks, after ``find_bad``, all simplices of the cells that are not certified to be valid between their corners.
+
+    Returns how many simplices are bad now.
+    """
+    count, t, work = 0, 0, solid_workspace()
+    while t < len(simplices.rows):
+        end, wrong = t + 1, bad[t]
+        while same_cell3(simplices.cells, t, end):
+            wrong |= bad[end]
+            end += 1
+        if not wrong:
+            cell = simplices.cells[t]
+            if not certainly_valid(points, simplices.solids, cell, unit, grain, -1, 0.0, 0.0, 0.0, work):
+                for k in range(t, end):
+                    bad[k] = inverted[k] = True
+        for k in range(t, end):
+            count += bad[k]
+        t = end
+    return count
+
+
+@kernel
+def find_bad(points, rows, orientation, unit, grain, bad, inverted, ratio, shapes=None):
     """Writes of each cell (T,) whether it is not certified positive as it will be written, whether it is certainly
     inverted, and D/S^(3/2).
 
@@ -71,6 +96,7 @@ def find_bad(points, rows, orientation, unit, grain, bad, inverted, ratio):
         value *= orientation[t]
         bad[t], inverted[t] = not value > bound, value < -bound
         count += bad[t]
-        _, lengths, _, _, _, _, _, _ = measured(ax, ay, az, bx, by, bz, cx, cy, cz)
+        weights = weights_at(shapes, t)
+        _, lengths, _, _, _, _, _, _ = measured_as(ax, ay, az, bx, by, bz, cx, cy, cz, weights)
         ratio[t] = value / max(lengths * np.sqrt(max(lengths, 0.0)), 1e-300)
     return count

@@ -43,6 +43,7 @@ from gmsnet.measure.volumes import MeasuredTetrahedra
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -125,7 +126,7 @@ class Limits:
 
 
 def limits(mesh: Mesh, topology: Topology | Volume, below: float = 0.9) -> Limits:
-    """The bounds less than ``below`` for a planar mesh; of volumes those of held cells alone.
+    """The bounds less than ``below`` for a planar mesh; of volumes and surfaces those of held cells alone.
 
     topology: of this mesh; which nodes it holds is what counts.
 
@@ -135,7 +136,12 @@ def limits(mesh: Mesh, topology: Topology | Volume, below: float = 0.9) -> Limit
     free[topology.free] = True
     if isinstance(topology, Volume):
         cell, held = topology.cell, np.all(~free[topology.cells], axis=1)
-        found = _held_in_space(mesh, topology, np.flatnonzero(held), below)
+        found = _held_in_space(MeasuredTetrahedra.of(mesh, topology)[0], np.flatnonzero(held), below)
+    elif isinstance(topology, Shell):
+        cells, cell = MeasuredCells.of(mesh, topology)
+        held = np.concatenate([np.all(~free[topology.triangles], axis=1), np.all(~free[topology.quads], axis=1)])
+        held = held if cells.order is None else held[cells.order]
+        found = _held_in_space(cells, np.flatnonzero(held), below)
     elif topology.patterns is not None:
         cells, cell = MeasuredCells.of(mesh, topology)
         found, held = links.collect(cells, topology, free, below)
@@ -156,9 +162,9 @@ def limits(mesh: Mesh, topology: Topology | Volume, below: float = 0.9) -> Limit
     )
 
 
-def _held_in_space(mesh: Mesh, topology: Volume, rows: Ints, below: float) -> groups.Groups:
-    """The tetrahedra of these rows that are worse than ``below``."""
-    shape = MeasuredTetrahedra.of(mesh, topology)[0].columns(rows.astype(np.int32))[SHAPE]
+def _held_in_space(cells: MeasuredTetrahedra | MeasuredCells, rows: Ints, below: float) -> groups.Groups:
+    """The cells of these rows that are worse than ``below``."""
+    shape = cells.columns(rows.astype(np.int32))[SHAPE]
     rows, shape = rows[shape < below], shape[shape < below]
     nowhere, one = np.full(len(rows), groups.NOWHERE), np.ones(len(rows), dtype=np.intp)
     made = groups.Groups.of(groups.HELD, nowhere, np.zeros(len(rows)), shape, one, rows)

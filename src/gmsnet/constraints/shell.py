@@ -1,0 +1,67 @@
+"""What the nodes of a surface mesh slide on, and on which side its cells show: the mesh itself, as it is given.
+
+Smooth nodes always slide on their patch; nodes of feature curves only where they are asked to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.constraints.facets import Facets, surface_itself
+from gmsnet.constraints.features import lengths_of, may_slide
+from gmsnet.constraints.outline import Flags
+from gmsnet.constraints.patches import Patches, patches_of
+from gmsnet.constraints.smooth_patches import dot, normals_of
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.ordering import space_points
+from gmsnet.topology.topology import Topology
+
+Floats = NDArray[np.float64]
+
+FEATURE = "feature of the surface"  # why nodes of sharp edges are held
+
+
+def patches_of_surface(
+    mesh: Mesh, topology: Topology, names: Sequence[str] | None, feature_angle: float, held: Flags
+) -> tuple[Facets, Patches]:
+    """The facets of a mesh in no plane and its patches; which of its nodes slide: (N,) by id.
+
+    names: of the markers whose nodes slide along curves: as ``check_slide`` gives them. held: (N,) bool.
+    """
+    facets = surface_itself(mesh, topology)
+    points = space_points(mesh)[:, :3].copy()
+    patches = patches_of(facets, points, feature_angle, mesh.single, ~held)
+    along = patches.curves.slides & may_slide(mesh, names, held)
+    return facets, replace(patches, curves=replace(patches.curves, slides=along))
+
+
+def sides_of(mesh: Mesh, topology: Topology, patches: Patches) -> NDArray[np.float32]:
+    """(S, 3) the vector n of each row of ``topology.near`` (kernels.star.shell).
+
+    Of a triangle, the mean of the reference's normals at its corners, or its own normal where the two are on different
+    sides; of a quad the normal of its diagonals.
+    """
+    points = space_points(mesh)[:, :3]
+    triangles = len(topology.triangles)
+    own = patches.unit[:triangles]
+    smooth = _unit(normals_of(patches, points).sum(axis=1)[:triangles])
+    alike = dot(own, smooth)
+    of_triangles = np.where(((alike > 0.0) | ~own.any(axis=1))[:, None], smooth, own)
+    quads = points[topology.quads]
+    of_quads = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1]) * topology.quad_orientation[:, None]
+    sides = np.zeros((len(topology.face_cell), 3))
+    sides[np.searchsorted(topology.face_cell, topology.cell)] = of_triangles
+    sides[np.searchsorted(topology.face_cell, topology.quad_cell)] = _unit(of_quads)
+    face = topology.near_origin if topology.near_cells is None else topology.near_origin[topology.near_cells]
+    return sides[face].astype(np.float32)
+
+
+def _unit(vectors: Floats) -> Floats:
+    """Of length 1, or 0."""
+    length = lengths_of(vectors)[:, None]
+    unit: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+    return unit

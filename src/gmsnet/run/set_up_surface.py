@@ -1,0 +1,58 @@
+"""The first state of a surface in space that is to be smoothed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.constraints.options import check_slide
+from gmsnet.constraints.shell import FEATURE, patches_of_surface, sides_of
+from gmsnet.constraints.sliding_in_space import SurfaceSliding
+from gmsnet.measure.report import measure
+from gmsnet.mesh.mesh import Mesh, unmeasured
+from gmsnet.methods import Smoother
+from gmsnet.parallel.executor import Executor
+from gmsnet.preserve.protection import Protection
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.state import State
+from gmsnet.topology.shell import Shell
+from gmsnet.topology.topology import Topology
+
+Floats = NDArray[np.float64]
+
+TOLERANCE = 0.05  # of the edges: how far nodes may go from the facets of the input
+
+
+def first_of_surface(
+    given: Mesh, restore: Callable[[Floats], Any], asked: NDArray[np.bool_], smoother: Smoother,
+    options: SmoothOptions, executor: Executor,
+) -> tuple[State, Shell]:  # fmt: skip
+    """The state of a mesh in no plane before the first stage. asked: (N,) bool, nodes to hold."""
+    names = check_slide(given, options.slide, options.feature_angle, options.geometry)
+    topology, start = Topology.and_points(given, asked, options.thread_count)
+    facets, patches = patches_of_surface(given, topology, names, options.feature_angle, asked)
+    slides = patches.slides | patches.curves.slides
+    if (patches.curves.slides & ~_flagged(topology.free, len(slides))).any():
+        topology, start = Topology.and_points(given, asked, options.thread_count, patches.curves.slides)
+    shell = Shell.made(topology, sides_of(given, topology, patches)).holding(~slides, FEATURE)
+    tolerance = options.surface_tolerance or TOLERANCE
+    sliding = SurfaceSliding.of(given, facets, patches, shell.memory, shell.free, tolerance)
+    others = unmeasured(given)
+    remarks = (f"not measured, and their nodes are held: {others}",) if others else ()
+    given = given.without_cells()
+    before = measure(given, shell, start, executor.for_blocks(0))
+    nothing = np.empty(0, dtype=np.float32)
+    state = State(
+        given, restore, smoother, before, Protection(shell, []), start, start, nothing, remarks, sliding=sliding
+    )
+    return state, shell
+
+
+def _flagged(nodes: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
+    """(count,) bool."""
+    flags = np.zeros(count, dtype=bool)
+    flags[nodes] = True
+    return flags

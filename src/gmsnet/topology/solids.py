@@ -1,0 +1,248 @@
+"""Hexahedra, wedges, pyramids and tetrahedra of a mesh in memory order, read so that all of a part are alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.cells.jacobian import form_of
+from gmsnet.cells.table import CELLS
+from gmsnet.kernels.simplex.mean_ratio3 import WEIGHTS3, Solids, Tetrahedra
+from gmsnet.kernels.topology import connectivity, layout
+from gmsnet.kernels.topology import solids as kernels
+from gmsnet.kernels.topology.facets import ALONE, OPPOSITE
+from gmsnet.kernels.topology.solids import FACETS, NONE, Tables
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.parallel.memory import refuse_unless_free
+from gmsnet.topology.fans import Marks
+from gmsnet.topology.ordering import space_points
+from gmsnet.topology.polygons import Ints
+from gmsnet.topology.wound import refuse_flat
+
+Flags = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+
+KINDS = ("tetra", "hexahedron", "wedge", "pyramid")  # by the numbers of kernels.simplex.mean_ratio3
+# The corners of a cell that is read inside out, in an order in which it is not.
+MIRRORED = np.array([
+    (0, 2, 1, 3, 4, 5, 6, 7), (4, 5, 6, 7, 0, 1, 2, 3), (3, 4, 5, 0, 1, 2, 6, 7), (0, 3, 2, 1, 4, 5, 6, 7),
+])  # fmt: skip
+CORNERS = np.array([CELLS[name].corners for name in KINDS])
+BITS = connectivity.BOUNDARY, connectivity.INTERFACE, connectivity.NON_MANIFOLD, connectivity.MISMATCHED
+BYTES_PER_CELL = 2_000  # that the set-up takes at most, of a hexahedron
+
+
+@cache
+def tables() -> Tables:
+    """What kernels know of the kinds."""
+    kinds = [CELLS[name] for name in KINDS]
+    facets, simplices = np.full((4, FACETS, 4), NONE), np.full((4, 8, 4), NONE)
+    around = np.full((3, 4, 8, 4), NONE)
+    facets_at = np.zeros((4, 8), dtype=np.int32)
+    for number, kind in enumerate(kinds):
+        for k, facet in enumerate(kind.facets):
+            facets[number, k, : len(facet)] = facet
+            facets_at[number, list(facet)] += 1
+        for k, simplex in enumerate(kind.simplices):
+            simplices[number, k] = simplex
+        for corner in range(kind.corners or 0):
+            joined = [j if i == corner else i for i, j in kind.edges if corner in (i, j)]
+            together = {node for simplex in kind.simplices if corner in simplex for node in simplex}
+            others = sorted(together - {corner, *joined})
+            rest = sorted(set(range(kind.corners or 0)) - together)
+            for turn, found in enumerate((joined, others, rest)):
+                around[turn, number, corner, : len(found)] = found
+    whole = [table.astype(np.int32) for table in (facets, around, simplices)]
+    return Tables(*whole, np.array([not kind.exact for kind in kinds]), facets_at)
+
+
+@cache
+def roles() -> tuple[Ints, Floats]:
+    """(K, 4) the role of each vertex of a corner simplex, by the kind; and (R, 6) the weights of each role.
+
+    The weights are those seen from the vertex, its spokes in the order of ``OPPOSITE``.
+    """
+    found: dict[tuple[float, ...], int] = {}
+    number = np.empty((4, 4), dtype=np.int32)
+    for kind in range(4):
+        of = np.zeros((4, 4))
+        for weight, (i, j) in zip(WEIGHTS3[kind], ((0, 1), (0, 2), (0, 3), (1, 2), (2, 3), (3, 1)), strict=True):
+            of[i, j] = of[j, i] = weight
+        for vertex in range(4):
+            a, b, c = OPPOSITE[vertex]
+            seen = (of[vertex, a], of[vertex, b], of[vertex, c], of[a, b], of[b, c], of[c, a])
+            number[kind, vertex] = found.setdefault(tuple(float(each) for each in seen), len(found))
+    return number, np.array(list(found))
+
+
+@dataclass(frozen=True, eq=False)
+class WoundSolids:
+    """Cells that are read alike.
+
+    cell: (T,) the index of each among all cells of the mesh, and cells: (T, 8) their nodes, behind the corners the
+    first one again, in file order. By places in memory: solids; corners (T,) how many; orientation (T,) int8, −1 for
+    what the file has inside out; region (T,), or none (0,) where all are the same; origin: the place in file order
+    of each.
+    twin: (6T,) the facet across each. marks, memory, position: as of Wound.
+    """
+
+    cell: NDArray[np.int64]
+    cells: Ints
+    solids: Solids
+    corners: Ints
+    orientation: NDArray[np.int8]
+    region: NDArray[np.int64]
+    origin: Ints
+    twin: Ints
+    marks: Marks
+    memory: Ints
+    position: Ints
+
+    @classmethod
+    def of(cls, mesh: Mesh, fixed: Flags | None = None) -> WoundSolids:
+        """Of a mesh; ``fixed`` and errors: see ``Volume.of``."""
+        refuse_flat(mesh)
+        cells, kind, cell, region, marks_by_id = _cells(mesh, fixed)
+        nodes = len(mesh.points)
+        refuse_unless_free(len(cells) * BYTES_PER_CELL, f"the connectivity of {len(cells):,} cells")
+        points = space_points(mesh)
+        memory, position = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
+        keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
+        layout.morton_order3(points, keys, other, memory, position)
+        place = position[cells]
+        origin = np.argsort(place.min(axis=1), kind="stable").astype(np.int32) if len(place) else np.empty(0, np.int32)
+        near, kind = place[origin], kind[origin]
+        region = region[origin] if len(region) else region
+        marks = marks_by_id[memory]
+        used = np.zeros(nodes, dtype=bool)
+        used[near] = True
+        twin = np.empty(FACETS * len(near), dtype=np.int32)
+        kernels.match_solids(near, kind, tables(), nodes, twin)
+        orientation = _wound(points[memory], near, kind, twin, marks)
+        corners, inside_out = CORNERS[kind].astype(np.int32), orientation < 0
+        if inside_out.any():
+            near[inside_out] = np.take_along_axis(near[inside_out], MIRRORED[kind[inside_out]], axis=1)
+            near = np.where(np.arange(8) < corners[:, None], near, near[:, :1])
+            kernels.match_solids(near, kind, tables(), nodes, twin)
+        kernels.mark_solids(near, kind, tables(), twin, region, _halved(near, kind, twin), *BITS, marks)
+        others = np.uint16(connectivity.LINE | connectivity.UNSUPPORTED_CELL)
+        marks[~used & (marks & others == 0)] |= np.uint16(connectivity.UNUSED)
+        solids = Solids(near, kind, form_of("hexahedron"), form_of("wedge"))
+        return cls(cell, cells, solids, corners, orientation, region, origin, twin, marks, memory, position)
+
+    @cached_property
+    def boundary_facets(self) -> NDArray[np.int64]:
+        """(N,) how many facets of the boundary are at each node."""
+        number = np.flatnonzero(self.twin == ALONE)
+        corners = tables().facets[self.solids.kind[number // FACETS], number % FACETS]
+        found: NDArray[np.int64] = np.bincount(
+            self.solids.nodes[(number // FACETS)[:, None], corners][corners != NONE], minlength=len(self.marks)
+        )
+        return found
+
+    @cached_property
+    def simplices(self) -> Tetrahedra:
+        """The corner simplices, cell by cell."""
+        nodes, kind = self.solids.nodes, self.solids.kind
+        count = np.array([len(CELLS[name].simplices) for name in KINDS])[kind]
+        first = np.concatenate([[0], np.cumsum(count)])
+        rows, table = np.empty((int(first[-1]), 4), dtype=np.int32), tables().simplices
+        for number in range(4):
+            chosen = np.flatnonzero(kind == number)
+            for s in range(len(CELLS[KINDS[number]].simplices) if len(chosen) else 0):
+                rows[first[chosen] + s] = nodes[chosen][:, table[number, s]]
+        owner = np.repeat(np.arange(len(kind), dtype=np.int32), count)
+        return Tetrahedra(rows, np.ones(len(rows), dtype=np.int8), kind[owner], owner, self.solids)
+
+
+def has_solids(mesh: Mesh) -> bool:
+    """Whether some cells are hexahedra, wedges or pyramids with straight edges."""
+    return any(block.kind in KINDS[1:] and len(block.nodes) for block in mesh.cells)
+
+
+def _cells(
+    mesh: Mesh, fixed: Flags | None
+) -> tuple[Ints, NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64], Marks]:
+    """The cells (T, 8) by ids, their kinds, indices and regions, none (0,) where all are the same; marks (N,) by ids.
+
+    Cells that name a node twice are none of them: their nodes are held, as those of kinds that are not smoothed.
+    """
+    marks = np.zeros(len(mesh.points), dtype=np.uint16)
+    parts, before = list[tuple[Ints, NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]](), 0
+    for block in mesh.cells:
+        if block.kind in KINDS:
+            whole = ~repeats_a_node(block)
+            marks[block.nodes[~whole]] |= np.uint16(connectivity.UNSUPPORTED_CELL)
+            nodes = block.nodes[whole].astype(np.int32)
+            wide = np.concatenate([nodes, np.repeat(nodes[:, :1], 8 - nodes.shape[1], axis=1)], axis=1)
+            number = np.full(len(nodes), KINDS.index(block.kind), dtype=np.uint8)
+            parts.append((wide, number, before + np.flatnonzero(whole), block.regions[whole]))
+        else:
+            volume = block.dimension in (3, None)
+            marks[block.nodes] |= np.uint16(connectivity.UNSUPPORTED_CELL if volume else connectivity.LINE)
+        before += len(block.nodes)
+    if fixed is not None:
+        marks[fixed] |= np.uint16(connectivity.CHOSEN)
+    cells, kind, cell, region = (np.concatenate(each) for each in zip(*parts, strict=True))
+    same = not len(region) or bool((region == region[0]).all())
+    return cells, kind, cell, np.empty(0, dtype=np.int64) if same else region, marks
+
+
+def repeats_a_node(block: CellBlock) -> Flags:
+    """(C,) which cells name a node twice."""
+    ordered = np.sort(block.nodes, axis=1)
+    found: Flags = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    return found
+
+
+def _wound(points: Floats, near: Ints, kind: NDArray[np.uint8], twin: Ints, marks: Marks) -> NDArray[np.int8]:
+    """The orientation of each cell; marks the nodes of what cannot be wound, or has no volume."""
+    count = len(near)
+    piece, orientation = np.full(count, -1, dtype=np.int32), np.ones(count, dtype=np.int8)
+    consistent = kernels.wind_solids(near, kind, tables(), twin, piece, orientation)
+    volume, extent = np.zeros((2, count))
+    for number in range(4):
+        chosen = np.flatnonzero(kind == number)
+        for simplex in CELLS[KINDS[number]].simplices if len(chosen) else ():
+            d, *ends = (points[near[chosen, v], :3] for v in simplex)
+            a, b, c = (end - d for end in ends)
+            each = np.einsum("ij,ij->i", a, np.cross(b, c)) / len(CELLS[KINDS[number]].simplices)
+            volume[chosen] += each
+            extent[chosen] += np.abs(each)
+    parts = len(consistent)
+    signed = np.bincount(piece, orientation * volume, parts)
+    orientation[signed[piece] < 0.0] *= -1
+    for found, mark in (
+        (~consistent, connectivity.NON_ORIENTABLE),
+        (np.abs(signed) <= 1e-9 * np.bincount(piece, extent, parts), connectivity.ZERO_AREA),
+    ):
+        marks[near[found[piece]].ravel()] |= np.uint16(mark)
+    return orientation
+
+
+def _halved(near: Ints, kind: NDArray[np.uint8], twin: Ints) -> Flags:
+    """(6T,) the facets that lie against others of other nodes: a quadrilateral and the two triangles that halve it."""
+    found = np.zeros(len(twin), dtype=bool)
+    number = np.flatnonzero(twin == ALONE)
+    corners = tables().facets[kind[number // FACETS], number % FACETS]
+    real = corners[:, 0] != NONE
+    number, corners = number[real], corners[real]
+    nodes = near[(number // FACETS)[:, None], np.maximum(corners, 0)]
+    four = corners[:, 3] != NONE
+    if not four.any() or four.all():
+        return found
+    quads, triangles = np.flatnonzero(four), np.flatnonzero(~four)
+    halves = np.concatenate([nodes[quads][:, list(half)] for half in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))])
+    keys = np.sort(np.concatenate([halves, nodes[triangles, :3]]), axis=1)
+    _, which = np.unique(keys, axis=0, return_inverse=True)
+    which = which.reshape(-1)
+    half, other = which[: len(halves)].reshape(4, -1), which[len(halves) :]
+    there = np.isin(half, other)
+    split = (there[0] & there[1]) | (there[2] & there[3])
+    found[number[quads[split]]] = True
+    found[number[triangles[np.isin(other, half[:, split])]]] = True
+    return found

@@ -1,0 +1,203 @@
+"""Whole runs on surfaces in space: what gets better, what stays, and what never gets worse."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from support.surfaces import sphere
+
+import gmsnet
+from gmsnet.constraints.shell import FEATURE
+from gmsnet.errors import InputError
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+
+
+def ball(count=400, seed=0, amount=0.3):
+    """The unit sphere, its nodes thrown along it."""
+    points, rows = sphere(count, seed)
+    rng = np.random.default_rng(seed)
+    points = points + amount * math.sqrt(4.0 * math.pi / count) * rng.uniform(-1.0, 1.0, points.shape)
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    return Mesh(points, (CellBlock("triangle", rows.astype(np.int32), np.zeros(len(rows), dtype=np.int64)),))
+
+
+def wavy(side=16, seed=0, amount=0.3, kind="quad"):
+    """A sheet that is bent both ways, its inner nodes thrown along it."""
+    k = np.arange(side + 1)
+    x, y = (axis.ravel().astype(float) for axis in np.meshgrid(k, k, indexing="ij"))
+    inner = (x > 0) & (x < side) & (y > 0) & (y < side)
+    rng = np.random.default_rng(seed)
+    x[inner] += amount * rng.uniform(-1, 1, inner.sum())
+    y[inner] += amount * rng.uniform(-1, 1, inner.sum())
+    points = np.column_stack([x, y, 1.5 * np.sin(x / 5.0) * np.cos(y / 6.0)])
+    corner = (k[:-1, None] * (side + 1) + k[None, :-1]).ravel()
+    quads = np.column_stack([corner, corner + side + 1, corner + side + 2, corner + 1]).astype(np.int32)
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    half = len(quads) // 2
+    cells = {
+        "quad": [("quad", quads)],
+        "triangle": [("triangle", triangles)],
+        "mixed": [
+            ("quad", quads[:half]),
+            ("triangle", np.concatenate([triangles[half : 2 * half], triangles[-half:]])),
+        ],
+    }[kind]
+    return Mesh(points, tuple(CellBlock(name, rows, np.zeros(len(rows), dtype=np.int64)) for name, rows in cells))
+
+
+def box(side=6, seed=0):
+    """The surface of a cube of triangles; the nodes inside of its sides are thrown within these."""
+    points, rows = {}, []
+
+    def node(*place):
+        return points.setdefault(place, len(points))
+
+    for axis in range(3):
+        for level in (0, side):
+            for u in range(side):
+                for v in range(side):
+
+                    def at(a, b, axis=axis, level=level):
+                        place = [a, b]
+                        place.insert(axis, level)
+                        return node(*place)
+
+                    a, b, c, d = at(u, v), at(u + 1, v), at(u + 1, v + 1), at(u, v + 1)
+                    rows += [(a, b, c), (a, c, d)] if (level == side) != (axis == 1) else [(a, c, b), (a, d, c)]
+    p = np.array(list(points), dtype=float)
+    rng = np.random.default_rng(seed)
+    inner = ((p > 0) & (p < side)).sum(axis=1) == 2
+    p += 0.25 * rng.uniform(-1, 1, p.shape) * ((p > 0) & (p < side)) * inner[:, None]
+    rows = np.array(rows, dtype=np.int32)
+    return Mesh(p, (CellBlock("triangle", rows, np.zeros(len(rows), dtype=np.int64)),)), inner
+
+
+@pytest.mark.parametrize("guard", ["valid", "worst", "star"])
+@pytest.mark.parametrize("method", ["auto", "laplacian", "barrier", "worst-first"])
+def test_a_sphere_gets_better_and_stays_one(method, guard):
+    mesh = ball()
+    result = gmsnet.smooth(mesh, method, guard=guard)
+    assert result.moved.sum() > 0
+    assert result.after.shape.mean() > result.before.shape.mean()
+    if guard != "valid":
+        assert result.after.shape.min() >= result.before.shape.min()
+    off = abs(np.linalg.norm(result.points, axis=1) - 1.0)
+    assert off.max() < 0.006  # of a sagitta of 0.01
+    assert np.array_equal(mesh.points[~result.moved], result.points[~result.moved])
+
+
+@pytest.mark.parametrize("kind", ["quad", "triangle", "mixed"])
+@pytest.mark.parametrize("guard", ["worst", "star"])
+def test_no_cell_becomes_worse_than_the_worst_was(kind, guard):
+    mesh = wavy(kind=kind)
+    result = gmsnet.smooth(mesh, guard=guard)
+    assert result.after.shape.min() > result.before.shape.min() + 0.1
+    assert result.after.shape.mean() > result.before.shape.mean()
+    assert not result.moved[result.held["boundary"]].any()
+
+
+def test_each_star_keeps_its_worst_cell():
+    mesh = ball(amount=0.6)
+    rows = mesh.cells[0].nodes
+    result = gmsnet.smooth(mesh, "barrier", guard="star", max_sweeps=3)
+    for node in range(len(mesh.points)):
+        around = (rows == node).any(axis=1)
+        assert result.after.shape[around].min() >= result.before.shape[around].min()
+
+
+def test_the_same_bits_for_any_number_of_threads():
+    mesh = ball(6000, seed=3)
+    one, two = (gmsnet.smooth(mesh, threads=threads).points for threads in (1, 2))
+    assert np.array_equal(one, two)
+
+
+def test_nodes_of_features_are_held_and_plane_sides_stay_plane():
+    mesh, inner = box()
+    result = gmsnet.smooth(mesh)
+    assert result.held[FEATURE].tolist() == np.flatnonzero(~inner).tolist()
+    assert result.after.shape.min() > result.before.shape.min()
+    on_side = (mesh.points == 0.0) | (mesh.points == 6.0)
+    assert np.array_equal(mesh.points[on_side], result.points[on_side])
+
+
+def test_nodes_of_features_slide_along_them():
+    mesh, inner = box()
+    result = gmsnet.smooth(mesh, slide=True)
+    corners = ((mesh.points == 0.0) | (mesh.points == 6.0)).all(axis=1)
+    assert result.held[FEATURE].tolist() == np.flatnonzero(corners).tolist()
+    on_side = (mesh.points == 0.0) | (mesh.points == 6.0)
+    assert np.array_equal(mesh.points[on_side], result.points[on_side])
+    assert result.moved[~inner].any()
+    assert result.after.shape.mean() > gmsnet.smooth(mesh).after.shape.mean()
+
+
+def test_nodes_of_an_open_edge_slide_where_they_are_let():
+    mesh = wavy(kind="triangle")
+    still, slid = gmsnet.smooth(mesh), gmsnet.smooth(mesh, slide=True)
+    rim = still.held["boundary"]
+    assert not still.moved[rim].any()
+    assert slid.moved[rim].any()
+    x, y = slid.points[:, 0], slid.points[:, 1]
+    assert ((x[rim] == 0) | (x[rim] == 16) | (y[rim] == 0) | (y[rim] == 16)).all()
+
+
+def test_the_tolerance_is_kept():
+    mesh = ball(100, amount=0.5)
+    loose, tight = (gmsnet.smooth(mesh, surface_tolerance=tolerance) for tolerance in (0.2, 0.005))
+    sagitta = [1.0 - np.linalg.norm(result.points, axis=1).min() for result in (loose, tight)]
+    assert sagitta[0] < sagitta[1]
+    for value in (0.0, -1.0, math.nan, "near"):
+        with pytest.raises(InputError, match="surface_tolerance"):
+            gmsnet.smooth(mesh, surface_tolerance=value)
+
+
+def test_flipped_faces_are_read_alike_and_stay_as_written():
+    mesh = ball(400, amount=0.1)
+    rows = mesh.cells[0].nodes.copy()
+    rows[::3] = rows[::3, ::-1]
+    flipped = Mesh(mesh.points, (CellBlock("triangle", rows, np.zeros(len(rows), dtype=np.int64)),))
+    result = gmsnet.smooth(flipped)
+    assert result.moved.all()
+    assert np.array_equal(result.mesh.cells[0].nodes, rows)
+
+
+def test_a_node_of_a_non_manifold_edge_is_held():
+    mesh = wavy(kind="triangle")
+    rows, points = mesh.cells[0].nodes, mesh.points
+    edge = rows[len(rows) // 3][:2]
+    points = np.vstack([points, points[edge].mean(axis=0) + np.array([0.0, 0.0, 5.0])])
+    rows = np.vstack([rows, [*edge, len(points) - 1]])
+    fin = Mesh(points, (CellBlock("triangle", rows, np.zeros(len(rows), dtype=np.int64)),))
+    result = gmsnet.smooth(fin)
+    assert not result.moved[edge].any()
+    assert result.moved.any()
+
+
+def test_isolated_nodes_and_doubled_and_flat_faces_are_no_trouble():
+    mesh = ball(200)
+    rows, points = mesh.cells[0].nodes, np.vstack([mesh.points, [[9.0, 9.0, 9.0]]])
+    doubled = np.vstack([rows, rows[:1]])
+    result = gmsnet.smooth((points, doubled))
+    assert not result.moved[[*rows[0], len(points) - 1]].any()
+    assert result.moved.any()
+    points = mesh.points.copy()
+    points[rows[0, 0]] = points[rows[0, 1]]  # two facets without area
+    result = gmsnet.smooth((points, rows))
+    assert np.isfinite(result.points).all()
+    assert result.after.inverted <= result.before.inverted
+
+
+def test_what_cannot_be_asked_of_surfaces_is_told():
+    mesh = ball(100)
+    for options, message in (
+        ({"target_quality": 0.5}, "target"),
+        ({"method": "getme"}, "not for surfaces"),
+        ({"method": "laplacian", "variant": "area"}, "not for surfaces"),
+        ({"size": np.ones(100)}, "metric"),
+        ({"best_by": "aspect"}, "best_by"),
+    ):
+        with pytest.raises(InputError, match=message):
+            gmsnet.smooth(mesh, **options)
