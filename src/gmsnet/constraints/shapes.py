@@ -169,3 +169,10 @@ def units(vectors: Floats) -> Floats:
     """(K, 3) of length 1; no direction stays none."""
     size = lengths(vectors)[:, None]
     return np.divide(vectors, size, out=np.zeros_like(vectors), where=size > 0.0)
+
+
+def tangents(normal: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors at right angles to each normal (K, 3) and to each other."""
+    axis = np.eye(3)[abs(normal).argmin(axis=1)]
+    one = units(np.cross(normal, axis))
+    return one, np.cross(normal, one)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.constraints.shapes import Shape, units
+from gmsnet.constraints.shapes import Shape, tangents
 from gmsnet.errors import InputError
 from gmsnet.generate.arguments import one_of, positive
 from gmsnet.generate.disturb import EDGES, corner_triangles, edge_lengths, edges_of, orientations, random_directions
@@ -74,13 +74,6 @@ def disturb_on(shaped: Shaped, amount: float, *, seed: int = 0, keep_valid: bool
             return Shaped(mesh.with_points(new), shaped.faces)
         shift[bad] *= 0.5 if halving < MOST_HALVINGS - 1 else 0.0
     raise InputError("the mesh has facets that are turned away from their face, or inverted cells, already")
-
-
-def tangents(normal: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors at right angles to each normal (K, 3) and to each other."""
-    axis = np.eye(3)[abs(normal).argmin(axis=1)]
-    one = units(np.cross(normal, axis))
-    return one, np.cross(normal, one)
 
 
 def _landed(old: Floats, shift: Floats, on: Ints, faces: list[Shape]) -> Floats:

@@ -39,7 +39,7 @@ def first_of_surface(
         topology, start = Topology.and_points(given, asked, options.thread_count, patches.curves.slides)
     shell = Shell.made(topology, sides_of(given, topology, patches)).holding(~slides, FEATURE)
     tolerance = options.surface_tolerance or TOLERANCE
-    sliding = SurfaceSliding.of(given, facets, patches, shell.memory, shell.free, tolerance)
+    sliding = SurfaceSliding.of(given, facets, patches, shell.memory, shell.free, tolerance, options.geometry)
     others = unmeasured(given)
     remarks = (f"not measured, and their nodes are held: {others}",) if others else ()
     given = given.without_cells()
