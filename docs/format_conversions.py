@@ -24,7 +24,7 @@ SOURCES = ("SU2", "Gmsh 2.2, text", "Gmsh 4.1, text", "VTK 4.2, text", "VTU, tex
 MEMORY = "memory"
 SILENT = "**silent**"
 
-FORMATS = {key: entry for key, entry in ALL_FORMATS.items() if not entry.folder}  # into which meshes are converted
+FORMATS = {key: entry for key, entry in ALL_FORMATS.items() if not entry.own}  # into which meshes are converted
 
 Items = set[object]
 Measured = tuple[str, str, bool, dict[str, str]]  # fact, source, is it in the mesh, target → outcome

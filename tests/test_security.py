@@ -101,7 +101,7 @@ sys.addaudithook(watch)
 folder = sys.argv[1]
 for name in gmsnet.methods.METHODS:
     gmsnet.smooth(mesh, name, max_sweeps=2)
-for entry in [entry for entry in gmsnet.io.FORMATS.values() if not entry.folder]:
+for entry in [entry for entry in gmsnet.io.FORMATS.values() if not entry.own]:
     path = folder + "/mesh" + entry.suffixes[0]
     gmsnet.write(mesh, path)
     gmsnet.write(gmsnet.smooth(gmsnet.read(path), max_sweeps=2).mesh, path)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gzip
+import importlib
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -145,7 +147,6 @@ def test_a_dry_run_with_an_output_or_in_place_writes_neither(run, folder, tmp_pa
         (["{dir}", "-", "--out-dir", "{out}"], ["standard input has no name"]),
         (["{out}x*", "--out-dir", "{out}"], ["no file has such a name"]),
         (["{empty}", "--out-dir", "{out}"], ["no mesh files in this folder", ".su2"]),
-        (["{case}", "--out-dir", "{out}"], ["OpenFOAM case is smoothed by itself", "--in-place"]),
         (["{dir}/a.su2", "{copy}/a.su2", "--out-dir", "{out}"], ["would both be written to"]),
         (["{dir}/a.su2", "{dir}/a.vtk", "--out-dir", "{out}", "--output-format", "vtu"], ["both be written to"]),
         (["{dir}", "--out-dir", "{out}", "--output-format", "xyz"], ["unknown format 'xyz'"]),
@@ -156,9 +157,7 @@ def test_bad_usage_is_told_before_anything_is_read(run, folder, tmp_path, argume
     for name in ("empty", "copy"):
         (tmp_path / name).mkdir()
     shutil.copy(folder / "a.su2", tmp_path / "copy")
-    (tmp_path / "case" / "constant" / "polyMesh").mkdir(parents=True)
     places = {"dir": folder, "out": tmp_path / "out", "empty": tmp_path / "empty", "copy": tmp_path / "copy"}
-    places["case"] = tmp_path / "case"
     done = run("smooth", *(argument.format(**places) for argument in arguments))
     assert (done.code, done.out) == (2, "")
     assert all(word in done.err for word in words)
@@ -180,3 +179,37 @@ def test_packed_files_of_a_folder_are_found(run, folder, tmp_path):
     done = run("smooth", tmp_path / "packed", "--out-dir", tmp_path / "out")
     assert done.code == 0, done.err
     assert gzip.decompress((tmp_path / "out" / "a.su2.gz").read_bytes()) != (folder / "a.su2").read_bytes()
+
+
+def test_cases_of_openfoam_are_folders(run, tmp_path, monkeypatch):
+    """Each goes into a folder of its name, where its mesh is whole; the case itself stays as it was."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "io")
+    openfoam = importlib.import_module("test_openfoam")
+    for name, way in (("one", openfoam.in_text), ("two", openfoam.FORMS["binary"])):
+        folder = tmp_path / name / "constant" / "polyMesh"
+        folder.mkdir(parents=True)
+        for file, data in way(openfoam.layer(4, 4)).items():
+            (folder / file).write_bytes(data)
+    out = tmp_path / "fixed"
+    assert run("smooth", tmp_path / "one", tmp_path / "two" / "constant" / "polyMesh", "--out-dir", out).code == 0
+    for name in ("one", "two"):
+        before, after = tmp_path / name / "constant" / "polyMesh", out / name / "constant" / "polyMesh"
+        assert names(after) == names(before)
+        for file in names(before):
+            assert file == "points" or (after / file).read_bytes() == (before / file).read_bytes()
+        old, new = gmsnet.read(tmp_path / name), gmsnet.read(out / name)
+        assert [b.nodes.tolist() for b in old.cells] == [b.nodes.tolist() for b in new.cells]
+    done = run("smooth", tmp_path / "one", tmp_path / "two", "--out-dir", out, "--output-format", "vtu")
+    assert done.code == 0
+    assert {"one.vtu", "two.vtu"} <= set(names(out))
+
+
+def test_a_dry_run_makes_no_folder_of_a_case(run, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "io")
+    openfoam = importlib.import_module("test_openfoam")
+    folder = tmp_path / "one" / "constant" / "polyMesh"
+    folder.mkdir(parents=True)
+    for file, data in openfoam.in_text(openfoam.layer(2, 2)).items():
+        (folder / file).write_bytes(data)
+    assert run("smooth", tmp_path / "one", "--out-dir", tmp_path / "fixed", "--dry-run").code == 0
+    assert not (tmp_path / "fixed").exists()

@@ -20,7 +20,7 @@ from fuzz.lines import lines, smallest, ways
 from fuzz.promises import examine
 from gmsnet.io.formats import FORMATS
 
-LONGEST = 1 << 13  # bytes of a file that is tried
+LONGEST = 1 << 14  # bytes of a file that is tried
 AT_ONCE = 10_000  # files that one worker tries: Atheris does not let go of what a mutator of ours has returned
 
 

@@ -16,9 +16,12 @@ from gmsnet.io.formats import FORMATS
 sys.path.insert(0, str(Path(__file__).parents[1] / "io"))  # the tests of the readers, and what they share
 
 import test_abaqus
+import test_fluent
 import test_gmsh_partitions
 import test_medit
+import test_mfem
 import test_nastran
+import test_netgen
 import test_obj
 import test_off
 import test_openfoam
@@ -31,8 +34,9 @@ import test_triangle
 import test_ugrid
 import test_volume_files
 import test_vtk
+import test_vtp
 import test_vtu
-from support import gmsh_variants
+from support import binary_meshes, gmsh_variants
 from support.damage import triangle_grid
 from support.vtk_variants import grid_of, legacy_variants, mixed_mesh, polydata_of, vtu_variants
 from test_su2_volumes import VOLUMES
@@ -207,6 +211,19 @@ def seeds() -> Iterator[tuple[str, bytes]]:
     zone = "1(a{type %sZone;%sLabels List<label> 1{0};})"
     zones = [(test_openfoam.head("regIOobject", k) + zone % (k, k)).encode() for k in ("cell", "face", "point")]
     yield "openfoam", NEXT.join((*test_openfoam.in_text(test_openfoam.VOLUMES).values(), *zones))
+    yield "fluent", test_fluent.PLAIN
+    yield "fluent", test_fluent.VOLUME
+    yield "mfem", test_mfem.PLAIN
+    yield "netgen", test_netgen.PLAIN
+    yield "vtp", test_vtp.PLAIN
+    yield "xdmf", binary_meshes.xdmf()
+    for packed in (False, True):
+        yield "cgns", binary_meshes.cgns(packed)
+        yield "med", binary_meshes.med(packed)
+        yield "vtkhdf", binary_meshes.vtkhdf(packed)
+        yield "exodus", binary_meshes.exodus4(packed)
+        yield "exodus", binary_meshes.exodus3(1 + packed, whole=packed)
+    yield "cgns", binary_meshes.cgns(kind=np.float32, mixed=True)
     yield from _written()
 
 

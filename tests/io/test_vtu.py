@@ -248,7 +248,7 @@ def test_appended_data_may_stand_in_front_of_the_grid() -> None:
 def test_what_is_visible_is_not_hidden(spans: list[tuple[int, int]], one: int, two: int) -> None:
     start, stop = sorted((one, two))
     hidden = sorted((first, first + size) for first, size in spans if first >= start)
-    seen = {at for part in Document(b"", hidden).visible(start, stop) for at in range(*part)}
+    seen = {at for part in Document(b"", hidden=hidden).visible(start, stop) for at in range(*part)}
     assert seen == {at for at in range(start, stop) if not any(first <= at < end for first, end in hidden)}
 
 

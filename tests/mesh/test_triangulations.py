@@ -134,9 +134,3 @@ def test_tensors_come_back_as_tensors(precision):
     assert np.array_equal(new.numpy().astype(np.float64), result.points)
     told = gmsnet.smooth({"points": given, "cells": cells}, max_sweeps=3).mesh["points"]
     assert torch.equal(told, new)
-
-
-def test_a_mesh_of_dolfinx_is_told_how_to_be_given():
-    kind = type("Mesh", (), {"__module__": "dolfinx.mesh"})
-    with pytest.raises(InputError, match=r"mesh\.geometry\.x and the cells, if it lies on one process alone"):
-        to_mesh(kind())

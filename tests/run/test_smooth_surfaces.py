@@ -6,73 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from support.surfaces import sphere
+from support.surface_meshes import ball, box, surface_mesh, wavy
 
 import gmsnet
 from gmsnet.constraints.shell import FEATURE
 from gmsnet.errors import InputError
-from gmsnet.mesh.cell_block import CellBlock
-from gmsnet.mesh.mesh import Mesh
-
-
-def ball(count=400, seed=0, amount=0.3):
-    """The unit sphere, its nodes thrown along it."""
-    points, rows = sphere(count, seed)
-    rng = np.random.default_rng(seed)
-    points = points + amount * math.sqrt(4.0 * math.pi / count) * rng.uniform(-1.0, 1.0, points.shape)
-    points /= np.linalg.norm(points, axis=1)[:, None]
-    return Mesh(points, (CellBlock("triangle", rows.astype(np.int32), np.zeros(len(rows), dtype=np.int64)),))
-
-
-def wavy(side=16, seed=0, amount=0.3, kind="quad"):
-    """A sheet that is bent both ways, its inner nodes thrown along it."""
-    k = np.arange(side + 1)
-    x, y = (axis.ravel().astype(float) for axis in np.meshgrid(k, k, indexing="ij"))
-    inner = (x > 0) & (x < side) & (y > 0) & (y < side)
-    rng = np.random.default_rng(seed)
-    x[inner] += amount * rng.uniform(-1, 1, inner.sum())
-    y[inner] += amount * rng.uniform(-1, 1, inner.sum())
-    points = np.column_stack([x, y, 1.5 * np.sin(x / 5.0) * np.cos(y / 6.0)])
-    corner = (k[:-1, None] * (side + 1) + k[None, :-1]).ravel()
-    quads = np.column_stack([corner, corner + side + 1, corner + side + 2, corner + 1]).astype(np.int32)
-    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    half = len(quads) // 2
-    cells = {
-        "quad": [("quad", quads)],
-        "triangle": [("triangle", triangles)],
-        "mixed": [
-            ("quad", quads[:half]),
-            ("triangle", np.concatenate([triangles[half : 2 * half], triangles[-half:]])),
-        ],
-    }[kind]
-    return Mesh(points, tuple(CellBlock(name, rows, np.zeros(len(rows), dtype=np.int64)) for name, rows in cells))
-
-
-def box(side=6, seed=0):
-    """The surface of a cube of triangles; the nodes inside of its sides are thrown within these."""
-    points, rows = {}, []
-
-    def node(*place):
-        return points.setdefault(place, len(points))
-
-    for axis in range(3):
-        for level in (0, side):
-            for u in range(side):
-                for v in range(side):
-
-                    def at(a, b, axis=axis, level=level):
-                        place = [a, b]
-                        place.insert(axis, level)
-                        return node(*place)
-
-                    a, b, c, d = at(u, v), at(u + 1, v), at(u + 1, v + 1), at(u, v + 1)
-                    rows += [(a, b, c), (a, c, d)] if (level == side) != (axis == 1) else [(a, c, b), (a, d, c)]
-    p = np.array(list(points), dtype=float)
-    rng = np.random.default_rng(seed)
-    inner = ((p > 0) & (p < side)).sum(axis=1) == 2
-    p += 0.25 * rng.uniform(-1, 1, p.shape) * ((p > 0) & (p < side)) * inner[:, None]
-    rows = np.array(rows, dtype=np.int32)
-    return Mesh(p, (CellBlock("triangle", rows, np.zeros(len(rows), dtype=np.int64)),)), inner
 
 
 @pytest.mark.parametrize("guard", ["valid", "worst", "star"])
@@ -158,7 +96,7 @@ def test_flipped_faces_are_read_alike_and_stay_as_written():
     mesh = ball(400, amount=0.1)
     rows = mesh.cells[0].nodes.copy()
     rows[::3] = rows[::3, ::-1]
-    flipped = Mesh(mesh.points, (CellBlock("triangle", rows, np.zeros(len(rows), dtype=np.int64)),))
+    flipped = surface_mesh(mesh.points, {"triangle": rows})
     result = gmsnet.smooth(flipped)
     assert result.moved.all()
     assert np.array_equal(result.mesh.cells[0].nodes, rows)
@@ -170,7 +108,7 @@ def test_a_node_of_a_non_manifold_edge_is_held():
     edge = rows[len(rows) // 3][:2]
     points = np.vstack([points, points[edge].mean(axis=0) + np.array([0.0, 0.0, 5.0])])
     rows = np.vstack([rows, [*edge, len(points) - 1]])
-    fin = Mesh(points, (CellBlock("triangle", rows, np.zeros(len(rows), dtype=np.int64)),))
+    fin = surface_mesh(points, {"triangle": rows})
     result = gmsnet.smooth(fin)
     assert not result.moved[edge].any()
     assert result.moved.any()

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from gmsnet.io.formats import FORMATS
 
-FILES = {key: entry for key, entry in FORMATS.items() if not entry.folder}
+FILES = {key: entry for key, entry in FORMATS.items() if not entry.own}

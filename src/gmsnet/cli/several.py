@@ -13,7 +13,7 @@ from gmsnet.cli.failure import BAD_INPUT, BUG, DONE, print_failure, told
 from gmsnet.cli.signals import Interrupted
 from gmsnet.errors import InputError
 from gmsnet.io.files import files_of
-from gmsnet.io.foam_case import mesh_folder
+from gmsnet.io.foam_case import MESH, mesh_folder
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, entry_of, known
 from gmsnet.io.packed import split_name
 from gmsnet.io.streams import STANDARD_INPUT
@@ -65,10 +65,22 @@ def jobs_of(names: Sequence[str], out_dir: str, output_format: str | None, *, dr
         jobs.append(Job(source, output, f"[{number}/{len(sources)}] "))
     if not dry_run:
         os.makedirs(out_dir, exist_ok=True)
+        for job in jobs:
+            if output_format is None and _is_case(job.source):
+                os.makedirs(os.path.join(job.output, MESH), exist_ok=True)
     return jobs
 
 
+def _is_case(name: str) -> bool:
+    """Whether a path is the folder of an OpenFOAM case, or of its mesh."""
+    return os.path.isdir(name) and mesh_folder(name) is not None
+
+
 def _name(source: str, output_format: str | None) -> str:
+    """The name of the output in its folder. A case keeps its name, and its mesh alone is written there."""
+    if _is_case(source):
+        case = os.path.basename(os.path.abspath(source).removesuffix(os.sep + MESH))
+        return case + (entry_of(output_format).suffixes[0] if output_format else "")
     name = os.path.basename(source)
     return name if output_format is None else os.path.splitext(name)[0] + entry_of(output_format).suffixes[0]
 
@@ -80,8 +92,8 @@ def _expanded(name: str) -> list[str]:
         suffixes = {entry.suffixes[0] for entry in FORMATS.values()}  # of pairs of files the one with the nodes
         inside = sorted(os.path.join(name, each) for each in os.listdir(name))
         found = [path for path in inside if split_name(path)[1].lower() in suffixes and os.path.isfile(path)]
-        if not found and mesh_folder(name) is not None:
-            raise InputError(f"{name}: an OpenFOAM case is smoothed by itself: give --in-place, or a copy of it as OUT")
+        if not found and _is_case(name):
+            return [name]
         if not found:
             raise InputError(f"{name}: there are no mesh files in this folder ({known()})")
         return found

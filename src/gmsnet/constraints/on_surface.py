@@ -11,7 +11,7 @@ from gmsnet.constraints.features import COLLINEAR, rounding_of
 from gmsnet.constraints.on_geometry import PER_EDGE, OnGeometry
 from gmsnet.constraints.outline import Flags, Longs
 from gmsnet.constraints.patches import NOTHING, Patches
-from gmsnet.constraints.smooth_patches import controls_of, dot, handles, skin_of
+from gmsnet.constraints.smooth_patches import controls_of, dot, handles, skin_of, summed
 from gmsnet.kernels.star.surface import CONTROLS, CURVE, CURVED, FLAT, LINE, NOWHERE, Surface
 from gmsnet.topology.polygons import Ints
 
@@ -30,12 +30,13 @@ class Rows(NamedTuple):
 def surface_of(
     patches: Patches, points: Floats, memory: Ints, single: bool, limit: Floats | None = None,
     geometry: OnGeometry | None = None, folds: bool = True,
+    normals: Floats | None = None,
 ) -> Surface | None:  # fmt: skip
     """The constraint for kernels, with the nodes where they are; None where none slides.
 
     points: (N, 3) by node ids. memory: (N,) node ids in memory order. limit: (N,) how far each may go from the facets
     or edges; None: as far as the cubics are. geometry: the true shape of what is not plane or straight. folds: the
-    facets around nodes are listed, so that none turns over.
+    facets around nodes are listed, so that none turns over. normals: as ``normals_of`` finds them, where they are known.
     """
     slides = patches.slides | patches.curves.slides
     if not slides.any():
@@ -49,7 +50,7 @@ def surface_of(
     found = [Rows(inner[level], FLAT, number[level], np.zeros(level.sum(), dtype=np.int64))]
     curved = inner[~level]
     kept = np.isin(patches.patch, patches.patch[facet[curved]])
-    skin = skin_of(patches, points, kept) if geometry is None else geometry.skin(patches, points, kept)
+    skin = skin_of(patches, points, kept, normals) if geometry is None else geometry.skin(patches, points, kept)
     found.append(Rows(curved, CURVED, np.zeros(len(curved), dtype=np.int64), skin.facet[curved]))
     lines, line_frame, pieces, before, after = _along_curves(patches, points, len(frame[0]), geometry)
     found += lines
@@ -88,8 +89,7 @@ def _columns(rows: Rows) -> tuple[Longs, Longs, Longs, Longs]:
 def _planes(patches: Patches, points: Floats, single: bool) -> tuple[Longs, tuple[Floats, Floats, Flags]]:
     """The number of the plane of each patch that is one, else NOTHING; origin, direction and common coordinates."""
     count = int(patches.patch.max(initial=-1)) + 1
-    normal = np.zeros((count, 3))
-    np.add.at(normal, patches.patch, patches.unit * patches.area[:, None])
+    normal = summed(patches.patch, patches.unit * patches.area[:, None], count)
     length = np.sqrt(dot(normal, normal))
     normal = np.divide(normal, length[:, None], out=np.zeros_like(normal), where=length[:, None] > 0.0)
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)

@@ -69,7 +69,8 @@ def patches_of(facets: Facets, points: Floats, feature_angle: float, single: boo
     sharp = np.flatnonzero(~smooth)
     still = facets.still.copy()
     apart = ~two if facets.closed else count > 2
-    for chosen in (found[apart], np.setdiff1d(line_keys, found)):  # edges of one facet or many; lines elsewhere
+    elsewhere = np.setdiff1d(line_keys, found) if len(line_keys) else line_keys
+    for chosen in (found[apart], elsewhere):  # edges of one facet or many; lines elsewhere
         still[chosen // nodes] = still[chosen % nodes] = True
     outline = _outline(facets, found[sharp], f[sharp], g[sharp], line_keys, still)
     curves = curves_along(outline, points, single, feature_angle, may)

@@ -15,7 +15,7 @@ from gmsnet.constraints.facets import Facets, surface_itself
 from gmsnet.constraints.features import lengths_of, may_slide
 from gmsnet.constraints.outline import Flags
 from gmsnet.constraints.patches import Patches, patches_of
-from gmsnet.constraints.smooth_patches import dot, normals_of
+from gmsnet.constraints.smooth_patches import dot
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import space_points
 from gmsnet.topology.topology import Topology
@@ -39,8 +39,8 @@ def patches_of_surface(
     return facets, replace(patches, curves=replace(patches.curves, slides=along))
 
 
-def sides_of(mesh: Mesh, topology: Topology, patches: Patches) -> NDArray[np.float32]:
-    """(S, 3) the vector n of each row of ``topology.near`` (kernels.star.shell).
+def sides_of(mesh: Mesh, topology: Topology, patches: Patches, normals: Floats) -> NDArray[np.float32]:
+    """(S, 3) the vector n of each row of ``topology.near`` (kernels.star.shell). normals: see ``normals_of``.
 
     Of a triangle, the mean of the reference's normals at its corners, or its own normal where the two are on different
     sides; of a quad the normal of its diagonals.
@@ -48,7 +48,7 @@ def sides_of(mesh: Mesh, topology: Topology, patches: Patches) -> NDArray[np.flo
     points = space_points(mesh)[:, :3]
     triangles = len(topology.triangles)
     own = patches.unit[:triangles]
-    smooth = _unit(normals_of(patches, points).sum(axis=1)[:triangles])
+    smooth = _unit(normals[:triangles].sum(axis=1))
     alike = dot(own, smooth)
     of_triangles = np.where(((alike > 0.0) | ~own.any(axis=1))[:, None], smooth, own)
     quads = points[topology.quads]

@@ -46,12 +46,12 @@ class SurfaceSliding:
     @classmethod
     def of(
         cls, mesh: Mesh, facets: Facets, patches: Patches, memory: Ints, free: Ints, tolerance: float = math.inf,
-        geometry: Geometry | None = None,
+        geometry: Geometry | None = None, normals: Floats | None = None,
     ) -> SurfaceSliding:  # fmt: skip
         """Of a mesh and the patches of its boundary; memory, free: of its topology.
 
         tolerance: how far from the facets nodes may go, over the mean length of their edges. geometry: their
-        true shape, which is asked once.
+        true shape, which is asked once. normals: see ``surface_of``.
         """
         points = space_points(mesh)[:, :3].copy()
         nodes = np.zeros(len(points), dtype=bool)
@@ -61,7 +61,7 @@ class SurfaceSliding:
         on = None if geometry is None else OnGeometry(geometry, facets, mesh.exponent)
         constraint = None
         if nodes.any():
-            constraint = surface_of(patches, points, memory, mesh.single, limit, on, facets.closed)
+            constraint = surface_of(patches, points, memory, mesh.single, limit, on, facets.closed, normals)
         return cls(facets, patches, points, mesh.exponent, memory, nodes, constraint)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:

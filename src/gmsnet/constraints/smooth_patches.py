@@ -29,14 +29,15 @@ class Skin(NamedTuple):
     facet: Longs
 
 
-def skin_of(patches: Patches, points: Floats, kept: NDArray[np.bool_]) -> Skin:
-    """The facets of the input that are kept (F,)."""
+def skin_of(patches: Patches, points: Floats, kept: NDArray[np.bool_], normals: Floats | None = None) -> Skin:
+    """The facets of the input that are kept (F,). normals: as ``normals_of`` finds them, where they are known."""
+    normals = normals_of(patches, points) if normals is None else normals
     fewer = np.where(kept, np.cumsum(kept) - 1, NOTHING)
     facet = np.full(len(points), NOTHING, dtype=np.int64)
     facet[patches.rows[kept]] = fewer[kept, None]
     beside = patches.beside[kept]
     over = np.where(beside == NOTHING, NOTHING, fewer[beside])
-    return Skin(points[patches.rows[kept]], normals_of(patches, points)[kept], over, facet)
+    return Skin(points[patches.rows[kept]], normals[kept], over, facet)
 
 
 def normals_of(patches: Patches, points: Floats) -> Floats:
@@ -49,13 +50,13 @@ def normals_of(patches: Patches, points: Floats) -> Floats:
     _, owner = np.unique(patches.patch[:, None] * nodes + rows, return_inverse=True)
     owner = owner.reshape(rows.shape)  # a node in each of its patches
     count = int(owner.max(initial=-1)) + 1
-    total = np.zeros((count, 3))
-    corner = points[rows]
+    corner, weighted = points[rows], np.empty((3, len(rows), 3))
     for k in range(3):
         a, b = corner[:, (k + 1) % 3] - corner[:, k], corner[:, (k + 2) % 3] - corner[:, k]
         weight = dot(a, a) * dot(b, b)
         share = np.divide(patches.area, weight, out=np.zeros(len(rows)), where=weight > 0.0)
-        np.add.at(total, owner[:, k], patches.unit * share[:, None])
+        weighted[k] = patches.unit * share[:, None]
+    total = summed(owner.T.ravel(), weighted.reshape(-1, 3), count)
     plane, parts = _planes(patches, owner, count)
     total[plane != NOTHING] = parts[plane[plane != NOTHING]]
     length = np.sqrt(dot(total, total))
@@ -71,8 +72,7 @@ def _planes(patches: Patches, owner: Longs, count: int) -> tuple[Longs, Floats]:
     quad are none.
     """
     part = linked(patches.beside, patches.flat)
-    normals = np.zeros((int(part.max(initial=-1)) + 1, 3))
-    np.add.at(normals, part, patches.unit * patches.area[:, None])
+    normals = summed(part, patches.unit * patches.area[:, None], int(part.max(initial=-1)) + 1)
     low, high = np.full(count, len(part)), np.full(count, NOTHING)
     np.minimum.at(low, owner, part[:, None])
     np.maximum.at(high, owner, part[:, None])
@@ -80,6 +80,11 @@ def _planes(patches: Patches, owner: Longs, count: int) -> tuple[Longs, Floats]:
     plane = np.full(count, NOTHING, dtype=np.int64)
     plane[owner[inner]] = part[inner, None]
     return plane, normals
+
+
+def summed(owner: Longs, vectors: Floats, count: int) -> Floats:
+    """(count, 3) the sums of vectors (K, 3) by their owners (K,), in their order."""
+    return np.stack([np.bincount(owner, vectors[:, axis], count) for axis in range(3)], axis=1)
 
 
 def controls_of(corner: Floats, normals: Floats) -> Floats:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
 from gmsnet.io.pieces import Pieces
 from gmsnet.io.splice import Slots
@@ -23,7 +24,8 @@ class Parsed:
 
     unread: what else the file holds, in words; it stays in the file, but no conversion can keep it. matched: (pairs, 2)
     nodes that the file says to be images of each other, such as those of periodic boundaries; None where it has none.
-    node_sets, rounding: see Mesh. form: which of its format's forms the file has (see Entry).
+    node_sets, rounding: see Mesh. form: which of its format's forms the file has (see Entry). main: which of several
+    files has the coordinates, where that is not the first.
     """
 
     points: NDArray[np.float64]
@@ -38,6 +40,7 @@ class Parsed:
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     rounding: Rounding | None = None
     form: str = ""
+    main: str = ""
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,13 @@ class Written:
 
     files: Mapping[str, Pieces]
     lost: list[str] = field(default_factory=list)
+
+
+def own_files_only(title: str) -> NoReturn:
+    """Raises the FormatError of a format that meshes of other formats are not converted to."""
+    raise FormatError(
+        f"{title} files are only written again, with other coordinates: write another format, such as .vtu or .msh"
+    )
 
 
 class Format(Protocol):

@@ -15,12 +15,22 @@ from gmsnet.io.contents import Data, is_open_pipe, load, refuse_unless_regular
 from gmsnet.io.convert import listed
 from gmsnet.io.document import Parsed
 from gmsnet.io.foam_case import OPENFOAM, case_of, file_in
-from gmsnet.io.formats import BY_SUFFIX, FORMATS, Entry, check_contents, entry_of, format_of_suffix, sniff
+from gmsnet.io.formats import (
+    BY_SUFFIX,
+    FORMATS,
+    Entry,
+    check_contents,
+    entry_in,
+    entry_of,
+    format_of_suffix,
+    sniff,
+)  # fmt: skip
 from gmsnet.io.packed import MAGIC, is_packed, packed, split_name, unpacked
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import FileSource, most_rounded
 from gmsnet.io.stamps import Stamp, Stamps
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_output
+from gmsnet.io.xdmf_xml import H5, linked, relinked
 from gmsnet.mesh.mesh import Mesh, Source
 
 
@@ -87,10 +97,26 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
         return entry, {entry.suffixes[0]: opened}
     entry = entry_of(format) if format is not None else FORMATS[format_of_suffix(name, split_name(name)[1])]
     if len(entry.suffixes) == 1:
-        return entry, {entry.suffixes[0]: _loaded(name)}
+        opened = _loaded(name)
+        if format is None:
+            entry = entry_in(opened[1], entry.key, split_name(name)[1])
+        return entry, {entry.suffixes[0]: opened, **_linked(entry, name, shown, opened[1], stream)}
     if stream:
         raise InputError(f"{shown}: {entry.title} takes several files and cannot be read from a stream")
     return entry, {suffix: _loaded(_beside(name, suffix)) for suffix in entry.suffixes}
+
+
+def _linked(entry: Entry, name: str, shown: str, data: Data, stream: bool) -> dict[str, tuple[str, Data, Stamp | None]]:
+    """The file beside it that an XDMF file names."""
+    try:
+        called = linked(data) if entry.linked else None
+    except FormatError as error:
+        raise FormatError(f"{shown}: {error}") from None
+    if called is None:
+        return {}
+    if stream:
+        raise InputError(f"{shown}: {entry.title} that names another file cannot be read from a stream")
+    return {H5: _loaded(os.path.join(os.path.dirname(name), called))}
 
 
 def _is_stream(name: str) -> bool:
@@ -153,7 +179,7 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamp
         node_sets=parsed.node_sets,
         rounding=parsed.rounding,
     )
-    main = entry.suffixes[0]
+    main = parsed.main or entry.suffixes[0]
     companions = {suffix: data for suffix, data in files.items() if suffix != main}
     source = FileSource(
         entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions,
@@ -196,6 +222,10 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
         raise _no_memory(shown) from None
     except InputError as error:
         raise FormatError(f"{shown}: {error}") from None
+    if H5 in files:
+        if name in STANDARD_OUTPUT or is_special(name):
+            raise InputError(f"{shown}: {entry.title} in several files cannot be written to a stream")
+        files = {**files, **_relinked(files, name, entry)}
     pieces = {suffix: _with_memory(shown, part) for suffix, part in files.items()}
     if name in STANDARD_OUTPUT:
         _to_standard_output(*pieces.values())
@@ -207,9 +237,18 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     return lost
 
 
+def _relinked(files: Mapping[str, Pieces], name: str, entry: Entry) -> dict[str, Pieces]:
+    """The file that names another one, with the name that this will have."""
+    main = entry.suffixes[0]
+    text = relinked(bytes(files[main]), os.path.basename(split_name(name)[0]) + H5)
+    return {main: Pieces(lambda: [text])}
+
+
 def _targets(name: str, entry: Entry, keys: list[str], stamps: Stamps | None) -> dict[str, str]:
     """Suffix → the path of each file that is written. Files of a case that were read and do not change are not."""
     folder = case_of(name, entry.key)
+    if folder is None and H5 in keys:
+        return {key: split_name(name)[0] + H5 if key == H5 else name for key in keys}
     if folder is None:
         return {key: _beside(name, key) if len(keys) > 1 else name for key in keys}
     paths = {key: file_in(folder, key, is_packed(name)) for key in keys}
@@ -264,7 +303,11 @@ def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
     elif stream:
         raise InputError(f"{shown}: name the format with --format ({', '.join(FORMATS)})")
     else:
-        entry = FORMATS[format_of_suffix(path, split_name(path)[1], reading=False)]
+        suffix = split_name(path)[1]
+        entry = FORMATS[format_of_suffix(path, suffix, reading=False)]
+        own = FORMATS.get(mesh.source.format) if mesh.source is not None else None
+        if own is not None and suffix.lower() in (*own.suffixes, *own.aliases):
+            entry = own  # of several formats with this suffix the one that was read
     if stream and len(entry.suffixes) > 1:
         raise InputError(f"{shown}: {entry.title} takes several files and cannot be written to a stream")
     return entry

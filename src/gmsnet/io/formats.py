@@ -11,6 +11,7 @@ from typing import cast
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Format, Written
+from gmsnet.io.hdf5 import MAGIC
 from gmsnet.io.packed import split_name
 from gmsnet.mesh.mesh import Mesh
 
@@ -22,7 +23,8 @@ class Entry:
     key: the name that ``--format`` takes. title: what messages call it. suffixes: lower case, the first is that of the
     file with the coordinates. aliases: other suffixes of that file. forms: of which one stands before the suffix of
     its files (``b8`` of a.b8.ugrid); without it a file has the form "". folder: the mesh is a folder, and the suffixes
-    are the names of its files; those of ``optional`` may be there.
+    are the names of its files; those of ``optional`` may be there. own: files of this format are only written again,
+    and no other mesh is converted to it. linked: the file may name another one beside it, which holds the numbers.
     """
 
     key: str
@@ -32,6 +34,8 @@ class Entry:
     forms: tuple[str, ...] = ()
     folder: bool = False
     optional: tuple[str, ...] = ()
+    own: bool = False
+    linked: bool = False
 
     def form_of(self, path: str) -> str:
         """The form that the name of a file says."""
@@ -69,6 +73,7 @@ FORMATS = {
             "OpenFOAM",
             ("points", "faces", "owner", "neighbour", "boundary"),
             folder=True,
+            own=True,
             optional=("cellZones", "faceZones", "pointZones"),
         ),
         Entry(
@@ -78,15 +83,25 @@ FORMATS = {
             (),
             tuple(f"{little}{how}{real}" for real in (8, 4) for how in "br" for little in ("", "l")),
         ),
+        Entry("xdmf", "XDMF", (".xdmf",), (".xmf",), own=True, linked=True),
+        Entry("exodus", "Exodus II", (".e",), (".exo", ".ex2", ".exii", ".g", ".gen"), own=True),
+        Entry("cgns", "CGNS", (".cgns",), own=True),
+        Entry("med", "MED", (".med",), own=True),
+        Entry("vtkhdf", "VTKHDF", (".vtkhdf",), (".hdf",), own=True),
+        Entry("vtp", "VTP", (".vtp",), own=True),
+        Entry("netgen", "Netgen", (".vol",), own=True),
+        Entry("mfem", "MFEM", (".mesh",), own=True),
+        Entry("fluent", "Fluent", (".msh",), (".cas",), own=True),
     )
 }
-BY_SUFFIX = {suffix: key for key, entry in FORMATS.items() if not entry.folder
-             for suffix in (*entry.suffixes, *entry.aliases)}  # fmt: skip
+BY_SUFFIX: dict[str, str] = {}  # the first format of each; the contents tell it from others of that suffix
+for _key, _entry in FORMATS.items():
+    for _suffix in () if _entry.folder else (*_entry.suffixes, *_entry.aliases):
+        BY_SUFFIX.setdefault(_suffix, _key)
 
 MENDS = {  # files that one may well have, but that are not read
     ".meshb": "binary Medit is not read: convert it to text (.mesh)",
     ".poly": "a .poly file is the input of Triangle: run Triangle on it and give the .node file",
-    ".cgns": "CGNS is not read: convert it to .su2, .vtu or .msh",
     ".geo": "a .geo file is a geometry: mesh it with Gmsh and give the .msh file",
     ".zip": "unpack it first",
 }
@@ -99,6 +114,12 @@ SIGNS = {
     "gmsh": (NONE, rb"\$(MeshFormat|Comments|NOD|Nodes|PhysicalNames)\b"),
     "vtk": (NONE, rb"#\s*vtk DataFile Version"),
     "vtu": (XML, rb"<VTKFile\b[^>]*\bUnstructuredGrid"),
+    "vtp": (XML, rb"<VTKFile\b[^>]*[\"']PolyData"),
+    "xdmf": (rb"(?s)<\?.*?\?>|<!.*?>", rb"<Xdmf\b"),
+    "exodus": (NONE, rb"CDF[\x01\x02\x05]"),
+    "netgen": (HASH, rb"mesh3d\b"),
+    "mfem": (HASH, rb"MFEM mesh v1\.[0-3]\b"),
+    "fluent": (NONE, rb"\(\s*(0\s*\"|1\s*\"|2\s+[23]\s*\))"),
     "ply": (NONE, rb"ply\s*\r?\n\s*(format|comment|obj_info)\b"),
     "stl": (NONE, rb"(?i:solid\b[^\r\n]*[\r\n]\s*(facet|endsolid)\b)"),
     "medit": (HASH, rb"MeshVersionFormatted\b"),
@@ -115,14 +136,16 @@ SIGNS = {
 }
 # Known by sight, but not read.
 STRANGERS = {
-    "an MFEM mesh": rb"MFEM (NC )?mesh v",
-    "a VTK file of another kind (not an UnstructuredGrid)": rb"(<\?xml[^>]*>\s*)?<VTKFile\b",
-    "an HDF5 file (CGNS, XDMF or the like)": rb"\x89HDF\r\n",
+    "an MFEM mesh of another kind (not v1.0)": rb"MFEM (NC |NURBS )?mesh v",
+    "a VTK file of another kind (not an UnstructuredGrid or PolyData)": rb"(<\?xml[^>]*>\s*)?<VTKFile\b",
+    "an HDF5 file": rb"\x89HDF\r\n",
+    "a CGNS file of the old kind (ADF, which adf2hdf converts)": rb"@\(#\)ADF Database",
     "a zip archive": rb"PK\x03\x04",
     "a binary Medit mesh": rb"\x01\0\0\0[\x01-\x04]\0\0\0\x03\0\0\0|\0\0\0\x01\0\0\0[\x01-\x04]\0\0\0\x03",
 }
+IN_HDF5 = ("exodus", "cgns", "med", "vtkhdf")
 HEAD = 4096  # bytes that are looked at
-MAY_BE_BINARY = ("gmsh", "vtk", "vtu", "stl", "ply", "ugrid", "openfoam")
+MAY_BE_BINARY = ("gmsh", "vtk", "vtu", "vtp", "stl", "ply", "ugrid", "openfoam", "exodus", "cgns", "med", "vtkhdf")
 
 
 def known() -> str:
@@ -150,6 +173,14 @@ def format_of_suffix(path: str, suffix: str, option: str = "--format", reading: 
     raise InputError(f"{path}: {what}; known are {known()}; or name the format with {option}")
 
 
+def entry_in(data: Data, key: str, suffix: str) -> Entry:
+    """The format of a file whose suffix several have: the one that the contents show, else that of ``key``."""
+    shown = sniff(data)
+    if shown is not None and suffix.lower() in (*FORMATS[shown].suffixes, *FORMATS[shown].aliases):
+        return FORMATS[shown]
+    return FORMATS[key]
+
+
 def sniff(data: Data) -> str | None:
     """The name of the format that the first bytes show, None where they do not."""
     head = data[:HEAD].removeprefix(b"\xef\xbb\xbf")
@@ -172,7 +203,7 @@ def check_contents(data: Data, key: str) -> None:
         raise FormatError(
             f"this looks like {other.title}, not {title}: rename it to {other.suffixes[0]} or pass --format {shown}"
         )
-    if shown is None:
+    if shown is None and not (key in IN_HDF5 and data[:8] == MAGIC):
         for what, sign in STRANGERS.items():
             if re.match(sign, data[:HEAD]):
                 raise FormatError(f"this is {what}, not {title}: convert it first ({known()} are read)")

@@ -6,10 +6,10 @@ of the arrays behind it follow.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -37,20 +37,31 @@ _IS_BLANK = np.isin(np.arange(256), list(b" \t\r\n"))
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
     reader = Reader(files[".vtu"])
-    point_count, cell_count = reader.count("NumberOfPoints"), reader.count("NumberOfCells")
-    places = reader.section("Points")
-    if len(places) != 1:
-        raise FormatError(f"the Piece has {len(places)} arrays of Points instead of one")
-    place = places[0]
-    if place.attributes.get("type") not in ("Float32", "Float64") or reader.width(place, 3) != 3:
-        reader.fail(place, "points must be three Float32 or Float64 each")
-    points, slots = _points(reader, place, point_count)
+    cell_count = reader.count("NumberOfCells")
+    return parsed(reader, *_cells(reader, cell_count))
+
+
+def _cells(reader: Reader, count: int) -> tuple[NDArray[np.int64], Listed]:
+    """VTK's types of the cells, and their nodes."""
     cells = {a.attributes.get("Name", ""): a for a in reader.section("Cells")}
     missing = [key for key in ("connectivity", "offsets", "types") if key not in cells]
     if missing:
         raise FormatError(f"the array {missing[0]!r} is missing among the Cells")
-    codes = reader.numbers(cells["types"], cell_count).values.astype(np.int64, copy=False)
-    ends = reader.numbers(cells["offsets"], cell_count).values.astype(np.int64, copy=False)
+    codes = reader.numbers(cells["types"], count).values.astype(np.int64, copy=False)
+    return codes, listed(reader, cells, count)
+
+
+class Listed(NamedTuple):
+    """sizes: (n,) the number of nodes of each cell; nodes: of all, one after another; fail: blames one of them."""
+
+    sizes: NDArray[np.int64]
+    nodes: NDArray[np.int64]
+    fail: Callable[[int, str], NoReturn]
+
+
+def listed(reader: Reader, cells: Mapping[str, DataArray], count: int) -> Listed:
+    """The nodes of ``count`` cells, of the arrays of one section by name."""
+    ends = reader.numbers(cells["offsets"], count).values.astype(np.int64, copy=False)
     sizes = np.diff(ends, prepend=0)
     if (sizes < 0).any():
         reader.fail(cells["offsets"], "the offsets do not rise")
@@ -61,6 +72,19 @@ def read(files: Mapping[str, Data]) -> Parsed:
             nodes.words.fail(index, message)
         reader.fail(cells["connectivity"], message)
 
+    return Listed(sizes, nodes.values.astype(np.int64, copy=False), blame)
+
+
+def parsed(reader: Reader, codes: NDArray[np.int64], cells: Listed) -> Parsed:
+    """The facts of a file with these cells. codes: (n,) VTK's types."""
+    point_count = reader.count("NumberOfPoints")
+    places = reader.section("Points")
+    if len(places) != 1:
+        raise FormatError(f"the Piece has {len(places)} arrays of Points instead of one")
+    place = places[0]
+    if place.attributes.get("type") not in ("Float32", "Float64") or reader.width(place, 3) != 3:
+        reader.fail(place, "points must be three Float32 or Float64 each")
+    points, slots = _points(reader, place, point_count)
     fields = [
         [
             (array.attributes.get("Name", f"{section} {k}"), values if width == 1 else values.reshape(count, width))
@@ -69,7 +93,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
             for width in [reader.width(array)]
             for values in [reader.numbers(array, count * width).values]
         ]
-        for section, count in (("PointData", point_count), ("CellData", cell_count))
+        for section, count in (("PointData", point_count), ("CellData", len(codes)))
     ]
     reader.check_apart(place)
     single = place.attributes["type"] == "Float32"
@@ -79,8 +103,8 @@ def read(files: Mapping[str, Data]) -> Parsed:
         if not array.section  # facts about the whole grid
         or (array.section in ("PointData", "CellData") and array.attributes.get("type") not in TYPES)
     ]
-    named = nodes.values.astype(np.int64, copy=False)
-    return vtk_cells.parsed(points, slots, single, codes, sizes, named, fields[0], fields[1], blame, unread)
+    sizes, nodes, blame = cells
+    return vtk_cells.parsed(points, slots, single, codes, sizes, nodes, fields[0], fields[1], blame, unread)
 
 
 def _points(reader: Reader, place: DataArray, count: int) -> tuple[NDArray[np.float64], Slots]:

@@ -41,8 +41,8 @@ class Reader:
     those of each appended array, by where its offset is written.
     """
 
-    def __init__(self, data: Data) -> None:
-        self.data, self.document = data, parse(data)
+    def __init__(self, data: Data, kind: str = "UnstructuredGrid") -> None:
+        self.data, self.document = data, parse(data, kind)
         self.budget, self.stored = ANYWAY + PER_BYTE * len(data), 0
         self.spans: dict[int, tuple[int, int]] = {}
         root = self.document.root
@@ -61,7 +61,7 @@ class Reader:
     def count(self, attribute: str) -> int:
         """A number of the one piece."""
         if len(self.document.pieces) != 1:
-            raise FormatError("the file has no Piece of an UnstructuredGrid")
+            raise FormatError(f"the file has no Piece of {self.document.kind}")
         text = self.document.pieces[0].get(attribute, "").strip()
         if not re.fullmatch(r"\d{1,18}", text, re.ASCII):
             raise FormatError(f"the Piece has no {attribute}, or one that is no count: {text[:24]!r}")

@@ -40,13 +40,14 @@ class DataArray:
 
 @dataclass
 class Document:
-    """A VTU file.
+    """A VTU file. kind: the type of its VTKFile, which is the name of the element with the pieces too.
 
     hidden: first byte of comments, and of what arrays contain beside their numbers, and the byte behind, in turn. root,
     pieces: the attributes of these elements. appended: the encoding of the appended data, and their bytes.
     """
 
     data: Data
+    kind: str = "UnstructuredGrid"
     hidden: list[tuple[int, int]] = field(default_factory=list)
     root: dict[str, str] = field(default_factory=dict)
     pieces: list[dict[str, str]] = field(default_factory=list)
@@ -69,11 +70,11 @@ class _RawDataFollow(Exception):
     """The parser has met the start tag of raw appended data."""
 
 
-def parse(data: Data) -> Document:
-    """The structure of the file. Raises FormatError where it is not well formed or no VTU file."""
+def parse(data: Data, kind: str = "UnstructuredGrid") -> Document:
+    """The structure of the file, which must be of this kind. Raises FormatError where it is not, or not well formed."""
     if not re.match(rb"[\xef\xbb\xbf \t\r\n]*<", data):
-        raise FormatError("line 1: not an XML file: a VTU file starts with '<VTKFile' or '<?xml'")
-    walker = _Walker(data)
+        raise FormatError("line 1: not an XML file: such a file starts with '<VTKFile' or '<?xml'")
+    walker = _Walker(data, kind)
     try:
         walker.parser.Parse(data, True)
     except _RawDataFollow:
@@ -91,8 +92,8 @@ def parse(data: Data) -> Document:
 class _Walker:
     """Follows the parser's events and notes where things stand."""
 
-    def __init__(self, data: Data) -> None:
-        self.data, self.document = data, Document(data)
+    def __init__(self, data: Data, kind: str) -> None:
+        self.data, self.document = data, Document(data, kind)
         self.path: list[str] = []
         self.tags: list[tuple[int, int]] = []
         self.open: tuple[str, str, dict[str, str], tuple[int, int]] | None = None
@@ -136,9 +137,10 @@ class _Walker:
             kind = attributes.get("type")
             if kind == "PUnstructuredGrid":
                 self.fail("a PUnstructuredGrid only names other files: smooth each of its pieces, or merge them first")
-            if kind != "UnstructuredGrid":
-                self.fail(f"a VTKFile of type {str(kind)[:24]!r} is not supported: write it as an UnstructuredGrid")
-        elif self.path == ["VTKFile", "UnstructuredGrid"] and name == "Piece":
+            if kind != self.document.kind:
+                wanted = self.document.kind
+                self.fail(f"a VTKFile of type {str(kind)[:24]!r} is not supported here: write it as {wanted}")
+        elif self.path == ["VTKFile", self.document.kind] and name == "Piece":
             if self.document.pieces:
                 self.fail("several pieces in one file are not supported: merge them first")
             self.document.pieces.append(attributes)
@@ -150,7 +152,7 @@ class _Walker:
             if encoding == "raw":
                 raise _RawDataFollow
         elif name in ("DataArray", "Array") and self.open is None:
-            section = self.path[-1] if self.path[:3] == ["VTKFile", "UnstructuredGrid", "Piece"] and depth == 4 else ""
+            section = self.path[-1] if self.path[:3] == ["VTKFile", self.document.kind, "Piece"] and depth == 4 else ""
             self.open = section, name, attributes, self.tag()
         self.path.append(name)
         self.tags.append(self.tag())

@@ -26,6 +26,7 @@ from gmsnet.mesh.array_forms import (
 )
 from gmsnet.mesh.arrays import coordinates
 from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.fem import from_dolfinx, from_meshkernel, from_netgen, from_plex, from_sfepy
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import NAMES, combined, names_a_region, names_of_rows
 from gmsnet.mesh.triangulations import from_delaunay, from_skfem, from_triangulation
@@ -33,6 +34,10 @@ from gmsnet.mesh.vtk_types import POLYLINE, POLYVERTEX, STRIP, VTK_KINDS, VTK_OR
 
 NOWHERE = np.zeros((), dtype=np.int64)  # the region of cells without any, once for all of them
 NOWHERE.flags.writeable = False
+FEM = (
+    ("dolfinx", "Mesh", from_dolfinx), ("petsc4py", "DMPlex", from_plex), ("sfepy", "Mesh", from_sfepy),
+    ("netgen", "Mesh", from_netgen), ("meshkernel", "Mesh2d", from_meshkernel),
+)  # fmt: skip
 VTK_CHAINS = {POLYVERTEX: ("vertex", 1), POLYLINE: ("line", 2)}  # of any number of nodes, taken as their pieces
 
 
@@ -41,12 +46,14 @@ def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
 
     thing: a Mesh; ``(points, cells)`` arrays or a mapping ``{"points": …, "cells": …, "regions": …, "markers": …}``
     (see ``mesh_from_arrays``); a ``Mesh`` of meshio or meshlane; an ``UnstructuredGrid`` or ``PolyData`` of PyVista; a
-    ``MeshTri``, ``MeshQuad`` or ``MeshTet`` of scikit-fem; a ``Triangulation`` of Matplotlib; a ``Delaunay`` of SciPy.
+    ``MeshTri``, ``MeshQuad`` or ``MeshTet`` of scikit-fem; a ``Triangulation`` of Matplotlib; a ``Delaunay`` of SciPy;
+    a ``Mesh`` of sfepy, Netgen or dolfinx; a ``DMPlex`` of PETSc; a ``Mesh2d`` of MeshKernel.
     Points in single precision give a Mesh with ``single`` set.
 
     restore(points): points (N×dim, float64) → the type that came in, with these coordinates and all else equal. The
     thing itself is never changed. Points come back as float64, or as float32 where they were float32. A ``Delaunay``
-    comes back as (points, simplices): triangles that were smoothed are no Delaunay triangulation of their points.
+    comes back as (points, simplices): triangles that were smoothed are no Delaunay triangulation of their points. So do
+    meshes of dolfinx and PETSc, which cannot be copied.
 
     Raises InputError where the thing is none of these, or its arrays do not describe a mesh.
     """
@@ -64,14 +71,17 @@ def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
         return from_triangulation(thing)
     if ("scipy", "Delaunay") in names:
         return from_delaunay(thing)
+    for library, called, convert in FEM:
+        if (library, called) in names:
+            return convert(thing)
     if isinstance(thing, Mapping):
         return from_mapping(thing)
     if isinstance(thing, (tuple, list)) and len(thing) == 2:
         return from_pair(thing)
     if "pyvista" in libraries:
         mend = "call its .cast_to_unstructured_grid() first (or .combine(), where it holds several blocks)"
-    elif "dolfinx" in libraries:
-        mend = "give its arrays, mesh.geometry.x and the cells, if it lies on one process alone (docs/fem.md)"
+    elif "ngsolve" in libraries:
+        mend = "give its .ngmesh"
     elif "vtkmodules" in libraries:
         mend = "wrap it with pyvista.wrap() first"
     elif isinstance(thing, str) or hasattr(thing, "__fspath__"):

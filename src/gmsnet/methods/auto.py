@@ -55,7 +55,7 @@ AHEAD = 50  # times the last gain are at most expected to come
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
-LARGE_VOLUME, LARGE_GAIN = 50_000, 0.005  # free nodes of a volume of which a pass must gain more
+LARGE_VOLUME, LARGE_GAIN = 50_000, 0.005  # free nodes of meshes in space of which a pass must gain more
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
 GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
@@ -98,7 +98,7 @@ class Auto(Smoother):
             if not self.phases and field.level != STAR and planar:
                 self.creep = Creep.of(field)
             self.phases = self.phases or plan_for(field.topology)
-            if self.phases is VOLUME_PLAN and len(field.topology.free) > LARGE_VOLUME:
+            if self.phases in IN_SPACE and len(field.topology.free) > LARGE_VOLUME:
                 self.pass_gain = LARGE_GAIN
             self._enter(0, field)
         if self.at == len(self.phases):

@@ -24,9 +24,10 @@ from gmsnet.kernels.methods import barrier as kernels
 from gmsnet.kernels.methods import shell
 from gmsnet.kernels.methods.barrier3 import Power3, sweep3
 from gmsnet.kernels.methods.barrier_star import Power
+from gmsnet.kernels.methods.shell_lanes import sweep_lanes
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
-from gmsnet.kernels.star.shell import ShellStars
+from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, Field, Method, StarSmoother, Tally
 from gmsnet.parallel.executor import Executor
@@ -57,9 +58,7 @@ class Barrier(StarSmoother):
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        relaxation = self.relaxation if self.sweeps < self.relaxed else 1.0
-        stretch = STRETCH if self.sweeps < self.means else 0.0
-        kernels.sweep(points, blocks, first, last, guard, self.power, relaxation, stretch, tally)
+        kernels.sweep(points, blocks, first, last, guard, self.power, *self._pace, tally)
 
     def visit_in_space(
         self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
@@ -72,9 +71,24 @@ class Barrier(StarSmoother):
         self, points: NDArray[np.float64], stars: ShellStars, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
+        shell.sweep(points, stars, first, last, guard, self.doublings, *self._pace, tally)
+
+    def visit_in_lanes(
+        self, points: NDArray[np.float64], lanes: ShellBlocks, first: int, last: int, guard: Guard, tally: Tally
+    ) -> None:
+        """See StarSmoother."""
+        sweep_lanes(points, *lanes, first, last, guard, *self._pace, tally)
+
+    @property
+    def in_lanes(self) -> bool:
+        """See StarSmoother."""
+        return self.doublings == 0
+
+    @property
+    def _pace(self) -> tuple[float, float]:
+        """ω, and how far to the mean, of this sweep."""
         relaxation = self.relaxation if self.sweeps < self.relaxed else 1.0
-        stretch = STRETCH if self.sweeps < self.means else 0.0
-        shell.sweep(points, stars, first, last, guard, self.doublings, relaxation, stretch, tally)
+        return relaxation, STRETCH if self.sweeps < self.means else 0.0
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""

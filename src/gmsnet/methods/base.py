@@ -24,7 +24,7 @@ from gmsnet.kernels.star.guard import (
     star_floors,
 )
 from gmsnet.kernels.star.guard3 import star_floors3
-from gmsnet.kernels.star.shell import ShellStars, star_floors_of_shell
+from gmsnet.kernels.star.shell import ShellBlocks, ShellStars, star_floors_of_shell
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.methods.floor import Floor
@@ -123,15 +123,28 @@ class StarSmoother(Smoother):
         """The same of stars of a surface in space, of methods that are for surfaces."""
         raise NotImplementedError
 
+    @property
+    def in_lanes(self) -> bool:
+        """Are stars of surfaces of triangles visited in blocks?"""
+        return False
+
+    def visit_in_lanes(
+        self, points: NDArray[np.float64], lanes: ShellBlocks, first: int, last: int, guard: Guard, tally: Tally
+    ) -> None:
+        """The same in blocks, of methods with ``in_lanes``."""
+        raise NotImplementedError
+
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
-        stars, guard = field.topology.stars, field.guard(executor)
+        stars, guard = self._stars(field), field.guard(executor)
         blocks = stars.blocks
 
         def visit(first: int, last: int) -> Tally:
             counts = np.zeros(3, dtype=np.int64)
             if isinstance(blocks, SpaceBlocks):
                 self.visit_in_space(field.points, blocks, first, last, guard, counts)
+            elif isinstance(blocks, ShellBlocks):
+                self.visit_in_lanes(field.points, blocks, first, last, guard, counts)
             elif isinstance(blocks, ShellStars):
                 self.visit_on_surface(field.points, blocks, first, last, guard, counts)
             else:
@@ -141,6 +154,13 @@ class StarSmoother(Smoother):
         tally = by_colour(executor, visit, stars, field.points)
         field.floor.swept(tally)
         return tally
+
+    def _stars(self, field: Field) -> Stars:
+        """Those that a sweep visits. At the level STAR most moves are judged star by star anyway."""
+        topology = field.topology
+        if self.in_lanes and isinstance(topology, Shell) and field.level != STAR and topology.in_lanes is not None:
+            return topology.in_lanes
+        return topology.stars
 
 
 def by_colour(

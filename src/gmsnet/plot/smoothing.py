@@ -36,7 +36,8 @@ def plot_smoothing(before: Mesh, after: Mesh, path: str | os.PathLike[str]) -> N
 
     Cells are coloured by 1/q. Where cells are too small to be seen in the whole, a second row shows the surroundings
     of the cell that was worst before. Of surfaces in space, the same is shaded, with their feature edges. Of volumes,
-    the worst cells are shown within the boundary, with histograms of η and dihedral angles. path: ``.png``, ``.svg`` or ``.pdf``.
+    the worst cells are shown within the boundary, with histograms of η and dihedral angles.
+    path: ``.png``, ``.svg`` or ``.pdf``.
     Raises InputError for another suffix, for meshes without measured cells, for two meshes of
     different cells, and where the file cannot be written; MissingExtraError where matplotlib is not installed.
     """

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gmsnet.constraints.options import check_slide
 from gmsnet.constraints.shell import FEATURE, patches_of_surface, sides_of
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
+from gmsnet.constraints.smooth_patches import normals_of
 from gmsnet.measure.report import measure
 from gmsnet.mesh.mesh import Mesh, unmeasured
 from gmsnet.methods import Smoother
@@ -18,6 +19,7 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.preserve.protection import Protection
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
+from gmsnet.topology.ordering import space_points
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 
@@ -37,9 +39,10 @@ def first_of_surface(
     slides = patches.slides | patches.curves.slides
     if (patches.curves.slides & ~_flagged(topology.free, len(slides))).any():
         topology, start = Topology.and_points(given, asked, options.thread_count, patches.curves.slides)
-    shell = Shell.made(topology, sides_of(given, topology, patches)).holding(~slides, FEATURE)
+    normals = normals_of(patches, space_points(given)[:, :3])
+    shell = Shell.made(topology, sides_of(given, topology, patches, normals)).holding(~slides, FEATURE)
     tolerance = options.surface_tolerance or TOLERANCE
-    sliding = SurfaceSliding.of(given, facets, patches, shell.memory, shell.free, tolerance, options.geometry)
+    sliding = SurfaceSliding.of(given, facets, patches, shell.memory, shell.free, tolerance, options.geometry, normals)
     others = unmeasured(given)
     remarks = (f"not measured, and their nodes are held: {others}",) if others else ()
     given = given.without_cells()

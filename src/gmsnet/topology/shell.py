@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.star import shell as kernels
-from gmsnet.kernels.star.shell import ShellSimplices, ShellStars
+from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.shell import ShellBlocks, ShellSimplices, ShellStars
 from gmsnet.kernels.topology import connectivity
 from gmsnet.topology.stars import Flags, Ints, Stars
 from gmsnet.topology.topology import Topology
@@ -87,6 +88,16 @@ class Shell(Topology):
         return ShellStars(
             nodes, stars.start, stars.around, self.first, self.star_side, most, stars.pattern, stars.patterns
         )
+
+    @cached_property
+    def in_lanes(self) -> Stars | None:
+        """The stars of the free nodes in blocks, of a surface of triangles alone."""
+        if self.patterns is not None:
+            return None
+        planar = self.in_blocks()
+        blocks = planar.blocks
+        assert isinstance(blocks, Blocks)
+        return Stars(ShellBlocks(blocks, self.stars_of(blocks.centre)), planar.first)
 
     @cached_property
     def stars(self) -> Stars:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.star.block import Blocks
-from gmsnet.kernels.star.shell import ShellStars
+from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.kernels.topology import connectivity
 from gmsnet.topology.polygons import Offsets
@@ -27,7 +27,7 @@ class Stars:
     In a plane a block has 64 stars of one degree, in space 16, on a surface 1.
     """
 
-    blocks: Blocks | SpaceBlocks | ShellStars
+    blocks: Blocks | SpaceBlocks | ShellStars | ShellBlocks
     first: Ints
 
     @property

@@ -168,6 +168,10 @@ class Topology(Connectivity):
     @cached_property
     def stars(self) -> Stars:
         """The patches in the order in which they are smoothed."""
+        return self.in_blocks()
+
+    def in_blocks(self) -> Stars:
+        """The same, made anew."""
         free = np.flatnonzero(self.near_free).astype(np.int32)
         numbers = self.near_pattern
         if self.patterns is None or numbers is None:

@@ -18,14 +18,14 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.jit.compile import inlined, kernel
 from gmsnet.kernels.methods.barrier_star import newton_step
 from gmsnet.kernels.methods.worst_first import power
 from gmsnet.kernels.simplex.mean_ratio2 import pull, roundness
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at, weights_of
 from gmsnet.kernels.star.shell import allowed, crossed, gather, half_lengths3, square
-from gmsnet.kernels.star.surface import directions_at, on_curves, snap3
+from gmsnet.kernels.star.surface import directions_at, land_on, on_curves
 
 MOST = 50.0  # times a Newton step: the longest one
 HALVINGS = 10
@@ -37,7 +37,7 @@ FLAT = 1e-6  # of F: what promises less is no gain
 VALUE, GX, GY, XX, XY, YY, SX, SY, SZ = range(9)  # of sums; the last three: of c
 
 
-@part
+@inlined
 def value_at(star, n, pattern, x, y, z, inverse, doublings):
     """F with the free node at (x, y, z), 1/M given, and the largest Q; infinite where a simplex has no area."""
     value, most = 0.0, 0.0
@@ -55,7 +55,7 @@ def value_at(star, n, pattern, x, y, z, inverse, doublings):
     return value, most
 
 
-@part
+@inlined
 def tangents(star, n, pattern, x, y, z, frame):
     """Two directions of the tangent plane of a star, into ``frame`` (6,), from the sum of its c."""
     sx, sy, sz = 0.0, 0.0, 0.0
@@ -68,7 +68,7 @@ def tangents(star, n, pattern, x, y, z, frame):
     across(sx, sy, sz, frame)
 
 
-@part
+@inlined
 def across(sx, sy, sz, frame):
     """Two unit vectors across a vector of any length, into ``frame``."""
     length = math.sqrt(square(sx, sy, sz))
@@ -83,7 +83,7 @@ def across(sx, sy, sz, frame):
     frame[3], frame[4], frame[5] = q, sign + sy * sy * p, -sy
 
 
-@part
+@inlined
 def newton(star, n, pattern, x, y, z, inverse, doublings, frame, sums):
     """F, −∇F/p and its Hessian over p along the two directions of ``frame``; False where a simplex has no area."""
     p = 2.0**doublings
@@ -119,7 +119,7 @@ def newton(star, n, pattern, x, y, z, inverse, doublings, frame, sums):
     return True
 
 
-@part
+@inlined
 def mean_of(star, n, pattern):
     """The mean of the neighbours."""
     x, y, z, share = 0.0, 0.0, 0.0, 1.0 / neighbours(pattern, n)
@@ -129,17 +129,14 @@ def mean_of(star, n, pattern):
     return x, y, z
 
 
-@part
+@inlined
 def landed(surface, row, x, y, z, normal):
     """Where a node comes to lie that would go to (x, y, z), its place there; and the normal of the reference."""
-    x, y, z, place = snap3(surface, row, x, y, z)
-    normal[0] = normal[1] = normal[2] = 0.0
-    if not on_curves(surface.kind[row]):
-        normal[0], normal[1], normal[2] = directions_at(surface, row, x, y, z)
+    x, y, z, place, normal[0], normal[1], normal[2] = land_on(surface, row, x, y, z)
     return x, y, z, place
 
 
-@part
+@inlined
 def go(points, i, stars, guard, star, n, pattern, floors, reach, dx, dy, dz, value, inverse, doublings, was, normal,
        tally):  # fmt: skip
     """Moves node i by (dx, dy, dz), halved until F falls below ``value`` and the guard allows it; returns F.
@@ -169,7 +166,7 @@ def go(points, i, stars, guard, star, n, pattern, floors, reach, dx, dy, dz, val
     return value
 
 
-@part
+@inlined
 def improve(points, i, stars, guard, inverse, doublings, relaxation, stretch, steps, star, floors, work, tally):
     """Newton steps of node i, as many as pay up to ``steps``; a tangled star tries the mean of its ring.
 
@@ -227,7 +224,7 @@ def improve(points, i, stars, guard, inverse, doublings, relaxation, stretch, st
         value = after
 
 
-@part
+@inlined
 def go_once(points, i, stars, guard, star, n, pattern, floors, reach, dx, dy, dz, value, inverse, doublings, was,
             normal, tally):  # fmt: skip
     """As ``go``, but by the whole step or not at all, and uncounted if not at all."""
@@ -245,7 +242,7 @@ def go_once(points, i, stars, guard, star, n, pattern, floors, reach, dx, dy, dz
     return value
 
 
-@part
+@inlined
 def tangled(star, n, pattern, stars, at, x, y, z):
     """Is a simplex of the star not upright?"""
     for k in range(count_of(pattern, n)):

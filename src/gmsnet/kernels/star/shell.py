@@ -28,9 +28,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
+from gmsnet.kernels.jit.compile import LANES, inlined, kernel
 from gmsnet.kernels.simplex.mean_ratio2 import SQUARE, same_cell, weights_at_first
 from gmsnet.kernels.simplex.predicates import UNDERFLOW, UNIT
+from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import LARGEST, WITH_FLOORS
 from gmsnet.kernels.star.pattern import Patterns, count_of, other_of, pair_of, weights_of
 
@@ -55,6 +56,13 @@ class ShellStars(NamedTuple):
     most: int
     pattern: NDArray[np.int32] | None = None
     patterns: Patterns | None = None
+
+
+class ShellBlocks(NamedTuple):
+    """The stars of a surface of triangles in blocks of LANES, and the same by node."""
+
+    blocks: Blocks
+    stars: ShellStars
 
 
 class ShellSimplices(NamedTuple):
@@ -117,7 +125,7 @@ def error_bound_of(m, delta):
     return ROUNDING * m * (UNIT * m + delta) + ROUNDING * delta * delta + UNDERFLOW
 
 
-@part
+@inlined
 def gather(points, stars, i, guard, star, floors):
     """The nodes around node i, three numbers each, into ``star``, the floor of each simplex into ``floors``.
 
@@ -171,7 +179,7 @@ def facing(cx, cy, cz, sx, sy, sz, tx, ty, tz, m, bound):
     return double, bound * (1.0 + wide * math.sqrt(square(cx, cy, cz)) / area)
 
 
-@part
+@inlined
 def fourth_is_clear(star, a, d, b, x, y, z, delta, floor):
     """Is the corner opposite to the node of a quad certified above its floor? D of it hangs on the diagonals."""
     ax, ay, az = star[3 * b] - star[3 * d], star[3 * b + 1] - star[3 * d + 1], star[3 * b + 2] - star[3 * d + 2]
@@ -186,7 +194,7 @@ def fourth_is_clear(star, a, d, b, x, y, z, delta, floor):
     return double - floor * lengths > bound
 
 
-@part
+@inlined
 def allowed(star, n, pattern, stars, at, floors, guard, reach, x, y, z, was, normal):
     """May the free node go to (x, y, z)? Are all its simplices certified there?
 
@@ -248,7 +256,7 @@ def double_of_row(points, rows, shapes, cells, t, cx, cy, cz):
         first = t
         while first > 0 and cells[first - 1] == cells[t]:
             first -= 1
-        p, q, r, s = rows[first, 0], rows[first + 1, 0], rows[first + 2, 0], rows[first + 3, 0]
+        p, q, s, r = rows[first, 0], rows[first, 1], rows[first, 2], rows[first + 2, 0]
         ax, ay, az = points[r, 0] - points[p, 0], points[r, 1] - points[p, 1], points[r, 2] - points[p, 2]
         bx, by, bz = points[s, 0] - points[q, 0], points[s, 1] - points[q, 1], points[s, 2] - points[q, 2]
         return facing(cx, cy, cz, ax, ay, az, bx, by, bz, largest6(ax, ay, az, bx, by, bz), 1.0)
@@ -337,7 +345,7 @@ def list_sides(rows, orientation, side, start, around, pattern, patterns, begin,
     return missing
 
 
-@part
+@inlined
 def side_of(simplices, t, points):
     """c·n of row t."""
     ax, ay, az, bx, by, bz = spokes_of(points, simplices.rows, t, simplices.orientation[t] > 0)

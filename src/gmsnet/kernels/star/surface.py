@@ -198,6 +198,21 @@ def within(limit, px, py, pz, x, y, z):
     return px + share * dx, py + share * dy, pz + share * dz
 
 
+@inlined
+def over_facet(surface, row, f, a, b, c):
+    """The place of a row over facet f."""
+    corner = surface.corner
+    return within(
+        surface.limit[row],
+        a * corner[f, 0, 0] + b * corner[f, 1, 0] + c * corner[f, 2, 0],
+        a * corner[f, 0, 1] + b * corner[f, 1, 1] + c * corner[f, 2, 1],
+        a * corner[f, 0, 2] + b * corner[f, 1, 2] + c * corner[f, 2, 2],
+        on_cubic(corner, surface.control, f, 0, a, b, c),
+        on_cubic(corner, surface.control, f, 1, a, b, c),
+        on_cubic(corner, surface.control, f, 2, a, b, c),
+    )
+
+
 @part
 def snap3(surface, row, x, y, z):
     """Where the node of a row goes that would go to (x, y, z): x, y, z, and its facet or piece there.
@@ -208,16 +223,7 @@ def snap3(surface, row, x, y, z):
     kind, place = surface.kind[row], np.int64(surface.place[row])
     if kind == CURVED:
         place, a, b, c = walk(surface, place, x, y, z)
-        corner = surface.corner
-        x, y, z = within(
-            surface.limit[row],
-            a * corner[place, 0, 0] + b * corner[place, 1, 0] + c * corner[place, 2, 0],
-            a * corner[place, 0, 1] + b * corner[place, 1, 1] + c * corner[place, 2, 1],
-            a * corner[place, 0, 2] + b * corner[place, 1, 2] + c * corner[place, 2, 2],
-            on_cubic(corner, surface.control, place, 0, a, b, c),
-            on_cubic(corner, surface.control, place, 1, a, b, c),
-            on_cubic(corner, surface.control, place, 2, a, b, c),
-        )
+        x, y, z = over_facet(surface, row, place, a, b, c)
     elif kind == CURVE:
         place, t = follow_curve(surface, place, x, y, z)
         piece = surface.piece
@@ -246,6 +252,30 @@ def snap3(surface, row, x, y, z):
     return x, y, z, place
 
 
+@inlined
+def on_curves(kind):
+    """Does a row of this kind have one way to go, and not two?"""
+    return kind >= LINE
+
+
+@inlined
+def land_on(surface, row, x, y, z):
+    """As ``snap3``, and the unit normal there, which is zero on curves."""
+    kind = surface.kind[row]
+    if kind == CURVED:
+        place, a, b, c = walk(surface, np.int64(surface.place[row]), x, y, z)
+        u, v, w = normal_on(surface.normal, place, a, b, c)
+        x, y, z = over_facet(surface, row, place, a, b, c)
+        if surface.single:
+            x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
+        return x, y, z, place, u, v, w
+    x, y, z, place = snap3(surface, row, x, y, z)
+    if on_curves(kind):
+        return x, y, z, place, 0.0, 0.0, 0.0
+    e = surface.of[row]
+    return x, y, z, place, surface.direction[e, 0], surface.direction[e, 1], surface.direction[e, 2]
+
+
 @part
 def directions_at(surface, row, x, y, z):
     """The unit normal of the patch, or the unit tangent of the curve, of a row at (x, y, z)."""
@@ -258,12 +288,6 @@ def directions_at(surface, row, x, y, z):
         return piece_tangent(surface.piece, place, t)
     e = surface.of[row]
     return surface.direction[e, 0], surface.direction[e, 1], surface.direction[e, 2]
-
-
-@inlined
-def on_curves(kind):
-    """Does a row of this kind have one way to go, and not two?"""
-    return kind >= LINE
 
 
 @kernel

@@ -1,0 +1,96 @@
+"""The elements of Exodus II: their types, the order of their nodes, and their sides.
+
+Source: L. A. Schoof and V. R. Yarberry, EXODUS II: A Finite Element Data Model, SAND92-2137, section 4.8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import FormatError
+from gmsnet.mesh.cell_block import CellBlock
+
+Ints = NDArray[np.int64]
+
+# What the name of a type begins with, in capitals, and its kinds by how many nodes they have.
+LINES = {2: "line", 3: "line3"}
+TRIANGLES = {3: "triangle", 6: "triangle6", 7: "triangle7"}
+QUADS = {4: "quad", 8: "quad8", 9: "quad9"}
+TETRAHEDRA = {4: "tetra", 10: "tetra10"}
+FAMILIES: tuple[tuple[tuple[str, ...], dict[int, str]], ...] = (
+    (("TETRA", "TET"), TETRAHEDRA),
+    (("HEX",), {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"}),
+    (("WEDGE",), {6: "wedge", 15: "wedge15", 18: "wedge18"}),
+    (("PYRAMID", "PYR"), {5: "pyramid", 13: "pyramid13", 14: "pyramid14"}),
+    (("TRI",), TRIANGLES),
+    (("QUAD", "SHELL4", "SHELL8", "SHELL9"), QUADS),
+    (("SHELL3", "SHELL6"), TRIANGLES),
+    (("SHELL",), {**TRIANGLES, **QUADS}),
+    (("BEAM", "TRUSS", "BAR", "EDGE", "LINE"), LINES),
+    (("SPHERE", "CIRCLE", "POINT", "NODE"), {1: "vertex"}),
+)
+# Where the middles come in another order than in a Mesh, the place in the file of each of a Mesh's nodes. A file lists
+# the middles of the edges between the two ends before those of the second end.
+ORDERS: dict[str, tuple[int, ...]] = {
+    "hexahedron20": (*range(12), *range(16, 20), *range(12, 16)),
+    "hexahedron27": (*range(12), *range(16, 20), *range(12, 16), 23, 24, 25, 26, 21, 22, 20),
+    "wedge15": (*range(9), 12, 13, 14, 9, 10, 11),
+    "wedge18": (*range(9), 12, 13, 14, 9, 10, 11, 15, 16, 17),
+}
+SIDES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetra": ((0, 1, 3), (1, 2, 3), (0, 3, 2), (0, 2, 1)),
+    "hexahedron": ((0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (0, 4, 7, 3), (0, 3, 2, 1), (4, 5, 6, 7)),
+    "wedge": ((0, 1, 4, 3), (1, 2, 5, 4), (0, 3, 5, 2), (0, 2, 1), (3, 4, 5)),
+    "pyramid": ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4), (0, 3, 2, 1)),
+}
+# Sides of second-order elements are kept by their corners: a marker says which nodes are meant.
+_FIRST_ORDER = {"triangle6": "triangle", "triangle7": "triangle", "quad8": "quad", "quad9": "quad",
+                "tetra10": "tetra", "hexahedron20": "hexahedron", "hexahedron27": "hexahedron", "wedge15": "wedge",
+                "wedge18": "wedge", "pyramid13": "pyramid", "pyramid14": "pyramid"}  # fmt: skip
+_SIDE_KINDS = {2: "line", 3: "triangle", 4: "quad"}
+
+
+def kind_of(called: str, nodes: int, dimension: int) -> str:
+    """The kind of elements of a type. Raises FormatError where it is not known, or has not so many nodes."""
+    upper = "".join(c for c in called.upper() if c.isalnum())
+    for beginnings, kinds in FAMILIES:
+        if upper.startswith(beginnings):
+            if nodes not in kinds:
+                raise FormatError(f"elements of type {called[:24]!r} with {nodes} nodes are not known")
+            return kinds[nodes]
+    raise FormatError(f"elements of type {called[:24]!r} are not known in a mesh of {dimension} dimensions")
+
+
+def side_cells(
+    first: Sequence[tuple[int, CellBlock]], elements: Ints, sides: Ints, dimension: int
+) -> tuple[dict[str, Ints], int]:
+    """Sides as cells (kind → nodes), and how many are not kept: those of elements of fewer dimensions than the mesh.
+
+    first: the number of the first element of each block. elements, sides: (n,) counted from 0. Raises FormatError for
+    elements and sides that do not exist.
+    """
+    count = first[-1][0] + len(first[-1][1].nodes) if first else 0
+    if len(elements) and not 0 <= elements.min() <= elements.max() < count:
+        raise FormatError(f"a side set names an element that is none of {count}")
+    found: dict[str, list[Ints]] = {}
+    kept = 0
+    for start, block in first:
+        kind = _FIRST_ORDER.get(block.kind, block.kind)
+        here = np.flatnonzero((elements >= start) & (elements < start + len(block.nodes)))
+        if block.dimension != dimension or kind not in SIDES or not len(here):
+            continue
+        if not 0 <= sides[here].min() <= sides[here].max() < len(SIDES[kind]):
+            # Faces of shells come before their edges: sides 1 and 2, which are the elements themselves.
+            raise FormatError(f"a side set names a side that a {kind} does not have")
+        for number, corners in enumerate(SIDES[kind]):
+            some = here[sides[here] == number]
+            if len(some):
+                nodes = block.nodes[elements[some] - start][:, list(corners)]
+                found.setdefault(_SIDE_KINDS[len(corners)], []).append(nodes)
+                kept += len(some)
+    return {kind: np.concatenate(parts) for kind, parts in found.items()}, len(elements) - kept

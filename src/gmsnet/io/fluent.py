@@ -1,0 +1,170 @@
+"""Fluent meshes as text (``.msh``, ``.cas``). Only the coordinates are written again.
+
+A file lists faces, each with the cell on either side; cells are put together from them. Zones of cells are regions,
+zones of faces on the boundary are markers. Source: the mesh file format in the manual of ANSYS Fluent, appendix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.cells.table import face_name
+from gmsnet.errors import FormatError
+from gmsnet.io.cells import distinct
+from gmsnet.io.contents import Data
+from gmsnet.io.document import Parsed, Written, own_files_only
+from gmsnet.io.fluent_sections import CELLS, FACES, NAMES, NODES, Section, face_lists, sections
+from gmsnet.io.foam_cells import Faces, Sides, volumes
+from gmsnet.io.places import ranges
+from gmsnet.io.splice import TextSlots
+from gmsnet.io.text import Text
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+
+name = "Fluent"
+suffixes = (".msh",)
+
+Ints = NDArray[np.int64]
+
+INTERIOR, PARENT = 2, 31  # types of boundary: faces between cells, and those of a refined cell's whole side
+
+
+def read(files: Mapping[str, Data]) -> Parsed:
+    """See Format."""
+    data = files[".msh"]
+    found = list(sections(data))
+    dimension = next((k.head[0] for k in found if k.key == 2 and k.head), 3)
+    if dimension not in (2, 3):
+        raise FormatError(f"the mesh has {dimension} dimensions instead of 2 or 3")
+    points, slots = _points(Text(data, ends=b")"), [k for k in found if k.key in NODES and k.body], dimension)
+    zones, sizes, nodes, sides = _faces(data, [k for k in found if k.key in FACES and k.body], len(points))
+    count = int(sides.max(initial=0))
+    if not count or count > len(sizes):
+        raise FormatError(f"{len(sizes)} faces name {count} cells: sections of faces are missing, or damaged")
+    if dimension == 2 and (sizes != 2).any():
+        raise FormatError("a face of a mesh in the plane has two nodes")
+    regions = _regions(found, count)
+    inner = (sides > 0).all(axis=1)
+    order = np.concatenate([np.flatnonzero(inner), np.flatnonzero(~inner)])
+    faces = _outward(sizes, nodes, sides, order)
+    blocks = volumes(faces, count, regions) if dimension == 3 else _polygons(faces, count, regions)
+    names = dict[tuple[int, int], str]()
+    titles = {k.zone: k.title for k in found if k.key in NAMES}
+    starts = np.cumsum(sizes) - sizes
+    for zone in distinct(zones):
+        own = np.flatnonzero((zones == zone) & ~inner)
+        for size in np.unique(sizes[own]).tolist():
+            some = own[sizes[own] == size]
+            table = nodes[starts[some][:, None] + np.arange(size)]
+            blocks.append(CellBlock("line" if size == 2 else face_name(size), table, np.full(len(some), zone)))
+        if len(own) and zone in titles:
+            names[dimension - 1, zone] = titles[zone]
+    names |= {(dimension, zone): titles[zone] for zone in distinct(regions) if zone in titles}
+    known = {0, 1, 2, *NODES, *FACES, *CELLS, *NAMES}
+    unread = [f"sections of the number {key}" for key in sorted({k.key for k in found} - known)]
+    return Parsed(points, blocks, slots, names, unread=["the faces and their order", *unread])
+
+
+def _points(text: Text, found: list[Section], dimension: int) -> tuple[NDArray[np.float64], TextSlots]:
+    """The coordinates of all zones of nodes, by their numbers."""
+    parts: list[tuple[int, NDArray[np.int64]]] = []
+    for section in found:
+        first, last = section.head[1:3] if len(section.head) > 2 else (1, 0)
+        assert section.body is not None
+        starts, _ = text.until(section.body[1]).tokens(section.body[0])
+        if first < 1 or len(starts) != (last - first + 1) * dimension:
+            text.fail(section.start, f"{len(starts)} coordinates do not fit the nodes {first} to {last}")
+        parts.append((first, starts.reshape(-1, dimension)))
+    parts.sort(key=lambda part: part[0])
+    at = 1
+    for first, part in parts:
+        if first != at:
+            raise FormatError(f"the node {at} is missing, or given twice: nodes go on with {first}")
+        at += len(part)
+    if not parts:
+        raise FormatError("the file has no nodes (section 10)")
+    starts = np.ascontiguousarray(np.concatenate([part for _, part in parts]))
+    points, ends = text.spans(starts)
+    return points, TextSlots(starts, ends)
+
+
+def _faces(data: Data, found: list[Section], count: int) -> tuple[Ints, Ints, Ints, Ints]:
+    """zone (F,), number of nodes (F,), all nodes, cells (F, 2) counted from 1, 0 where there is none."""
+    none = np.empty(0, dtype=np.int64)
+    zones, sizes, nodes, sides = [none], [none], [none], [np.empty((0, 2), dtype=np.int64)]
+    for section in found:
+        if len(section.head) > 3 and section.head[3] == PARENT:
+            continue
+        size, listed, pair = face_lists(data, section)
+        zones.append(np.full(len(size), section.zone))
+        sizes.append(size)
+        nodes.append(listed - 1)
+        sides.append(pair)
+    all_nodes, all_sides = np.concatenate(nodes), np.concatenate(sides)
+    if len(all_nodes) and not 0 <= all_nodes.min() <= all_nodes.max() < count:
+        raise FormatError(f"a face names a node that is none of 1 to {count}")
+    if (all_sides < 0).any() or (len(all_sides) and not all_sides.any(axis=1).all()):
+        raise FormatError("a face lies at no cell")
+    return np.concatenate(zones), np.concatenate(sizes), all_nodes, all_sides
+
+
+def _regions(found: list[Section], count: int) -> Ints:
+    """The zone of each cell."""
+    regions = np.zeros(count, dtype=np.int64)
+    for section in found:
+        if section.key in CELLS and len(section.head) > 2 and section.zone:
+            first, last = section.head[1:3]
+            if 1 <= first <= last:
+                regions[first - 1 : last] = section.zone
+    return regions
+
+
+def _outward(sizes: Ints, nodes: Ints, sides: Ints, order: Ints) -> Faces:
+    """The faces with those between cells first, each with its normal out of its owner.
+
+    A file lists a face so that its normal points into the first of its cells.
+    """
+    first = np.cumsum(sizes) - sizes
+    pair = sides[order]
+    turned = pair[:, 0] > 0
+    owner = np.where(turned, pair[:, 0], pair[:, 1]) - 1
+    length = sizes[order]
+    rank = ranges(np.zeros(len(order), dtype=np.int64), length)
+    forward = np.repeat(~turned, length)
+    step = np.where(forward, rank, np.repeat(length, length) - 1 - rank)
+    listed = nodes[np.repeat(first[order], length) + step]
+    between = int((pair > 0).all(axis=1).sum())
+    return Faces(length, listed, owner, pair[:between, 1] - 1)
+
+
+def _polygons(faces: Faces, count: int, regions: Ints) -> list[CellBlock]:
+    """Cells in the plane, from edges that all run around them in one sense."""
+    sides = Sides.of(faces)
+    edges = faces.points.reshape(-1, 2)[sides.face]
+    edges = np.where(sides.out[:, None], edges, edges[:, ::-1])
+    number = np.bincount(sides.cell, minlength=count)
+    if number.min(initial=3) < 3:
+        raise FormatError(f"cell {int(np.argmin(number)) + 1} has only {number.min()} faces")
+    start = np.cumsum(number) - number
+    blocks = []
+    for size in distinct(number):
+        cells = np.flatnonzero(number == size)
+        around = edges[start[cells][:, None] + np.arange(size)]
+        nodes = np.empty((len(cells), size), dtype=np.int64)
+        nodes[:, 0], here = around[:, 0, 0], around[:, 0, 1]
+        for k in range(1, size):
+            nodes[:, k] = here
+            here = around[np.arange(len(cells)), np.argmax(around[:, :, 0] == here[:, None], axis=1), 1]
+        good = (np.sort(nodes, axis=1) == np.sort(around[:, :, 0], axis=1)).all(axis=1) & (here == nodes[:, 0])
+        if not good.all():
+            raise FormatError(f"the faces of cell {int(cells[np.argmin(good)]) + 1} do not run around it")
+        blocks.append(CellBlock(face_name(size), nodes, regions[cells]))
+    return blocks
+
+
+def write(mesh: Mesh) -> Written:
+    """Raises FormatError: only files of this format are written again."""
+    return own_files_only(name)

@@ -1,0 +1,50 @@
+"""Polygonal data in VTK's XML (``.vtp``), read and written again as ``.vtu`` is: vertices, lines and polygons."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NoReturn
+
+import numpy as np
+
+from gmsnet.errors import FormatError
+from gmsnet.io import vtu
+from gmsnet.io.contents import Data
+from gmsnet.io.document import Parsed, Written, own_files_only
+from gmsnet.io.vtu_reader import Reader
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX, STRIP
+
+name = "VTP"
+suffixes = (".vtp",)
+
+SECTIONS = {"Verts": POLYVERTEX, "Lines": POLYLINE, "Strips": STRIP, "Polys": POLYGON}  # as the cell data are in order
+
+
+def read(files: Mapping[str, Data]) -> Parsed:
+    """See Format."""
+    reader = Reader(files[".vtp"], "PolyData")
+    parts, codes, cuts = [], [], [0]
+    for section, code in SECTIONS.items():
+        count = reader.count(f"NumberOf{section}") if f"NumberOf{section}" in reader.document.pieces[0] else 0
+        arrays = {a.attributes.get("Name", ""): a for a in reader.section(section)}
+        if not count:
+            continue
+        if missing := [key for key in ("connectivity", "offsets") if key not in arrays]:
+            raise FormatError(f"the array {missing[0]!r} is missing among the {section}")
+        parts.append(vtu.listed(reader, arrays, count))
+        codes.append(np.full(count, code))
+        cuts.append(cuts[-1] + len(parts[-1].nodes))
+
+    def fail(index: int, message: str) -> NoReturn:
+        k = int(np.searchsorted(cuts, index, side="right")) - 1
+        parts[k].fail(index - cuts[k], message)
+
+    none = np.empty(0, dtype=np.int64)
+    sizes, nodes = (np.concatenate([none, *(part[k] for part in parts)]) for k in (0, 1))
+    return vtu.parsed(reader, np.concatenate([none, *codes]), vtu.Listed(sizes, nodes, fail))
+
+
+def write(mesh: Mesh) -> Written:
+    """Raises FormatError: only files of this format are written again."""
+    return own_files_only(name)

@@ -1,0 +1,130 @@
+"""The XML of an XDMF file: its elements, and at which bytes what they contain stands."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import NoReturn
+from xml.parsers import expat
+from xml.sax.saxutils import escape, unescape
+
+from gmsnet.errors import FormatError
+from gmsnet.io.contents import Data
+from gmsnet.io.text import fail
+
+H5 = ".h5"  # what the file beside it goes by in a mesh
+MOST_DEEP, MOST_ELEMENTS = 100, 200_000
+# The text of an item that is kept in HDF5: the name of the file, a colon, the path within it.
+REFERENCE = re.compile(rb"(>\s*)([^<>:\"/\\]{1,255}):(/[^<>]*?)(?=\s*</)")
+
+
+@dataclass(eq=False)
+class Element:
+    """tag: without its namespace; start: its first byte; stop: the byte behind what it contains."""
+
+    tag: str
+    attributes: Mapping[str, str]
+    start: int
+    stop: int = 0
+    children: list[Element] = field(default_factory=list)
+
+    def of(self, tag: str) -> list[Element]:
+        """The children of this name."""
+        return [child for child in self.children if child.tag == tag]
+
+    def all(self, tag: str) -> Iterator[Element]:
+        """All elements of this name inside, in the order of the file."""
+        for child in self.children:
+            if child.tag == tag:
+                yield child
+            yield from child.all(tag)
+
+    def get(self, *keys: str, default: str = "") -> str:
+        """The first of these attributes that is there."""
+        return next((self.attributes[key] for key in keys if key in self.attributes), default)
+
+
+def parse(data: Data) -> Element:
+    """The element Xdmf. Raises FormatError where the XML is not well formed or no XDMF file."""
+    if not re.match(rb"[\xef\xbb\xbf \t\r\n]*<", data):
+        raise FormatError("line 1: not an XML file: an XDMF file starts with '<Xdmf' or '<?xml'")
+    walker = _Walker(data)
+    try:
+        walker.parser.Parse(data[:], True)
+    except expat.ExpatError as error:
+        raise FormatError(f"line {error.lineno}: the XML is not well formed: {expat.ErrorString(error.code)}") from None
+    except (LookupError, ValueError) as error:
+        if isinstance(error, FormatError):
+            raise
+        raise FormatError("the XML has an encoding that is not supported: write it as UTF-8") from None
+    root = walker.root.children[0]
+    if root.tag != "Xdmf":
+        fail(data, root.start, f"the root element is {root.tag[:24]!r} instead of 'Xdmf'")
+    return root
+
+
+class _Walker:
+    """Follows the parser's events and notes where things stand."""
+
+    def __init__(self, data: Data) -> None:
+        self.data, self.root = data, Element("", {}, 0)
+        self.open, self.count = [self.root], 0
+        self.parser = expat.ParserCreate()
+        self.parser.StartElementHandler, self.parser.EndElementHandler = self.begin, self.finish
+        self.parser.StartDoctypeDeclHandler = self.doctype
+
+    def doctype(self, name: str, system: str | None, public: str | None, internal: bool) -> None:
+        """Programs write ``<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd">``, which is never loaded; entities are refused."""
+        if internal:
+            fail(self.data, self.parser.CurrentByteIndex, "a DOCTYPE with declarations is not allowed: remove it")
+
+    def begin(self, name: str, attributes: dict[str, str]) -> None:
+        at = self.parser.CurrentByteIndex
+        self.count += 1
+        if len(self.open) > MOST_DEEP or self.count > MOST_ELEMENTS:
+            fail(self.data, at, "there are too many elements, or they lie too deep inside one another")
+        element = Element(name.rpartition(":")[2], attributes, at)
+        self.open[-1].children.append(element)
+        self.open.append(element)
+
+    def finish(self, name: str) -> None:
+        self.open.pop().stop = self.parser.CurrentByteIndex
+
+
+def check_plain(data: Data, element: Element) -> tuple[int, int]:
+    """The bytes of an element that contains a text alone. Raises FormatError where there is more than that."""
+    tag = _START.match(data, element.start)
+    if tag is None:
+        raise FormatError("the XML has an encoding that is not supported: write it as UTF-8")
+    first, stop = tag.end(), element.stop
+    if element.children or data.find(b"<", first, stop) >= 0:
+        blame(data, element, "nothing but numbers may stand in it")
+    return (first, stop) if first <= stop else (stop, stop)
+
+
+_START = re.compile(rb"<[^<\"'>]*(?:(?:\"[^\"]*\"|'[^']*')[^<\"'>]*)*>")
+
+
+def blame(data: Data, element: Element, message: str) -> NoReturn:
+    """Raises FormatError with the line and the name of an element."""
+    fail(data, element.start, f"{element.tag[:40]}: {message}")
+
+
+def linked(data: Data) -> str | None:
+    """The name of the HDF5 file that the items name, which lies beside; None where there is none.
+
+    Raises FormatError where they name several, or one in another folder.
+    """
+    names = {unescape(found[2].decode("utf-8", "replace")).strip() for found in REFERENCE.finditer(data)}
+    if len(names) > 1:
+        raise FormatError(f"the items name {len(names)} HDF5 files: put the arrays into one")
+    if not names and re.search(rb"Format\s*=\s*[\"']HDF[\"']", data):
+        raise FormatError("an item of Format HDF must name a file beside this one, as in mesh.h5:/points")
+    return names.pop() if names else None
+
+
+def relinked(data: bytes, called: str) -> bytes:
+    """The file with another name for the HDF5 file."""
+    new = escape(called).encode()
+    return REFERENCE.sub(lambda found: found[1] + new + b":" + found[3], data)

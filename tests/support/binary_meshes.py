@@ -1,0 +1,205 @@
+"""Meshes in HDF5 and netCDF as the programs that own the formats lay them out, made by h5py and SciPy."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from typing import Any
+
+import h5py
+import numpy as np
+from scipy.io import netcdf_file
+
+# Two triangles and a quadrilateral around two inner nodes, a line each at the left and at the right.
+POINTS = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [1, 1], [0, 1], [0.4, 0.5], [1.6, 0.4]])
+TRIANGLES = np.array([[0, 1, 6], [1, 4, 6], [4, 5, 6], [5, 0, 6], [1, 2, 7], [2, 3, 7]])
+QUADS = np.array([[1, 7, 3, 4]])
+LINES = np.array([[5, 0], [2, 3]])
+GZIP: dict[str, Any] = {"chunks": True, "compression": "gzip", "shuffle": True}
+
+
+def _file(fill: Callable[[h5py.File], None], **options: Any) -> bytes:
+    stream = io.BytesIO()
+    with h5py.File(stream, "w", libver=("v110", "v110"), **options) as file:
+        fill(file)
+    return stream.getvalue()
+
+
+def cgns(packed: bool = False, kind: type = np.float64, mixed: bool = False) -> bytes:
+    """One zone with a section of each type, or with one of them all."""
+    how = GZIP if packed else {}
+
+    def node(parent: h5py.Group, name: str, label: str, data: Any = None, **more: Any) -> h5py.Group:
+        made = parent.create_group(name)
+        made.attrs["name"], made.attrs["label"] = np.bytes_(name), np.bytes_(label)
+        made.attrs["type"] = np.bytes_("MT")
+        if data is not None:
+            made.create_dataset(" data", data=data, **more)
+        return made
+
+    def letters(text: str) -> np.ndarray:
+        return np.frombuffer(text.encode(), np.int8)
+
+    def fill(file: h5py.File) -> None:
+        base = node(file, "Base", "CGNSBase_t", np.array([2, 2], np.int32))
+        zone = node(base, "blk-1", "Zone_t", np.array([[8], [7], [0]], np.int32))
+        node(zone, "ZoneType", "ZoneType_t", letters("Unstructured"))
+        grid = node(zone, "GridCoordinates", "GridCoordinates_t")
+        for axis in range(2):
+            node(grid, f"Coordinate{'XY'[axis]}", "DataArray_t", POINTS[:, axis].astype(kind), **how)
+        sections = [("tri", 5, TRIANGLES), ("quad", 7, QUADS), ("walls", 3, LINES)]
+        if mixed:
+            rows = [[code, *(row + 1)] for _, code, cells in sections[:2] for row in cells.tolist() for row in
+                    [np.array(row)]]  # fmt: skip
+            sections = [("all", 20, np.concatenate(rows) - 1), sections[2]]
+        at = 1
+        for name, code, cells in sections:
+            count = 7 if code == 20 else len(cells)
+            made = node(zone, name, "Elements_t", np.array([code, 0], np.int32))
+            node(made, "ElementRange", "IndexRange_t", np.array([at, at + count - 1], np.int32))
+            node(made, "ElementConnectivity", "DataArray_t", (np.ravel(cells) + 1).astype(np.int32))
+            at += count
+        conditions = node(zone, "ZoneBC", "ZoneBC_t")
+        held = node(conditions, "held", "BC_t", letters("BCWall"))
+        node(held, "PointList", "IndexArray_t", np.array([[7]], np.int32))
+        node(zone, "FlowSolution", "FlowSolution_t")
+
+    return _file(fill)
+
+
+def med(packed: bool = False) -> bytes:
+    """Families of cells and nodes, with groups."""
+    how = GZIP if packed else {}
+
+    def fill(file: h5py.File) -> None:
+        mesh = file.create_group("ENS_MAA/plate")
+        mesh.attrs["ESP"], mesh.attrs["DIM"] = 2, 2
+        step = mesh.create_group("-0000000000000000001-0000000000000000001")
+        step.create_dataset("NOE/COO", data=POINTS.T.ravel(), **how)
+        step.create_dataset("NOE/FAM", data=np.array([0, 0, 0, 0, 0, 0, 3, 0]))
+        cells = (("TR3", TRIANGLES, [-1] * 4 + [-2] * 2), ("QU4", QUADS, [-2]), ("SE2", LINES, [-5, -5]))
+        step["NOE/COO"].attrs["NBR"] = len(POINTS)
+        for name, rows, families in cells:
+            step.create_dataset(f"MAI/{name}/NOD", data=rows.T.ravel() + 1)
+            step[f"MAI/{name}/NOD"].attrs["NBR"] = len(rows)
+            step.create_dataset(f"MAI/{name}/FAM", data=np.array(families))
+        for part, number, text in (("ELEME", -1, "steel"), ("ELEME", -5, "wall"), ("NOEUD", 3, "sensor")):
+            family = file.create_group(f"FAS/plate/{part}/FAM_{number}_{text}")
+            family.attrs["NUM"] = number
+            names = np.zeros((1, 80), np.int8)
+            names[0, : len(text)] = np.frombuffer(text.encode(), np.int8)
+            family.create_dataset("GRO/NOM", data=names)
+            family["GRO"].attrs["NBR"] = 1
+
+    return _file(fill)
+
+
+def vtkhdf(packed: bool = False, kind: type = np.float64) -> bytes:
+    """An unstructured grid of one piece."""
+    how = GZIP if packed else {}
+
+    def fill(file: h5py.File) -> None:
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"], root.attrs["Type"] = [1, 0], np.bytes_("UnstructuredGrid")
+        nodes = np.concatenate([TRIANGLES.ravel(), QUADS.ravel()])
+        for name, value in (("Points", 8), ("Cells", 7), ("ConnectivityIds", len(nodes))):
+            root.create_dataset(f"NumberOf{name}", data=[value])
+        root.create_dataset("Points", data=np.pad(POINTS, ((0, 0), (0, 1))).astype(kind), **how)
+        root.create_dataset("Connectivity", data=nodes)
+        root.create_dataset("Offsets", data=np.cumsum([0] + [3] * 6 + [4]))
+        root.create_dataset("Types", data=np.array([5] * 6 + [9], np.uint8))
+        root.create_dataset("PointData/heat", data=np.arange(8.0))
+        root.create_dataset("CellData/material", data=np.array([1, 1, 1, 1, 2, 2, 2]))
+
+    return _file(fill)
+
+
+def exodus4(packed: bool = False) -> bytes:
+    """Exodus in netCDF-4, as far as h5py alone makes it."""
+    how = GZIP if packed else {}
+
+    def fill(file: h5py.File) -> None:
+        for axis in range(2):
+            file.create_dataset(f"coord{'xy'[axis]}", data=POINTS[:, axis], **how)
+        for k, (kind, cells) in enumerate((("TRI3", TRIANGLES), ("QUAD4", QUADS)), 1):
+            made = file.create_dataset(f"connect{k}", data=(cells + 1).astype(np.int32))
+            made.attrs["elem_type"] = np.bytes_(kind)
+        file.create_dataset("eb_prop1", data=np.array([10, 20], np.int32))
+        file.create_dataset("elem_ss1", data=np.array([4, 6], np.int32))
+        file.create_dataset("side_ss1", data=np.array([1, 1], np.int32))
+        file.create_dataset("node_ns1", data=np.array([7], np.int32))
+
+    return _file(fill)
+
+
+def exodus3(version: int = 2, whole: bool = False) -> bytes:
+    """Exodus in the classic form. whole: all coordinates in one variable."""
+    stream = io.BytesIO()
+    file = netcdf_file(stream, "w", version=version)
+    for name, size in (("time_step", None), ("num_nodes", 8),
+                       ("num_dim", 2), ("num_el_blk", 2), ("len_name", 33), ("num_el_in_blk1", 6),
+                       ("num_nod_per_el1", 3), ("num_el_in_blk2", 1), ("num_nod_per_el2", 4), ("num_side_ss1", 2),
+                       ("num_nod_ns1", 1)):  # fmt: skip
+        file.createDimension(name, size)
+
+    def variable(name: str, kind: str, dimensions: tuple[str, ...], values: Any, **attributes: str) -> None:
+        made = file.createVariable(name, kind, dimensions)
+        made[:] = values
+        for key, value in attributes.items():
+            setattr(made, key, value)
+
+    if whole:
+        variable("coord", "d", ("num_dim", "num_nodes"), POINTS.T)
+    else:
+        variable("coordx", "d", ("num_nodes",), POINTS[:, 0])
+        variable("coordy", "d", ("num_nodes",), POINTS[:, 1])
+    variable("connect1", "i", ("num_el_in_blk1", "num_nod_per_el1"), TRIANGLES + 1, elem_type="TRI3")
+    variable("connect2", "i", ("num_el_in_blk2", "num_nod_per_el2"), QUADS + 1, elem_type="QUAD")
+    variable("eb_prop1", "i", ("num_el_blk",), [10, 20])
+    names = np.zeros((2, 33), "S1")
+    names[0, :5] = list("steel")
+    variable("eb_names", "c", ("num_el_blk", "len_name"), names)
+    variable("elem_ss1", "i", ("num_side_ss1",), [4, 6])
+    variable("side_ss1", "i", ("num_side_ss1",), [1, 1])
+    variable("node_ns1", "i", ("num_nod_ns1",), [7])
+    variable("time_whole", "d", ("time_step",), [0.5])
+    file.flush()
+    return stream.getvalue()
+
+
+XDMF = """<?xml version="1.0"?>
+<!DOCTYPE Xdmf SYSTEM "Xdmf.dtd" []>
+<Xdmf Version="3.0"><Domain><Grid Name="mesh" GridType="Uniform">
+<Geometry GeometryType="XY"><DataItem Dimensions="8 2" NumberType="Float" Precision="8" Format="{how}">
+{points}</DataItem></Geometry>
+<!-- the cells -->
+<Topology TopologyType="Mixed" NumberOfElements="7"><DataItem Dimensions="{count}" NumberType="Int" Format="{how}">
+{cells}</DataItem></Topology>
+<Attribute Name="material" Center="Cell"><DataItem Dimensions="7" NumberType="Int" Format="XML">1 1 1 1 2 2 2</DataItem>
+</Attribute></Grid></Domain></Xdmf>
+""".replace(" []", "")
+
+
+def xdmf_topology() -> np.ndarray:
+    """The list of mixed types."""
+    return np.concatenate([np.ravel([[4, *row] for row in TRIANGLES.tolist()]), [5, *QUADS[0].tolist()]])
+
+
+def xdmf(inside: bool = True) -> bytes:
+    """The XML, with the numbers inside or in mesh.h5."""
+    cells = xdmf_topology()
+    texts = {
+        "points": "\n".join(" ".join(map(str, row)) for row in POINTS.tolist()) if inside else "mesh.h5:/points",
+        "cells": " ".join(map(str, cells.tolist())) if inside else "mesh.h5:/cells",
+    }
+    return XDMF.format(how="XML" if inside else "HDF", count=len(cells), **texts).encode()
+
+
+def xdmf_h5(packed: bool = False) -> bytes:
+    """The file beside it."""
+
+    def fill(file: h5py.File) -> None:
+        file.create_dataset("points", data=POINTS, **(GZIP if packed else {}))
+        file.create_dataset("cells", data=xdmf_topology())
+
+    return _file(fill)
