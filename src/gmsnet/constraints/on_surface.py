@@ -36,7 +36,7 @@ def surface_of(
 
     points: (N, 3) by node ids. memory: (N,) node ids in memory order. limit: (N,) how far each may go from the facets
     or edges; None: as far as the cubics are. geometry: the true shape of what is not plane or straight. folds: the
-    facets around nodes are listed, so that none turns over. normals: as ``normals_of`` finds them, where they are known.
+    facets around nodes are listed, so that none turns over. normals: see ``normals_of``, where they are known.
     """
     slides = patches.slides | patches.curves.slides
     if not slides.any():
