@@ -31,7 +31,7 @@ MADE = {
     "organic": "organic_surface", "bracket": "bracket",
 }  # fmt: skip
 FILES = ("sph.vtk", "42400-IDGH.stl", "hemisphere.off", "maxFace.obj", "footbones.ply")
-OURS = "gmsnet auto"
+OURS = "gmsnet"
 
 
 def arrays(name: str, nodes: int) -> tuple[np.ndarray, np.ndarray]:
@@ -57,7 +57,10 @@ def row(tool: str, points: np.ndarray, rows: np.ndarray, program: str) -> str:
     with tempfile.TemporaryDirectory() as folder:
         source, target = str(Path(folder, "in.npz")), str(Path(folder, "out.npz"))
         np.savez(source, points=points, rows=rows)
-        call = [sys.executable if tool == OURS else program, str(Path(__file__).parent / "peers" / "surface_worker.py")]
+        call = [
+            sys.executable if tool.startswith(OURS) else program,
+            str(Path(__file__).parent / "peers" / "surface_worker.py"),
+        ]
         try:
             done = subprocess.run(
                 [*call, tool, source, target], capture_output=True, text=True, timeout=300, check=False

@@ -21,14 +21,17 @@ def timed(job: Callable[[], object]) -> tuple[object, float]:
     return found, time.perf_counter() - begun
 
 
-def gmsnet_auto(points: Floats, rows: NDArray[np.int64]) -> Found:
-    import gmsnet
-    from gmsnet.mesh.cell_block import CellBlock
+def gmsnet_with(**options: object) -> Tool:
+    def run(points: Floats, rows: NDArray[np.int64]) -> Found:
+        import gmsnet
+        from gmsnet.mesh.cell_block import CellBlock
 
-    mesh = gmsnet.Mesh(points, (CellBlock("triangle", rows, np.zeros(len(rows), dtype=np.int64)),))
-    gmsnet.smooth(mesh, threads=1)
-    result, seconds = timed(lambda: gmsnet.smooth(mesh, threads=1))
-    return result.points, seconds
+        mesh = gmsnet.Mesh(points, (CellBlock("triangle", rows, np.zeros(len(rows), dtype=np.int64)),))
+        gmsnet.smooth(mesh, threads=1, **options)
+        result, seconds = timed(lambda: gmsnet.smooth(mesh, threads=1, **options))
+        return result.points, seconds
+
+    return run
 
 
 def mmgs(points: Floats, rows: NDArray[np.int64]) -> Found:
@@ -93,7 +96,8 @@ def libigl_flow(points: Floats, rows: NDArray[np.int64]) -> Found:
 
 
 TOOLS: dict[str, Tool] = {
-    "gmsnet auto": gmsnet_auto,
+    "gmsnet auto": gmsnet_with(),
+    "gmsnet, feature angle 60°": gmsnet_with(feature_angle=60),
     "Mmgs (no insertion, no swap)": mmgs,
     "VTK smooth, 100 passes": vtk_laplacian,
     "VTK Taubin, 50 passes": vtk_taubin,
