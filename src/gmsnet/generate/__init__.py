@@ -1,4 +1,4 @@
-"""Test meshes: random, good, curved, adapted ones, layers, grids, deformed, tetrahedra, thrown nodes."""
+"""Test meshes: random, good, curved, adapted ones, layers, grids, deformed, volumes, thrown nodes."""
 
 from gmsnet.generate.adapted import Front, adapted_mesh
 from gmsnet.generate.c_grid import c_grid_mesh
@@ -15,8 +15,10 @@ from gmsnet.generate.outline import SHAPES
 from gmsnet.generate.random import random_mesh
 from gmsnet.generate.recombine import random_quad_mesh, recombine, split_into_quads
 from gmsnet.generate.settle import settle
+from gmsnet.generate.solids import block_volume
 from gmsnet.generate.split import split_edges
 from gmsnet.generate.structured import kershaw_mesh, structured_mesh
+from gmsnet.generate.swept import o_grid_section, swept_volume
 from gmsnet.generate.volumes import lattice_volume, part_volume, random_volume
 
 __all__ = [
@@ -24,6 +26,7 @@ __all__ = [
     "Curve",
     "Front",
     "adapted_mesh",
+    "block_volume",
     "c_grid_mesh",
     "disc_of_quads",
     "disturb",
@@ -35,6 +38,7 @@ __all__ = [
     "layered_mesh",
     "layered_volume",
     "moved_hole_mesh",
+    "o_grid_section",
     "on_circle",
     "part_volume",
     "random_mesh",
@@ -47,6 +51,7 @@ __all__ = [
     "split_edges",
     "split_into_quads",
     "structured_mesh",
+    "swept_volume",
     "swirled_mesh",
     "terrain_mesh",
     "throw",
