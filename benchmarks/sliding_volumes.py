@@ -20,7 +20,8 @@ from machine import describe
 from scipy.spatial import Delaunay
 
 import gmsnet
-from gmsnet.generate.volumes import boundary_faces, determinants, part_volume
+from gmsnet.generate.marked_volume import outer_faces
+from gmsnet.generate.volumes import determinants, part_volume
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -40,7 +41,7 @@ def thrown(cells: int, keep: Keep, share: float = 0.35, seed: int = 0) -> Mesh:
     used, rows = np.unique(rows, return_inverse=True)
     points, rows = points[used], rows.reshape(-1, 4)
     on = np.zeros(points.shape, dtype=bool)
-    for face in boundary_faces(rows):
+    for face in outer_faces({"tetra": rows})["triangle"]:
         on[face] |= np.ptp(points[face], axis=0) == 0.0
     shift = np.where(on, 0.0, np.random.default_rng(seed).uniform(-share, share, points.shape) / cells)
     while (low := determinants(points + shift, rows) < 0.02 / cells**3).any():

@@ -28,7 +28,8 @@ from volumes import _blocks, cube
 
 import gmsnet
 from gmsnet.generate import disturb
-from gmsnet.generate.volumes import boundary_faces, lattice_volume, part_volume
+from gmsnet.generate.marked_volume import outer_faces
+from gmsnet.generate.volumes import lattice_volume, part_volume
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.volume import Volume
 
@@ -71,7 +72,7 @@ class Case:
         free[topology.free] = True
         self.held = ~free[used]
         self.own = ~self.held[self.cells].all(axis=1)
-        np.savez(path, self.points, self.cells, boundary_faces(self.cells), self.held)
+        np.savez(path, self.points, self.cells, outer_faces({"tetra": self.cells})["triangle"], self.held)
 
     def figures(self, points: np.ndarray) -> tuple[float, ...]:
         """Least and mean η, smallest and largest dihedral angle, inverted cells, and how far a held node has gone."""

@@ -97,8 +97,8 @@ def reference(points: np.ndarray, cells: np.ndarray, free: np.ndarray) -> list[n
     return ends
 
 
-def minimum(points: np.ndarray, cells: np.ndarray, free: np.ndarray, power: int) -> np.ndarray:
-    """One of them."""
+def minimum(points: np.ndarray, cells: np.ndarray, free: np.ndarray, power: float, energy=energy) -> np.ndarray:
+    """One of them. energy: of the cells, as ``energy``."""
     points, gradient, weight = points.copy(), np.empty_like(points), np.empty(len(points))
     _, scale = energy(points, cells, power, 1.0, gradient, weight)
     value, _ = energy(points, cells, power, scale, gradient, weight)

@@ -1,7 +1,8 @@
-// Mesquite on a mesh of tetrahedra: mesquite_volumes WRAPPER INPUT OUTPUT
+// Mesquite on a mesh of tetrahedra or hexahedra: mesquite_volumes WRAPPER INPUT OUTPUT
 //
-// WRAPPER: ShapeImprover or ShapeImprovementWrapper, with their defaults. INPUT: the numbers of nodes and tetrahedra; x,
-// y, z and 1 for a held node or 0, a node a line; four nodes, counted from 0, a cell a line. OUTPUT: seconds of the
+// WRAPPER: ShapeImprover, ShapeImprovementWrapper or UntangleWrapper, with their defaults. INPUT: the numbers of nodes,
+// of cells, and of the corners of each (4 or 8); x, y, z and 1 for a held node or 0, a node a line; the nodes of a cell,
+// counted from 0, a line. OUTPUT: seconds of the
 // processor for the set-up from arrays and for the smoothing; x, y and z, a node a line. It is built as
 // mesquite_driver.cpp, whose first lines tell how, and named by MESQUITE_VOLUMES.
 
@@ -18,6 +19,7 @@
 #include "Mesquite_QualityAssessor.hpp"
 #include "Mesquite_ShapeImprovementWrapper.hpp"
 #include "Mesquite_ShapeImprover.hpp"
+#include "Mesquite_UntangleWrapper.hpp"
 
 namespace msq = MESQUITE_NS;
 
@@ -29,12 +31,12 @@ int main(int count, char** words) {
         return 2;
     }
     std::ifstream input(words[2]);
-    size_t nodes = 0, cells = 0;
-    input >> nodes >> cells;
+    size_t nodes = 0, cells = 0, width = 0;
+    input >> nodes >> cells >> width;
     std::vector<double> points(3 * nodes);
     std::vector<int> held(nodes);
     for (size_t k = 0; k < nodes; ++k) input >> points[3 * k] >> points[3 * k + 1] >> points[3 * k + 2] >> held[k];
-    std::vector<unsigned long> corners(4 * cells);
+    std::vector<unsigned long> corners(width * cells);
     for (unsigned long& corner : corners) input >> corner;
     if (!input) {
         std::cerr << "the input cannot be read\n";
@@ -42,10 +44,13 @@ int main(int count, char** words) {
     }
     const double began = seconds();
     msq::MsqError error;
-    msq::ArrayMesh mesh(3, nodes, points.data(), held.data(), cells, msq::TETRAHEDRON, corners.data());
+    msq::ArrayMesh mesh(3, nodes, points.data(), held.data(), cells, width == 8 ? msq::HEXAHEDRON : msq::TETRAHEDRON,
+                        corners.data());
     std::unique_ptr<msq::Wrapper> improver;
     if (std::string(words[1]) == "ShapeImprovementWrapper")
         improver.reset(new msq::ShapeImprovementWrapper());
+    else if (std::string(words[1]) == "UntangleWrapper")
+        improver.reset(new msq::UntangleWrapper());
     else
         improver.reset(new msq::ShapeImprover());
     improver->quality_assessor().disable_printing_results();

@@ -1,6 +1,7 @@
-"""Tools that move the inner nodes of tetrahedra, each from arrays: (points, seconds) of the processor, one thread.
+"""Tools that move the inner nodes of volumes, each from arrays: (points, seconds) of the processor, one thread.
 
-points (N, 3), cells (T, 4) of positive volume, faces (F, 3) of the boundary, held (N,) bool. Making the tool's own mesh
+points (N, 3), cells (T, 4) of positive volume, faces (F, 3) of the boundary, held (N,) bool. gmsnet, MFEM and Mesquite
+take hexahedra (T, 8) with faces (F, 4), too. Making the tool's own mesh
 does not count, nor does reading it; for gmsnet the whole call counts, from arrays to arrays.
 """
 
@@ -30,7 +31,7 @@ def gmsnet_with(**options: object) -> Callable[..., Found]:
     def run(points, cells, faces, held) -> Found:
         import gmsnet
 
-        mesh = (points, [("tetra", cells)])
+        mesh = (points, [("tetra" if cells.shape[1] == 4 else "hexahedron", cells)])
         gmsnet.smooth(mesh, max_sweeps=1, threads=1, fixed=held)  # compiles
         gmsnet.smooth(mesh, threads=1, fixed=held, **options)
         found = []
@@ -98,19 +99,21 @@ def mfem_tmop(metric: int, iterations: int) -> Callable[..., Found]:
         import mfem.ser as mfem
         from mfem._ser import tmop_modules as tmop
 
-        mesh = mfem.Mesh(3, len(points), len(cells), len(faces))
+        mesh, tetra = mfem.Mesh(3, len(points), len(cells), len(faces)), cells.shape[1] == 4
         for place in points.tolist():
             mesh.AddVertex(*place)
         for cell in cells.tolist():
-            mesh.AddTet(*cell)
+            (mesh.AddTet if tetra else mesh.AddHex)(*cell)
         for face in faces.tolist():
-            mesh.AddBdrTriangle(*face)
-        mesh.FinalizeTetMesh(1, 0, False)
+            (mesh.AddBdrTriangle if tetra else mesh.AddBdrQuad)(*face)
+        (mesh.FinalizeTetMesh if tetra else mesh.FinalizeHexMesh)(1, 0, False)
         mesh.EnsureNodes()
         collection = mfem.H1_FECollection(1, 3)
         space = mfem.FiniteElementSpace(mesh, collection, 3)
         mesh.SetNodalFESpace(space)
         nodes, rule = mesh.GetNodes(), mfem.IntRules.Get(mfem.Geometry.TETRAHEDRON, 1)
+        if not tetra:  # a hexahedron is judged by its corners
+            rule = mfem.IntegrationRules(0, mfem.Quadrature1D.GaussLobatto).Get(mfem.Geometry.CUBE, 1)
         metric_of = getattr(tmop, f"TMOP_Metric_{metric}")()
         target = tmop.TargetConstructor(tmop.TargetConstructor.IDEAL_SHAPE_UNIT_SIZE)
         target.SetNodes(nodes)
@@ -149,7 +152,7 @@ def mesquite(wrapper: str) -> Callable[..., Found]:
         with TemporaryDirectory() as folder:
             given, found = Path(folder, "given"), Path(folder, "found")
             with given.open("w") as file:
-                file.write(f"{len(points)} {len(cells)}\n")
+                file.write(f"{len(points)} {len(cells)} {cells.shape[1]}\n")
                 np.savetxt(file, np.column_stack([points, held]), "%.17g %.17g %.17g %d")
                 np.savetxt(file, cells, "%d")
             subprocess.run([os.environ[MESQUITE], wrapper, given, found], check=True)

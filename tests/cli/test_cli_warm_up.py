@@ -29,7 +29,7 @@ def test_unknown_kinds_are_told_before_anything_is_compiled(run, monkeypatch):
     monkeypatch.setattr(warm_up, "_use", None)
     done = run("warm-up", "--cells", "triangle", "--cells", "hexagon")
     assert (done.code, done.out) == (2, "")
-    assert "unknown kind of cells 'hexagon': known are triangle, quad, tetra, second-order" in done.err
+    assert "unknown kind of cells 'hexagon': known are triangle, quad, tetra, surface, second-order" in done.err
 
 
 @pytest.mark.long

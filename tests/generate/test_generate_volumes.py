@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 import gmsnet
 from gmsnet.errors import InputError
 from gmsnet.generate import disturb, lattice_volume, layered_volume, part_volume, random_volume
-from gmsnet.generate.volumes import CYLINDER, CYLINDER_RADIUS, SIDES, SPHERE, SPHERE_RADIUS
+from gmsnet.generate.marked_volume import SIDES
+from gmsnet.generate.volumes import CYLINDER, CYLINDER_RADIUS, SPHERE, SPHERE_RADIUS
 from gmsnet.measure.volumes import exact_signs3
 
 SMALL = settings(max_examples=20)

@@ -166,11 +166,23 @@ def test_defects_are_named():
     named = {what: rows.tolist() for what, rows in defects.defects_of(found).items()}
     assert numbers.tolist() == list(range(29))
     assert named[defects.REPEATED] == [5]
-    assert named[defects.TURNED] == [9]
+    assert found.turned["hexahedron"].tolist() == [9]
+    assert defects.TURNED not in named
     assert 27 in named[defects.FLAT]
     report = quality(mesh)
-    assert not report.valid[[5, 9, 27]].any()
+    assert not report.valid[[5, 27]].any()
+    assert report.valid[9]
     assert report.summary()["defects"][defects.REPEATED] == {"count": 1, "cells": [5]}
+
+
+def test_a_cell_that_is_folded_over_is_inside_out():
+    points, cells = lattice(2)
+    fold = points.copy()
+    fold[cells[0][0]] = [3, 3, 3]  # a corner of the cube, beyond its other end
+    mesh = Mesh(fold, (block("hexahedron", cells),))
+    assert quality(mesh).inverted == 1
+    alone = Mesh(points * [1, 1, -1], (block("hexahedron", cells[:1]), block("tetra", [cells[7][[0, 1, 3, 4]]])))
+    assert quality(alone).inverted == 0
 
 
 @pytest.mark.parametrize("diagonal", [0, 1])

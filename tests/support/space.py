@@ -22,12 +22,15 @@ def see(points, blocks, block, number, constants, step, floor, unit, grain):
     fetch3(points, blocks, block, workspace)
     derive(
         workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, number, constants, None,
-        workspace.kept, workspace.sums,
+        workspace.kept, workspace.sums, None, None, None,
     )  # fmt: skip
     for k in range(3 * LANES3):
         workspace.step[k] = step[k]
-    judge(workspace.kept, rows, blocks.cells, block, number, constants, None, workspace.step, floor, workspace.sums)
-    certify3(workspace, unit, grain)
+    judge(
+        workspace.kept, rows, blocks.cells, block, number, constants, None, workspace.step, floor, workspace.sums,
+        blocks.at[block], None, None, None,
+    )  # fmt: skip
+    certify3(workspace, unit, grain, None)
     return workspace
 
 

@@ -14,7 +14,7 @@ from gmsnet.errors import InputError
 from gmsnet.generate import disturb, lattice_volume, random_mesh, random_quad_mesh, second_order
 
 pv = pytest.importorskip("pyvista", minversion="0.48")
-from gmsnet.pyvista import Accessor, grid_of  # noqa: E402
+from gmsnet.pyvista import Accessor, accessor_of, grid_of  # noqa: E402
 
 LATTICE = lattice_volume(3)
 CURVED = second_order(random_mesh(60, seed=5))
@@ -185,3 +185,10 @@ def test_without_a_pyvista_that_takes_accessors_the_mend_is_named(tmp_path, libr
     )
     assert said in done.stdout
     assert "pip install 'pyvista>=0.48'" in done.stdout
+
+
+def test_the_accessor_for_type_checkers_is_the_same():
+    grid = grid_of(MESHES["triangle"])
+    made = accessor_of(grid).smooth(max_sweeps=2)
+    assert isinstance(accessor_of(grid), Accessor)
+    assert np.array_equal(made.points, grid.gmsnet.smooth(max_sweeps=2).points)

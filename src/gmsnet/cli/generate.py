@@ -18,17 +18,18 @@ def generate(
         str,
         typer.Option(
             help="random, structured (rows and columns, or a body-centred lattice), o-grid (layers around a body), "
-            "c-grid (and along its wake), "
-            "adapted (to a front inside), kershaw (zigzag), layered (tetrahedra on a wall), part (a cube of them "
-            "with two holes); surfaces, some of them volumes: sphere, torus, cylinder, cone, organic or "
+            "c-grid (and along its wake), swept (a disc or --shape along a way), "
+            "adapted (to a front inside), kershaw (zigzag), layered (prisms or tetrahedra on a wall) part (a cube "
+            "of tetrahedra with two holes); surfaces, some of them volumes: sphere, torus, cylinder, cone, organic or "
             "bracket (an L with fillets and holes)."
         ),
     ] = "random",
     cells: Annotated[
         str | None,
         typer.Option(
-            help="triangle, quad, mixed or tetra.",
-            show_default="triangle; mixed if o-grid, tetra if layered or part, quad if structured or kershaw",
+            help="triangle, quad, mixed, tetra, hexahedron, wedge, pyramid or mixed-volume.",
+            show_default="triangle; mixed if o-grid, tetra if layered or part, hexahedron if swept, quad if "
+            "structured or kershaw",
         ),
     ] = None,
     shape: Annotated[
@@ -55,7 +56,8 @@ def generate(
         int | None, typer.Option(help="Of random: sweeps of Laplacian smoothing of the triangles.", show_default="0")
     ] = None,
     columns: Annotated[
-        int | None, typer.Option(help="Of structured, kershaw, layered and part: columns of quads, or of the lattice.")
+        int | None,
+        typer.Option(help="Columns of quads, cubes or the lattice, of the square inside an O-grid that is swept."),
     ] = None,
     rows: Annotated[int | None, typer.Option(help="Of structured and kershaw: rows of quads.")] = None,
     flatness: Annotated[
@@ -68,7 +70,7 @@ def generate(
         bool, typer.Option("--interface", help="Of structured mixed: the patch is a region of its own.")
     ] = False,
     layers: Annotated[
-        int | None, typer.Option(help="Of o-grid, c-grid and layered: rows of stretched cells.", show_default="20; 8")
+        int | None, typer.Option(help="Of o-grid, c-grid, layered and swept: rows of cells.", show_default="20; 8")
     ] = None,
     aspect: Annotated[
         float | None,
@@ -80,6 +82,12 @@ def generate(
         int | None, typer.Option(help="Of o-grid and c-grid: nodes on the wall.", show_default="120")
     ] = None,
     body: Annotated[str | None, typer.Option(help="Of o-grid: airfoil or circle.", show_default="airfoil")] = None,
+    twist: Annotated[
+        float | None, typer.Option(help="Of swept: by how many degrees the section turns.", show_default="0")
+    ] = None,
+    bend: Annotated[
+        float | None, typer.Option(help="Of swept: of how many degrees the way is an arc.", show_default="0")
+    ] = None,
     seed: Annotated[int, typer.Option(help="The same seed makes the same mesh.")] = 0,
     jitter: Annotated[
         float,
@@ -113,7 +121,7 @@ def generate(
     options = {
         "shape": shape, "rings": rings, "nodes": nodes, "boundary": boundary, "settle": settle, "columns": columns,
         "rows": rows, "flatness": flatness, "share": share, "interface": interface or None, "layers": layers,
-        "aspect": aspect, "around": around, "body": body,
+        "aspect": aspect, "around": around, "body": body, "twist": twist, "bend": bend,
     }  # fmt: skip
     given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
     kind, generator = chosen(pattern, cells, given)
@@ -121,21 +129,20 @@ def generate(
         given["rings"] = _read_rings(rings)
     made = generator.make(given, size, seed)
     mesh = made.mesh if isinstance(made, Shaped) else made
-    border = mesh.cells[-1]
+    border = [block for block in mesh.cells if block.dimension == (2 if mesh.has_volumes else 1)]
     if jitter and isinstance(made, Shaped):
         mesh = disturb_on(made, jitter, seed=seed, keep_valid=not tangled, edge=jitter_edge or "mean").mesh
     elif jitter:
         inner = np.ones(len(mesh.points), dtype=bool)
-        inner[border.nodes] = False
+        inner[np.concatenate([block.nodes.ravel() for block in border])] = False
         mesh = disturb(mesh, inner, jitter, seed=seed, keep_valid=not tangled, edge=jitter_edge or "mean")
     aside = is_standard_output(out)  # where the mesh itself goes; a file is another one once it is replaced
     lost = write(mesh, out, format)
     domain = "cube" if mesh.has_volumes else "square"
     what = f"{pattern} {kind}" if pattern != "random" else str(rings or shape or domain)
     sort = f"{'marked' if interface else 'boundary'} {'faces' if mesh.has_volumes else 'edges'}"
-    inner_blocks = mesh.cells[: -1 if len(mesh.cells) > 1 else None]
-    counts = ", ".join(f"{len(block.nodes):,} {block.kind}s" for block in inner_blocks)
-    counts += f" and {len(border.nodes):,} {sort}" if len(mesh.cells) > 1 else ""
+    counts = ", ".join(f"{len(block.nodes):,} {block.kind}s" for block in mesh.cells[: len(mesh.cells) - len(border)])
+    counts += f" and {sum(len(block.nodes) for block in border):,} {sort}" if border else ""
     typer.echo(
         f"{'standard output' if out == '-' else out}: {what} with {len(mesh.points):,} nodes, {counts} (seed {seed})",
         err=aside,

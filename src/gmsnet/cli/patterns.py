@@ -89,11 +89,48 @@ def _random_volume(given: Given, size: float, seed: int) -> Mesh:
     return random_volume(given.get("nodes", NODES), size=size, seed=seed)
 
 
-def _layered_volume(given: Given, size: float, seed: int) -> Mesh:
-    from gmsnet.generate import layered_volume
+def _layered_volume(kind: str) -> Callable[[Given, float, int], Mesh]:
+    def make(given: Given, size: float, seed: int) -> Mesh:
+        from gmsnet.generate import layered_volume
 
-    first = {"first": 1.0 / given["aspect"]} if given.get("aspect", 0.0) > 0.0 else {}
-    return layered_volume(given.get("columns", 10), given.get("layers", 8), size=size, seed=seed, **first)
+        first = {"first": 1.0 / given["aspect"]} if given.get("aspect", 0.0) > 0.0 else {}
+        columns, layers = given.get("columns", 10), given.get("layers", 8)
+        return layered_volume(columns, layers, kind=kind, size=size, seed=seed, **first)
+
+    return make
+
+
+def _block(kind: str) -> Callable[[Given, float, int], Mesh]:
+    def make(given: Given, size: float, seed: int) -> Mesh:
+        from gmsnet.generate import block_volume
+
+        return block_volume(given.get("columns", _side_of(given)), kind, size=size)
+
+    return make
+
+
+def _swept(kind: str) -> Callable[[Given, float, int], Mesh]:
+    def make(given: Given, size: float, seed: int) -> Mesh:
+        from gmsnet.generate import o_grid_section, random_mesh, settle, swept_volume
+
+        side, layers = _side_of(given), given.get("layers", 8)
+        if kind == "hexahedron":
+            columns = given.get("columns", side)
+            section = o_grid_section(columns, max(1, columns // 2), radius=0.5 * size)
+        else:
+            section = settle(random_mesh(max(1, side * side), _outline(given), size=size, seed=seed), 20)
+        return swept_volume(section, layers, 2.0 * size, **_named(given, "twist", "bend"))
+
+    return make
+
+
+def _side_of(given: Given) -> int:
+    """Cells on each side of a grid with about so many nodes inside."""
+    nodes = given.get("nodes", NODES)
+    if nodes < 1:
+        raise InputError(f"a mesh needs at least 1 node inside, got --nodes {nodes}")
+    side: int = round(nodes ** (1 / 3))
+    return 1 + max(1, side)
 
 
 def _lattice(name: str) -> Callable[[Given, float, int], Mesh]:
@@ -126,6 +163,7 @@ def _cells_of(nodes: int) -> int:
 
 RANDOM = frozenset({"nodes", "shape", "rings", "boundary", "settle"})
 GRID = frozenset({"nodes", "columns", "rows"})
+SWEPT = frozenset({"nodes", "layers", "twist", "bend"})
 LAYERS = frozenset({"layers", "aspect", "around", "body"})
 
 PATTERNS: dict[str, dict[str, Generator]] = {  # pattern → its cells, the default first → generator
@@ -139,6 +177,10 @@ PATTERNS: dict[str, dict[str, Generator]] = {  # pattern → its cells, the defa
         "quad": Generator(_structured, GRID),
         "mixed": Generator(_hybrid, frozenset({"nodes", "share", "interface"})),
         "tetra": Generator(_lattice("lattice_volume"), frozenset({"nodes", "columns"})),
+        "hexahedron": Generator(_block("hexahedron"), frozenset({"nodes", "columns"})),
+        "wedge": Generator(_block("wedge"), frozenset({"nodes", "columns"})),
+        "pyramid": Generator(_block("pyramid"), frozenset({"nodes", "columns"})),
+        "mixed-volume": Generator(_block("mixed"), frozenset({"nodes", "columns"})),
     },
     "o-grid": {
         "mixed": Generator(_around_body("layered_mesh", "mixed"), LAYERS),
@@ -151,8 +193,15 @@ PATTERNS: dict[str, dict[str, Generator]] = {  # pattern → its cells, the defa
     },
     "adapted": {"triangle": Generator(_adapted, frozenset({"nodes", "aspect"}))},
     "kershaw": {"quad": Generator(_kershaw, GRID | {"flatness"})},
-    "layered": {"tetra": Generator(_layered_volume, frozenset({"columns", "layers", "aspect"}))},
+    "layered": {
+        "tetra": Generator(_layered_volume("tetra"), frozenset({"columns", "layers", "aspect"})),
+        "wedge": Generator(_layered_volume("wedge"), frozenset({"columns", "layers", "aspect"})),
+    },
     "part": {"tetra": Generator(_lattice("part_volume"), frozenset({"nodes", "columns"}))},
+    "swept": {
+        "hexahedron": Generator(_swept("hexahedron"), SWEPT | {"columns"}),
+        "wedge": Generator(_swept("wedge"), SWEPT | {"shape"}),
+    },
     "sphere": {
         "triangle": _shaped("sphere_surface"),
         "quad": _shaped("sphere_surface", cells="quad"),

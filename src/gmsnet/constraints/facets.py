@@ -11,6 +11,7 @@ from gmsnet.constraints.features import lengths_of
 from gmsnet.constraints.outline import Flags, Longs, line_cells, mark_sets
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.held import SMOOTHED
+from gmsnet.topology.solids import WoundSolids, halved
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.wound import Wound
 
@@ -38,12 +39,12 @@ class Facets:
     halves: int = 0
 
 
-def boundary_of(mesh: Mesh, wound: Wound) -> Facets:
-    """The boundary of the tetrahedra of a mesh."""
+def boundary_of(mesh: Mesh, wound: Wound | WoundSolids) -> Facets:
+    """The boundary of the volumes of a mesh; its quadrilaterals are halved."""
     rows = wound.memory[wound.boundary].astype(np.int64)
-    region = wound.region[wound.outer >> 2] if len(wound.region) else np.zeros(len(rows), dtype=np.int64)
+    region = wound.region[wound.boundary_cell] if len(wound.region) else np.zeros(len(rows), dtype=np.int64)
     lines, line_marks, still = line_cells(mesh)
-    marks, names = _marks(mesh, rows, still)
+    marks, names = _marks(mesh, rows, still, halves=isinstance(wound, WoundSolids))
     table, label = np.unique(np.column_stack([region, marks]), axis=0, return_inverse=True)
     return Facets(rows, label.reshape(-1), tuple(names[row] for row in table[:, 1].tolist()), lines, line_marks, still)
 
@@ -65,16 +66,19 @@ def surface_itself(mesh: Mesh, topology: Topology) -> Facets:
     return Facets(every, label.reshape(-1).astype(np.int64), names, lines, line_marks, still, False, len(halves))
 
 
-def _marks(mesh: Mesh, rows: Longs, still: Flags) -> tuple[Longs, list[tuple[str, ...]]]:
+def _marks(mesh: Mesh, rows: Longs, still: Flags, *, halves: bool) -> tuple[Longs, list[tuple[str, ...]]]:
     """The set of marks of each facet as a number, and the names behind each number (``mark_sets``).
 
-    Nodes of surface cells that are none of the facets become still.
+    Nodes of surface cells that are none of the facets become still. halves: quadrilaterals are two of them each.
     """
     faces, marks = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     for block in mesh.cells:
         if block.dimension == 2 and block.kind == "triangle":
             faces.append(block.nodes)
             marks.append(block.regions)
+        elif block.kind == "quad" and halves:
+            faces.append(halved(block.nodes))
+            marks.append(np.repeat(block.regions, 2))
         elif block.dimension == 2:
             still[block.nodes] = True
     cells, numbers = np.concatenate(faces), np.concatenate(marks)

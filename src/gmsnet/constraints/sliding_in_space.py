@@ -22,6 +22,7 @@ from gmsnet.kernels.star.surface import Surface
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import space_points
 from gmsnet.topology.polygons import Ints
+from gmsnet.topology.solids import WoundSolids
 from gmsnet.topology.wound import Wound
 
 Floats = NDArray[np.float64]
@@ -94,10 +95,10 @@ def area_of(points: Floats, facets: Facets) -> float:
 
 
 def patches_to_slide_on(
-    mesh: Mesh, wound: Wound, names: Sequence[str] | None, feature_angle: float = FEATURE_ANGLE,
+    mesh: Mesh, wound: Wound | WoundSolids, names: Sequence[str] | None, feature_angle: float = FEATURE_ANGLE,
     held: Flags | None = None,
 ) -> tuple[Facets, Patches] | None:  # fmt: skip
-    """The boundary of a mesh of tetrahedra and its patches; None where no node is to slide.
+    """The boundary of a mesh of volumes and its patches; None where no node is to slide.
 
     names: as ``check_slide`` gives them. held: (N,) bool.
     """

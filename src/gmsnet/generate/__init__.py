@@ -1,4 +1,4 @@
-"""Test meshes: random, good, curved, adapted ones, layers, grids, deformed, surfaces, tetrahedra, thrown nodes."""
+"""Test meshes: random, good, curved, adapted ones, layers, grids, deformed, surfaces, volumes, thrown nodes."""
 
 from gmsnet.generate.adapted import Front, adapted_mesh
 from gmsnet.generate.c_grid import c_grid_mesh
@@ -17,9 +17,11 @@ from gmsnet.generate.random import random_mesh
 from gmsnet.generate.recombine import random_quad_mesh, recombine, split_into_quads
 from gmsnet.generate.settle import settle
 from gmsnet.generate.shaped import Shaped, disturb_on
+from gmsnet.generate.solids import block_volume
 from gmsnet.generate.split import split_edges
 from gmsnet.generate.structured import kershaw_mesh, structured_mesh
 from gmsnet.generate.surfaces import ball_volume, cone_surface, organic_surface, sphere_surface, torus_surface
+from gmsnet.generate.swept import o_grid_section, swept_volume
 from gmsnet.generate.volumes import lattice_volume, part_volume, random_volume
 
 __all__ = [
@@ -29,6 +31,7 @@ __all__ = [
     "Shaped",
     "adapted_mesh",
     "ball_volume",
+    "block_volume",
     "bracket",
     "c_grid_mesh",
     "cone_surface",
@@ -44,6 +47,7 @@ __all__ = [
     "layered_mesh",
     "layered_volume",
     "moved_hole_mesh",
+    "o_grid_section",
     "on_circle",
     "organic_surface",
     "part_volume",
@@ -58,6 +62,7 @@ __all__ = [
     "split_edges",
     "split_into_quads",
     "structured_mesh",
+    "swept_volume",
     "swirled_mesh",
     "terrain_mesh",
     "throw",

@@ -10,10 +10,11 @@ from scipy.spatial import ConvexHull
 
 from gmsnet.constraints.shapes import Cone, Plane, Shape, Sphere, Star, Torus, units
 from gmsnet.generate.arguments import one_of, positive, whole_number
+from gmsnet.generate.marked_volume import outer_faces
 from gmsnet.generate.refined import refined
 from gmsnet.generate.shaped import Shaped, faced
 from gmsnet.generate.structured import grid_quads
-from gmsnet.generate.volumes import boundary_faces, determinants
+from gmsnet.generate.volumes import determinants
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -118,7 +119,7 @@ def in_faces(points: Floats, rows: Ints, faces: Mapping[str, Shape], face_of: Ca
     """Tetrahedra of the region "domain", turned to be positive, and their boundary, whose faces a function tells."""
     negative = determinants(points, rows) < 0.0
     rows[negative] = rows[negative][:, [0, 2, 1, 3]]
-    facets = boundary_faces(rows)
+    facets = outer_faces({"tetra": rows})["triangle"]
     region = np.broadcast_to(face_of(facets), len(facets)) + 1
     names = {(3, 1): "domain"} | {(2, k): name for k, name in enumerate(faces, start=1)}
     cells = CellBlock("tetra", rows, np.ones(len(rows), dtype=np.int64))

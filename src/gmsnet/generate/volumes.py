@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from gmsnet.cells.tetrahedron import TETRAHEDRON
 from gmsnet.generate.arguments import positive, whole_number
+from gmsnet.generate.marked_volume import SIDES, marked_volume, on_sides, outer_faces
 from gmsnet.generate.random import generator
-from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SIDES = ("left", "right", "front", "back", "bottom", "top")  # x = 0, x = 1, y = 0, …
 WEIGHT = 1e-3  # of the random weights, in squared spacings: enough to decide, too little to see
 ROUNDS = 8  # of steps towards the holes
 KEPT = 0.2  # of its volume: what a cell keeps at least when nodes go onto a hole
@@ -48,7 +44,7 @@ def random_volume(nodes: int, *, size: float = 1.0, seed: int = 0) -> Mesh:
     points = np.concatenate([outer, margin + (1.0 - 2.0 * margin) * rng.random((nodes, 3))])
     weight = np.zeros(len(points))
     weight[: len(outer)] = WEIGHT / count**2 * rng.random(len(outer))
-    return marked(points, _regular(points, weight, 1e-12 / count**3), on_sides, SIDES, size)
+    return marked_volume(points, {"tetra": _regular(points, weight, 1e-12 / count**3)}, on_sides, SIDES, size)
 
 
 def lattice_volume(cells: int, *, size: float = 1.0) -> Mesh:
@@ -58,7 +54,8 @@ def lattice_volume(cells: int, *, size: float = 1.0) -> Mesh:
     ``disturb`` throws the nodes out of place. Region, markers and errors are as in ``random_volume``.
     """
     cells = whole_number(cells, "the number of cells", 1)
-    return marked(*_lattice(cells), on_sides, SIDES, positive(size, "the size"))
+    points, rows = _lattice(cells)
+    return marked_volume(points, {"tetra": rows}, on_sides, SIDES, positive(size, "the size"))
 
 
 def part_volume(cells: int, *, size: float = 1.0) -> Mesh:
@@ -78,7 +75,7 @@ def part_volume(cells: int, *, size: float = 1.0) -> Mesh:
     left = tetrahedra[(_from_cylinder(centre)[1] >= 0.0) & (_from_sphere(centre)[1] >= 0.0)]
     used, rows = np.unique(left, return_inverse=True)
     points, rows = points[used], rows.reshape(left.shape)
-    faces = boundary_faces(rows)
+    faces = outer_faces({"tetra": rows})["triangle"]
     of = _on_part(points, faces)
     holes = [
         (np.unique(faces[of == len(SIDES)]), _from_cylinder),
@@ -90,15 +87,7 @@ def part_volume(cells: int, *, size: float = 1.0) -> Mesh:
         for nodes, towards in holes:
             shift[nodes] = towards(points[nodes])[0]
         points += _halved(points, shift, rows, least)
-    return marked(points, rows, lambda points, faces: of, (*SIDES, "cylinder", "sphere"), size)
-
-
-def boundary_faces(tetrahedra: Ints) -> Ints:
-    """(B × 3) the facets of one tetrahedron alone, seen from outside, in the order of the cells."""
-    facets = tetrahedra[:, TETRAHEDRON.facets].reshape(-1, 3)
-    _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
-    found: Ints = facets[np.sort(first[count == 1])]
-    return found
+    return marked_volume(points, {"tetra": rows}, lambda points, faces: of, (*SIDES, "cylinder", "sphere"), size)
 
 
 def determinants(points: Floats, tetrahedra: Ints) -> Floats:
@@ -167,14 +156,6 @@ def _radial(spoke: Floats, radius: float) -> tuple[Floats, Floats]:
     return spoke * (radius / np.maximum(length, 1e-300) - 1.0)[:, None], length - radius
 
 
-def on_sides(points: Floats, faces: Ints) -> Ints:
-    """(B,) which side of the unit cube each face lies in, 6 for none."""
-    corners = points[faces]
-    on = np.stack([(corners[:, :, k // 2] == k % 2).all(axis=1) for k in range(6)])
-    side: Ints = np.where(on.any(axis=0), on.argmax(axis=0), len(SIDES))
-    return side
-
-
 def _on_part(points: Floats, faces: Ints) -> Ints:
     """The same, 6 for the cylinder and 7 for the sphere: where no side, the nearer of the two."""
     side, centre = on_sides(points, faces), points[faces].mean(axis=1)
@@ -191,14 +172,3 @@ def _halved(points: Floats, shift: Floats, rows: Ints, least: Floats) -> Floats:
             return shift
         shift[np.unique(rows[bad])] *= 0.5
     return np.zeros_like(shift)
-
-
-def marked(
-    points: Floats, rows: Ints, side_of: Callable[[Floats, Ints], Ints], markers: tuple[str, ...], size: float
-) -> Mesh:
-    """The mesh of some tetrahedra in the region "domain" and of the faces around them by marker."""
-    faces = boundary_faces(rows)
-    number = side_of(points, faces) + 1
-    names: Mapping[tuple[int, int], str] = {(3, 1): "domain"} | {(2, k): name for k, name in enumerate(markers, 1)}
-    domain = CellBlock("tetra", rows, np.ones(len(rows), dtype=np.int64))
-    return Mesh(points * size, (domain, CellBlock("triangle", faces, number)), names)

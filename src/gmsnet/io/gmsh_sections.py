@@ -24,13 +24,17 @@ from gmsnet.io.text import Text, fail, quoted
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 from gmsnet.kernels.text import text as kernels
 
+_HEX20 = (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)
+_WEDGE15 = (*range(6), 6, 9, 7, 12, 14, 13, 8, 10, 11)
+_PYRAMID13 = (*range(5), 5, 8, 10, 6, 7, 9, 11, 12)
 # Gmsh's types of elements: the name, the number of nodes and, where Gmsh's order differs, the places of Mesh's nodes.
 KINDS = {
     1: Kind("line"), 2: Kind("triangle"), 3: Kind("quad"), 4: Kind("tetra"), 5: Kind("hexahedron"), 6: Kind("wedge"),
     7: Kind("pyramid"), 8: Kind("line3"), 9: Kind("triangle6"), 10: Kind("quad9"),
     11: Kind("tetra10", (0, 1, 2, 3, 4, 5, 6, 7, 9, 8)), 15: Kind("vertex"), 16: Kind("quad8"),
-    17: Kind("hexahedron20", (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)), 21: Kind("triangle10"),
-    26: Kind("line4"),
+    12: Kind("hexahedron27", (*_HEX20, 22, 23, 21, 24, 20, 25, 26)), 13: Kind("wedge18", (*_WEDGE15, 15, 17, 16)),
+    14: Kind("pyramid14", (*_PYRAMID13, 13)), 17: Kind("hexahedron20", _HEX20), 18: Kind("wedge15", _WEDGE15),
+    19: Kind("pyramid13", _PYRAMID13), 21: Kind("triangle10"), 26: Kind("line4"),
 }  # fmt: skip
 SIZES = np.array([nodes_of(KINDS[code].name) if code in KINDS else 0 for code in range(max(KINDS) + 1)], dtype=np.int8)
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.io.fields import LARGEST
+from gmsnet.io.nastran_decimals import rounded
 from gmsnet.io.nastran_lines import Bulk, Ints
 from gmsnet.io.text import fail, quoted
 from gmsnet.mesh.rounding import Rounding
@@ -177,9 +178,13 @@ def _scientific(value: float, width: int) -> str:
 
 def kept(widths: NDArray[np.int64], points: Floats, nodes: Ints) -> Floats:
     """The points as fields of ``widths[node]`` columns hold them (see Rounding.keep)."""
-    out = [[worth(fitted(x, width)) for x in row] for row, width in zip(points.tolist(), widths[nodes].tolist(),
-                                                                      strict=True)]  # fmt: skip
-    return np.array(out).reshape(points.shape)
+    flat, columns = points.reshape(-1), np.repeat(widths[nodes], points.shape[1])
+    out, sure = rounded(flat, columns)
+    zero = flat == 0.0
+    out[zero] = flat[zero]
+    left = np.flatnonzero(~sure & ~zero)
+    out[left] = [worth(fitted(x, width)) for x, width in zip(flat[left].tolist(), columns[left].tolist(), strict=True)]
+    return out.reshape(points.shape)
 
 
 def rounding_of(widths: NDArray[np.int64], points: Floats) -> Rounding:

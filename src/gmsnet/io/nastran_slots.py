@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gmsnet.io import splice
 from gmsnet.io.contents import Data
+from gmsnet.io.nastran_decimals import texts
 from gmsnet.io.nastran_lines import LARGE, WIDTH, Bulk, Cards, Ints
 from gmsnet.io.nastran_numbers import fitted
 from gmsnet.io.pieces import Piece
@@ -37,19 +38,22 @@ class FieldSlots:
         for first in range(0, len(new), step):
             some = slice(first, first + step)
             node, axis = np.nonzero(old[some] != new[some])
-            for k in np.argsort(self.starts[some][node, axis], kind="stable").tolist():
-                where = first + int(node[k]), int(axis[k])
-                start, end = int(self.starts[where]), int(self.ends[where])
-                yield view[at:start]
-                yield self._field(bytes(view[start:end]), float(new[where]), where[0])
+            order = np.argsort(self.starts[some][node, axis], kind="stable")
+            node, axis = first + node[order], axis[order]
+            values, widths, pieces = new[node, axis], self.widths[node], list[Piece]()
+            rows = zip(self.starts[node, axis].tolist(), self.ends[node, axis].tolist(), texts(values, widths),
+                       values.tolist(), widths.tolist(), self.free[node].tolist(), strict=True)  # fmt: skip
+            for start, end, text, value, width, free in rows:
+                number = (fitted(value, width) if text is None else text).encode()
+                pieces += [view[at:start], self._field(view[start:end].tobytes(), number, width, free)]
                 at = end
+            yield b"".join(pieces)
         yield view[at:]
 
-    def _field(self, old: bytes, value: float, node: int) -> bytes:
+    @staticmethod
+    def _field(old: bytes, text: bytes, width: int, free: bool) -> bytes:
         """A field with another number in it, at the side where the old one was."""
-        width = int(self.widths[node])
-        text = fitted(value, width).encode()
-        if self.free[node]:
+        if free:
             word = old.strip()
             return old.replace(word, text) if word else text
         if len(old) < width:  # at the end of a line, which may become longer

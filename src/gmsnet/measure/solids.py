@@ -18,6 +18,7 @@ from gmsnet.measure.solid import judge_volumes
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.plane import exponent_of
 from gmsnet.topology.ordering import space_points
+from gmsnet.topology.solids import WoundSolids, has_solids
 
 Floats = NDArray[np.float64]
 Signs = NDArray[np.int8]
@@ -57,17 +58,18 @@ class MeasuredSolids:
     def of(cls, mesh: Mesh) -> tuple[MeasuredSolids, NDArray[np.int64]]:
         """Those of a mesh, and the index of each among all its cells.
 
-        Cells of a kind are read inside out where most of them, with straight edges, have a negative size.
+        Cells with straight edges are wound alike with those that they share facets with; others of a kind are read
+        inside out where most of them, with straight edges, have a negative size.
         """
         blocks, before = [], 0
-        points = space_points(mesh)
+        points, wound = space_points(mesh), _wound(mesh)
         for block in mesh.cells:
             if has_form(block.kind) and len(block.nodes):
                 nodes = block.nodes.astype(np.int32)
-                orientation = np.ones(len(nodes), dtype=np.int8)
-                corners = straight_size(points, nodes, CELLS[block.kind])
-                if int((corners < 0.0).sum()) > int((corners > 0.0).sum()):
-                    orientation *= -1
+                size = straight_size(points, nodes, CELLS[block.kind])
+                most = -1 if int((size < 0.0).sum()) > int((size > 0.0).sum()) else 1
+                known = wound[before : before + len(nodes)]
+                orientation = np.where(known == 0, np.int8(most), known)
                 blocks.append(Solids(block.kind, nodes, np.arange(before, before + len(nodes)), orientation))
             before += len(block.nodes)
         return cls._of(mesh, blocks)
@@ -194,3 +196,12 @@ class MeasuredSolids:
             corners = CELLS[block.kind].corners or 1
             found.append((self.points / corners)[block.nodes[:, :corners]].sum(axis=1))
         return self.in_order(np.concatenate(found).T).T
+
+
+def _wound(mesh: Mesh) -> Signs:
+    """The orientation of each cell of a mesh, 0 for those that are not wound."""
+    found = np.zeros(sum(len(block.nodes) for block in mesh.cells), dtype=np.int8)
+    if has_solids(mesh):
+        wound = WoundSolids.of(mesh)
+        found[wound.cell[wound.origin]] = wound.orientation
+    return found

@@ -40,7 +40,7 @@ from gmsnet.methods.base import ALL_CELLS, Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.below_in_space import BelowInSpace
 from gmsnet.methods.creep import Creep
-from gmsnet.methods.phases import NEWTON, SMALL_PLAN, SURFACE_PLAN, VOLUME_PLAN, WORST, Phase, plan_for
+from gmsnet.methods.phases import MIXED_PLAN, NEWTON, SMALL_PLAN, SURFACE_PLAN, VOLUME_PLAN, WORST, Phase, plan_for
 from gmsnet.methods.whole_mesh import CLOSEST, SETTLED, WholeMesh
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
@@ -60,7 +60,7 @@ WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
 GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
 EXACT = 20_000  # free nodes: up to so many, all nodes of such a mesh go to the minimum of Σq, which is near
-IN_SPACE = (VOLUME_PLAN, SURFACE_PLAN)
+IN_SPACE = (VOLUME_PLAN, MIXED_PLAN, SURFACE_PLAN)
 NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
 
 

@@ -29,6 +29,7 @@ from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.stars import Stars
 from gmsnet.topology.topology import Topology
@@ -64,6 +65,8 @@ class Field:
 
     def guard(self, executor: Executor) -> Guard:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
+        if isinstance(self.topology, MixedVolume):
+            self.topology.lend_slack(self)
         if self.level == WORST:
             floor = self.floor.of(self.points, self.topology, self.precision, executor)
             return MeshGuard(*self.precision, floor, self.constraint)

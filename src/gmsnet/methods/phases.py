@@ -9,7 +9,9 @@ from typing import NamedTuple
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Smoother
 from gmsnet.methods.optimize import Newton
+from gmsnet.methods.to_the_end import ToTheEnd
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
+from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
@@ -87,10 +89,14 @@ SURFACE_PLAN = (
 )
 
 
+# Of other volumes, grids among which have an ideal mesh.
+MIXED_PLAN = (*VOLUME_PLAN, Phase("Newton on q, in float64", ToTheEnd, 1))
+
+
 def plan_for(topology: Topology | Volume) -> Sequence[Phase]:
     """The phases for a mesh of this size and these cells."""
     if isinstance(topology, Volume):
-        return VOLUME_PLAN
+        return MIXED_PLAN if isinstance(topology, MixedVolume) else VOLUME_PLAN
     if isinstance(topology, Shell):
         return SURFACE_PLAN
     if len(topology.free) <= SMALL:

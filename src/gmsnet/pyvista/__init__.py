@@ -4,11 +4,11 @@ PyVista imports this package by the entry points ``pyvista.accessors`` and ``pyv
 for. ``import gmsnet.pyvista`` does the same at once.
 """
 
-from gmsnet.pyvista.accessor import Accessor
+from gmsnet.pyvista.accessor import Accessor, accessor_of
 from gmsnet.pyvista.grid import grid_of
 from gmsnet.pyvista.library import pyvista
 
-__all__ = ["Accessor", "grid_of"]
+__all__ = ["Accessor", "accessor_of", "grid_of"]
 
 for _target in (pyvista.PolyData, pyvista.UnstructuredGrid):
     pyvista.register_dataset_accessor("gmsnet", _target, override=True)(Accessor)

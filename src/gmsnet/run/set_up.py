@@ -39,7 +39,7 @@ from gmsnet.topology.ordering import space_points, taken
 from gmsnet.topology.solids import KINDS, has_solids
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
-from gmsnet.topology.wound import refuse_flat
+from gmsnet.topology.wound import Wound, refuse_flat
 
 Floats = NDArray[np.float64]
 
@@ -145,7 +145,11 @@ def _first_of_volume(
     """The same of a mesh of tetrahedra."""
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     wound, sliding = wound_of(given, asked), None
-    surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked)
+    surface = None
+    if isinstance(wound, Wound):
+        surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked)
+    elif names != ():
+        raise InputError("boundary nodes of hexahedra, wedges and pyramids cannot slide yet: leave slide out")
     if surface is None:
         topology = volume_of(wound)
     else:

@@ -35,7 +35,8 @@ class MixedVolume(Volume):
     joined to it by an edge: the first of its ring. role, owner: (M,) of the simplices at nodes (kernels.star.space).
     order: (N,) by which stars stand beside one another. inexact_at, inexact: in CSR form the cells at each node that
     may be invalid though their corner simplices are positive. file_numbers: (T,) the kind of each cell in file order, a
-    number in file_kinds.
+    number in file_kinds. slack: (T,) of each cell near in memory (kernels.star.space), which is lent to one Field:
+    lent has it.
     """
 
     all_simplices: Tetrahedra
@@ -47,6 +48,8 @@ class MixedVolume(Volume):
     inexact_at: NDArray[np.int64]
     inexact: Ints
     file_numbers: NDArray[np.uint8]
+    slack: NDArray[np.float64]
+    lent: list[object]
     file_kinds = KINDS
 
     @classmethod
@@ -96,8 +99,15 @@ class MixedVolume(Volume):
             wound.cell, wound.cells, of_file, simplices.rows, simplices.orientation, wound.origin[simplices.cells], own,
             local[:total].copy(), ring_start, ring[:end].copy(), Colouring(places, ring_start, padded), slid,
             simplices, core, edges, role[:total].copy(), owner[:total].copy(), order.astype(np.int64), inexact_at,
-            cell[chosen], kinds, held=held, free=free, memory=wound.memory, near_free=marks == 0,
+            cell[chosen], kinds, np.zeros(len(kind)), [None],
+            held=held, free=free, memory=wound.memory, near_free=marks == 0,
         )  # fmt: skip
+
+    def lend_slack(self, field: object) -> None:
+        """To a Field, whose points its guard alone moves from now on: what was known of others is forgotten."""
+        if self.lent[0] is not field:
+            self.slack[:] = 0.0
+            self.lent[0] = field
 
     @property
     def inside_out(self) -> str:
@@ -106,7 +116,7 @@ class MixedVolume(Volume):
         return ", ".join(f"{count:,} {name}" for name, count in zip(KINDS[1:], counts, strict=True) if count)
 
     @property
-    def simplices(self) -> Tetrahedra:  # type: ignore[override]
+    def simplices(self) -> Tetrahedra:
         """See Volume."""
         return self.all_simplices
 
@@ -115,7 +125,7 @@ class MixedVolume(Volume):
         simplices = self.all_simplices
         assert simplices.solids is not None
         assert simplices.cells is not None
-        cells = chosen[simplices.solids.nodes].any(axis=1)
+        cells: Flags = np.asarray(chosen[simplices.solids.nodes].any(axis=1))
         return np.flatnonzero(cells[simplices.cells]).astype(np.int32)
 
     @cached_property
@@ -158,7 +168,7 @@ class MixedVolume(Volume):
         mixture = Mixture(
             np.empty(total, dtype=np.uint8), np.hstack([weights, sigma, sigma / 3.0]).astype(np.float32), weights,
             np.empty(total, dtype=np.uint16), np.empty(total * LANES3, dtype=np.int32),
-            np.empty(count * LANES3, dtype=np.int32), solids, self.inexact_at, self.inexact,
+            np.empty(count * LANES3, dtype=np.int32), solids, self.inexact_at, self.inexact, self.slack,
         )  # fmt: skip
         made = SpaceBlocks(
             np.empty(count * LANES3, dtype=np.int32), np.empty(ring_begin[-1], dtype=np.int32), ring_begin[:-1],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,8 +57,10 @@ def tables() -> Tables:
             rest = sorted(set(range(kind.corners or 0)) - together)
             for turn, found in enumerate((joined, others, rest)):
                 around[turn, number, corner, : len(found)] = found
-    whole = [table.astype(np.int32) for table in (facets, around, simplices)]
-    return Tables(*whole, np.array([not kind.exact for kind in kinds]), facets_at)
+    inexact = np.array([not kind.exact for kind in kinds])
+    return Tables(
+        facets.astype(np.int32), around.astype(np.int32), simplices.astype(np.int32), inexact, facets_at
+    )  # fmt: skip
 
 
 @cache
@@ -135,6 +138,27 @@ class WoundSolids:
         return cls(cell, cells, solids, corners, orientation, region, origin, twin, marks, memory, position)
 
     @cached_property
+    def boundary_cell(self) -> NDArray[np.int64]:
+        """(F,) the cell of each triangle of ``boundary``."""
+        return self._outside[0]
+
+    @cached_property
+    def boundary(self) -> Ints:
+        """(F, 3) the facets of one cell alone, counter-clockwise as seen from outside; those of four are ``halved``."""
+        return self._outside[1]
+
+    @cached_property
+    def _outside(self) -> tuple[NDArray[np.int64], Ints]:
+        number = np.flatnonzero(self.twin == ALONE)
+        corners = tables().facets[self.solids.kind[number // FACETS], number % FACETS]
+        real, four = corners[:, 0] != NONE, corners[:, 3] != NONE
+        nodes = self.solids.nodes[(number // FACETS)[:, None], np.maximum(corners, 0)]
+        three = real & ~four
+        halves = self.position[halved(self.memory[nodes[four]])]
+        cell = np.concatenate([number[three] // FACETS, np.repeat(number[four] // FACETS, 2)])
+        return cell, np.concatenate([nodes[three, :3], halves]).astype(np.int32)
+
+    @cached_property
     def boundary_facets(self) -> NDArray[np.int64]:
         """(N,) how many facets of the boundary are at each node."""
         number = np.flatnonzero(self.twin == ALONE)
@@ -157,6 +181,13 @@ class WoundSolids:
                 rows[first[chosen] + s] = nodes[chosen][:, table[number, s]]
         owner = np.repeat(np.arange(len(kind), dtype=np.int32), count)
         return Tetrahedra(rows, np.ones(len(rows), dtype=np.int8), kind[owner], owner, self.solids)
+
+
+def halved(quads: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
+    """(2F, 3) the triangles on both sides of the diagonal from the lowest node of each quadrilateral (F, 4)."""
+    turn = (np.argmin(quads, axis=1)[:, None] + np.arange(4)) % 4
+    a, b, c, d = np.take_along_axis(quads, turn, axis=1).astype(np.int64).T
+    return np.stack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)], axis=1).reshape(-1, 3)
 
 
 def has_solids(mesh: Mesh) -> bool:

@@ -75,6 +75,11 @@ class Wound:
         found: NDArray[np.int64] = 4 * near[alone >> 2] + (alone & 3)
         return found
 
+    @property
+    def boundary_cell(self) -> NDArray[np.int64]:
+        """(F,) the cell of each facet of ``boundary``."""
+        return self.outer >> 2
+
     @cached_property
     def boundary(self) -> Ints:
         """(F, 3) the nodes of these facets, counter-clockwise as seen from outside."""

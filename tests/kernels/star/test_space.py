@@ -57,7 +57,7 @@ def test_sums_of_a_star_and_after_a_step(number, seed, rings):
     rng = np.random.default_rng(seed)
     points, topology = stars(rng, rings, off=0.2)
     ratios = np.empty(len(topology.near))
-    cubed_ratios(points, topology.near, topology.near_orientation, 0, len(ratios), ratios)
+    cubed_ratios(points, topology.near, topology.near_orientation, None, 0, len(ratios), ratios)
     power, blocks = Power3.of(number, max(1.0, ratios.max() / K3)), topology.stars.blocks
     assert len(blocks.filled) == -(-len(rings) // LANES3)
     step = rng.normal(scale=0.02, size=(3, LANES3)).astype(np.float32)

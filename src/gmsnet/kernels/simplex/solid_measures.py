@@ -8,6 +8,7 @@ from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.simplex.jacobian3 import solid_workspace
 from gmsnet.kernels.simplex.mean_ratio3 import HEXAHEDRON, WEDGE, measured_as, same_cell3, shape_of, weights_at
 from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, spokes_of
+from gmsnet.kernels.simplex.slack3 import slack_of
 from gmsnet.kernels.simplex.tetra_measures import COARSE, COUNT, FINE, INVERTED, MINIMUM, UNCERTAIN
 from gmsnet.kernels.simplex.validity3 import certified_solid
 
@@ -27,6 +28,8 @@ def certainly_valid(points, solids, cell, unit, grain, moved, x, y, z, work):
     """Is a cell, whose corner simplices are positive, certified to be valid everywhere? See ``certified_solid``."""
     kind = solids.kind[cell]
     if kind != HEXAHEDRON and kind != WEDGE:
+        return True
+    if slack_of(points, solids.nodes[cell], kind == HEXAHEDRON, unit, grain, moved, x, y, z, work) >= 0.0:
         return True
     form = solids.hexahedron if kind == HEXAHEDRON else solids.wedge
     return certified_solid(points, solids.nodes[cell], form, 1.0, unit, grain, moved, x, y, z, work)

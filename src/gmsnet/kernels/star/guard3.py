@@ -19,14 +19,16 @@ import numpy as np
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.jit.vectors import WIDTH as LANES3
 from gmsnet.kernels.simplex.jacobian3 import solid_workspace
-from gmsnet.kernels.simplex.mean_ratio3 import same_cell3, square, weights_at
+from gmsnet.kernels.simplex.mean_ratio3 import HEXAHEDRON, same_cell3, square, weights_at
 from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, largest_component
 from gmsnet.kernels.simplex.predicates import UNIT
-from gmsnet.kernels.simplex.solid_measures import certainly_valid
+from gmsnet.kernels.simplex.slack3 import slack_of
+from gmsnet.kernels.simplex.validity3 import certified_solid
 
 MIXED_BOUND = 2.0  # times ``error_bound3`` where cells are not all tetrahedra
 LARGEST3 = 0.0481126  # above D/S^(3/2) of a regular tetrahedron, 1/√432
 COARSE3 = 2.0**-24
+WIDER = 1.0 + 2.0**-20
 
 
 @inlined
@@ -161,13 +163,39 @@ def floor_at(mixture, floors, centre, a, b, c, at, k, lane):
 
 @part
 def sound(mixture, points, i, x, y, z, unit, grain):
-    """Are the cells at node i certified to be valid everywhere with it at (x, y, z)?
+    """Are the cells at node i certified to be valid everywhere with it at (x, y, z)? If so, it is to go there.
 
-    Those of which corner simplices do not tell: hexahedra and wedges.
+    Those of which corner simplices do not tell: hexahedra and wedges. Most have slack enough (kernels.simplex.slack3).
     """
     if mixture is not None:
-        solids, work = mixture.solids, solid_workspace()
+        dx, dy, dz = x - points[i, 0], y - points[i, 1], z - points[i, 2]
+        away, slack, enough = WIDER * math.sqrt(square(dx, dy, dz)), mixture.slack, True
         for k in range(mixture.at[i], mixture.at[i + 1]):
-            if not certainly_valid(points, solids, mixture.around[k], unit, grain, i, x, y, z, work):
+            enough &= slack[mixture.around[k]] > away
+        if not enough and not renewed(mixture, points, i, x, y, z, unit, grain, away):
+            return False
+        for k in range(mixture.at[i], mixture.at[i + 1]):
+            own = slack[mixture.around[k]]
+            slack[mixture.around[k]] = -own if own < 0.0 else max(own - away, 0.0)
+    return True
+
+
+@part
+def renewed(mixture, points, i, x, y, z, unit, grain, away):
+    """Are those that have not slack enough certified? Theirs is made anew, with the other sign."""
+    solids, slack, work = mixture.solids, mixture.slack, np.empty(72)
+    for k in range(mixture.at[i], mixture.at[i + 1]):
+        cell = mixture.around[k]
+        if slack[cell] > away:
+            continue
+        nodes, kind = solids.nodes[cell], solids.kind[cell]
+        found = slack_of(points, nodes, kind == HEXAHEDRON, unit, grain, i, x, y, z, work)
+        if found < 0.0:
+            form = solids.hexahedron if kind == HEXAHEDRON else solids.wedge
+            if not certified_solid(points, nodes, form, 1.0, unit, grain, i, x, y, z, solid_workspace()):
+                for j in range(mixture.at[i], k):  # it does not go there
+                    slack[mixture.around[j]] = max(slack[mixture.around[j]], 0.0)
                 return False
+            found = 0.0
+        slack[cell] = -found if found > 0.0 else 0.0
     return True

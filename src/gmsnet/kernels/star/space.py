@@ -40,7 +40,8 @@ class Mixture(NamedTuple):
     (R, 6) the same in float64. present: uint16 by [block][row], the lanes that have such a simplex. owner: by
     [block][row][lane], the cell of each. edges: (B·LANES3,) how many nodes of the ring, from the first on, an edge
     joins to the free one. solids: all cells. at: (N + 1,), those at each node that are not valid just where their
-    corner simplices are positive begin there in ``around``.
+    corner simplices are positive begin there in ``around``. slack: (T,) of each cell
+    (kernels.simplex.slack3), for points that the guard alone has moved since it was set to 0.
     """
 
     role: NDArray[np.uint8]
@@ -52,6 +53,7 @@ class Mixture(NamedTuple):
     solids: mean_ratio3.Solids
     at: NDArray[np.int64]
     around: NDArray[np.int32]
+    slack: NDArray[np.float64]
 
 
 class SpaceBlocks(NamedTuple):

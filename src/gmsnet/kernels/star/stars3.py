@@ -12,7 +12,7 @@ from gmsnet.kernels.simplex.orientation3 import largest_component
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.fold import folds, refuse_folds
 from gmsnet.kernels.star.guard import WITH_FLOORS
-from gmsnet.kernels.star.guard3 import MIXED_BOUND, certified, error_bound3, floor_at, sound
+from gmsnet.kernels.star.guard3 import MIXED_BOUND, WIDER, certified, error_bound3, floor_at, sound
 from gmsnet.kernels.star.slide3 import land3, note_places, on_surface, take_place
 from gmsnet.kernels.star.space import (
     KEPT,
@@ -27,7 +27,6 @@ from gmsnet.kernels.star.space import (
     weights_in_row,
 )
 
-WIDER = 1.0 + 2.0**-20
 HALVINGS = 12  # of a step that is not allowed
 
 
