@@ -109,7 +109,8 @@ def test_command_makes_what_the_functions_make(tmp_path, options, expected):
     [
         (
             "--pattern zigzag",
-            "unknown pattern 'zigzag'; there are random, structured, o-grid, c-grid, adapted, kershaw, layered, part",
+            "unknown pattern 'zigzag'; there are random, structured, o-grid, c-grid, adapted, kershaw, layered, part, "
+            "swept, sphere, torus, cylinder, cone, organic, bracket",
         ),
         ("--cells hex", "--pattern random makes --cells triangle or quad or mixed or tetra, not 'hex'"),
         ("--pattern kershaw --cells mixed", "--pattern kershaw makes --cells quad, not 'mixed'"),

@@ -19,16 +19,17 @@ def generate(
         typer.Option(
             help="random, structured (rows and columns, or a body-centred lattice), o-grid (layers around a body), "
             "c-grid (and along its wake), swept (a disc or --shape along a way), "
-            "adapted (to a front inside), kershaw (zigzag), layered (prisms or tetrahedra on a wall) or part (a cube "
-            "of tetrahedra with two holes)."
+            "adapted (to a front inside), kershaw (zigzag), layered (prisms or tetrahedra on a wall) part (a cube "
+            "of tetrahedra with two holes); surfaces, some of them volumes: sphere, torus, cylinder, cone, organic or "
+            "bracket (an L with fillets and holes)."
         ),
     ] = "random",
     cells: Annotated[
         str | None,
         typer.Option(
             help="triangle, quad, mixed, tetra, hexahedron, wedge, pyramid or mixed-volume.",
-            show_default="triangle if random or adapted, mixed if o-grid, tetra if layered or part, hexahedron if "
-            "swept, else quad",
+            show_default="triangle; mixed if o-grid, tetra if layered or part, hexahedron if swept, quad if "
+            "structured or kershaw",
         ),
     ] = None,
     shape: Annotated[
@@ -41,7 +42,9 @@ def generate(
     ] = None,
     nodes: Annotated[
         int | None,
-        typer.Option(help="Random nodes inside; of quads, grids and lattices about so many.", show_default="1000"),
+        typer.Option(
+            help="Random nodes inside; of quads, grids, lattices and surfaces about so many.", show_default="1000"
+        ),
     ] = None,
     size: Annotated[
         float, typer.Option(help="Side of the square around the shape; chord of the body; factor for --rings.")
@@ -87,7 +90,10 @@ def generate(
     ] = None,
     seed: Annotated[int, typer.Option(help="The same seed makes the same mesh.")] = 0,
     jitter: Annotated[
-        float, typer.Option(help="Then throw each inner node up to this many of its edge lengths away.")
+        float,
+        typer.Option(
+            help="Then throw each inner node up to this many of its edge lengths away, on surfaces along them."
+        ),
     ] = 0.0,
     jitter_edge: Annotated[
         str | None, typer.Option(help="With --jitter: the node's mean or shortest edge.", show_default="mean")
@@ -103,7 +109,7 @@ def generate(
 
     from gmsnet.cli.patterns import chosen
     from gmsnet.errors import InputError
-    from gmsnet.generate import disturb
+    from gmsnet.generate import Shaped, disturb, disturb_on
     from gmsnet.io import write
     from gmsnet.io.streams import is_standard_output
 
@@ -121,9 +127,12 @@ def generate(
     kind, generator = chosen(pattern, cells, given)
     if rings is not None:
         given["rings"] = _read_rings(rings)
-    mesh = generator.make(given, size, seed)
+    made = generator.make(given, size, seed)
+    mesh = made.mesh if isinstance(made, Shaped) else made
     border = [block for block in mesh.cells if block.dimension == (2 if mesh.has_volumes else 1)]
-    if jitter:
+    if jitter and isinstance(made, Shaped):
+        mesh = disturb_on(made, jitter, seed=seed, keep_valid=not tangled, edge=jitter_edge or "mean").mesh
+    elif jitter:
         inner = np.ones(len(mesh.points), dtype=bool)
         inner[np.concatenate([block.nodes.ravel() for block in border])] = False
         mesh = disturb(mesh, inner, jitter, seed=seed, keep_valid=not tangled, edge=jitter_edge or "mean")
@@ -132,10 +141,10 @@ def generate(
     domain = "cube" if mesh.has_volumes else "square"
     what = f"{pattern} {kind}" if pattern != "random" else str(rings or shape or domain)
     sort = f"{'marked' if interface else 'boundary'} {'faces' if mesh.has_volumes else 'edges'}"
-    counts = ", ".join(f"{len(block.nodes):,} {block.kind}s" for block in mesh.cells[: -len(border)])
+    counts = ", ".join(f"{len(block.nodes):,} {block.kind}s" for block in mesh.cells[: len(mesh.cells) - len(border)])
+    counts += f" and {sum(len(block.nodes) for block in border):,} {sort}" if border else ""
     typer.echo(
-        f"{'standard output' if out == '-' else out}: {what} with {len(mesh.points):,} nodes, {counts} and "
-        f"{sum(len(block.nodes) for block in border):,} {sort} (seed {seed})",
+        f"{'standard output' if out == '-' else out}: {what} with {len(mesh.points):,} nodes, {counts} (seed {seed})",
         err=aside,
     )
     for loss in lost:

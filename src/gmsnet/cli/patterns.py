@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from gmsnet.errors import InputError
 
 if TYPE_CHECKING:
+    from gmsnet.generate.shaped import Shaped
     from gmsnet.mesh.mesh import Mesh
 
 Given = Mapping[str, Any]  # name of an option → what the user gave; without those that were not given
@@ -20,7 +21,7 @@ NODES = 1000
 class Generator:
     """make: the mesh, from the options that were given, the size and the seed. takes: names of options."""
 
-    make: Callable[[Given, float, int], Mesh]
+    make: Callable[[Given, float, int], Mesh | Shaped]
     takes: frozenset[str]
 
 
@@ -144,6 +145,17 @@ def _lattice(name: str) -> Callable[[Given, float, int], Mesh]:
     return make
 
 
+def _shaped(name: str, **cells: str) -> Generator:
+    """The function of ``gmsnet.generate`` with this name, which makes a shape of about so many nodes."""
+
+    def make(given: Given, size: float, seed: int) -> Shaped:
+        from gmsnet import generate
+
+        return getattr(generate, name)(given.get("nodes", NODES), size=size, **cells)  # type: ignore[no-any-return]
+
+    return Generator(make, frozenset({"nodes"}))
+
+
 def _cells_of(nodes: int) -> int:
     """Cells on each side of a body-centred lattice with about so many nodes inside: n³ + (n − 1)³."""
     return min(range(1, 2 + int(nodes ** (1 / 3))), key=lambda n: abs(n**3 + (n - 1) ** 3 - nodes))
@@ -190,6 +202,16 @@ PATTERNS: dict[str, dict[str, Generator]] = {  # pattern → its cells, the defa
         "hexahedron": Generator(_swept("hexahedron"), SWEPT | {"columns"}),
         "wedge": Generator(_swept("wedge"), SWEPT | {"shape"}),
     },
+    "sphere": {
+        "triangle": _shaped("sphere_surface"),
+        "quad": _shaped("sphere_surface", cells="quad"),
+        "tetra": _shaped("ball_volume"),
+    },
+    "torus": {"triangle": _shaped("torus_surface"), "quad": _shaped("torus_surface", cells="quad")},
+    "cylinder": {kind: _shaped("cylinder", cells=kind) for kind in ("triangle", "quad", "tetra")},
+    "cone": {"triangle": _shaped("cone_surface")},
+    "organic": {"triangle": _shaped("organic_surface")},
+    "bracket": {kind: _shaped("bracket", cells=kind) for kind in ("triangle", "tetra")},
 }
 
 

@@ -45,7 +45,7 @@ class Outcome(Account):
             console.print(output.table(stages[0], stages[1:]))
             console.print()
         console.print(self.verdict())
-        for note in self.result.notes:
+        for note in [*self.surface(), *self.result.notes]:
             console.print(note)
         if len(result.after.cell) and self.free:
             console.print(self.nearness())

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.curve import ArcSpline, arc_spline, through
 from gmsnet.constraints.features import Curves
-from gmsnet.constraints.geometry import Entity, Geometry, named
+from gmsnet.constraints.geometry import Entity, Geometry, checked, named
 from gmsnet.errors import InputError
 from gmsnet.kernels.star.constraint import ARCS, LINE, SAME_X, SAME_Y, Constraint
 from gmsnet.topology.polygons import Ints
@@ -91,8 +91,8 @@ def _on_geometry(curves: Curves, points: Floats, geometry: Geometry, exponent: i
         entity = Entity(1, c, curves.names[c])
         wanted = _samples(p)
         places, parameters = geometry.project(entity, np.ldexp(wanted, exponent))
-        places = np.ldexp(_checked(places, wanted.shape, "places", entity), -exponent)
-        direction = _checked(geometry.tangent(entity, parameters), wanted.shape, "tangents", entity)
+        places = np.ldexp(checked(places, wanted.shape, "places", entity), -exponent)
+        direction = checked(geometry.tangent(entity, parameters), wanted.shape, "tangents", entity)
         if curves.closed[c]:
             places[-1], direction[-1] = places[0], direction[0]
         else:
@@ -117,13 +117,3 @@ def _samples(p: Floats) -> Floats:
     """SAMPLES places on each edge of a polyline, from its beginning on, and its last point."""
     share = (np.arange(SAMPLES) / SAMPLES)[None, :, None]
     return np.vstack([(p[:-1, None] + share * np.diff(p, axis=0)[:, None]).reshape(-1, 2), p[-1:]])
-
-
-def _checked(values: object, shape: tuple[int, ...], what: str, entity: Entity) -> Floats:
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.zeros(0)
-    if array.shape != shape or not np.isfinite(array).all():
-        raise InputError(f"the {what} that geometry gives for {named(entity)} must be {shape} finite numbers")
-    return array

@@ -10,15 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gmsnet.constraints.curve import ArcSpline, through
+from gmsnet.constraints.shapes import Shape, tangents
 from gmsnet.errors import InputError
 from gmsnet.mesh.arrays import plain_array
 
 Floats = NDArray[np.float64]
+ROUNDS = 60  # of projections onto two shapes
 CORNER = 30.0  # degrees: where a polyline turns by more it has a corner, elsewhere it stands for a smooth curve
 
 
 class Entity(NamedTuple):
-    """Which curve of a mesh is meant. dimension: 1. number: among its curves. markers: whose line cells are on it."""
+    """Which curve (dimension 1) or patch (2) of a mesh is meant. number: among those of its dimension. markers: whose
+    cells are on it; of a patch of a surface, its region."""
 
     dimension: int
     number: int
@@ -26,14 +29,14 @@ class Entity(NamedTuple):
 
 
 class Geometry(Protocol):
-    """The true shape of the curves of a mesh, in the mesh's own coordinates along the two axes of its plane."""
+    """The true shape of a mesh's curves and patches in its coordinates: D = 2 along the axes of its plane, or D = 3."""
 
     def project(self, entity: Entity, points: Floats) -> tuple[Floats, Floats]:
-        """The places (K, 2) on an entity nearest to points (K, 2), and their parameters (K,) there."""
+        """The places (K, D) on an entity nearest to points (K, D), and their parameters, a row for each."""
         ...
 
     def tangent(self, entity: Entity, parameters: Floats) -> Floats:
-        """Tangents (K, 2) of an entity at parameters (K,), of any length, in either direction."""
+        """Tangents (K, D) of a curve at parameters, of any length, in either direction; of a patch two (K, 2, 3)."""
         ...
 
 
@@ -97,4 +100,54 @@ def _smooth(name: str, points: ArrayLike) -> ArcSpline:
 
 def named(entity: Entity) -> str:
     """For messages."""
-    return f"the curve {entity.number}" + (f" ({', '.join(entity.markers)})" if entity.markers else "")
+    return f"the {'curve' if entity.dimension == 1 else 'patch'} {entity.number}" + (
+        f" ({', '.join(entity.markers)})" if entity.markers else ""
+    )
+
+
+def checked(values: object, shape: tuple[int, ...], what: str, entity: Entity) -> Floats:
+    """What a geometry gave, as an array of its own. Raises InputError for another shape and for no finite numbers."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.zeros(0)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise InputError(f"the {what} that geometry gives for {named(entity)} must be {shape} finite numbers")
+    return array
+
+
+class Shapes:
+    """Surfaces by formulas (``constraints.shapes``) as the geometry of patches, by names of their regions or markers.
+
+    A curve between two patches is where their shapes meet: alternating projections find it.
+    """
+
+    def __init__(self, shapes: Mapping[str, Shape]) -> None:
+        if not isinstance(shapes, Mapping) or not shapes:
+            raise InputError("Shapes needs a mapping: name of a region or marker → its shape")
+        self._shapes = dict(shapes)
+
+    def project(self, entity: Entity, points: Floats) -> tuple[Floats, Floats]:
+        """See Geometry; the parameters are the places. On curves between shapes, those of both, one after the other.
+
+        Raises InputError for an entity that none of the shapes is named after.
+        """
+        places = points
+        for _ in range(1 if entity.dimension == 2 else ROUNDS):
+            for shape in self._of(entity):
+                places = shape.project(places)
+        return places, places
+
+    def tangent(self, entity: Entity, parameters: Floats) -> Floats:
+        """See Geometry. Raises InputError as ``project``."""
+        normals = [shape.normal(parameters) for shape in self._of(entity)]
+        if entity.dimension == 1:
+            return np.cross(normals[0], normals[-1])
+        return np.stack(tangents(normals[0]), axis=1)
+
+    def _of(self, entity: Entity) -> list[Shape]:
+        found = [self._shapes[name] for name in entity.markers if name in self._shapes]
+        if len(found) < (2 if entity.dimension == 1 else 1):
+            known = ", ".join(map(repr, self._shapes))
+            raise InputError(f"there is no shape for {named(entity)}, only for {known}: let only these slide")
+        return found[:2]

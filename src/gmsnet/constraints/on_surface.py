@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.constraints.features import COLLINEAR, Curves, rounding_of
+from gmsnet.constraints.features import COLLINEAR, rounding_of
+from gmsnet.constraints.on_geometry import PER_EDGE, OnGeometry
 from gmsnet.constraints.outline import Flags, Longs
 from gmsnet.constraints.patches import NOTHING, Patches
-from gmsnet.constraints.smooth_patches import controls_of, dot, handles, normals_of, summed
+from gmsnet.constraints.smooth_patches import controls_of, dot, handles, skin_of, summed
 from gmsnet.kernels.star.surface import CONTROLS, CURVE, CURVED, FLAT, LINE, NOWHERE, Surface
 from gmsnet.topology.polygons import Ints
 
@@ -27,17 +28,15 @@ class Rows(NamedTuple):
 
 
 def surface_of(
-    patches: Patches,
-    points: Floats,
-    memory: Ints,
-    single: bool,
-    limit: Floats | None = None,
+    patches: Patches, points: Floats, memory: Ints, single: bool, limit: Floats | None = None,
+    geometry: OnGeometry | None = None, folds: bool = True,
     normals: Floats | None = None,
-) -> Surface | None:
+) -> Surface | None:  # fmt: skip
     """The constraint for kernels, with the nodes where they are; None where none slides.
 
     points: (N, 3) by node ids. memory: (N,) node ids in memory order. limit: (N,) how far each may go from the facets
-    or edges; None: as far as the cubics are. normals: as ``normals_of`` finds them, where they are known.
+    or edges; None: as far as the cubics are. geometry: the true shape of what is not plane or straight. folds: the
+    facets around nodes are listed, so that none turns over. normals: see ``normals_of``, where they are known.
     """
     slides = patches.slides | patches.curves.slides
     if not slides.any():
@@ -51,26 +50,36 @@ def surface_of(
     found = [Rows(inner[level], FLAT, number[level], np.zeros(level.sum(), dtype=np.int64))]
     curved = inner[~level]
     kept = np.isin(patches.patch, patches.patch[facet[curved]])
-    fewer = np.cumsum(kept) - 1
-    found.append(Rows(curved, CURVED, np.zeros(len(curved), dtype=np.int64), fewer[facet[curved]]))
-    lines, line_frame, pieces, before, after = _along_curves(patches.curves, points, len(frame[0]))
+    skin = skin_of(patches, points, kept, normals) if geometry is None else geometry.skin(patches, points, kept)
+    found.append(Rows(curved, CURVED, np.zeros(len(curved), dtype=np.int64), skin.facet[curved]))
+    lines, line_frame, pieces, before, after = _along_curves(patches, points, len(frame[0]), geometry)
     found += lines
 
     nodes, kind, of, place = (np.concatenate(parts) for parts in zip(*map(_columns, found), strict=True))
     order = np.argsort(nodes)
     row = np.full(len(points), NOWHERE, dtype=np.int32)
     row[nodes[order]] = np.arange(len(nodes))
-    corners, normal = patches.rows[kept], (normals_of(patches, points) if normals is None else normals)[kept]
-    beside = patches.beside[kept]
     origin, direction, same = (np.concatenate(parts) for parts in zip(frame, line_frame, strict=True))
     return Surface(
         row[memory], kind[order].astype(np.int8), of[order].astype(np.int32), place[order].astype(np.int32),
-        origin, direction, same, points[corners], normal,
-        np.where(beside == NOTHING, NOWHERE, fewer[beside]).astype(np.int32),
-        controls_of(points, corners, normal) if len(corners) else np.empty((0, CONTROLS, 3)),
+        origin, direction, same, skin.corner, skin.normal, skin.beside.astype(np.int32),
+        controls_of(skin.corner, skin.normal) if len(skin.corner) else np.empty((0, CONTROLS, 3)),
         pieces, before, after, bool(single),
         np.full(len(nodes), np.inf) if limit is None else limit[nodes[order]],
+        *_around(patches.rows if folds else patches.rows[:0], patches.unit, row, memory),
     )  # fmt: skip
+
+
+def _around(rows: Longs, unit: Floats, row: Ints, memory: Ints) -> tuple[Ints, Ints, Floats]:
+    """The facets around the node of each row (``Surface``). row: (N,) by node ids."""
+    around = np.concatenate([np.column_stack([rows[:, k], rows[:, k - 2], rows[:, k - 1]]) for k in range(3)])
+    chosen = np.flatnonzero(row[around[:, 0]] != NOWHERE)
+    chosen = chosen[np.argsort(row[around[chosen, 0]], kind="stable")]
+    start = np.zeros(int((row != NOWHERE).sum()) + 1, dtype=np.int32)
+    np.cumsum(np.bincount(row[around[chosen, 0]], minlength=len(start) - 1), out=start[1:])
+    place = np.empty(len(memory), dtype=np.int32)
+    place[memory] = np.arange(len(memory), dtype=np.int32)
+    return start, place[around[chosen, 1:]], np.tile(unit[: len(rows)], (3, 1))[chosen]
 
 
 def _columns(rows: Rows) -> tuple[Longs, Longs, Longs, Longs]:
@@ -101,10 +110,11 @@ def _planes(patches: Patches, points: Floats, single: bool) -> tuple[Longs, tupl
 
 
 def _along_curves(
-    curves: Curves, points: Floats, first: int
+    patches: Patches, points: Floats, first: int, geometry: OnGeometry | None
 ) -> tuple[list[Rows], tuple[Floats, Floats, Flags], Floats, Ints, Ints]:
     """The nodes on each curve; their frames, numbered from ``first`` on; cubic pieces and what follows them."""
     found, frames, pieces, links, count = list[Rows](), list[tuple[Floats, Floats, Flags]](), list[Floats](), [], 0
+    curves, per_edge = patches.curves, 1 if geometry is None else PER_EDGE
     for c in range(len(curves)):
         nodes = curves.nodes_of(c)
         inner, place = nodes[:-1] if curves.closed[c] else nodes[1:-1], np.arange(len(nodes) - 1)
@@ -120,9 +130,13 @@ def _along_curves(
             found.append(Rows(chosen, LINE, number, np.zeros_like(number)))
             continue
         frames.append((p[0], np.zeros(3), same))
-        found.append(Rows(chosen, CURVE, number, count + place))
-        pieces.append(_cubics(p, bool(curves.closed[c])))
-        numbers = np.arange(count, count + len(p) - 1)
+        found.append(Rows(chosen, CURVE, number, count + per_edge * place))
+        if geometry is None:
+            pieces.append(_cubics(p, *_tangents(p, bool(curves.closed[c]))))
+        else:
+            q, tangent = geometry.chain(patches, c, p)
+            pieces.append(_cubics(q, tangent[:-1], tangent[1:]))
+        numbers = np.arange(count, count + len(pieces[-1]))
         links.append(_neighbours(numbers, bool(curves.closed[c])))
         count += len(numbers)
     none = np.empty((0, 3))
@@ -143,8 +157,14 @@ def _neighbours(numbers: Longs, closed: bool) -> Ints:
     return both
 
 
-def _cubics(p: Floats, closed: bool) -> Floats:
-    """(K − 1, 4, 3) cubics over the edges of a chain (K, 3), along the tangents of circles through three nodes.
+def _cubics(p: Floats, start: Floats, end: Floats) -> Floats:
+    """(K − 1, 4, 3) cubics over the edges of a chain (K, 3), along tangents at the start and at the end of each."""
+    edge = np.diff(p, axis=0)
+    return np.stack([p[:-1], p[:-1] + handles(edge, start), p[1:] - handles(edge, end), p[1:]], axis=1)
+
+
+def _tangents(p: Floats, closed: bool) -> tuple[Floats, Floats]:
+    """Those of circles through three nodes, at the start and at the end of each edge.
 
     At an end of a chain the tangent makes the same angle with the edge as at the edge's other end. On circles the
     error is of sixth order.
@@ -156,11 +176,9 @@ def _cubics(p: Floats, closed: bool) -> Floats:
     near, far = (np.roll(length, 1, axis=0), length) if closed else (length[:-1], length[1:])
     tangent = back * far + ahead * near
     if closed:
-        start, end = tangent, np.roll(tangent, -1, axis=0)
-    else:
-        first = _mirrored(tangent[:1], unit[:1])
-        start, end = np.vstack([first, tangent]), np.vstack([tangent, _mirrored(tangent[-1:], unit[-1:])])
-    return np.stack([p[:-1], p[:-1] + handles(edge, start), p[1:] - handles(edge, end), p[1:]], axis=1)
+        return tangent, np.roll(tangent, -1, axis=0)
+    first = _mirrored(tangent[:1], unit[:1])
+    return np.vstack([first, tangent]), np.vstack([tangent, _mirrored(tangent[-1:], unit[-1:])])
 
 
 def _mirrored(tangent: Floats, unit: Floats) -> Floats:

@@ -29,10 +29,7 @@ def check_slide(
     angles out of range, objects that are no geometry, and meshes that are not planar while nodes are to slide.
     """
     check_sliding(feature_angle, geometry)
-    names = _names_of(mesh, slide)
-    if geometry is not None and mesh.plane is None:
-        raise InputError("a geometry cannot be given for meshes in space yet: leave geometry out")
-    return names
+    return _names_of(mesh, slide)
 
 
 def check_sliding(feature_angle: Any, geometry: Any) -> None:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets, boundary_of, edge_lengths
 from gmsnet.constraints.features import lengths_of, may_slide
+from gmsnet.constraints.geometry import Geometry
+from gmsnet.constraints.on_geometry import OnGeometry
 from gmsnet.constraints.on_surface import surface_of
 from gmsnet.constraints.options import FEATURE_ANGLE
 from gmsnet.constraints.outline import Flags
@@ -44,26 +46,23 @@ class SurfaceSliding:
 
     @classmethod
     def of(
-        cls,
-        mesh: Mesh,
-        facets: Facets,
-        patches: Patches,
-        memory: Ints,
-        free: Ints,
-        tolerance: float = math.inf,
-        normals: Floats | None = None,
-    ) -> SurfaceSliding:
+        cls, mesh: Mesh, facets: Facets, patches: Patches, memory: Ints, free: Ints, tolerance: float = math.inf,
+        geometry: Geometry | None = None, normals: Floats | None = None,
+    ) -> SurfaceSliding:  # fmt: skip
         """Of a mesh and the patches of its boundary; memory, free: of its topology.
 
-        tolerance: how far from the facets nodes may go, over the mean length of their edges. normals: see
-        ``surface_of``.
+        tolerance: how far from the facets nodes may go, over the mean length of their edges. geometry: their
+        true shape, which is asked once. normals: see ``surface_of``.
         """
         points = space_points(mesh)[:, :3].copy()
         nodes = np.zeros(len(points), dtype=bool)
         nodes[free] = True
         nodes &= patches.slides | patches.curves.slides
         limit = tolerance * edge_lengths(facets, points) if tolerance < math.inf else None
-        constraint = surface_of(patches, points, memory, mesh.single, limit, normals) if nodes.any() else None
+        on = None if geometry is None else OnGeometry(geometry, facets, mesh.exponent)
+        constraint = None
+        if nodes.any():
+            constraint = surface_of(patches, points, memory, mesh.single, limit, on, facets.closed, normals)
         return cls(facets, patches, points, mesh.exponent, memory, nodes, constraint)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:

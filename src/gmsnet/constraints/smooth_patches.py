@@ -7,6 +7,8 @@ the tangent. Where all nodes of a facet have the normal of one plane, the cubic 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +17,27 @@ from gmsnet.constraints.patches import NOTHING, Patches, linked
 from gmsnet.kernels.star.surface import CENTRE, CONTROLS
 
 Floats = NDArray[np.float64]
+
+
+class Skin(NamedTuple):
+    """The facets over which cubics stand: corner (F, 3, 3), normal (F, 3, 3) there; beside (F, 3), the facet across the
+    edge from corner k to k + 1, else NOTHING; facet (N,), one at each node by id, else NOTHING."""
+
+    corner: Floats
+    normal: Floats
+    beside: Longs
+    facet: Longs
+
+
+def skin_of(patches: Patches, points: Floats, kept: NDArray[np.bool_], normals: Floats | None = None) -> Skin:
+    """The facets of the input that are kept (F,). normals: as ``normals_of`` finds them, where they are known."""
+    normals = normals_of(patches, points) if normals is None else normals
+    fewer = np.where(kept, np.cumsum(kept) - 1, NOTHING)
+    facet = np.full(len(points), NOTHING, dtype=np.int64)
+    facet[patches.rows[kept]] = fewer[kept, None]
+    beside = patches.beside[kept]
+    over = np.where(beside == NOTHING, NOTHING, fewer[beside])
+    return Skin(points[patches.rows[kept]], normals[kept], over, facet)
 
 
 def normals_of(patches: Patches, points: Floats) -> Floats:
@@ -64,10 +87,9 @@ def summed(owner: Longs, vectors: Floats, count: int) -> Floats:
     return np.stack([np.bincount(owner, vectors[:, axis], count) for axis in range(3)], axis=1)
 
 
-def controls_of(points: Floats, rows: Longs, normals: Floats) -> Floats:
-    """(F, CONTROLS, 3) the inner control points of the cubics (kernels.star.surface) over facets with these normals."""
-    corner = points[rows]
-    made = np.empty((len(rows), CONTROLS, 3))
+def controls_of(corner: Floats, normals: Floats) -> Floats:
+    """(F, CONTROLS, 3) the inner control points of the cubics (kernels.star.surface) over facets (F, 3, 3)."""
+    made = np.empty((len(corner), CONTROLS, 3))
     for k in range(3):
         j = (k + 1) % 3
         edge = corner[:, j] - corner[:, k]

@@ -43,9 +43,9 @@ def disturb(
     axes = [0, 1, 2] if mesh.has_volumes else list(mesh.plane or ())
     old = np.ascontiguousarray(mesh.points[:, axes])
     blocks = [block for block in mesh.cells if block.dimension == dimension]
-    edges = np.concatenate([np.empty((0, 2), dtype=np.int64), *map(_edges, blocks)])
-    throw = _directions(len(old), dimension, generator(seed))
-    shift = throw * (_edge_lengths(old, edges, edge) * amount * _mask(free, len(old)))[:, None]
+    edges = np.concatenate([np.empty((0, 2), dtype=np.int64), *map(edges_of, blocks)])
+    throw = random_directions(len(old), dimension, generator(seed))
+    shift = throw * (edge_lengths(old, edges, edge) * amount * _mask(free, len(old)))[:, None]
     if keep_valid:
         keep_orientation(old, shift, _corners(blocks), single=mesh.single)
     points = mesh.points.copy()
@@ -53,7 +53,7 @@ def disturb(
     return mesh.with_points(points)
 
 
-def _directions(count: int, dimension: int, rng: np.random.Generator) -> Floats:
+def random_directions(count: int, dimension: int, rng: np.random.Generator) -> Floats:
     """(count × dimension) random points in the unit disc or ball."""
     share = rng.random(count)
     radius, angle = np.cbrt(share) if dimension == 3 else np.sqrt(share), 2 * np.pi * rng.random(count)
@@ -112,7 +112,7 @@ def _corners(blocks: Sequence[CellBlock]) -> Ints:
     return np.concatenate([block.nodes[:, block.cell.simplices].reshape(-1, 4) for block in blocks])
 
 
-def _edges(block: CellBlock) -> Ints:
+def edges_of(block: CellBlock) -> Ints:
     """(E × 2) the edges of all cells, those between two of them twice."""
     ring = block.nodes[:, : block.corners]
     if block.dimension == 3:
@@ -120,7 +120,7 @@ def _edges(block: CellBlock) -> Ints:
     return np.stack([ring, np.roll(ring, -1, axis=1)], axis=2).reshape(-1, 2)
 
 
-def _edge_lengths(points: Floats, edges: Ints, which: str) -> Floats:
+def edge_lengths(points: Floats, edges: Ints, which: str) -> Floats:
     """(N,) mean or shortest length of the edges at each node; 0 where it has none."""
     edges = np.unique(np.sort(edges, axis=1), axis=0)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)

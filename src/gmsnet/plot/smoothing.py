@@ -16,6 +16,7 @@ from gmsnet.measure.palette import AFTER, BEFORE
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.plot.figure import check_target, file_bytes, new_figure
 from gmsnet.plot.histogram import histogram
+from gmsnet.plot.surfaces import surface_figure
 from gmsnet.plot.view import View, add_colour_bar, check_mesh, draw
 from gmsnet.plot.volumes import volume_figure
 from gmsnet.plot.zoom import RING_BELOW, frame, surroundings
@@ -34,9 +35,10 @@ def plot_smoothing(before: Mesh, after: Mesh, path: str | os.PathLike[str]) -> N
     """Write a picture of a mesh before and after smoothing, side by side, with histograms of 1/q and smallest angle.
 
     Cells are coloured by 1/q. Where cells are too small to be seen in the whole, a second row shows the surroundings
-    of the cell that was worst before. Of volumes, it shows the worst cells within the boundary, and histograms of η and
-    dihedral angles. path: ``.png``, ``.svg`` or ``.pdf``.
-    Raises InputError for another suffix, for surfaces in space and meshes without measured cells, for two meshes of
+    of the cell that was worst before. Of surfaces in space, the same is shaded, with their feature edges. Of volumes,
+    the worst cells are shown within the boundary, with histograms of η and dihedral angles.
+    path: ``.png``, ``.svg`` or ``.pdf``.
+    Raises InputError for another suffix, for meshes without measured cells, for two meshes of
     different cells, and where the file cannot be written; MissingExtraError where matplotlib is not installed.
     """
     if [block.nodes.tobytes() for block in before.cells] != [block.nodes.tobytes() for block in after.cells]:
@@ -44,6 +46,8 @@ def plot_smoothing(before: Mesh, after: Mesh, path: str | os.PathLike[str]) -> N
     check_mesh(before)
     if before.has_volumes:
         return _save(volume_figure([before, after]), path)
+    if before.plane is None:
+        return _save(surface_figure([before, after]), path)
     topology = Topology.of(before)  # wound as before, a cell that has turned over since is drawn as inverted
     views = [View.of(before, "before", BEFORE, topology), View.of(after, "after", AFTER, topology)]
     return _save(_figure(views), path)
@@ -52,7 +56,9 @@ def plot_smoothing(before: Mesh, after: Mesh, path: str | os.PathLike[str]) -> N
 def plot_quality(mesh: Mesh, path: str | os.PathLike[str]) -> None:
     """Write a picture of one mesh and its quality; see plot_smoothing."""
     check_mesh(mesh)
-    _save(volume_figure([mesh]) if mesh.has_volumes else _figure([View.of(mesh, "", AFTER)]), path)
+    if mesh.has_volumes:
+        return _save(volume_figure([mesh]), path)
+    return _save(surface_figure([mesh]) if mesh.plane is None else _figure([View.of(mesh, "", AFTER)]), path)
 
 
 def _save(figure: Figure, path: str | os.PathLike[str]) -> None:

@@ -26,10 +26,7 @@ POINTS = 345.6  # across a picture, in printer's points: 4.8 inches
 
 
 def check_mesh(mesh: Mesh) -> None:
-    """Raise what plotting this mesh would raise, before any work: InputError unless it is planar, or has volumes, and
-    has measured cells."""
-    if mesh.plane is None and not mesh.has_volumes:
-        raise InputError("a picture shows planar meshes and volumes, and this is a surface in space")
+    """Raise what plotting this mesh would raise, before any work: InputError unless it has measured cells."""
     if not any(measured(mesh, block) and len(block.nodes) for block in mesh.cells):
         if mesh.has_volumes:
             raise InputError("a picture of volumes shows the quality of tetrahedra, and this mesh has none")

@@ -179,6 +179,11 @@ class Account:
         """How many nodes could move."""
         return len(self.mesh.points) - sum(len(ids) for ids in self.result.held.values())
 
+    def surface(self) -> list[str]:
+        """How far the surface has come from the input's, if one has changed."""
+        change = self.result.surface_change
+        return [] if change is None else [change.sentence()]
+
     def reasons(self) -> str:
         """Why nodes are held, with how many of them."""
         return ", ".join(f"{reason}: {len(ids):,}" for reason, ids in self.result.held.items())
@@ -194,6 +199,7 @@ class Account:
             "cells": sum(len(block.nodes) for block in self.mesh.cells),
             "before": result.before.summary(),
             "after": after.summary(),
+            "surface": None if result.surface_change is None else result.surface_change.summary(),
             "conformity": None if change is None else {k: v.summary() for k, v in change._asdict().items()},
             "improved": bool(result.moved.any()),
             "moved": int(result.moved.sum()),

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.report import ASPECT, QualityReport, measure
+from gmsnet.measure.surface_change import Compared
 from gmsnet.measure.totals import Totals
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.metric.conformity import Conformity, ConformityChange
@@ -67,7 +69,15 @@ def result_of(state: State, options: SmoothOptions, began: float) -> SmoothResul
         invalid_curved=0 if state.second_order is None else state.second_order.invalid[1],
         conformity=None if state.metric is None else ConformityChange(*state.conformity),
         asked=options.asked,
+        compared=_compared(state, points),
     )
+
+
+def _compared(state: State, points: Floats) -> Compared | None:
+    """The boundary along which nodes slide, in the input and now."""
+    if not isinstance(state.sliding, SurfaceSliding) or state.sliding.constraint is None:
+        return None
+    return Compared(state.sliding.facets.rows, state.mesh.points, points)
 
 
 def _with_corners(state: State) -> Topology | Volume:

@@ -29,7 +29,8 @@ def contents_of(account: Account, title: str, command: str, facts: Sequence[tupl
         grids.append(Grid("Stages", stages))
     return Contents(
         title=title, verdict=account.verdict(), mesh=account.mesh, before=result.before, after=result.after,
-        document=account.document(), command=command, faults=account.faults(), held=result.held, notes=result.notes,
+        document=account.document(), command=command, faults=account.faults(), held=result.held,
+        notes=[*account.surface(), *result.notes],
         worst_before=worst_cells(account.mesh, result.before, account.held, WORST),
         worst_after=worst_cells(account.mesh, result.after, account.held, WORST),
         unmended=[(cell.cell, cell.reason) for cell in result.unmended], facts=known, grids=grids,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gmsnet.measure.bounds.bounds import Limits, limits
 from gmsnet.measure.report import QualityReport
+from gmsnet.measure.surface_change import Compared, SurfaceChange, surface_change
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.display import amount, html_table, plain, text_table
 from gmsnet.metric.conformity import ConformityChange
@@ -49,6 +50,7 @@ class SmoothResult:
     seconds: for the whole call. invalid_curved: how many second-order cells are not certified valid. conformity: before
     and after, to the metric or the sizes that were asked for; None without any. With one, the least and the mean 1/q in
     ``history`` are those in the metric. asked: the options of the call that were not the defaults, as plain values.
+    compared: the surface whose nodes may have slid, before and after (``surface_change``); None where none does.
     """
 
     mesh: Any
@@ -67,6 +69,7 @@ class SmoothResult:
     invalid_curved: int = 0
     conformity: ConformityChange | None = None
     asked: Mapping[str, Any] = field(default_factory=dict)
+    compared: Compared | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "held", HeldNodes(self.held))
@@ -97,6 +100,11 @@ class SmoothResult:
         reasons = ", ".join(f"{reason} {len(ids):,}" for reason, ids in self.held.items())
         inverted = f"inverted still: {amount(len(self.unmended), 'cell')}, see unmended"
         return [*([f"held: {reasons}"] if reasons else []), *([inverted] if self.unmended else []), *self.notes]
+
+    @cached_property
+    def surface_change(self) -> SurfaceChange | None:
+        """How far the surface has come from the input's facets; None where there is no surface that changes."""
+        return None if self.compared is None else surface_change(self.compared)
 
     def report(self, path: str | os.PathLike[str]) -> None:
         """Write one HTML file that shows what was done: figures, a picture before and after, what is held and why.

@@ -155,7 +155,7 @@ def _first_of_volume(
     else:
         topology = volume_of(wound, surface[1].slides | surface[1].curves.slides)
         tolerance = options.surface_tolerance or math.inf
-        sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, tolerance)
+        sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, tolerance, options.geometry)
     remarks = held_anyway(asked, topology, fixed, options.slides)
     if others := unmoved(given):
         remarks.append(f"not measured, and their nodes are held: {others}")

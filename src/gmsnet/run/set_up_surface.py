@@ -42,7 +42,7 @@ def first_of_surface(
     normals = normals_of(patches, space_points(given)[:, :3])
     shell = Shell.made(topology, sides_of(given, topology, patches, normals)).holding(~slides, FEATURE)
     tolerance = options.surface_tolerance or TOLERANCE
-    sliding = SurfaceSliding.of(given, facets, patches, shell.memory, shell.free, tolerance, normals)
+    sliding = SurfaceSliding.of(given, facets, patches, shell.memory, shell.free, tolerance, options.geometry, normals)
     others = unmeasured(given)
     remarks = (f"not measured, and their nodes are held: {others}",) if others else ()
     given = given.without_cells()

@@ -32,7 +32,9 @@ class Surface(NamedTuple):
     same (E, 3) bool, which coordinates all its points have in common. Of facets (F,): corner (F, 3, 3) points, normal
     (F, 3, 3), beside (F, 3) int32, the facet across the edge from corner k to k + 1, NOWHERE at the rim, control
     (F, CONTROLS, 3). Of pieces (P,): piece (P, 4, 3) control points, before, after (P,) int32. single: new coordinates
-    are rounded to float32. limit: (R,) how far from the facets, or edges, themselves each row may go.
+    are rounded to float32. limit: (R,) how far from the facets, or edges, themselves each row may go. Of facets of a
+    volume's boundary around each row (M,), in CSR form by start (R + 1,): ring (M, 2) int32, the other two nodes, seen
+    counter-clockwise from outside; own (M, 3) its unit normal at first.
     """
 
     row: NDArray[np.int32]
@@ -51,6 +53,9 @@ class Surface(NamedTuple):
     after: NDArray[np.int32]
     single: bool
     limit: NDArray[np.float64]
+    start: NDArray[np.int32]
+    ring: NDArray[np.int32]
+    own: NDArray[np.float64]
 
 
 @inlined

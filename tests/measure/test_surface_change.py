@@ -1,0 +1,119 @@
+"""Distances between two states of a surface, against slow obvious twins and against what is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import gmsnet
+from gmsnet.generate import ball_volume, disturb_on, sphere_surface, torus_surface
+from gmsnet.measure.surface_change import PLACES, Compared, Grid, surface_change
+
+
+def slow_distance(point, triangle):
+    """By all corners, all edges and the inside, one after the other."""
+    found = [np.linalg.norm(point - corner) for corner in triangle]
+    for k in range(3):
+        a, b = triangle[k - 1], triangle[k]
+        square = (b - a) @ (b - a)
+        if square > 0 and 0 <= (point - a) @ (b - a) <= square:
+            found.append(np.linalg.norm(point - a - (point - a) @ (b - a) / square * (b - a)))
+    a, b, c = triangle
+    matrix = np.column_stack([b - a, c - a])
+    if np.linalg.matrix_rank(matrix, tol=1e-12) == 2:
+        (s, t), *_ = np.linalg.lstsq(matrix, point - a, rcond=None)
+        if s >= 0 and t >= 0 and s + t <= 1:
+            found.append(np.linalg.norm(point - a - matrix @ [s, t]))
+    return min(found)
+
+
+@settings(max_examples=40)
+@given(seed=st.integers(0, 10**6), count=st.integers(1, 40), spread=st.sampled_from([0.01, 0.3, 2.0]))
+def test_the_nearest_facet_is_found(seed, count, spread):
+    rng = np.random.default_rng(seed)
+    triangles = rng.normal(size=(count, 1, 3)) + spread * rng.normal(size=(count, 3, 3))
+    triangles[rng.random(count) < 0.1, 2] = triangles[0, 0]
+    triangles[rng.random(count) < 0.1, 1:] = triangles[0, 0]
+    if rng.random() < 0.2:
+        triangles[..., 2] = 0.5
+    points = 3 * rng.normal(size=(15, 3))
+    points[:3] = triangles[:1].mean(axis=1)
+    far, which = Grid(triangles).nearest(points)
+    slow = np.array([[slow_distance(p, t) for t in triangles] for p in points])
+    assert far == pytest.approx(slow.min(axis=1), rel=1e-9, abs=1e-9)
+    assert slow[np.arange(len(points)), which] == pytest.approx(far, rel=1e-9, abs=1e-9)
+
+
+def twin(rows, before, after):
+    was, now = before[rows], after[rows]
+
+    def one_sided(points, triangles):
+        return max(min(slow_distance(p, t) for t in triangles) for p in points)
+
+    def places(triangles):
+        return np.concatenate([weights @ triangles for weights in PLACES])
+
+    used = np.unique(rows)
+    nodes = [min(slow_distance(p, t) for t in was) for p in after[used]]
+    middles = now.mean(axis=1)
+    sides = [one_sided(np.concatenate([after[used], places(now), middles]), was)]
+    sides += [one_sided(np.concatenate([before[used], places(was)]), now)]
+    return max(nodes), np.mean(nodes), max(sides)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-150, 1e150])
+def test_all_figures_of_a_small_surface(scale):
+    shaped = sphere_surface(30)
+    rows = shaped.mesh.cells[0].nodes.astype(np.int64)
+    before, after = shaped.mesh.points, disturb_on(shaped, 0.3, seed=1).mesh.points
+    largest, mean, hausdorff = twin(rows, before, after)
+    change = surface_change(Compared(rows, scale * before, scale * after))
+    assert change.largest / scale == pytest.approx(largest)
+    assert change.mean / scale == pytest.approx(mean)
+    assert change.hausdorff / scale == pytest.approx(hausdorff)
+    assert change.diagonal / scale == pytest.approx(np.linalg.norm(np.ptp(before, axis=0)))
+
+    def measures(points):
+        a, b, c = (points[rows[:, k]] for k in range(3))
+        return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum(), np.linalg.det(np.stack([a, b, c], axis=1)).sum()
+
+    (area, volume), (new_area, new_volume) = measures(before), measures(after)
+    assert change.area == pytest.approx(new_area / area - 1)
+    assert change.volume == pytest.approx(new_volume / volume - 1)
+    assert 0 < change.normal < 60
+
+
+def test_a_surface_that_stays_and_one_that_is_moved():
+    mesh = torus_surface(300).mesh
+    rows = mesh.cells[0].nodes.astype(np.int64)
+    same = surface_change(Compared(rows, mesh.points, mesh.points))
+    assert (same.area, same.volume) == (0, 0)
+    assert max(same.largest, same.mean, same.hausdorff) < 1e-15
+    assert same.normal < 1e-5
+    grown = surface_change(Compared(rows, mesh.points, 1.1 * mesh.points))
+    assert grown.area == pytest.approx(0.21)
+    assert grown.volume == pytest.approx(0.331)
+    turned = rows[:, ::-1]
+    flipped = surface_change(
+        Compared(np.where(np.arange(len(rows))[:, None] == 3, turned, rows), mesh.points, mesh.points)
+    )
+    assert flipped.volume is None
+    assert surface_change(Compared(rows[:0], mesh.points, mesh.points)) is None
+    fold = mesh.points.copy()
+    far = np.unique(rows[(rows == rows[0, 0]).any(axis=1)])
+    fold[rows[0, 0]] += 2.0 * (fold[far].mean(axis=0) - fold[rows[0, 0]]) + 3.0 * (fold[rows[0, 1]] - fold[rows[0, 0]])
+    assert surface_change(Compared(rows, mesh.points, fold)).normal > 90
+
+
+def test_results_tell_of_the_boundary_that_slid():
+    mesh = disturb_on(ball_volume(300), 0.2, seed=1).mesh
+    result = gmsnet.smooth(mesh, slide=True)
+    rows = mesh.cells[1].nodes.astype(np.int64)
+    wanted = surface_change(Compared(rows, mesh.points, result.points))
+    found = result.surface_change
+    assert found.largest == pytest.approx(wanted.largest, rel=1e-12)
+    assert found.hausdorff == pytest.approx(wanted.hausdorff, rel=1e-12)
+    assert 0 < found.largest < 0.1 * found.edge
+    assert gmsnet.smooth(mesh).surface_change is None
