@@ -68,7 +68,7 @@ def _use(kind: str) -> None:
             result = smooth(mesh, max_sweeps=20, **way)
             _ = result.limits, result.after.summary()  # which reports show
     with TemporaryDirectory() as folder:
-        for suffix in (".vtk", ".su2") if kind != SECOND_ORDER else (".vtk",):
+        for suffix in (".vtk", ".su2") if kind not in (SECOND_ORDER, SURFACE) else (".vtk",):
             path = Path(folder) / f"mesh{suffix}"
             io.write(meshes[0], path)
             io.write(smooth(io.read(path), max_sweeps=2).mesh, path)
