@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets, boundary_of, edge_lengths
-from gmsnet.constraints.features import lengths_of, may_slide
+from gmsnet.constraints.features import may_slide
 from gmsnet.constraints.geometry import Geometry
 from gmsnet.constraints.on_geometry import OnGeometry
 from gmsnet.constraints.on_surface import surface_of
@@ -71,27 +71,23 @@ class SurfaceSliding:
         if self.constraint is None:
             return "slide: no node of the boundary can move along it" if closed else "surface: no node can move on it"
         points = np.ldexp(mesh.points, -self.exponent)  # its own exponent may differ
-        measured = enclosed if closed else area_of
-        before, after = measured(self.start, self.facets), measured(points, self.facets)
-        change = abs(after - before) / abs(before) if before else 0.0
         away = farthest(self.constraint, points[self.memory], moved[self.memory])
-        return (
+        said = (
             f"{'slide' if closed else 'surface'}: {int((self.nodes & moved).sum()):,} of {int(self.nodes.sum()):,} "
             f"nodes have moved {'along the boundary' if closed else 'on it'}, at most {away:.2g} of an edge from the "
-            f"input's facets; the {'volume' if closed else 'area'} changes by {change:.2g} of itself"
+            "input's facets"
         )
+        if not closed:
+            return said
+        before, after = enclosed(self.start, self.facets), enclosed(points, self.facets)
+        change = abs(after - before) / abs(before) if before else 0.0
+        return f"{said}; the volume changes by {change:.2g} of itself"
 
 
 def enclosed(points: Floats, facets: Facets) -> float:
     """The volume that facets enclose."""
     a, b, c = (points[facets.rows[:, k]] - points.mean(axis=0) for k in range(3))
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
-
-
-def area_of(points: Floats, facets: Facets) -> float:
-    """The area of facets."""
-    a, b, c = (points[facets.rows[:, k]] for k in range(3))
-    return float(lengths_of(np.cross(b - a, c - a)).sum() / 2.0)
 
 
 def patches_to_slide_on(

@@ -27,8 +27,7 @@ class SurfaceChange:
     distances of either surface from the other, sampled at the nodes and at places on facets. diagonal: of the box
     around the surface as it was; edge: the mean length of its edges. normal: the largest angle, in degrees, between a
     facet's normal and that of the facet which was nearest to its middle. Of large surfaces an even part is looked at.
-    area, volume: by what share of themselves they
-    have changed; the volume is None where the surface is not closed.
+    area, volume: by what share of themselves they have changed; the volume is None where the surface is not closed.
     """
 
     largest: float
@@ -49,7 +48,7 @@ class SurfaceChange:
         whole = self.diagonal or 1.0
         volume = "" if self.volume is None else f", the volume by {self.volume:+.2g} of itself"
         return (
-            f"surface: nodes are at most {self.largest / whole:.2g} of the diagonal from the input's facets "
+            f"distance: nodes are at most {self.largest / whole:.2g} of the diagonal from the input's facets "
             f"(mean {self.mean / whole:.2g}), the Hausdorff distance is {self.hausdorff / whole:.2g} of it; normals "
             f"turn by at most {self.normal:.3g}°; the area changes by {self.area:+.2g}{volume}"
         )
