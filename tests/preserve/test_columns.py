@@ -1,23 +1,32 @@
-"""Layers of tetrahedra: found where they were made, and nowhere else; held, and untouched by smoothing."""
+"""Layers of tetrahedra and of prisms: found where they were made, nowhere else; held by smoothing."""
 
 import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.generate import disturb, lattice_volume, layered_volume, part_volume, random_volume
+from gmsnet.generate import (
+    block_volume,
+    disturb,
+    lattice_volume,
+    layered_volume,
+    o_grid_section,
+    part_volume,
+    random_volume,
+    swept_volume,
+)
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.columns import layers_of_volume
 from gmsnet.preserve.protection import LAYER
+from gmsnet.topology.mixed_volume import volume_of, wound_of
 from gmsnet.topology.ordering import space_points, taken
-from gmsnet.topology.volume import Volume
 
 KINDS = [(10, 8, 0.02, 1.4), (12, 10, 0.005, 1.5), (12, 5, 0.1, 1.3), (10, 4, 0.3, 1.0)]  # cells, rows, first, growth
 
 
 def found(mesh):
     """The layers, and which nodes may move."""
-    volume = Volume.of(mesh)
+    volume = volume_of(wound_of(mesh))
     free = np.zeros(len(mesh.points), dtype=bool)
     free[volume.free] = True
     return layers_of_volume(volume, taken(space_points(mesh), volume.memory)), free
@@ -43,6 +52,35 @@ def test_layers_are_found_where_they_are(kind, seed):
     assert 2.5 < layers.median <= layers.largest
 
 
+@pytest.mark.parametrize(("rows", "first"), [(8, 0.1), (12, 0.02), (15, 0.002)])
+def test_rows_of_prisms_are_held_where_they_are_flat(rows, first):
+    cells, growth = 14, 1.4
+    mesh = layered_volume(cells, rows, kind="wedge", first=first, growth=growth)
+    layers, free = found(mesh)
+    known = np.zeros((len(mesh.points) // (cells + 1) ** 2, (cells + 1) ** 2), dtype=bool)
+    known[: rows + 1] = True
+    assert not (layers.nodes & ~(known.ravel() & free)).any()
+    flat = 1 + int(np.sum(first * growth ** np.arange(rows) < 1.0 / 2.5))  # levels whose cells below are so flat
+    known[flat:] = False
+    assert layers.nodes[known.ravel() & free].mean() >= 0.94
+    assert layers.cells.mean() < sum(len(b.nodes) for b in mesh.cells if b.kind == "wedge") / len(layers.cells)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_section_that_was_swept_has_none(seed):
+    section = o_grid_section(6 + seed, 3 + seed, radius=0.5)
+    mesh = swept_volume(section, 12 + 2 * seed, 3.0, twist=15.0 * seed, bend=45.0 * seed)
+    assert not found(mesh)[0]
+    inner = volume_of(wound_of(mesh)).free
+    assert not found(disturb(mesh, inner, 0.2, seed=seed))[0]
+
+
+@pytest.mark.parametrize("kind", ["hexahedron", "wedge"])
+def test_a_grid_that_was_squeezed_has_none(kind):
+    mesh = squeezed(block_volume(10, kind), 0.2)
+    assert not found(mesh)[0]
+
+
 def squeezed(mesh, by):
     """The mesh, flat."""
     return mesh.with_points(mesh.points * [1.0, 1.0, by])
@@ -51,7 +89,7 @@ def squeezed(mesh, by):
 @pytest.mark.parametrize("seed", range(4))
 def test_none_where_there_are_none(seed):
     random, part = random_volume(1000, seed=seed), part_volume(9 + seed)
-    inner = Volume.of(part).free
+    inner = volume_of(wound_of(part)).free
     thrown = disturb(squeezed(part, 0.3), inner, 0.2, seed=seed)
     for mesh in (random, squeezed(random, 0.2), squeezed(random, 5.0), part, thrown):
         assert not found(mesh)[0]

@@ -25,6 +25,9 @@ Floats = NDArray[np.float64]
 
 WALLS = ("boundary", "interface between regions")  # why the nodes of walls are held
 FLAT, STILL_FLAT = 2.5, 1.7  # how many times longer than thick cells are, in the mean around a node: at a wall, inside
+# How many times longer than thick flat cells are in the shorter of the two directions: else they are long one way
+# alone, as where a section was swept. The thirds of prisms lie askew, which evens that out.
+BROAD, BROAD_THIRDS = 1.5, 1.2
 ALONG_WALL = 0.1  # of the squared length of the edges on a wall: what may lie across it
 TURN = math.cos(math.radians(30.0))  # of a column from row to row
 HIGHER = 2.5  # times as high as the row before it: no row of the same layer
@@ -32,34 +35,35 @@ ROWS = 2  # nodes of a column above its wall
 FEWEST = 12  # columns
 GROWN = 1.25  # times as flat at the wall as at the end of the column, in the median
 EVEN = 0.03  # of its height: by how much that of a row differs from column to column, in the median
+MOST = 0.5  # of the free nodes, in columns of rows of one height: more are a grid
 DETERMINANT = 1.0 / 45.0  # of a moment of trace 1: less is flat by 2 or more
 
 
 def layers_of_volume(topology: Volume, points: Floats) -> Layers:
-    """The layers of a mesh of tetrahedra as it is now. points: (N, 4) in memory order."""
+    """The layers of a mesh of volumes as it is now; their cells in memory order. points: (N, 4) in memory order."""
     nodes, rows = len(points), topology.near
     none = Layers(np.zeros(nodes, dtype=bool), np.zeros(len(rows), dtype=bool), 1.0, 1.0, 0)
     wall = _wall_nodes(topology)
-    foot, normal, flatness = _feet(points, rows, wall)
+    broad = BROAD_THIRDS if topology.simplices.shapes is None else BROAD
+    foot, normal, flatness = _feet(points, rows, wall, broad)
     if len(foot) < FEWEST:
         return none
-    columns, heights, last = _grown(topology, points, foot, normal)
+    columns, heights, last = _grown(topology, points, foot, normal, broad)
     long: Flags = np.asarray((columns[:, ROWS : ROWS + 1] >= 0).any(axis=1))
     if long.sum() < FEWEST:
         return none
-    chosen = long & _accepted(rows, columns, heights, flatness, last, long, wall)
+    chosen = long & _accepted(rows, columns, heights, flatness, last, long, wall, len(topology.free))
     if not chosen.any():
         return none
     inside = np.zeros(nodes, dtype=bool)
     members = columns[chosen]
     inside[members[members >= 0]] = True
-    cells = inside[rows].all(axis=1)
+    solids = topology.simplices.solids
+    cells: Flags = np.asarray(inside[rows if solids is None else solids.nodes].all(axis=1))
     held = np.zeros(nodes, dtype=bool)
     held[topology.memory] = inside & topology.near_free
-    of_file = np.zeros(len(rows), dtype=bool)
-    of_file[topology.near_origin] = cells
     found = flatness[chosen]
-    return Layers(held, of_file, float(np.median(found)), float(found.max()), 0)
+    return Layers(held, cells, float(np.median(found)), float(found.max()), 0)
 
 
 def _wall_nodes(topology: Volume) -> Flags:
@@ -71,7 +75,7 @@ def _wall_nodes(topology: Volume) -> Flags:
     return wall
 
 
-def _feet(points: Floats, rows: Ints, wall: Flags) -> tuple[Ints, Floats, Floats]:
+def _feet(points: Floats, rows: Ints, wall: Flags, broad: float) -> tuple[Ints, Floats, Floats]:
     """The nodes of walls where all cells are flat along the wall: places, unit normals (K, 3), flatness (K,)."""
     moments, along = np.zeros((2, len(wall), kernels.MOMENTS))
     count = np.zeros(len(wall), dtype=np.int32)
@@ -80,13 +84,13 @@ def _feet(points: Floats, rows: Ints, wall: Flags) -> tuple[Ints, Floats, Floats
     mean = moments[some] / count[some, None]
     few = _determinant(mean) < DETERMINANT
     some, mean = some[few].astype(np.int32), mean[few]
-    flatness, normal = _flat(mean)
+    flatness, normal = _flat(mean, broad)
     across = np.einsum("ki,kij,kj->k", normal, _tensors(along[some]), normal)
     good = (flatness >= FLAT) & (across <= ALONG_WALL * along[some, :3].sum(axis=1))
     return some[good], normal[good], flatness[good]
 
 
-def _grown(topology: Volume, points: Floats, foot: Ints, normal: Floats) -> tuple[Ints, Floats, Floats]:
+def _grown(topology: Volume, points: Floats, foot: Ints, normal: Floats, broad: float) -> tuple[Ints, Floats, Floats]:
     """The columns: (C, R) places from the foot on, −1 behind their ends; heights (C, R − 1); flatness of the last."""
     nodes, inner = len(points), topology.near_free & (np.diff(topology.start) > 0)
     at, normal, last = foot.copy(), normal.copy(), np.full(len(foot), np.nan)
@@ -108,7 +112,7 @@ def _grown(topology: Volume, points: Floats, foot: Ints, normal: Floats) -> tupl
         ahead = np.flatnonzero(to >= 0)
         mean = np.empty((len(ahead), kernels.MOMENTS))
         kernels.of_stars(points, to[ahead], topology.start, topology.local, topology.ring_start, topology.ring, mean)
-        flatness, direction = _flat(mean)
+        flatness, direction = _flat(mean, broad)
         alike = (flatness >= STILL_FLAT) & (abs((direction * normal[ahead]).sum(axis=1)) >= TURN)
         to[ahead[~alike]] = -1
         going = ahead[alike]
@@ -122,9 +126,12 @@ def _grown(topology: Volume, points: Floats, foot: Ints, normal: Floats) -> tupl
 
 
 def _accepted(
-    rows: Ints, columns: Ints, heights: Floats, flatness: Floats, last: Floats, long: Flags, wall: Flags
+    rows: Ints, columns: Ints, heights: Floats, flatness: Floats, last: Floats, long: Flags, wall: Flags, free: int
 ) -> Flags:
-    """(C,) which columns stand beside enough others and have grown, or are of rows of one height."""
+    """(C,) which columns stand beside enough others and have grown, or are of rows of one height that are not the mesh.
+
+    free: how many nodes may move.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components  # loads what few runs need
 
@@ -145,7 +152,8 @@ def _accepted(
             continue
         grown = np.median(flatness[own]) >= GROWN * np.median(last[own])
         even = np.median(differ[piece[pairs[:, 0]] == name], axis=None) <= EVEN
-        accepted[own] = grown or even
+        part = np.count_nonzero(columns[own, 1:] >= 0) < MOST * free
+        accepted[own] = grown or (even and part)
     return accepted
 
 
@@ -161,9 +169,13 @@ def _determinant(moments: Floats) -> Floats:
     return found
 
 
-def _flat(moments: Floats) -> tuple[Floats, Floats]:
-    """How many times longer than thick cells of these moments are (K,), and the direction in which they are thin."""
+def _flat(moments: Floats, broad: float) -> tuple[Floats, Floats]:
+    """How many times longer than thick cells of these moments are (K,), and the direction in which they are thin.
+
+    1.0 of cells that are long one way alone. broad: BROAD, or BROAD_THIRDS of tetrahedra.
+    """
     values, vectors = np.linalg.eigh(_tensors(moments))
     values = np.maximum(values, 1e-30)
     flatness: Floats = np.sqrt(np.sqrt(values[:, 1] * values[:, 2]) / values[:, 0])
+    flatness[values[:, 1] < broad**2 * values[:, 0]] = 1.0
     return flatness, vectors[:, :, 0]
