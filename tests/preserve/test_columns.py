@@ -70,7 +70,6 @@ def test_rows_of_prisms_are_held_where_they_are_flat(rows, first):
 def test_a_section_that_was_swept_has_none(seed):
     section = o_grid_section(6 + seed, 3 + seed, radius=0.5)
     mesh = swept_volume(section, 12 + 2 * seed, 3.0, twist=15.0 * seed, bend=45.0 * seed)
-    assert not found(mesh)[0]
     inner = volume_of(wound_of(mesh)).free
     assert not found(disturb(mesh, inner, 0.2, seed=seed))[0]
 

@@ -35,7 +35,7 @@ ROWS = 2  # nodes of a column above its wall
 FEWEST = 12  # columns
 GROWN = 1.25  # times as flat at the wall as at the end of the column, in the median
 EVEN = 0.03  # of its height: by how much that of a row differs from column to column, in the median
-MOST = 0.5  # of the free nodes, in columns of rows of one height: more are a grid
+MOST = 0.35  # of the free nodes, in columns of rows of one height: more are a grid
 DETERMINANT = 1.0 / 45.0  # of a moment of trace 1: less is flat by 2 or more
 
 
@@ -146,13 +146,13 @@ def _accepted(
     accepted = np.zeros(len(columns), dtype=bool)
     first = heights[:, 0]
     differ = abs(first[pairs[:, 0]] - first[pairs[:, 1]]) / np.maximum(first[pairs[:, 0]], first[pairs[:, 1]])
+    part = np.count_nonzero(columns[long, 1:] >= 0) < MOST * free
     for name in np.unique(piece[long]).tolist():
         own = long & (piece == name)
         if own.sum() < FEWEST:
             continue
         grown = np.median(flatness[own]) >= GROWN * np.median(last[own])
         even = np.median(differ[piece[pairs[:, 0]] == name], axis=None) <= EVEN
-        part = np.count_nonzero(columns[own, 1:] >= 0) < MOST * free
         accepted[own] = grown or (even and part)
     return accepted
 
