@@ -117,8 +117,8 @@ def smooth(
         float | None,
         typer.Option(
             metavar="X",
-            help="How far nodes of surfaces may go from the input's facets, over the length of their edges (default: "
-            "0.05 of surface meshes; of volumes no bound).",
+            help="How far nodes of surfaces may go from the input's facets, over the length of their edges.",
+            show_default="0.05",
         ),
     ] = None,
     threads: Annotated[

@@ -12,6 +12,7 @@ from gmsnet.errors import InputError
 from gmsnet.mesh.mesh import Mesh
 
 FEATURE_ANGLE = 30.0  # degrees
+TOLERANCE = 0.05  # of the edges: how far nodes may go from the facets of the input
 
 SlideChoice: TypeAlias = Any  # None, True, False, a marker's name or several names: what users give is checked here
 FORMS = "slide must be None, True or names of markers"

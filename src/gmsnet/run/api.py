@@ -76,8 +76,8 @@ def smooth(
     curves, boundary nodes of tetrahedra on their surface: None (they stay), True, or names of markers whose nodes may.
     feature_angle: degrees; curves end, and edges of surfaces are sharp, where they turn by more. geometry: what to
     slide on in the plane instead of arcs through the input's nodes (docs/sliding.md). surface_tolerance: how far from
-    the input's facets nodes of surfaces may go, over the mean length of their edges (default: 0.05 of a surface mesh,
-    without a bound at the boundary of a volume).
+    the input's facets nodes of surfaces may go, over the mean length of their edges (default: 0.05; with a geometry
+    without a bound).
     metric: the tensors of which the cells are to be unit cells, by shape and size (docs/metric.md): an array (N, 3) of
     m11, m12, m22 at the nodes, or a function from points (n, 2) to such an array. size: the same for lengths h of
     edges: an array (N,), or a function from points (n, 2) to one (n,); its metric is h⁻²·I.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gmsnet.constraints.geometry import Geometry
-from gmsnet.constraints.options import FEATURE_ANGLE, SlideChoice, check_sliding
+from gmsnet.constraints.options import FEATURE_ANGLE, TOLERANCE, SlideChoice, check_sliding
 from gmsnet.errors import InputError
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.measure.report import ASPECT, SHAPE
@@ -124,6 +124,11 @@ class SmoothOptions:
     def slides(self) -> bool:
         """May nodes of curves move along them?"""
         return self.slide is not None and self.slide is not False
+
+    @property
+    def distance(self) -> float:
+        """How far from the input's facets nodes may go, over the length of their edges; a geometry is trusted."""
+        return self.surface_tolerance or (TOLERANCE if self.geometry is None else math.inf)
 
     @property
     def adapts(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -154,8 +153,7 @@ def _first_of_volume(
         topology = volume_of(wound)
     else:
         topology = volume_of(wound, surface[1].slides | surface[1].curves.slides)
-        tolerance = options.surface_tolerance or math.inf
-        sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, tolerance, options.geometry)
+        sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, options.distance, options.geometry)
     remarks = held_anyway(asked, topology, fixed, options.slides)
     if others := unmoved(given):
         remarks.append(f"not measured, and their nodes are held: {others}")

@@ -25,8 +25,6 @@ from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
 
-TOLERANCE = 0.05  # of the edges: how far nodes may go from the facets of the input
-
 
 def first_of_surface(
     given: Mesh, restore: Callable[[Floats], Any], asked: NDArray[np.bool_], smoother: Smoother,
@@ -41,8 +39,9 @@ def first_of_surface(
         topology, start = Topology.and_points(given, asked, options.thread_count, patches.curves.slides)
     normals = normals_of(patches, space_points(given)[:, :3])
     shell = Shell.made(topology, sides_of(given, topology, patches, normals)).holding(~slides, FEATURE)
-    tolerance = options.surface_tolerance or TOLERANCE
-    sliding = SurfaceSliding.of(given, facets, patches, shell.memory, shell.free, tolerance, options.geometry, normals)
+    sliding = SurfaceSliding.of(
+        given, facets, patches, shell.memory, shell.free, options.distance, options.geometry, normals
+    )
     others = unmeasured(given)
     remarks = (f"not measured, and their nodes are held: {others}",) if others else ()
     given = given.without_cells()
