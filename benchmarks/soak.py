@@ -71,7 +71,7 @@ class Traces:
 
 def smooth_one(number: int, random: np.random.Generator, folder: Path) -> None:
     """One mesh of 20 to 300 nodes with the method and by the way that its number tells."""
-    written = [key for key, entry in FORMATS.items() if not entry.folder]
+    written = [key for key, entry in FORMATS.items() if not (entry.folder or entry.own)]
     method, key = list(METHODS)[number % len(METHODS)], written[number % len(written)]
     mesh = gmsnet.random_mesh(int(random.integers(20, 300)), seed=number % 50)
     if number % 5 == 0:

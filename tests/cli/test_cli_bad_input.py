@@ -70,7 +70,6 @@ BAD_FILES = [  # input, what the message must hold
     ("inf.su2", ["inf.su2", "inf"]),
     ("word.su2", ["word.su2", "line", "1.2.3"]),
     ("far-index.su2", ["far-index.su2", "99999", "line"]),
-    ("hexes.vtk", ["hexes.vtk", "hexahedron", "only tetrahedra move"]),
     ("cut.vtk", ["cut.vtk"]),
     ("good.xyz", ["good.xyz", ".su2", "--format"]),
     ("packed.su2.gz", ["packed.su2.gz", "damaged", "unpack"]),
@@ -152,6 +151,18 @@ def check(done, folder, before, words):
 def test_bad_files(run, folder, name, words):
     before = contents(folder)
     check(run("smooth", folder / name, folder / "out.su2"), folder, before, words)
+
+
+def test_cells_that_name_a_node_twice_are_held_and_not_drawn(run, folder):
+    before = (folder / "hexes.vtk").read_text()
+    done = run("smooth", folder / "hexes.vtk", folder / "out.vtk")
+    assert done.code == 0
+    assert "written unchanged" in done.out
+    assert (folder / "out.vtk").read_text() == before
+    done = run("quality", folder / "hexes.vtk", "--plot", folder / "picture.png")
+    assert done.code == 2
+    assert "has none that is measured" in done.err
+    assert not (folder / "picture.png").exists()
 
 
 @pytest.mark.parametrize("name", [name for name, _ in BAD_FILES])

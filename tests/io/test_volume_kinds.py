@@ -120,7 +120,7 @@ def test_nodes_stand_where_gmsh_has_them(kind, tmp_path):
     gmsh = pytest.importorskip("gmsh")
     path, mesh = tmp_path / "mesh.msh", cells_of(kind)
     io.write(mesh, path)
-    gmsh.initialize()
+    gmsh.initialize(interruptible=False)  # else it takes Ctrl-C away from the tests that follow
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.open(str(path))

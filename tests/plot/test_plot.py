@@ -174,14 +174,6 @@ def test_a_hundred_thousand_cells(tmp_path):
         (SMALL, "p", "no suffix"),
         (SMALL, "nowhere/p.png", "does not exist"),
         (Mesh(np.eye(3), (CellBlock("line", np.array([[0, 1]]), np.zeros(1)),)), "p.png", "has none"),
-        (
-            Mesh(
-                np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1.0]]),
-                (CellBlock("triangle", np.array([[0, 1, 2], [1, 3, 2]]), np.zeros(2)),),
-            ),
-            "p.png",
-            "planar meshes and volumes, and this is a surface",
-        ),
     ],
 )
 def test_what_cannot_be_drawn(tmp_path, mesh, name, message):

@@ -134,9 +134,12 @@ def test_all_measures_and_unknown_ones():
         square().gmsnet.quality("shap")
 
 
-def test_surfaces_in_space_and_strips_are_refused_in_words():
-    with pytest.raises(InputError, match="surface"):
-        pv.Sphere().gmsnet.smooth()
+def test_surfaces_in_space_move_and_strips_are_refused_in_words():
+    sphere = pv.Sphere()
+    made = sphere.gmsnet.smooth()
+    assert made.n_cells == sphere.n_cells
+    assert (made.points != sphere.points).any()
+    assert gmsnet.quality(made).shape.min() >= gmsnet.quality(sphere).shape.min()
     with pytest.raises(InputError, match=r"call \.triangulate\(\) first"):
         pv.Sphere().strip().gmsnet.quality()
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gmsnet.measure.bins import bins_of
 from gmsnet.measure.report import QualityReport
@@ -29,8 +28,8 @@ class Shown(Protocol):
         ...
 
     @property
-    def corners(self) -> NDArray[Any]:
-        """(T, corners of a cell)."""
+    def quads(self) -> bool:
+        """Are its bins those of cells that may be quads, or of volumes?"""
         ...
 
     @property
@@ -42,7 +41,7 @@ class Shown(Protocol):
 def histogram(axes: Axes, views: Sequence[Shown], name: str, label: str) -> None:
     """The share of cells by a measure (an array of QualityReport, by name), and a mark at the worst value."""
     values, worst = [view.report.column(name) for view in views], np.max if name == "max_dihedral" else np.min
-    bins = bins_of(name, values, quads=any(view.corners.shape[1] == 4 for view in views)).tolist()
+    bins = bins_of(name, values, quads=any(view.quads for view in views)).tolist()
     for view, each in zip(views, values, strict=True):
         share = np.full(len(each), 100.0 / len(each))
         axes.hist(each, bins, weights=share, color=view.colour, alpha=0.35, edgecolor="none")

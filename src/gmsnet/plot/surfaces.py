@@ -55,6 +55,11 @@ class Sheet:
     closed: bool
 
     @property
+    def quads(self) -> bool:
+        """See ``Shown``."""
+        return bool(self.corners.shape[1] == 4)
+
+    @property
     def normals(self) -> Floats:
         """(T, 3) of length 1."""
         a, b, c = (self.points[self.corners[:, k]] for k in range(3))

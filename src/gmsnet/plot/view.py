@@ -71,6 +71,11 @@ class View:
         )
 
     @property
+    def quads(self) -> bool:
+        """See ``Shown``."""
+        return bool(self.corners.shape[1] == 4)
+
+    @property
     def box(self) -> NDArray[np.float64]:
         """(2 × 2) least and greatest coordinates of the nodes that are drawn."""
         used = self.points[np.unique(np.concatenate([self.corners.ravel(), *(o.ravel() for o in self.others)]))]

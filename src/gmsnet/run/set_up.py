@@ -38,7 +38,7 @@ from gmsnet.topology.ordering import space_points, taken
 from gmsnet.topology.solids import KINDS, has_solids
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
-from gmsnet.topology.wound import Wound, refuse_flat
+from gmsnet.topology.wound import refuse_flat
 
 Floats = NDArray[np.float64]
 
@@ -141,14 +141,10 @@ def _first_of_volume(
     given: Mesh, restore: Callable[[Floats], Any], asked: NDArray[np.bool_], fixed: Any, smoother: Smoother,
     options: SmoothOptions, executor: Executor,
 ) -> State:  # fmt: skip
-    """The same of a mesh of tetrahedra."""
+    """The same of a mesh of volumes."""
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     wound, sliding = wound_of(given, asked), None
-    surface = None
-    if isinstance(wound, Wound):
-        surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked)
-    elif names != ():
-        raise InputError("boundary nodes of hexahedra, wedges and pyramids cannot slide yet: leave slide out")
+    surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked)
     if surface is None:
         topology = volume_of(wound)
     else:
