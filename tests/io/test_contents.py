@@ -252,7 +252,7 @@ def test_writing_takes_no_memory_by_the_size_of_the_file(
     monkeypatch.setattr(splice, "_PIECE", 1 << 12)
     monkeypatch.setattr(splice, "ROWS", 1 << 7)
     path, out = (tmp_path / f"{stem}{FORMATS[key].suffixes[0]}" for stem in ("in", "out"))
-    io.write(triangle_grid(60), path)
+    io.write(triangle_grid(80), path)
     mesh = io.read(path)
     moved = mesh.with_points(mesh.points + np.array([1 / 3, 1 / 7, 0.0])[: mesh.points.shape[1]])
     io.write(moved, out)  # which may compile kernels

@@ -45,6 +45,8 @@ if "planar" in sys.argv:
 shape = vtk_to_numpy(simple.servermanager.Fetch(smooth).GetCellData().GetArray("gmsnet shape"))
 told["least"], told["cells"] = float(np.nanmin(shape)), len(shape)
 simple.SaveData(target, proxy=smooth)
-sphere = GmsnetSmooth(Input=simple.Sphere())  # noqa: F821
-sphere.UpdatePipeline()
+sphere = simple.Sphere()
+told["sphere moved"] = int((points(GmsnetSmooth(Input=sphere)) != points(sphere)).any(axis=1).sum())  # noqa: F821
+nothing = GmsnetSmooth(Input=simple.Line())  # noqa: F821
+nothing.UpdatePipeline()
 print("TOLD " + json.dumps(told))
