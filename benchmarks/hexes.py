@@ -17,8 +17,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -27,6 +25,7 @@ from pathlib import Path
 
 import numba
 import numpy as np
+from apart import made_by
 from machine import describe
 from peers.volume_tools import MESQUITE, gmsnet_with, mesquite, mfem_tmop
 from volumes import minimum
@@ -146,16 +145,7 @@ class Case:
 
     def run(self, tool: str, limit: float) -> tuple[np.ndarray, float] | str:
         """What a tool makes of it, and its seconds; or why there is nothing."""
-        target = self.path.with_suffix(".out.npz")
-        command = [sys.executable, __file__, "--work", tool, str(self.path), str(target)]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=False)
-        except subprocess.TimeoutExpired:
-            return f"more than {limit:g} s"
-        if done.returncode:
-            return (done.stderr.strip().splitlines() or [f"ended with {done.returncode}"])[-1][:90]
-        with np.load(target) as found:
-            return found["points"], float(found["seconds"])
+        return made_by(Path(__file__), tool, self.path, limit)
 
 
 def compare(name: str, case: Case, tools: list[str], limit: float) -> None:

@@ -155,7 +155,6 @@ def test_all_edges_of_an_ideal_cell_are_equally_long(kind):
 @each(SOLID)
 def test_only_corners_that_decide_are_called_exact(kind):
     assert kind.exact == (kind.name in {"triangle", "quad", "tetra", "pyramid"})
-    assert kind.validity is None
 
 
 WHOLE = st.integers(-9, 9)

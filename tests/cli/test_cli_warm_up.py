@@ -29,7 +29,8 @@ def test_unknown_kinds_are_told_before_anything_is_compiled(run, monkeypatch):
     monkeypatch.setattr(warm_up, "_use", None)
     done = run("warm-up", "--cells", "triangle", "--cells", "hexagon")
     assert (done.code, done.out) == (2, "")
-    assert "unknown kind of cells 'hexagon': known are triangle, quad, tetra, surface, second-order" in done.err
+    known = "triangle, quad, tetra, hexahedron, surface, second-order"
+    assert f"unknown kind of cells 'hexagon': known are {known}" in done.err
 
 
 @pytest.mark.long

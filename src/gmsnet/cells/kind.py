@@ -28,8 +28,6 @@ class CellKind(NamedTuple):
 
     exact: whether a cell is valid just where all of its simplices are positive. Its Jacobian determinant then lies
     between those at the corners. Quads must be planar.
-    validity: (K, S) combinations of the determinants of ``simplices`` that must be positive for a cell to be valid;
-    None: there are none beside the simplices themselves, which decide where ``exact`` is True.
     """
 
     name: str
@@ -42,7 +40,6 @@ class CellKind(NamedTuple):
     simplices: tuple[Nodes, ...] = ()
     ideal: tuple[Matrix, ...] = ()
     exact: bool = False
-    validity: Matrix | None = None
 
 
 def higher_order(
@@ -72,7 +69,7 @@ def higher_order(
             for facet, centre in zip(linear.facets, centres or [None] * len(linear.facets), strict=True)
         )
     # The corners do not decide here: what does is made of the determinants between all nodes, not of the simplices'.
-    return linear._replace(name=name, nodes=nodes, order=order, edges=edges, facets=facets, exact=False, validity=None)
+    return linear._replace(name=name, nodes=nodes, order=order, edges=edges, facets=facets, exact=False)
 
 
 def _sides(facet: Nodes) -> list[tuple[int, int]]:

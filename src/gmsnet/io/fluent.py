@@ -29,7 +29,7 @@ suffixes = (".msh",)
 
 Ints = NDArray[np.int64]
 
-INTERIOR, PARENT = 2, 31  # types of boundary: faces between cells, and those of a refined cell's whole side
+PARENT = 31  # the type of boundary of a refined cell's whole side
 
 
 def read(files: Mapping[str, Data]) -> Parsed:

@@ -13,6 +13,7 @@ from gmsnet import io
 from gmsnet.errors import InputError
 from gmsnet.generate import (
     Curve,
+    block_volume,
     disturb,
     good_mesh,
     layered_mesh,
@@ -30,7 +31,7 @@ NODES = 150  # of a small mesh
 FAR = 0.6  # of a mesh that is to be tangled, nodes are thrown by up to so many edges
 
 Way = Mapping[str, Any]
-SECOND_ORDER, SURFACE = "second-order", "surface"
+SECOND_ORDER, SURFACE, SOLID = "second-order", "surface", "hexahedron"
 WAYS: Sequence[Way] = ({}, {"preserve": "none"}, {"slide": True}, {"guard": "star"})
 PLANAR: Sequence[Way] = (*WAYS, {"preserve": "size"}, {"target_quality": 0.35}, {"target_angle": 25.0})
 SPACE: Sequence[Way] = (*WAYS, {"target_quality": 0.4}, {"target_dihedral": 20.0})
@@ -38,6 +39,7 @@ KINDS: Mapping[str, Sequence[Way]] = {
     "triangle": PLANAR,
     "quad": PLANAR,
     "tetra": SPACE,
+    SOLID: (*WAYS, {"target_quality": 0.4}),
     SURFACE: ({}, {"slide": True}, {"guard": "star"}),
     SECOND_ORDER: ({}, {"preserve": "none"}),
 }
@@ -46,7 +48,7 @@ KINDS: Mapping[str, Sequence[Way]] = {
 def warm_up(kinds: Sequence[str] | None = None) -> Iterator[tuple[str, float]]:
     """Compiles what the default method needs for meshes of some kinds (default: all), those in files included.
 
-    "quad" is for meshes of quads and triangles, too.
+    "quad" is for meshes of quads and triangles, "hexahedron" for those of hexahedra, wedges and pyramids, too.
     Yields each kind when it is done, with the seconds that went into compilation. Raises InputError for other kinds.
     """
     for kind in kinds or KINDS:
@@ -86,6 +88,8 @@ def _meshes(kind: str) -> list[Mesh]:
     """Of the planar ones: random, with layers, refined towards a wall, deformed as a whole."""
     if kind == "tetra":
         return [random_volume(NODES, seed=1)]
+    if kind == SOLID:
+        return [block_volume(4, "mixed")]
     quads = random_quad_mesh(NODES, cells="mixed", seed=1)
     if kind == SURFACE:
         return [_bent(random_mesh(NODES, seed=1)), _bent(quads)]
