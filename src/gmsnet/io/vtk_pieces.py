@@ -82,6 +82,6 @@ def _numbered(parts: list[tuple[Part, Link]], links: list[Link]) -> list[tuple[P
     return [(part.in_region(numbers[link.group], link.name), link) for part, link in parts]
 
 
-pvtu = PieceFormat("PVTU", (".pvtu",), "PUnstructuredGrid")
-pvtp = PieceFormat("PVTP", (".pvtp",), "PPolyData")
-vtm = PieceFormat("VTM", (".vtm",), BLOCKS)
+pvtu: PieceFormat = PieceFormat("PVTU", (".pvtu",), "PUnstructuredGrid")
+pvtp: PieceFormat = PieceFormat("PVTP", (".pvtp",), "PPolyData")
+vtm: PieceFormat = PieceFormat("VTM", (".vtm",), BLOCKS)

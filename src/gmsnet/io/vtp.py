@@ -16,7 +16,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX, STRIP
 
 name = "VTP"
-suffixes = (".vtp",)
+suffixes: tuple[str, ...] = (".vtp",)
 
 SECTIONS = {"Verts": POLYVERTEX, "Lines": POLYLINE, "Strips": STRIP, "Polys": POLYGON}  # as the cell data are in order
 

@@ -28,7 +28,7 @@ from gmsnet.io.vtu_xml import DataArray, Document
 from gmsnet.mesh.mesh import Mesh
 
 name = "VTU"
-suffixes = (".vtu",)
+suffixes: tuple[str, ...] = (".vtu",)
 
 NAMES = {kind: called for called, kind in TYPES.items()}
 _IS_BLANK = np.isin(np.arange(256), list(b" \t\r\n"))

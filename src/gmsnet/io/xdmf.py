@@ -31,7 +31,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import combined, regions_of
 
 name = "XDMF"
-suffixes = (".xdmf",)
+suffixes: tuple[str, ...] = (".xdmf",)
 
 Ints = NDArray[np.int64]
 
@@ -40,6 +40,10 @@ COUNTED = (1, 2, 3)  # in a list of mixed types the number of their nodes follow
 
 class Items:
     """The numbers of the items of a file."""
+
+    data: Data
+    text: Text
+    h5: File | None
 
     def __init__(self, files: Mapping[str, Data]) -> None:
         self.data, self.text = files[".xdmf"], Text(files[".xdmf"], ends=b"<")

@@ -30,6 +30,10 @@ class Floor:
     worst cells can name them (``watch``).
     """
 
+    enough: int
+    looks: int
+    unhindered: int
+
     LOOKS, MOST_LOOKS, SHARE, FEWEST = 3, 12, 16, 64
     WATCHED = 64  # cells
 

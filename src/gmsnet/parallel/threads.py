@@ -48,7 +48,7 @@ class Serial(Process):
         return self
 
 
-serial = Serial()
+serial: Serial = Serial()
 
 
 class Threads(Process):

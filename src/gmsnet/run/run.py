@@ -68,6 +68,18 @@ class Run:
     ended the sweeps, if they were interrupted.
     """
 
+    topology: Topology | Volume
+    options: SmoothOptions
+    missing: Callable[[Floats], NDArray[np.int32]] | None
+    metric: Metric | None
+    smoother: Smoother | Corners
+    executor: Executor
+    field: Field
+    sweeps: int
+    first: int
+    best: Floats
+    best_score: Score
+
     def __init__(
         self, start: Start, smoother: Smoother, options: SmoothOptions, executor: Executor = serial,
         missing: Callable[[Floats], NDArray[np.int32]] | None = None,
