@@ -66,6 +66,11 @@ class Vector:
         """In float64."""
         return Vector(self.builder, self.builder.fpext(self.value, DOUBLES))
 
+    def above(self, least: float) -> Vector:
+        """This where it is at least so large, and elsewhere zero; what is not a number stays so."""
+        small = self.builder.fcmp_ordered("<", self.value, self._of(least))
+        return self.where(self.builder.not_(small), 0.0)
+
     def below(self, other: Vector) -> Any:
         """A mask: where this is less."""
         return self.builder.fcmp_ordered("<", self.value, other.value)

@@ -38,7 +38,7 @@ FLAT = 1e-5  # of F: a node with less to gain stays, for float32 does not tell i
 
 
 class Power3(NamedTuple):
-    """number: k of p = 3·2^k, −1 for p = 3/2. constants: see kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m."""
+    """number: k of p = 3·2^k, from −2 on. constants: see kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m."""
 
     number: int
     constants: NDArray[np.float32]
@@ -48,7 +48,7 @@ class Power3(NamedTuple):
     @classmethod
     def of(cls, number: int, worst: float = 1.0) -> Power3:
         """Of a power, of (q/q_worst)^p. worst: q_worst³, so that high powers stay within float32."""
-        p = 1.5 if number < 0 else 3.0 * 2.0**number
+        p = 3.0 * 2.0**number
         scale, m = 1.0 / (K3 * worst), 2.0 * p / 3.0
         constants = (scale, math.sqrt(scale), 2.0 * p, m, 0.5 * (1.0 + 1.0 / m), 1.0 - 1.0 / p)
         return cls(number, np.array(constants, dtype=np.float32), 6.0 * p, 1.0 + 1.0 / m)
