@@ -30,13 +30,14 @@ class Rows(NamedTuple):
 def surface_of(
     patches: Patches, points: Floats, memory: Ints, single: bool, limit: Floats | None = None,
     geometry: OnGeometry | None = None, folds: bool = True,
-    normals: Floats | None = None,
+    normals: Floats | None = None, bound: float | None = None,
 ) -> Surface | None:  # fmt: skip
     """The constraint for kernels, with the nodes where they are; None where none slides.
 
     points: (N, 3) by node ids. memory: (N,) node ids in memory order. limit: (N,) how far each may go from the facets
     or edges; None: as far as the cubics are. geometry: the true shape of what is not plane or straight. folds: the
-    facets around nodes are listed, so that none turns over. normals: see ``normals_of``, where they are known.
+    facets around nodes are listed, so that none turns over. normals: see ``normals_of``, where they are known. bound:
+    how far any place on a facet may be.
     """
     slides = patches.slides | patches.curves.slides
     if not slides.any():
@@ -67,6 +68,7 @@ def surface_of(
         pieces, before, after, bool(single),
         np.full(len(nodes), np.inf) if limit is None else limit[nodes[order]],
         *_around(patches.rows if folds else patches.rows[:0], patches.unit, row, memory),
+        bound,
     )  # fmt: skip
 
 

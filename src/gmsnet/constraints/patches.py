@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets
 from gmsnet.constraints.features import COLLINEAR, SLACK, Curves, curves_along, lengths_of, rounding_of
+from gmsnet.constraints.needles import free_edges
 from gmsnet.constraints.outline import Flags, Longs, Outline, edge_keys
 
 Floats = NDArray[np.float64]
@@ -36,8 +37,12 @@ class Patches:
     flat: Flags
 
 
-def patches_of(facets: Facets, points: Floats, feature_angle: float, single: bool, may: Flags) -> Patches:
+def patches_of(
+    facets: Facets, points: Floats, feature_angle: float, single: bool, may: Flags, free_needles: bool = False
+) -> Patches:
     """The patches of a surface. points: (N, 3). feature_angle: degrees. may: (N,) bool, which nodes may slide.
+
+    free_needles: edges are not sharp that are so only because a facet there is thin (constraints/needles.py).
 
     An edge is sharp where its two facets turn by more than the feature angle, differ in their region or marks, or have
     no area, where it belongs to one facet or more than two, and where there is a line cell.
@@ -55,7 +60,14 @@ def patches_of(facets: Facets, points: Floats, feature_angle: float, single: boo
     turning, size = _of_cells(facets, normal, unit, area)
     cosine = (turning[f] * turning[g]).sum(axis=1)
     smooth = two & (size[f] > 0.0) & (size[g] > 0.0) & (facets.label[f] == facets.label[g])
-    smooth &= cosine >= math.cos(math.radians(feature_angle)) - SLACK
+    least = math.cos(math.radians(feature_angle)) - SLACK
+    gentle = smooth & (cosine >= least)
+    if free_needles:
+        triangles = len(rows) - facets.halves
+        alike = two & (facets.label[f] == facets.label[g]) & (np.maximum(f, g) < triangles)
+        freed, unit = free_edges(points[rows], unit, area, one, other, gentle, alike, least)
+        gentle |= freed
+    smooth = gentle
     line_keys = edge_keys(facets.lines[:, 0], facets.lines[:, 1], nodes)
     smooth &= ~np.isin(found, line_keys)
 

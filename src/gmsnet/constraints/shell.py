@@ -26,15 +26,17 @@ FEATURE = "feature of the surface"  # why nodes of sharp edges are held
 
 
 def patches_of_surface(
-    mesh: Mesh, topology: Topology, names: Sequence[str] | None, feature_angle: float, held: Flags
-) -> tuple[Facets, Patches]:
+    mesh: Mesh, topology: Topology, names: Sequence[str] | None, feature_angle: float, held: Flags,
+    free_needles: bool = False,
+) -> tuple[Facets, Patches]:  # fmt: skip
     """The facets of a mesh in no plane and its patches; which of its nodes slide: (N,) by id.
 
-    names: of the markers whose nodes slide along curves: as ``check_slide`` gives them. held: (N,) bool.
+    names: of the markers whose nodes slide along curves: as ``check_slide`` gives them. held: (N,) bool. free_needles:
+    see ``patches_of``.
     """
     facets = surface_itself(mesh, topology)
     points = space_points(mesh)[:, :3].copy()
-    patches = patches_of(facets, points, feature_angle, mesh.single, ~held)
+    patches = patches_of(facets, points, feature_angle, mesh.single, ~held, free_needles)
     along = patches.curves.slides & may_slide(mesh, names, held)
     return facets, replace(patches, curves=replace(patches.curves, slides=along))
 

@@ -27,7 +27,7 @@ def edge_length(corner, f, k):
 def off_facet(surface, place, x, y, z):
     """The distance of a point from the facet nearest to it, from ``place`` on, over the mean length of its edges."""
     corner = surface.corner
-    f, a, b, c = walk(surface, place, x, y, z)
+    f, a, b, c = walk(surface.corner, surface.beside, place, x, y, z)
     px = a * corner[f, 0, 0] + b * corner[f, 1, 0] + c * corner[f, 2, 0]
     py = a * corner[f, 0, 1] + b * corner[f, 1, 1] + c * corner[f, 2, 1]
     pz = a * corner[f, 0, 2] + b * corner[f, 1, 2] + c * corner[f, 2, 2]

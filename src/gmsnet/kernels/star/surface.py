@@ -34,7 +34,8 @@ class Surface(NamedTuple):
     (F, CONTROLS, 3). Of pieces (P,): piece (P, 4, 3) control points, before, after (P,) int32. single: new coordinates
     are rounded to float32. limit: (R,) how far from the facets, or edges, themselves each row may go. Of facets of a
     volume's boundary around each row (M,), in CSR form by start (R + 1,): ring (M, 2) int32, the other two nodes, seen
-    counter-clockwise from outside; own (M, 3) its unit normal at first.
+    counter-clockwise from outside; own (M, 3) its unit normal at first. bound: how far places on facets may lie from
+    the reference's (kernels.star.chords).
     """
 
     row: NDArray[np.int32]
@@ -56,6 +57,7 @@ class Surface(NamedTuple):
     start: NDArray[np.int32]
     ring: NDArray[np.int32]
     own: NDArray[np.float64]
+    bound: float | None = None
 
 
 @inlined
@@ -88,9 +90,12 @@ def along_edge(corner, f, k, x, y, z):
 
 
 @part
-def walk(surface, f, x, y, z):
-    """The facet nearest to a point, from facet f on, and the three barycentric coordinates there, none below 0."""
-    corner, beside, last = surface.corner, surface.beside, NOWHERE
+def walk(corner, beside, f, x, y, z):
+    """The facet nearest to a point, from facet f on, and the three barycentric coordinates there, none below 0.
+
+    Told no more of the surface than it needs: all that is passed to a part is copied.
+    """
+    last = NOWHERE
     for _ in range(LONGEST_WALK):
         b, c = barycentric(corner, f, x, y, z)
         a = 1.0 - b - c
@@ -199,17 +204,16 @@ def within(limit, px, py, pz, x, y, z):
 
 
 @inlined
-def over_facet(surface, row, f, a, b, c):
+def over_facet(corner, control, limit, f, a, b, c):
     """The place of a row over facet f."""
-    corner = surface.corner
     return within(
-        surface.limit[row],
+        limit,
         a * corner[f, 0, 0] + b * corner[f, 1, 0] + c * corner[f, 2, 0],
         a * corner[f, 0, 1] + b * corner[f, 1, 1] + c * corner[f, 2, 1],
         a * corner[f, 0, 2] + b * corner[f, 1, 2] + c * corner[f, 2, 2],
-        on_cubic(corner, surface.control, f, 0, a, b, c),
-        on_cubic(corner, surface.control, f, 1, a, b, c),
-        on_cubic(corner, surface.control, f, 2, a, b, c),
+        on_cubic(corner, control, f, 0, a, b, c),
+        on_cubic(corner, control, f, 1, a, b, c),
+        on_cubic(corner, control, f, 2, a, b, c),
     )
 
 
@@ -222,8 +226,8 @@ def snap3(surface, row, x, y, z):
     """
     kind, place = surface.kind[row], np.int64(surface.place[row])
     if kind == CURVED:
-        place, a, b, c = walk(surface, place, x, y, z)
-        x, y, z = over_facet(surface, row, place, a, b, c)
+        place, a, b, c = walk(surface.corner, surface.beside, place, x, y, z)
+        x, y, z = over_facet(surface.corner, surface.control, surface.limit[row], place, a, b, c)
     elif kind == CURVE:
         place, t = follow_curve(surface, place, x, y, z)
         piece = surface.piece
@@ -259,16 +263,25 @@ def on_curves(kind):
 
 
 @inlined
+def land_curved(corner, beside, control, normal, limit, single, place, x, y, z):
+    """As ``land_on``, on a curved patch, from the facet ``place`` on. In loops arrays are told: counted once."""
+    place, a, b, c = walk(corner, beside, place, x, y, z)
+    u, v, w = normal_on(normal, place, a, b, c)
+    x, y, z = over_facet(corner, control, limit, place, a, b, c)
+    if single:
+        x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
+    return x, y, z, place, u, v, w
+
+
+@inlined
 def land_on(surface, row, x, y, z):
     """As ``snap3``, and the unit normal there, which is zero on curves."""
     kind = surface.kind[row]
     if kind == CURVED:
-        place, a, b, c = walk(surface, np.int64(surface.place[row]), x, y, z)
-        u, v, w = normal_on(surface.normal, place, a, b, c)
-        x, y, z = over_facet(surface, row, place, a, b, c)
-        if surface.single:
-            x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
-        return x, y, z, place, u, v, w
+        return land_curved(
+            surface.corner, surface.beside, surface.control, surface.normal, surface.limit[row], surface.single,
+            np.int64(surface.place[row]), x, y, z,
+        )  # fmt: skip
     x, y, z, place = snap3(surface, row, x, y, z)
     if on_curves(kind):
         return x, y, z, place, 0.0, 0.0, 0.0
@@ -281,7 +294,7 @@ def directions_at(surface, row, x, y, z):
     """The unit normal of the patch, or the unit tangent of the curve, of a row at (x, y, z)."""
     kind, place = surface.kind[row], np.int64(surface.place[row])
     if kind == CURVED:
-        place, a, b, c = walk(surface, place, x, y, z)
+        place, a, b, c = walk(surface.corner, surface.beside, place, x, y, z)
         return normal_on(surface.normal, place, a, b, c)
     if kind == CURVE:
         place, t = follow_curve(surface, place, x, y, z)
