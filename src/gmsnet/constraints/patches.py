@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets
-from gmsnet.constraints.features import COLLINEAR, SLACK, Curves, curves_along, lengths_of, rounding_of
+from gmsnet.constraints.features import COLLINEAR, SLACK, Curves, curves_along, dot, lengths_of, rounding_of
 from gmsnet.constraints.needles import free_edges
 from gmsnet.constraints.outline import Flags, Longs, Outline, edge_keys
 
@@ -53,12 +53,14 @@ def patches_of(
     unit = np.divide(normal, area[:, None], out=np.zeros_like(normal), where=area[:, None] > 0.0)
     keys = edge_keys(rows, np.roll(rows, -1, axis=1), nodes).ravel()
     order = np.argsort(keys, kind="stable")
-    found, first, count = np.unique(keys[order], return_index=True, return_counts=True)
+    begins = np.diff(keys[order], prepend=-1) != 0
+    first = np.flatnonzero(begins)
+    found, count = keys[order[first]], np.diff(first, append=len(keys))
     two = count == 2
     one, other = order[first], order[first + two]  # numbers 3f + k; the same one where there is no other
     f, g = one // 3, other // 3
     turning, size = _of_cells(facets, normal, unit, area)
-    cosine = (turning[f] * turning[g]).sum(axis=1)
+    cosine = dot(turning[f], turning[g])
     smooth = two & (size[f] > 0.0) & (size[g] > 0.0) & (facets.label[f] == facets.label[g])
     least = math.cos(math.radians(feature_angle)) - SLACK
     gentle = smooth & (cosine >= least)
@@ -74,7 +76,7 @@ def patches_of(
     beside, flat = np.full(len(keys), NOTHING, dtype=np.int64), np.zeros(len(keys), dtype=bool)
     beside[one[smooth]], beside[other[smooth]] = g[smooth], f[smooth]
     beyond = points[rows[g, (other + 2) % 3]] - points[rows[f, 0]]
-    away = abs((beyond * unit[f]).sum(axis=1))
+    away = abs(dot(beyond, unit[f]))
     level = smooth & (away <= COLLINEAR * lengths_of(beyond) + rounding_of(points, single)) & (cosine > 0.0)
     flat[one[level]] = flat[other[level]] = True
 
@@ -109,10 +111,12 @@ def _of_cells(facets: Facets, normal: Floats, unit: Floats, area: Floats) -> tup
 
 def linked(beside: Longs, chosen: Flags | None = None) -> Longs:
     """(F,) the number of the part of each facet, of those that are joined across their edges; chosen: (F, 3) which."""
+    joins = beside != NOTHING if chosen is None else chosen
+    if not joins.any():
+        return np.arange(len(beside), dtype=np.int64)
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components  # loads what few runs need
 
-    joins = beside != NOTHING if chosen is None else chosen
     one, _ = np.nonzero(joins)
     shape = (len(beside), len(beside))
     graph = coo_array((np.ones(len(one), dtype=np.int8), (one, beside[joins])), shape=shape)

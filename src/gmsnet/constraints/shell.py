@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets, surface_itself
-from gmsnet.constraints.features import lengths_of, may_slide
+from gmsnet.constraints.features import dot, lengths_of, may_slide
 from gmsnet.constraints.outline import Flags
 from gmsnet.constraints.patches import Patches, patches_of
-from gmsnet.constraints.smooth_patches import dot
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import space_points
 from gmsnet.topology.topology import Topology

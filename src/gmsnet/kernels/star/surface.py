@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
+from gmsnet.kernels.star.pieces import LONGEST_WALK, NOWHERE, follow_curve, on_piece, piece_tangent
 
 FLAT, CURVED, LINE, CURVE = range(4)  # kinds of rows; the last two have one way to go
-LONGEST_WALK = 100  # facets or pieces from one place to the next
-NOWHERE = -1
 # Where the control points of the edges stand: the one after corner k towards k + 1 is 2k, the other one 2k + 1.
 CENTRE, CONTROLS = 6, 7
 
@@ -142,55 +141,6 @@ def normal_on(normal, f, a, b, c):
 
 
 @inlined
-def along_piece(piece, p, x, y, z):
-    """How far along the chord of a piece the foot of a point is: below 0 before its beginning, above 1 behind it."""
-    ux, uy, uz = piece[p, 3, 0] - piece[p, 0, 0], piece[p, 3, 1] - piece[p, 0, 1], piece[p, 3, 2] - piece[p, 0, 2]
-    square = ux * ux + uy * uy + uz * uz
-    if not square > 0.0:
-        return 0.0
-    return ((x - piece[p, 0, 0]) * ux + (y - piece[p, 0, 1]) * uy + (z - piece[p, 0, 2]) * uz) / square
-
-
-@part
-def follow_curve(surface, p, x, y, z):
-    """The piece nearest to a point, from piece p on, and how far along its chord, from 0 to 1."""
-    way = 0
-    for _ in range(LONGEST_WALK):
-        t = along_piece(surface.piece, p, x, y, z)
-        if t < 0.0 and way <= 0 and surface.before[p] != NOWHERE:
-            p, way = surface.before[p], -1
-        elif t > 1.0 and way >= 0 and surface.after[p] != NOWHERE:
-            p, way = surface.after[p], 1
-        else:
-            return p, min(max(t, 0.0), 1.0)
-    return p, min(max(t, 0.0), 1.0)
-
-
-@inlined
-def on_piece(piece, p, k, t):
-    """Coordinate k of the place on a piece: its very ends at 0 and 1."""
-    r = 1.0 - t
-    ends = r * r * r * piece[p, 0, k] + t * t * t * piece[p, 3, k]
-    return ends + 3.0 * r * t * (r * piece[p, 1, k] + t * piece[p, 2, k])
-
-
-@part
-def piece_tangent(piece, p, t):
-    """The unit tangent of a piece."""
-    r = 1.0 - t
-    x = r * r * (piece[p, 1, 0] - piece[p, 0, 0]) + 2.0 * r * t * (piece[p, 2, 0] - piece[p, 1, 0])
-    y = r * r * (piece[p, 1, 1] - piece[p, 0, 1]) + 2.0 * r * t * (piece[p, 2, 1] - piece[p, 1, 1])
-    z = r * r * (piece[p, 1, 2] - piece[p, 0, 2]) + 2.0 * r * t * (piece[p, 2, 2] - piece[p, 1, 2])
-    x += t * t * (piece[p, 3, 0] - piece[p, 2, 0])
-    y += t * t * (piece[p, 3, 1] - piece[p, 2, 1])
-    z += t * t * (piece[p, 3, 2] - piece[p, 2, 2])
-    length = np.sqrt(x * x + y * y + z * z)
-    if not length > 0.0:
-        return 1.0, 0.0, 0.0
-    return x / length, y / length, z / length
-
-
-@inlined
 def within(limit, px, py, pz, x, y, z):
     """(x, y, z), or the place on the way there from (px, py, pz) at this distance from it."""
     if limit == np.inf:
@@ -229,7 +179,7 @@ def snap3(surface, row, x, y, z):
         place, a, b, c = walk(surface.corner, surface.beside, place, x, y, z)
         x, y, z = over_facet(surface.corner, surface.control, surface.limit[row], place, a, b, c)
     elif kind == CURVE:
-        place, t = follow_curve(surface, place, x, y, z)
+        place, t = follow_curve(surface.piece, surface.before, surface.after, place, x, y, z)
         piece = surface.piece
         x, y, z = within(
             surface.limit[row],
@@ -297,7 +247,7 @@ def directions_at(surface, row, x, y, z):
         place, a, b, c = walk(surface.corner, surface.beside, place, x, y, z)
         return normal_on(surface.normal, place, a, b, c)
     if kind == CURVE:
-        place, t = follow_curve(surface, place, x, y, z)
+        place, t = follow_curve(surface.piece, surface.before, surface.after, place, x, y, z)
         return piece_tangent(surface.piece, place, t)
     e = surface.of[row]
     return surface.direction[e, 0], surface.direction[e, 1], surface.direction[e, 2]
@@ -306,8 +256,14 @@ def directions_at(surface, row, x, y, z):
 @kernel
 def locate3(surface, points):
     """Writes anew where each node that slides is, of coordinates (N, 3 or 4) that were kept without that."""
-    for node in range(len(surface.row)):
-        row = surface.row[node]
-        if row >= 0:
-            _, _, _, place = snap3(surface, row, points[node, 0], points[node, 1], points[node, 2])
-            surface.place[row] = place
+    rows, kind, kept, corner, beside = surface.row, surface.kind, surface.place, surface.corner, surface.beside
+    for node in range(len(rows)):
+        row = rows[node]
+        if row < 0:
+            continue
+        x, y, z = points[node, 0], points[node, 1], points[node, 2]
+        if kind[row] == CURVED:
+            place, _, _, _ = walk(corner, beside, np.int64(kept[row]), x, y, z)
+        else:
+            _, _, _, place = snap3(surface, row, x, y, z)
+        kept[row] = place
