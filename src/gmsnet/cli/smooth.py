@@ -121,6 +121,18 @@ def smooth(
             show_default="0.05",
         ),
     ] = None,
+    hausdorff: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X",
+            help="How far facets of surfaces may go from the input's, over the diagonal of the whole: 0.001, say.",
+            show_default="no bound",
+        ),
+    ] = None,
+    free_needles: Annotated[
+        bool,
+        typer.Option(help="Edges of surfaces that look sharp only because a facet is thin are no features."),
+    ] = False,
     threads: Annotated[
         int | None,
         typer.Option(min=1, help="Use at most so many processors (default: all). Same result for any number."),
@@ -203,7 +215,8 @@ def smooth(
         preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, weights=weights,
         best_by=best_by,
         slide=True if slide and "all" in slide else slide or None, feature_angle=feature_angle,
-        surface_tolerance=surface_tolerance, **values_at_nodes(metric, size),
+        surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles,
+        **values_at_nodes(metric, size),
     )  # fmt: skip
 
     def one(job: Job, destination: Destination | None) -> tuple[int, bool]:
