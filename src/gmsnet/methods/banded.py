@@ -68,6 +68,7 @@ class Banded(StarSmoother):
     """start: (N, 2) points in memory order, whose areas count. kept: in memory order, too."""
 
     stops_when_idle = False
+    shared_out = False
 
     def __init__(self, start: NDArray[np.float64], kept: Kept) -> None:
         self.start, self.kept = start, kept
