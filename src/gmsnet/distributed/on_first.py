@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,12 +57,13 @@ def smoothed_on_first(
     if whole is not None:
         try:
             result = _smoothed(whole, options)
+            result = replace(result, notes=[*result.notes, _note(whole, why)])
         except GmsnetError as error:
             wrong = str(error)
     raise_everywhere(comm, wrong)
     figures: dict[str, Any] | None = None
     if whole is not None and result is not None:
-        figures = _figures(whole, result) | {"notes": [*result.notes, _note(whole, why)]}
+        figures = _figures(whole, result)
     told = comm.bcast(figures)
     points = scattered(whole, None if result is None else result.points, piece, comm)
     moved = scattered(whole, None if result is None else result.moved, piece, comm)
@@ -88,6 +90,7 @@ def _figures(whole: Whole, result: SmoothResult) -> dict[str, Any]:
         "sweeps": result.sweeps,
         "stop_reason": result.stop_reason,
         "history": result.history,
+        "notes": result.notes,
         "held": {reason: len(ids) for reason, ids in result.held.items()},
         "nodes": len(whole.ids),
         "cells": sum(len(block.nodes) for block in whole.mesh.cells),
