@@ -73,7 +73,7 @@ def main() -> None:
             neighbours = (rank > 0) + (rank < comm.size - 1)
             print(
                 f"rank {rank}: {nodes:,} nodes; {messages:.0f} messages and {size:,.0f} bytes a sweep "
-                f"(two rows of nodes to each of {neighbours}: {32 * (side - 2) * neighbours:,} at most); {first:.0f} MB "
+                f"(two rows to each of {neighbours}: {32 * (side - 2) * neighbours:,} at most); {first:.0f} MB "
                 f"before, {last:.0f} MB at most, {(last - first) * 2**20 / share:.0f} bytes a node of its share"
             )
 
