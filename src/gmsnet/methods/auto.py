@@ -67,6 +67,25 @@ NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh 
 class Auto(Smoother):
     """The phases one after the other. Without any: those for the size of the mesh."""
 
+    phases: Sequence[Phase]
+    at: int
+    whole: int
+    slow: bool
+    last: bool
+    ideal: bool
+    pass_gain: float
+    passes: int
+    least: float
+    again: int
+    made: int
+    rounds: int
+    gained: float
+    converged: bool
+    smoother: Smoother
+    mean: float
+    phase: str
+    looks: bool
+
     stops_when_idle = False
 
     def __init__(self, phases: Sequence[Phase] = ()) -> None:

@@ -30,6 +30,9 @@ FEWEST, WATCHED = 12, 64  # cells
 class WorstInSpace(Smoother):
     """One sweep is all CYCLES. least: the minimum η after the last one; gained: what it has brought."""
 
+    gained: float
+    least: float
+
     least = gained = -math.inf
 
     def sweep(self, field: Field, executor: Executor, test: object) -> Tally:
