@@ -74,6 +74,7 @@ class Banded(StarSmoother):
     converged: bool
 
     stops_when_idle = False
+    shared_out = False
 
     def __init__(self, start: NDArray[np.float64], kept: Kept) -> None:
         self.start, self.kept = start, kept

@@ -103,7 +103,7 @@ class Run:
 
     def to_the_end(self, most: int | None = None) -> str:
         """Sweeps until a stop rule says why to stop. most: sweeps, if fewer than the options allow."""
-        if not len(self.topology.free):
+        if not self.executor.total(np.array(len(self.topology.free))):
             return NOTHING_TO_MOVE
         if self._reached():
             return TARGET_REACHED
@@ -138,7 +138,6 @@ class Run:
     def _sweep(self) -> int:
         """One sweep; returns how many nodes moved."""
         tally = self.smoother.sweep(self.field, self.executor, lambda: self._keep_if_best(self._score()))
-        tally = self.executor.total(tally)
         self.tally += tally
         self.phases[self.smoother.phase] = None
         self.sweeps += 1
