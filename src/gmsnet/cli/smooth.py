@@ -204,8 +204,8 @@ def smooth(
     from gmsnet.cli.file_work import Done, FileWork
     from gmsnet.cli.fix import fixed_nodes
     from gmsnet.cli.metric import values_at_nodes
+    from gmsnet.cli.ranks import smooth_function
     from gmsnet.cli.smooth_report import Outcome
-    from gmsnet.run.api import smooth_with
     from gmsnet.run.options import SmoothOptions
     from gmsnet.run.set_up import check_mesh
 
@@ -227,7 +227,7 @@ def smooth(
         options = replace(asked, callback=work.after_sweep)
 
         def make(mesh: Mesh) -> Callable[[], SmoothResult]:
-            return partial(smooth_with, mesh, options, fixed_nodes(mesh, fix) if fix else None)
+            return partial(smooth_function(), mesh, options, fixed_nodes(mesh, fix) if fix else None)
 
         def told(done: Done) -> Outcome:
             return Outcome(done.mesh, done.result, done.compiled, job.source, done.written, done.lost, plot, report)

@@ -1,9 +1,9 @@
 """The stage of second-order planar cells: the invalid are made valid, corners smoothed, and narrow cells given room.
 
 The method of the call moves the corners, as if cells were straight, and they take their middles along
-(methods/curved.py). Nodes of the boundary, of interfaces, of line cells and of first-order cells stay, middles among
-them. A move is taken if all cells around it are certified valid by the coefficients of their determinants
-(docs/guarantees.md).
+(methods/curved.py). Nodes of first-order cells beside them move, too. Nodes of the boundary, of interfaces and of line
+cells stay, middles among them. A move is taken if all cells around it are certified valid by the coefficients of their
+determinants (docs/guarantees.md).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.descend import improve_nodes
 from gmsnet.kernels.curved.stars import CurvedMesh, counter_clockwise, curved_mesh
-from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES, WIDEST
+from gmsnet.kernels.simplex.bernstein import CORNERS, KINDS, NAMES, WIDEST
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import LEVELS, VALID
 from gmsnet.measure.curved import judge_curved
@@ -25,52 +25,52 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, method_named
 from gmsnet.methods.curved import Curved
 from gmsnet.parallel.executor import Executor
-from gmsnet.preserve.protection import protected
+from gmsnet.preserve.protection import Protection, protected
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import SecondOrder, State
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS, NOTHING_TO_MOVE
 from gmsnet.run.sweep_stage import sweep
 from gmsnet.topology.held import OF_SECOND_ORDER
-from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.ordering import near_points, planar_points
 from gmsnet.topology.topology import Topology
 
 LOW = 0.5  # a cell whose certified bound over its straight size is less gets more room
 SWEEPS = 10
-FIRST_ORDER = "node of first-order cells"
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
 def second_order_of(mesh: Mesh, topology: Topology, options: SmoothOptions) -> SecondOrder | None:
-    """The second-order cells of a planar mesh and which of their nodes may move; None where there are none."""
+    """The second-order cells of a planar mesh, those beside them, and which of their nodes may move; None where there
+    are none."""
     blocks = [block for block in mesh.cells if block.kind in NAMES and len(block.nodes)]
     if not blocks or mesh.plane is None:
         return None
     cells, kinds, regions, index, before = [], [], [], [], 0
-    first_order = np.zeros(len(mesh.points), dtype=bool)
+    lines = list[NDArray[np.int64]]()
     for block in mesh.cells:
-        if block.kind in NAMES:
+        if block.kind in KINDS:
             rows = np.full((len(block.nodes), WIDEST), -1, dtype=np.int32)
             rows[:, : block.nodes.shape[1]] = block.nodes
             cells.append(rows)
-            kinds.append(np.full(len(rows), NAMES.index(block.kind), dtype=np.int8))
+            kinds.append(np.full(len(rows), KINDS.index(block.kind), dtype=np.int8))
             regions.append(block.regions)
             index.append(np.arange(before, before + len(rows)))
-        else:
-            first_order[block.nodes] = True
+        elif block.dimension == 1:
+            lines.append(block.nodes[:, :2])
         before += len(block.nodes)
     table, kind, number = np.concatenate(cells), np.concatenate(kinds), np.concatenate(index)
     table = counter_clockwise(table, kind, topology.orientation_of(number) < 0)
     may = np.zeros(len(mesh.points), dtype=bool)
     may[topology.held.get(OF_SECOND_ORDER, np.empty(0, dtype=np.int64))] = True
-    may &= ~first_order
-    may[_on_interfaces(table, kind, np.concatenate(regions))] = False
-    first = np.zeros(len(mesh.points), dtype=bool)
-    first[topology.free] = True
+    may[topology.free] = True
+    for ids in topology.sliding.values():
+        may[ids] = False
+    edges = np.concatenate([*lines, np.empty((0, 2), dtype=np.int64)])
+    may[_held_middles(table, kind, np.concatenate(regions), edges, len(may))] = False
     twin = straight(mesh)
-    whole, near = Topology.and_points(twin, ~(may | first))
-    corners = whole.holding(first, FIRST_ORDER)
-    return SecondOrder(table, kind, may, whole, protected(twin, corners, options.preserved, options.fix_layers, near))
+    whole, near = Topology.and_points(twin, ~may)
+    return SecondOrder(table, kind, may, whole, protected(twin, whole, options.preserved, options.fix_layers, near))
 
 
 def straight(mesh: Mesh) -> Mesh:
@@ -83,38 +83,55 @@ def straight(mesh: Mesh) -> Mesh:
     return Mesh(planar_points(mesh), tuple(cells))
 
 
-def _on_interfaces(cells: NDArray[np.int32], kinds: NDArray[np.int8], regions: NDArray[np.int64]) -> NDArray[np.int32]:
-    """The middles of edges between two regions."""
-    middles, of = [], []
+def _held_middles(
+    cells: NDArray[np.int32], kinds: NDArray[np.int8], regions: NDArray[np.int64], lines: NDArray[np.int64], nodes: int
+) -> NDArray[np.int64]:
+    """The middles of edges between two regions and of line cells (L, 2), and those that are corners elsewhere."""
+    ends, middles, of = [], [], []
+    corner = np.zeros(nodes, dtype=bool)
     for kind, corners in enumerate(CORNERS):
         rows = np.flatnonzero(kinds == kind)
-        middles.append(cells[rows, corners : 2 * corners].ravel())
-        of.append(np.repeat(regions[rows], corners))
-    nodes, region = np.concatenate(middles), np.concatenate(of)
-    order = np.argsort(nodes, kind="stable")
-    nodes, region = nodes[order], region[order]
-    found: NDArray[np.int32] = nodes[1:][(nodes[1:] == nodes[:-1]) & (region[1:] != region[:-1])]
-    return found
+        corner[cells[rows, :corners]] = True
+        for k in range(corners):
+            ends.append(cells[rows][:, [k, (k + 1) % corners]])
+            middles.append(cells[rows, corners + k])  # −1 of first-order cells
+            of.append(regions[rows])
+    pairs = np.sort(np.concatenate([*ends, lines]), axis=1)
+    key = pairs[:, 0].astype(np.int64) * nodes + pairs[:, 1]
+    middle, region = np.concatenate(middles), np.concatenate(of)
+    marked = np.isin(key[: len(middle)], key[len(middle) :])
+    order = np.argsort(key[: len(middle)], kind="stable")
+    same = key[order][1:] == key[order][:-1]
+    between = order[1:][same & (region[order][1:] != region[order][:-1])]
+    marked |= np.isin(key[: len(middle)], key[between])
+    held = np.zeros(nodes, dtype=bool)
+    held[middle[marked & (middle >= 0)]] = True
+    also = middle[middle >= 0]
+    held[also[corner[also]]] = True
+    return np.flatnonzero(held)
 
 
 def untangle_second_order(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """Makes the invalid second-order cells valid, as many as can be."""
+    """Makes the invalid second-order cells valid, and first-order ones beside them, as many as can be."""
     given = state.second_order
     if given is None:
         return state
     points, mesh, free = _opened(state)
     sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
-    invalid, least = int((sign != 1).sum()), float(quality.min())
     by_id = np.empty_like(free)
     by_id[state.topology.memory] = free
-    known = replace(given, free=by_id, sign=sign, invalid=(invalid, invalid), least=(least, least))
-    state = replace(state, second_order=replace(known, unable=_unable(given, options)))
-    if not (options.untangle and invalid and free.any()):
+    known = replace(given, free=by_id, sign=sign)
+    invalid, least = known.figures(sign, quality)
+    known = replace(known, invalid=(invalid, invalid), least=(least, least), unable=_unable(given, options))
+    state = replace(state, second_order=known)
+    if not (options.untangle and (sign != 1).any() and free.any()):
         return state
     from gmsnet.untangle.curved import untangle_curved  # untangling takes 0.15 s more to import
 
-    untangle_curved(points, mesh, free, state.precision)
-    return _judged(state, points, mesh)
+    corners = _corners(known).topology
+    assert isinstance(corners, Topology)
+    untangle_curved(points, mesh, free, state.precision, corners)
+    return _protected_anew(_judged(state, points, mesh), options)
 
 
 def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -126,10 +143,9 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     room = -math.inf
     if options.guard != LEVELS[VALID]:
         sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
-        room = float(quality[sign == 1].min(initial=LOW))
-    corners = replace(given.protection, base=given.protection.base.holding(~given.free, OF_SECOND_ORDER))
+        room = float(quality[(sign == 1) & given.curved].min(initial=LOW))
     ready = replace(
-        state, points=points, totals=None, protection=corners, released=False, sliding=None,
+        state, points=points, totals=None, protection=_corners(given), released=False, sliding=None,
         smoother=options.smoother(), curved=Curved(mesh, room),
     )  # fmt: skip
     done = sweep(ready, options, executor)
@@ -188,15 +204,31 @@ def _judged(state: State, points: Floats, mesh: CurvedMesh) -> State:
     sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
     if ((given.sign == 1) & (sign != 1)).any():
         return state
-    invalid, least = (given.invalid[0], int((sign != 1).sum())), (given.least[0], float(quality.min()))
-    return replace(
-        state, points=points, totals=None, second_order=replace(given, sign=sign, invalid=invalid, least=least)
-    )
+    invalid, least = given.figures(sign, quality)
+    known = replace(given, sign=sign, invalid=(given.invalid[0], invalid), least=(given.least[0], least))
+    return replace(state, points=points, totals=None, second_order=known)
+
+
+def _corners(given: SecondOrder) -> Protection:
+    """The protection with the nodes alone free that may move."""
+    return replace(given.protection, base=given.protection.base.holding(~given.free, OF_SECOND_ORDER))
+
+
+def _protected_anew(state: State, options: SmoothOptions) -> State:
+    """What is protected as the cells are once they are untangled: tangles are no layers."""
+    given = state.second_order
+    assert given is not None
+    points = np.empty_like(state.points)
+    points[given.whole.memory] = state.points
+    mesh = Mesh(points, ())
+    near = near_points(mesh, given.whole)
+    found = protected(mesh, given.whole, options.preserved, options.fix_layers, near, firm=True)
+    return replace(state, second_order=replace(given, protection=found))
 
 
 def _unable(given: SecondOrder, options: SmoothOptions) -> str:
     """Why the method does not move corners, to be added to the note; "" if it does."""
-    quads = (given.kinds != NAMES.index("triangle6")).any()
+    quads = any(CORNERS[kind] == 4 for kind in np.unique(given.kinds))
     if not quads or method_named(options.method_name).moves("quad", options.objective):
         return ""
     return f"; {options.method_name} moves triangles alone, so that no corner was moved for its cells' shape"

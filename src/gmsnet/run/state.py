@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.sliding import Sliding
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
-from gmsnet.kernels.simplex.bernstein import CORNERS
+from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES
 from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.kernels.star.surface import Surface
@@ -45,11 +45,12 @@ class Final(NamedTuple):
 class SecondOrder:
     """The second-order cells of a mesh (run/second_order.py).
 
-    cells: (C, 9) ids, counter-clockwise, −1 past the last node; kinds: (C,) (kernels.simplex.bernstein). free: (N,)
-    bool by ids. whole: the connectivity of the mesh with straight cells, where corners are free, too; protection: of
-    that, with corners alone free, and what of it is protected. sign: (C,) of det J in each cell, as it is now. invalid:
-    how many cells are not certified valid, least: the least certified bound over a straight cell's size, both at first
-    and now. None of the three is known before the first stage. unable: why the method does not move corners.
+    cells: (C, 9) ids, counter-clockwise, −1 past the last node; kinds: (C,) (kernels.simplex.bernstein), first-order
+    cells of the mesh among them. free: (N,) bool by ids. whole: the connectivity of the mesh with straight cells, where
+    corners are free, too; protection: of that, and what of it is protected. sign: (C,) of det J in each cell, as it is
+    now. invalid: how many second-order cells are not certified valid, least: the least certified bound over a straight
+    cell's size, both at first and now. None of the three is known before the first stage. unable: why the method does
+    not move corners.
     """
 
     cells: NDArray[np.int32]
@@ -63,12 +64,21 @@ class SecondOrder:
     unable: str = ""
 
     @property
+    def curved(self) -> NDArray[np.bool_]:
+        """(C,) which cells are of the second order."""
+        return np.asarray(self.kinds < len(NAMES))
+
+    @property
     def corners(self) -> NDArray[np.bool_]:
         """(N,) by id: which nodes are a corner."""
         found = np.zeros(len(self.free), dtype=bool)
         for kind, count in enumerate(CORNERS):
             found[self.cells[self.kinds == kind, :count]] = True
         return found
+
+    def figures(self, sign: NDArray[np.int8], quality: Floats) -> tuple[int, float]:
+        """How many second-order cells are not certified valid, and the least of their bounds."""
+        return int((sign != 1)[self.curved].sum()), float(quality[self.curved].min())
 
     def note(self, moved: NDArray[np.bool_]) -> str:
         """What was done. moved: (N,) by id."""

@@ -1,8 +1,9 @@
-"""Invalid cells of second-order meshes made valid: inner middles first, then corners, patch by patch.
+"""Invalid cells of second-order meshes made valid: straight cells first, then inner middles, then corners.
 
-Each patch of cells around invalid ones is a transaction. What stands at its end is the best state on the way: the
-fewest cells that are not certainly valid, none of them valid at first, and no cell with positive corners at first
-without them now. Boundary middles and all else that is not free stays.
+Where straight cells are inverted, they are untangled as those of first-order meshes are, in a copy, and middles follow.
+Then the mesh is mended patch by patch. Each patch of cells around invalid ones is a transaction. What stands at its
+end is the best state on the way: the fewest cells that are not certainly valid, none of them valid at first, and no
+cell with positive corners at first without them now. Boundary middles and all else that is not free stays.
 
 Source of the idea: T. Toulorge, C. Geuzaine, J.-F. Remacle, J. Lambrechts, "Robust untangling of curvilinear meshes",
 Journal of Computational Physics 254, 2013 (patches around invalid cells, bounds from Bernstein coefficients).
@@ -16,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.descend import straighten, untangling_sweep
-from gmsnet.kernels.curved.stars import CENTRE, NO_EDGE, CurvedMesh
+from gmsnet.kernels.curved.stars import CENTRE, NO_EDGE, CurvedMesh, dragged
 from gmsnet.kernels.simplex.bernstein import QUAD9
 from gmsnet.kernels.simplex.jacobian import judge_cells, straight_signs
 from gmsnet.kernels.star.guard import Precision
+from gmsnet.topology.topology import Topology
+from gmsnet.untangle import untangle
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -57,29 +60,65 @@ def untangle_curved(
     mesh: CurvedMesh,
     free: Mask,
     precision: Precision = Precision(),  # noqa: B008
+    straight: Topology | None = None,
 ) -> CurvedScore:
     """Moves free nodes (N,) until as many cells as can be are certainly valid.
 
     points: (N, 2) float64, C-contiguous; they and the stored offsets of the mesh change in place. free: corners,
-    middles and centres that may move; those of the boundary must not be among them.
+    middles and centres that may move; those of the boundary must not be among them. straight: the connectivity of the
+    mesh with straight cells, of whose free nodes corners are; None: straight cells are not untangled for themselves.
     """
+    before = int((_signs(points, mesh, np.arange(len(mesh.cells)), precision) != 1).sum())
+    if straight is not None:
+        _untangle_straight(points, mesh, free, precision, straight)
+    return CurvedScore(before, _mend(points, mesh, free, precision))
+
+
+def _untangle_straight(points: Floats, mesh: CurvedMesh, free: Mask, precision: Precision, straight: Topology) -> None:
+    """Takes the mesh with its straight cells untangled, and mended, if fewer cells are invalid and no other ones."""
+    every = np.arange(len(mesh.cells))
+    if (_straight_signs(points, mesh, every, precision) == 1).all():
+        return
+    untangled = untangle(points, straight, precision).points
+    moved = np.flatnonzero((untangled != points).any(axis=1) & free & mesh.corner)
+    trial = points.copy()
+    twin = mesh._replace(ratio=mesh.ratio.copy(), centre_ratio=mesh.centre_ratio.copy())
+    dragged(trial, twin, moved, untangled[moved], precision.single)
+    bad = twin.cells[_signs(trial, twin, every, precision) != 1]
+    inner = np.flatnonzero(free_inner(mesh, free))
+    straighten(trial, twin, inner[np.isin(inner, bad)], precision.single)
+    _mend(trial, twin, free, precision)
+    was, now = (_signs(p, m, every, precision) for p, m in ((points, mesh), (trial, twin)))
+    before, after = (_straight_signs(p, m, every, precision) for p, m in ((points, mesh), (trial, twin)))
+    lost = ((was == 1) & (now != 1)) | ((before != -1) & (after != 1))
+    if (now != 1).sum() < (was != 1).sum() and not lost.any():
+        points[:], mesh.ratio[:], mesh.centre_ratio[:] = trial, twin.ratio, twin.centre_ratio
+
+
+def _mend(points: Floats, mesh: CurvedMesh, free: Mask, precision: Precision) -> int:
+    """Mends a mesh patch by patch; returns how many cells are not certainly valid."""
     inner = free_inner(mesh, free)
-    corner = free & (np.diff(mesh.edge_start) > 0)
+    corner = free & mesh.corner
     bad = np.flatnonzero(_signs(points, mesh, np.arange(len(mesh.cells)), precision) != 1)
-    before = len(bad)
     for rings, sweeps, thresholds in TRIES:
         for cells in _patches(mesh, bad, rings):
             _Patch(points, mesh, cells, inner, corner, precision).untangle(sweeps, thresholds)
         bad = bad[_signs(points, mesh, bad, precision) != 1]
         if not bad.size:
             break
-    return CurvedScore(before, len(bad))
+    return len(bad)
 
 
 def _signs(points: Floats, mesh: CurvedMesh, cells: Ints, precision: Precision) -> NDArray[np.int8]:
     sign, quality = np.zeros(len(cells), dtype=np.int8), np.empty(len(cells))
     table, kinds = mesh.cells[cells], mesh.kinds[cells]
     judge_cells(points, table, kinds, precision.unit, precision.grain, 0, len(cells), sign, quality)
+    return sign
+
+
+def _straight_signs(points: Floats, mesh: CurvedMesh, cells: Ints, precision: Precision) -> NDArray[np.int8]:
+    sign = np.zeros(len(cells), dtype=np.int8)
+    straight_signs(points, mesh.cells[cells], mesh.kinds[cells], *precision[:2], sign)
     return sign
 
 
@@ -137,9 +176,7 @@ class _Patch:
         return _signs(self.points, self.mesh, self.cells, self.precision)
 
     def straight_signs(self) -> NDArray[np.int8]:
-        sign, table = np.zeros(len(self.cells), dtype=np.int8), self.mesh.cells[self.cells]
-        straight_signs(self.points, table, self.mesh.kinds[self.cells], *self.precision[:2], sign)
-        return sign
+        return _straight_signs(self.points, self.mesh, self.cells, self.precision)
 
     def state(self) -> tuple[Floats, Floats, Floats]:
         mesh = self.mesh
