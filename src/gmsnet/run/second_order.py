@@ -1,9 +1,9 @@
-"""The stage of second-order planar cells: the invalid are made valid, corners smoothed, and narrow cells given room.
+"""The stage of second-order cells: the invalid are made valid, corners smoothed, and narrow cells given room.
 
-The method of the call moves the corners, as if cells were straight, and they take their middles along
-(methods/curved.py). Nodes of the boundary, of interfaces, of line cells and of first-order cells stay, middles among
-them. A move is taken if all cells around it are certified valid by the coefficients of their determinants
-(docs/guarantees.md).
+The method of the call moves the corners, as if cells were straight, and they take their middles along: in a plane after
+each of its sweeps (methods/curved.py), in space all together at the end (methods/solid_cells.py). Nodes of the
+boundary, of interfaces, of line cells and of first-order cells stay, middles among them. A move is taken if all cells
+around it are certified valid by the coefficients of their determinants (docs/guarantees.md).
 """
 
 from __future__ import annotations
@@ -14,25 +14,37 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.curved.descend import improve_nodes
-from gmsnet.kernels.curved.stars import CurvedMesh, counter_clockwise, curved_mesh
+from gmsnet.kernels.curved.stars import counter_clockwise, curved_mesh
 from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES, WIDEST
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import LEVELS, VALID
-from gmsnet.measure.curved import judge_curved
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, method_named
 from gmsnet.methods.curved import Curved
+from gmsnet.methods.planar_cells import PlanarCells
+from gmsnet.methods.solid_cells import SolidCells
 from gmsnet.parallel.executor import Executor
-from gmsnet.preserve.protection import protected
+from gmsnet.preserve.protection import protected, protected_volume
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import SecondOrder, State
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS, NOTHING_TO_MOVE
 from gmsnet.run.sweep_stage import sweep
+from gmsnet.topology.curved_solids import (
+    CORNERS3,
+    at_odds,
+    curved_solids,
+    has_curved,
+    of_positive_sense,
+    on_rim,
+    table_of,
+)
+from gmsnet.topology.curved_solids import straight as straight_solids
 from gmsnet.topology.held import OF_SECOND_ORDER
-from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.mixed_volume import volume_of, wound_of
+from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 LOW = 0.5  # a cell whose certified bound over its straight size is less gets more room
 SWEEPS = 10
@@ -44,7 +56,7 @@ Flags = NDArray[np.bool_]
 def second_order_of(mesh: Mesh, topology: Topology, options: SmoothOptions) -> SecondOrder | None:
     """The second-order cells of a planar mesh and which of their nodes may move; None where there are none."""
     blocks = [block for block in mesh.cells if block.kind in NAMES and len(block.nodes)]
-    if not blocks or mesh.plane is None:
+    if not blocks or mesh.plane is None or mesh.has_volumes:
         return None
     cells, kinds, regions, index, before = [], [], [], [], 0
     first_order = np.zeros(len(mesh.points), dtype=bool)
@@ -71,6 +83,34 @@ def second_order_of(mesh: Mesh, topology: Topology, options: SmoothOptions) -> S
     whole, near = Topology.and_points(twin, ~(may | first))
     corners = whole.holding(first, FIRST_ORDER)
     return SecondOrder(table, kind, may, whole, protected(twin, corners, options.preserved, options.fix_layers, near))
+
+
+def second_order_solids_of(mesh: Mesh, topology: Volume, options: SmoothOptions) -> SecondOrder | None:
+    """The same of volumes. topology: of those of the first order."""
+    if not has_curved(mesh):
+        return None
+    table, kinds, number, others = table_of(mesh)
+    nodes = len(mesh.points)
+    regions = np.concatenate([block.regions for block in mesh.cells])[number]
+    may = np.zeros(nodes, dtype=bool)
+    may[topology.held.get(OF_SECOND_ORDER, np.empty(0, dtype=np.int64))] = True
+    may &= ~(others | on_rim(table, kinds, regions, nodes) | at_odds(table, kinds, nodes))
+    first = np.zeros(nodes, dtype=bool)
+    first[topology.free] = True
+    twin = straight_solids(mesh)
+    whole = volume_of(wound_of(twin, ~(may | first)))
+    inside_out = np.zeros(sum(len(block.nodes) for block in mesh.cells), dtype=bool)
+    inside_out[whole.cell] = whole.orientation < 0
+    table = of_positive_sense(table, kinds, inside_out[number])
+    corner = np.zeros(nodes, dtype=bool)
+    corner[whole.free] = True
+    at_corners = np.zeros(nodes, dtype=bool)
+    for kind, count in enumerate(CORNERS3):
+        at_corners[table[kinds == kind, :count]] = True
+    may &= corner | ~at_corners
+    corners, near = whole.holding(first, FIRST_ORDER), taken(space_points(mesh), whole.memory)
+    protection = protected_volume(corners, options.preserved, options.fix_layers, near, firm=False)
+    return SecondOrder(table, kinds, may, whole, protection)
 
 
 def straight(mesh: Mesh) -> Mesh:
@@ -102,19 +142,33 @@ def untangle_second_order(state: State, options: SmoothOptions, executor: Execut
     given = state.second_order
     if given is None:
         return state
-    points, mesh, free = _opened(state)
-    sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
+    cells = _opened(state)
+    sign, quality = cells.judged()
     invalid, least = int((sign != 1).sum()), float(quality.min())
-    by_id = np.empty_like(free)
-    by_id[state.topology.memory] = free
+    by_id = np.empty_like(cells.free)
+    by_id[state.topology.memory] = cells.free
     known = replace(given, free=by_id, sign=sign, invalid=(invalid, invalid), least=(least, least))
     state = replace(state, second_order=replace(known, unable=_unable(given, options)))
-    if not (options.untangle and invalid and free.any()):
+    if not (options.untangle and invalid and cells.free.any()):
         return state
     from gmsnet.untangle.curved import untangle_curved  # untangling takes 0.15 s more to import
 
-    untangle_curved(points, mesh, free, state.precision)
-    return _judged(state, points, mesh)
+    if isinstance(cells, SolidCells):
+        _untangle_corners(cells, given, executor)
+    untangle_curved(cells)
+    return _judged(state, cells)
+
+
+def _untangle_corners(cells: SolidCells, given: SecondOrder, executor: Executor) -> None:
+    """Where straight cells are inverted: the corners go where these are not, if that makes more cells valid."""
+    from gmsnet.untangle.space import untangle_volume
+
+    every = np.arange(len(cells.mesh.cells))
+    inverted = int((cells.straight_signs(every) != 1).sum())
+    topology = given.protection.topology
+    if inverted and isinstance(topology, Volume):
+        done = untangle_volume(cells.points, topology, cells.precision, executor, inverted)
+        cells.take(done.points)
 
 
 def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -122,21 +176,26 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     given = state.second_order
     if given is None or given.unable or state.stop_reason == CALLBACK or not given.free.any():
         return state
-    points, mesh, _ = _opened(state)
-    room = -math.inf
+    cells, room = _opened(state), -math.inf
     if options.guard != LEVELS[VALID]:
-        sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
+        sign, quality = cells.judged()
         room = float(quality[sign == 1].min(initial=LOW))
     corners = replace(given.protection, base=given.protection.base.holding(~given.free, OF_SECOND_ORDER))
+    curved = Curved(cells.mesh, room) if isinstance(cells, PlanarCells) else None
     ready = replace(
-        state, points=points, totals=None, protection=corners, released=False, sliding=None,
-        smoother=options.smoother(), curved=Curved(mesh, room),
+        state, points=cells.points, totals=None, protection=corners, released=False, sliding=None,
+        smoother=options.smoother(), curved=curved,
     )  # fmt: skip
     done = sweep(ready, options, executor)
     if done.stop_reason == NOTHING_TO_MOVE:
         return state
     state = replace(state, history=done.history, interruption=done.interruption, stop_reason=done.stop_reason)
-    return _judged(state, done.points, mesh)
+    if isinstance(cells, PlanarCells):
+        return _judged(state, cells._replace(points=done.points))
+    level = LEVELS.index(options.guard)
+    guard = Field(cells.points, corners.topology, state.precision, level).guard(executor)
+    cells.advance(done.points, guard, room)
+    return _judged(state, cells)
 
 
 def make_room(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -144,58 +203,53 @@ def make_room(state: State, options: SmoothOptions, executor: Executor) -> State
     given = state.second_order
     if given is None or state.stop_reason == CALLBACK or not given.free.any():
         return state
-    points, mesh, free = _opened(state)
+    cells = _opened(state)
     topology = given.protection.topology
-    inner = np.flatnonzero(_inner(mesh, free))
-    corners = np.flatnonzero(free & topology.near_free)
+    inner, corners = np.flatnonzero(cells.inner), np.flatnonzero(cells.free & topology.near_free)
     level, tally = LEVELS.index(options.guard), np.zeros(3, dtype=np.int64)
     for _ in range(min(SWEEPS, options.max_sweeps)):
         moved = int(tally[MOVED])
-        guard = Field(points, topology, state.precision, level).guard(executor)
-        improve_nodes(points, mesh, inner, LOW, guard, tally)
-        improve_nodes(points, mesh, corners, LOW, guard, tally)
+        guard = Field(cells.points, topology, state.precision, level).guard(executor)
+        cells.improve(inner, LOW, guard, tally)
+        cells.improve(corners, LOW, guard, tally)
         if tally[MOVED] == moved:
             break
     if state.stop_reason == NOTHING_TO_MOVE:
         state = state.ended(NO_PROGRESS)
-    return _judged(state, points, mesh)
+    return _judged(state, cells)
 
 
-def _opened(state: State) -> tuple[Floats, CurvedMesh, Flags]:
+def _opened(state: State) -> PlanarCells | SolidCells:
     """A copy of the points, the second-order cells, and which nodes may move, all by places in memory."""
     given = state.second_order
     assert given is not None
     topology, points = state.topology, state.points.copy()
     table = np.where(given.cells >= 0, topology.places[given.cells], np.int32(-1))
     free = given.free[topology.memory]
+    if given.solid:
+        return SolidCells(points, curved_solids(points, table, given.kinds, ~free), free, state.precision)
     mesh = curved_mesh(points, table, given.kinds, ~free)
     free[mesh.edges[~mesh.dragged].ravel()] = False  # ends and middles of edges with one cell
-    return points, mesh, free
+    return PlanarCells(points, mesh, free, state.precision)
 
 
-def _inner(mesh: CurvedMesh, free: Flags) -> Flags:
-    """(N,) the middles and centres that may move by themselves."""
-    from gmsnet.untangle.curved import free_inner  # which takes 0.15 s to import
-
-    return free_inner(mesh, free)
-
-
-def _judged(state: State, points: Floats, mesh: CurvedMesh) -> State:
+def _judged(state: State, cells: PlanarCells | SolidCells) -> State:
     """The state with these points, and how its cells are now; as it was if one of them has lost its validity."""
     given = state.second_order
     assert given is not None
     assert given.sign is not None
-    sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
+    sign, quality = cells.judged()
     if ((given.sign == 1) & (sign != 1)).any():
         return state
     invalid, least = (given.invalid[0], int((sign != 1).sum())), (given.least[0], float(quality.min()))
-    return replace(
-        state, points=points, totals=None, second_order=replace(given, sign=sign, invalid=invalid, least=least)
-    )
+    known = replace(given, sign=sign, invalid=invalid, least=least)
+    return replace(state, points=cells.points, totals=None, second_order=known)
 
 
 def _unable(given: SecondOrder, options: SmoothOptions) -> str:
     """Why the method does not move corners, to be added to the note; "" if it does."""
+    if given.solid:
+        return ""  # the method was asked for the kinds of straight cells when the call began
     quads = (given.kinds != NAMES.index("triangle6")).any()
     if not quads or method_named(options.method_name).moves("quad", options.objective):
         return ""

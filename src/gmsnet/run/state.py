@@ -27,6 +27,7 @@ from gmsnet.run.run import Start, precision_of
 from gmsnet.run.score import Score
 from gmsnet.run.stop import INTERRUPTED
 from gmsnet.run.sweep import Sweep
+from gmsnet.topology.curved_solids import CORNERS3
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -45,17 +46,18 @@ class Final(NamedTuple):
 class SecondOrder:
     """The second-order cells of a mesh (run/second_order.py).
 
-    cells: (C, 9) ids, counter-clockwise, −1 past the last node; kinds: (C,) (kernels.simplex.bernstein). free: (N,)
-    bool by ids. whole: the connectivity of the mesh with straight cells, where corners are free, too; protection: of
-    that, with corners alone free, and what of it is protected. sign: (C,) of det J in each cell, as it is now. invalid:
-    how many cells are not certified valid, least: the least certified bound over a straight cell's size, both at first
-    and now. None of the three is known before the first stage. unable: why the method does not move corners.
+    cells: (C, 9) ids, counter-clockwise, −1 past the last node; kinds: (C,) (kernels.simplex.bernstein). Of volumes
+    (C, 27) of positive sense, and numbers of topology.curved_solids.CURVED. free: (N,) bool by ids. whole: the
+    connectivity of the mesh with straight cells, where corners are free, too; protection: of that, with corners alone
+    free, and what of it is protected. sign: (C,) of det J in each cell, as it is now. invalid: how many cells are not
+    certified valid, least: the least certified bound over a straight cell's size, of volumes over the mean, both at
+    first and now. None of the three is known before the first stage. unable: why the method does not move corners.
     """
 
     cells: NDArray[np.int32]
     kinds: NDArray[np.int8]
     free: NDArray[np.bool_]
-    whole: Topology
+    whole: Topology | Volume
     protection: Protection
     sign: NDArray[np.int8] | None = None
     invalid: tuple[int, int] = (0, 0)
@@ -63,10 +65,15 @@ class SecondOrder:
     unable: str = ""
 
     @property
+    def solid(self) -> bool:
+        """Are they volumes?"""
+        return isinstance(self.whole, Volume)
+
+    @property
     def corners(self) -> NDArray[np.bool_]:
         """(N,) by id: which nodes are a corner."""
         found = np.zeros(len(self.free), dtype=bool)
-        for kind, count in enumerate(CORNERS):
+        for kind, count in enumerate(CORNERS3 if self.solid else CORNERS):
             found[self.cells[self.kinds == kind, :count]] = True
         return found
 
