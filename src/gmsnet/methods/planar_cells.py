@@ -19,6 +19,8 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 Signs = NDArray[np.int8]
 
+LOW = 0.5  # a cell whose certified bound over its straight size is less gets more room
+
 
 class PlanarCells(NamedTuple):
     """Nodes by places in memory.
@@ -31,6 +33,11 @@ class PlanarCells(NamedTuple):
     mesh: CurvedMesh
     free: Flags
     precision: Precision = Precision()
+
+    @property
+    def low(self) -> float:
+        """A cell with a lower bound is to get more room."""
+        return LOW
 
     @property
     def inner(self) -> Flags:

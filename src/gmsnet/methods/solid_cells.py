@@ -19,7 +19,7 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 Signs = NDArray[np.int8]
 
-SHARP = 0.5  # a lower bound over the mean that is less is made sharp
+LOW = 0.5  # a cell whose certified bound over its straight cell's least determinant is less gets more room
 HALVINGS, ROUNDS = 5, 12  # of the way of a corner, before it stays; after so many rounds it stays at once
 
 
@@ -30,6 +30,11 @@ class SolidCells(NamedTuple):
     mesh: CurvedSolids
     free: Flags
     precision: Precision = Precision()
+
+    @property
+    def low(self) -> float:
+        """A cell with a lower bound is to get more room."""
+        return LOW
 
     @property
     def inner(self) -> Flags:
@@ -50,11 +55,11 @@ class SolidCells(NamedTuple):
         return sign, quality
 
     def judged(self) -> tuple[Signs, Floats]:
-        """The sign of det J in each cell, exact where floats do not tell, and its lower bound over its mean.
+        """The sign of det J in each cell, exact where floats do not tell, and its ``quality3``.
 
-        The bound is sharp where it is less than SHARP.
+        The bound is sharp where it is ``low``.
         """
-        sign, quality = self._judged(np.arange(len(self.mesh.cells)), SHARP)
+        sign, quality = self._judged(np.arange(len(self.mesh.cells)), self.low)
         for kind, form in enumerate(self.mesh.forms):
             rows = np.flatnonzero((sign == 0) & (self.mesh.kinds == kind))
             if len(rows):
@@ -109,7 +114,7 @@ class SolidCells(NamedTuple):
     def advance(self, places: Floats, guard: Guard, room: float) -> Ints:
         """Takes the corners to their places (N, 3 or more) together, with what follows them; returns which have moved.
 
-        A cell of a corner that moves is valid afterwards, with a bound over the mean of ``room`` or more, and its
+        A cell of a corner that moves is valid afterwards, with a ``quality3`` of ``room`` or more, and its
         corners are certified above the guard's floor. Where one would not be, its corners go half of the way, and so
         on. Those of cells that are not certified to begin with stay.
         """

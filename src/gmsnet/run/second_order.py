@@ -46,7 +46,6 @@ from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
-LOW = 0.5  # a cell whose certified bound over its straight size is less gets more room
 SWEEPS = 10
 FIRST_ORDER = "node of first-order cells"
 Floats = NDArray[np.float64]
@@ -179,7 +178,7 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     cells, room = _opened(state), -math.inf
     if options.guard != LEVELS[VALID]:
         sign, quality = cells.judged()
-        room = float(quality[sign == 1].min(initial=LOW))
+        room = float(quality[sign == 1].min(initial=cells.low))
     corners = replace(given.protection, base=given.protection.base.holding(~given.free, OF_SECOND_ORDER))
     curved = Curved(cells.mesh, room) if isinstance(cells, PlanarCells) else None
     ready = replace(
@@ -210,8 +209,8 @@ def make_room(state: State, options: SmoothOptions, executor: Executor) -> State
     for _ in range(min(SWEEPS, options.max_sweeps)):
         moved = int(tally[MOVED])
         guard = Field(cells.points, topology, state.precision, level).guard(executor)
-        cells.improve(inner, LOW, guard, tally)
-        cells.improve(corners, LOW, guard, tally)
+        cells.improve(inner, cells.low, guard, tally)
+        cells.improve(corners, cells.low, guard, tally)
         if tally[MOVED] == moved:
             break
     if state.stop_reason == NOTHING_TO_MOVE:

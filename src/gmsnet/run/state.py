@@ -50,8 +50,9 @@ class SecondOrder:
     (C, 27) of positive sense, and numbers of topology.curved_solids.CURVED. free: (N,) bool by ids. whole: the
     connectivity of the mesh with straight cells, where corners are free, too; protection: of that, with corners alone
     free, and what of it is protected. sign: (C,) of det J in each cell, as it is now. invalid: how many cells are not
-    certified valid, least: the least certified bound over a straight cell's size, of volumes over the mean, both at
-    first and now. None of the three is known before the first stage. unable: why the method does not move corners.
+    certified valid, least: the least certified bound over a straight cell's size, of volumes over its least determinant
+    at a corner, both at first and now. None of the three is known before the first stage. unable: why the method does
+    not move corners.
     """
 
     cells: NDArray[np.int32]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.curved.stars3 import NO_FOLLOWER, place3, remember3
 from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.simplex.jacobian3 import COEFFICIENTS, DEPTH, expand_solid, gather_solid, solid_workspace
-from gmsnet.kernels.simplex.mean_ratio3 import weights_at
+from gmsnet.kernels.simplex.mean_ratio3 import determinant, weights_at
 from gmsnet.kernels.simplex.orientation3 import determinant_and_bound
 from gmsnet.kernels.simplex.validity3 import INVALID, VALID, minimum_of_solid, sign_of_solid, smallest_solid
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
@@ -73,43 +73,60 @@ def judged(points, mesh, c, unit, grain, work):
 
 
 @inlined
-def mean_of(form, work):
-    """The mean of the coefficients: that of det J."""
-    total = 0.0
-    for k in range(COEFFICIENTS, COEFFICIENTS + form.terms):
-        total += work[k]
-    return total / form.terms
+def spokes3(points, mesh, c, s):
+    """The spokes of a corner simplex of a cell, and the largest coordinate of its nodes."""
+    cell, simplex = mesh.cells[c], mesh.simplices[mesh.kinds[c], s]
+    v, a, b, d = cell[simplex[0]], cell[simplex[1]], cell[simplex[2]], cell[simplex[3]]
+    x, y, z = points[v, 0], points[v, 1], points[v, 2]
+    reach = max(max(abs(x), abs(y)), abs(z))
+    for k in (a, b, d):
+        reach = max(reach, max(max(abs(points[k, 0]), abs(points[k, 1])), abs(points[k, 2])))
+    return (
+        points[a, 0] - x, points[a, 1] - y, points[a, 2] - z, points[b, 0] - x, points[b, 1] - y, points[b, 2] - z,
+        points[d, 0] - x, points[d, 1] - y, points[d, 2] - z, reach,
+    )  # fmt: skip
+
+
+@part
+def least_straight3(points, mesh, c):
+    """The least determinant at the corners of the straight cell."""
+    least = np.inf
+    for s in range(STRAIGHT):
+        if mesh.simplices[mesh.kinds[c], s, 0] < 0:
+            break
+        ax, ay, az, bx, by, bz, cx, cy, cz, _ = spokes3(points, mesh, c, s)
+        least = min(least, determinant(ax, ay, az, bx, by, bz, cx, cy, cz))
+    return least
+
+
+@part
+def quality_over3(least, form, bound, enough, work):
+    """The lower bound of det J over that least determinant, sharp where it is less than ``enough``; else −∞."""
+    if not least > 0.0:
+        return -np.inf
+    uncut = (smallest_solid(form, COEFFICIENTS, work) - bound) / least
+    return uncut if uncut >= enough else minimum_of_solid(form, bound, work) / least
 
 
 @part
 def quality3(points, mesh, c, enough, unit, grain, work):
-    """The lower bound of det J over its mean, sharp where it is less than ``enough``; −∞ without a positive mean."""
-    form = mesh.forms[mesh.kinds[c]]
+    """The lower bound of det J over the least determinant at a corner of the straight cell: about 1 if straight.
+
+    −∞ where that is not positive. Sharp where it is less than ``enough``.
+    """
     bound = expanded(points, mesh, c, unit, grain, work)
-    mean = mean_of(form, work)
-    if not mean > 0.0:
-        return -np.inf
-    uncut = (smallest_solid(form, COEFFICIENTS, work) - bound) / mean
-    return uncut if uncut >= enough else minimum_of_solid(form, bound, work) / mean
+    return quality_over3(least_straight3(points, mesh, c), mesh.forms[mesh.kinds[c]], bound, enough, work)
 
 
 @part
 def straight_sign3(points, mesh, c, floor, unit, grain):
     """1 where all corner simplices of a cell are certified above a floor, −1 where one is certainly not positive."""
-    kind, cell, found = mesh.kinds[c], mesh.cells[c], 1
+    kind, found = mesh.kinds[c], 1
     weights = weights_at(mesh.shapes, kind)
     for s in range(STRAIGHT):
         if mesh.simplices[kind, s, 0] < 0:
             break
-        v, a = cell[mesh.simplices[kind, s, 0]], cell[mesh.simplices[kind, s, 1]]
-        b, d = cell[mesh.simplices[kind, s, 2]], cell[mesh.simplices[kind, s, 3]]
-        x, y, z = points[v, 0], points[v, 1], points[v, 2]
-        reach = max(max(abs(x), abs(y)), abs(z))
-        ax, ay, az = points[a, 0] - x, points[a, 1] - y, points[a, 2] - z
-        bx, by, bz = points[b, 0] - x, points[b, 1] - y, points[b, 2] - z
-        cx, cy, cz = points[d, 0] - x, points[d, 1] - y, points[d, 2] - z
-        for k in (a, b, d):
-            reach = max(reach, max(max(abs(points[k, 0]), abs(points[k, 1])), abs(points[k, 2])))
+        ax, ay, az, bx, by, bz, cx, cy, cz, reach = spokes3(points, mesh, c, s)
         delta = unit * reach + grain
         if certified(ax, ay, az, bx, by, bz, cx, cy, cz, delta, floor, weights):
             continue
@@ -220,15 +237,8 @@ def judge_curved_solids(points, mesh, cells, unit, grain, enough, sign, quality)
         c = cells[k]
         form = mesh.forms[mesh.kinds[c]]
         bound = expanded(points, mesh, c, unit, grain, work)
-        mean = mean_of(form, work)
-        least = smallest_solid(form, COEFFICIENTS, work) - bound
         sign[k] = sign_of_solid(form, bound, DEPTH, work)
-        if not mean > 0.0:
-            quality[k] = -np.inf
-        elif least >= enough * mean:
-            quality[k] = least / mean
-        else:
-            quality[k] = minimum_of_solid(form, bound, work) / mean
+        quality[k] = quality_over3(least_straight3(points, mesh, c), form, bound, enough, work)
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Descent of single nodes on the Bernstein coefficients of the volume cells around them: kernels.curved.descend.
 
-A coefficient is a polynomial of degree 3 in the place of a node. A model of degree 2 stands for it, from its values
-at ten places. With these values v over the mean size of the cell's coefficients, t the place in units of the star's
+In the place of a node alone a coefficient is affine, for its share in the Jacobian matrix has rank one. With followers
+it is of higher degree: a model of degree 2 stands for it, from its values at ten places. With these values v over the mean size of the cell's coefficients, t the place in units of the star's
 size, and t₀ the straight place of a follower, the objectives are Σ max(0, τ − v)² and −Σ log v, with κ|t − t₀|² for
 followers. Steps are of Gauss and Newton, halved until the objective of the model falls.
 """
@@ -20,6 +20,7 @@ from gmsnet.kernels.curved.commit3 import (
     quality3,
     restore3,
     save3,
+    spokes3,
 )
 from gmsnet.kernels.curved.descend import ARMIJO, DAMPING, END, IMPROVE, LONGEST, SAMPLE, SHORTENINGS, STEPS, UNTANGLE
 from gmsnet.kernels.curved.stars3 import NO_FOLLOWER, corners_of, mean_place, place3, put3, remember3
@@ -54,7 +55,7 @@ def sample3(points, mesh, i, column, work):
     row, corner = 0, is_corner(mesh, i)
     for k in range(mesh.cell_start[i], mesh.cell_start[i + 1]):
         c, at = mesh.cell_of[k], k - mesh.cell_start[i]
-        kind, cell = mesh.kinds[c], mesh.cells[c]
+        kind = mesh.kinds[c]
         expanded(points, mesh, c, 0.0, 0.0, work.solid)
         count = mesh.forms[kind].terms
         if column == 0:
@@ -67,13 +68,8 @@ def sample3(points, mesh, i, column, work):
             row += 1
         s = 0
         while corner and s < 8 and mesh.simplices[kind, s, 0] >= 0:
-            v, a = cell[mesh.simplices[kind, s, 0]], cell[mesh.simplices[kind, s, 1]]
-            b, d = cell[mesh.simplices[kind, s, 2]], cell[mesh.simplices[kind, s, 3]]
-            x, y, z = points[v, 0], points[v, 1], points[v, 2]
-            double = determinant(
-                points[a, 0] - x, points[a, 1] - y, points[a, 2] - z, points[b, 0] - x, points[b, 1] - y,
-                points[b, 2] - z, points[d, 0] - x, points[d, 1] - y, points[d, 2] - z,
-            )  # fmt: skip
+            ax, ay, az, bx, by, bz, cx, cy, cz, _ = spokes3(points, mesh, c, s)
+            double = determinant(ax, ay, az, bx, by, bz, cx, cy, cz)
             work.model[row, column] = work.scale[at] * double
             row += 1
             s += 1
