@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from support import curved
 
-from gmsnet.kernels.simplex.bernstein import NAMES, NODES, WIDEST
+from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES, NODES, QUAD, TRIANGLE, WIDEST
 from gmsnet.measure.curved import exact_sign, judge_curved
 
 
@@ -27,6 +29,21 @@ def test_exact_signs_are_those_of_the_twin(kind):
         assert sign == curved.exact_sign(nodes, NAMES[kind], depth=7, budget=4000)
         seen.add(sign)
     assert seen >= {1, -1}
+
+
+@pytest.mark.parametrize("kind", [TRIANGLE, QUAD])
+def test_a_first_order_cell_has_the_sign_of_its_corners(kind):
+    rng, corners, seen = np.random.default_rng(kind), CORNERS[kind], set()
+    for k in range(300):
+        nodes = rng.integers(0, 3 + k % 5, (corners, 2)) * 0.1  # on a grid that floats miss by their rounding
+        exact = [[Fraction(v) for v in node] for node in nodes.tolist()]
+        around = [(exact[j], exact[(j + 1) % corners], exact[j - 1]) for j in range(corners)]
+        least = min((p[0] - o[0]) * (q[1] - o[1]) - (p[1] - o[1]) * (q[0] - o[0]) for o, p, q in around)
+        sign, quality = judge_curved(*table(nodes, kind))
+        assert sign.tolist() == [1 if least > 0 else -1]
+        assert quality[0] <= 0 or least > 0
+        seen.add(least > 0)
+    assert seen == {True, False}
 
 
 def test_a_corner_without_an_angle_is_invalid_exactly():

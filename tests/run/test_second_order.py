@@ -37,15 +37,18 @@ def twins(kind, seed=1, amount=0.25):
 
 def boundary(mesh):
     """(N,) bool: nodes of edges with one cell, middles among them."""
-    corners = [np.roll(b.nodes[:, : CORNERS[b.kind]], -1, axis=1) for b in mesh.cells if b.kind in CORNERS]
-    rows = [
-        np.stack([b.nodes[:, : CORNERS[b.kind]], after, b.nodes[:, CORNERS[b.kind] : 2 * CORNERS[b.kind]]], axis=-1)
-        for b, after in zip((b for b in mesh.cells if b.kind in CORNERS), corners, strict=True)
-    ]
-    edges = np.concatenate([row.reshape(-1, 3) for row in rows])
-    _, at, uses = np.unique(edges[:, 2], return_index=True, return_counts=True)
+    rows = [np.empty((0, 3), dtype=int)]
+    for block in mesh.cells:
+        count = {**CORNERS, "triangle": 3, "quad": 4}.get(block.kind, 0)
+        for k in range(count):
+            ends = block.nodes[:, [k, (k + 1) % count]]
+            rows.append(
+                np.column_stack([np.sort(ends), block.nodes[:, count + k] if block.kind in CORNERS else ends[:, 0]])
+            )
+    edges = np.concatenate(rows)
+    _, number, uses = np.unique(edges[:, :2], axis=0, return_inverse=True, return_counts=True)
     found = np.zeros(len(mesh.points), dtype=bool)
-    found[edges[at[uses == 1]]] = True
+    found[edges[uses[number.ravel()] == 1]] = True
     return found
 
 
@@ -195,25 +198,64 @@ def test_stretched_layers_are_held_as_in_the_first_order_twin():
     assert free.moved.sum() > result.moved.sum()
 
 
-def test_first_order_cells_beside_them_move_in_their_own_sweeps():
-    """Cells on the left are of the second order, the others of the first; nodes between them stay."""
+def of_both_orders(first, second, chosen):
+    """The cells of ``first`` where ``chosen`` says so by the number of each, those of ``second`` elsewhere."""
+    blocks, before = [], 0
+    for one, two in zip(first.cells, second.cells, strict=True):
+        some = chosen(np.arange(before, before + len(one.nodes)))
+        before += len(one.nodes)
+        blocks += [CellBlock(b.kind, b.nodes[rows], b.regions[rows]) for b, rows in ((one, some), (two, ~some))]
+    return Mesh(second.points, tuple(blocks))
+
+
+@pytest.mark.parametrize("chosen", [lambda cell: cell % 7 < 3, lambda cell: cell % 40 < 20, lambda cell: cell < 90])
+@pytest.mark.parametrize("kind", ["triangle6", "quad9", "mixed"])
+def test_meshes_of_both_orders_become_as_good_as_those_of_the_first(kind, chosen):
+    first, second = twins(kind)
+    mesh = of_both_orders(first, second, chosen)
+    expected, result = gmsnet.smooth(first), gmsnet.smooth(mesh)
+    assert_sound(mesh, result)
+    assert (shape(result.after) >= shape(expected.after) - [0.03, 0.005]).all()
+    free = np.setdiff1d(np.concatenate([b.nodes.ravel() for b in first.cells]), np.flatnonzero(boundary(second)))
+    assert result.moved[free].mean() > 0.9
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", BASES)
+def test_a_square_that_is_tangled_is_mended_whatever_its_orders(kind, seed):
+    """Straight cells of one, of the other and of both orders, corners thrown by an edge."""
+    first, quads = BASES[kind](seed), "quad8" if kind == "quad8" else "quad9"
+    first = Mesh(first.points, first.cells)
+    thrown = throw(second_order(first, quads=quads), middles=0.0, corners=1.0, seed=seed)
+    first = first.with_points(thrown.points[: len(first.points)])
+    second = second_order(first, quads=quads)
+    assert gmsnet.quality(first).inverted > 5
+    for mesh in (second, of_both_orders(first, second, lambda cell: cell % 3 == seed % 3)):
+        result = gmsnet.smooth(mesh)
+        assert result.after.inverted == 0
+        assert_sound(mesh, result)
+
+
+def test_middles_between_a_region_of_each_order_and_on_marked_lines_stay():
     first, second = twins("triangle6")
-    triangles = first.cells[0].nodes
+    triangles, inner = first.cells[0].nodes, np.flatnonzero(~boundary(second))
     left = first.points[triangles][:, :, 0].mean(axis=1) < np.median(first.points[:, 0])
+    own = second.cells[0].nodes[left]
+    line = next(cell for cell in own if np.isin(cell, inner).all())
     cells = (
-        CellBlock("triangle", triangles[~left], np.zeros((~left).sum(), dtype=int)),
-        CellBlock("triangle6", second.cells[0].nodes[left], np.zeros(left.sum(), dtype=int)),
+        CellBlock("triangle", triangles[~left], np.ones((~left).sum(), dtype=int)),
+        CellBlock("triangle6", own, np.zeros(left.sum(), dtype=int)),
+        CellBlock("line", line[None, :2], np.zeros(1, dtype=int)),
     )
-    mesh = Mesh(second.points, cells)
-    result = gmsnet.smooth(mesh)
+    result = gmsnet.smooth(Mesh(second.points, cells))
     between = np.intersect1d(triangles[left], triangles[~left])
-    assert not result.moved[between].any()
-    only_left, only_right = np.setdiff1d(triangles[left], between), np.setdiff1d(triangles[~left], between)
-    assert result.moved[only_left].any()
-    assert result.moved[only_right].any()
-    assert shape(result.after)[1] > shape(result.before)[1]
-    sign, _ = curved_meshes.judged(result.mesh)
-    assert (sign == 1).all()
+    edges = np.concatenate([own[:, [k, (k + 1) % 3, 3 + k]] for k in range(3)])
+    middles = edges[np.isin(edges[:, :2], between).all(axis=1), 2]
+    single = np.flatnonzero(np.bincount(edges[:, 2], minlength=len(second.points)) == 1)
+    held = np.concatenate([between, np.intersect1d(middles, single), line[[0, 1, 3]]])
+    assert not result.moved[held].any()
+    assert result.moved[np.setdiff1d(inner, held)].any()
+    assert result.invalid_curved == 0
 
 
 def test_the_bound_of_the_worst_cell_knows_that_corners_move():

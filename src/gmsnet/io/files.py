@@ -25,12 +25,12 @@ from gmsnet.io.formats import (
     format_of_suffix,
     sniff,
 )  # fmt: skip
+from gmsnet.io.linked import folders_for, links_of, placed
 from gmsnet.io.packed import MAGIC, is_packed, packed, split_name, unpacked
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import FileSource, most_rounded
 from gmsnet.io.stamps import Stamp, Stamps
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_output
-from gmsnet.io.xdmf_xml import H5, linked, relinked
 from gmsnet.mesh.mesh import Mesh, Source
 
 
@@ -49,7 +49,7 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     shown = "standard input" if name in STANDARD_INPUT else name
     entry, opened = _open(name, shown, format)
     files = {suffix: data for suffix, (_, data, _) in opened.items()}
-    if len(files) > 1:
+    if len(files) > 1 and not entry.linked:
         shown = opened[entry.suffixes[0]][0]
     try:
         check_contents(files[entry.suffixes[0]], entry.key)
@@ -107,17 +107,15 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
 
 
 def _linked(entry: Entry, name: str, shown: str, data: Data, stream: bool) -> dict[str, tuple[str, Data, Stamp | None]]:
-    """The file beside it that an XDMF file names."""
+    """The files that a file names, by their keys."""
     try:
-        called = linked(data) if entry.linked else None
+        named = links_of(entry, data)
     except FormatError as error:
         raise FormatError(f"{shown}: {error}") from None
-    if called is None:
-        return {}
-    if stream:
+    if named and stream:
         raise InputError(f"{shown}: {entry.title} that names another file cannot be read from a stream")
     try:
-        return {H5: _loaded(os.path.join(os.path.dirname(name), called))}
+        return {key: _loaded(os.path.join(os.path.dirname(name), path)) for key, path in named.items()}
     except InputError as error:
         raise type(error)(f"{shown}: the file that it names cannot be read: {error}") from None
 
@@ -187,7 +185,7 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamp
     source = FileSource(
         entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions,
         mesh.region_names, mesh.point_data, mesh.cell_data, tuple(parsed.unread), stamps, parsed.matched,
-        mesh.node_sets, parsed.form,
+        mesh.node_sets, parsed.form, parsed.shares,
     )  # fmt: skip
     return replace(mesh, source=source)
 
@@ -225,41 +223,34 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
         raise _no_memory(shown) from None
     except InputError as error:
         raise FormatError(f"{shown}: {error}") from None
-    if H5 in files:
+    stamps = source.stamps if isinstance(source, FileSource) else Stamps()
+    targets: dict[str, str] = {}
+    if entry.linked and len(files) > 1:
         if name in STANDARD_OUTPUT or is_special(name):
             raise InputError(f"{shown}: {entry.title} in several files cannot be written to a stream")
-        files = {**files, **_relinked(files, name, entry)}
+        files, targets = placed(entry, files, name, stamps)
     pieces = {suffix: _with_memory(shown, part) for suffix, part in files.items()}
     if name in STANDARD_OUTPUT:
         _to_standard_output(*pieces.values())
     else:
-        stamps = source.stamps if isinstance(source, FileSource) else None
-        targets = _targets(name, entry, list(files), stamps)
-        replace_files({path: packed(pieces[key]) if is_packed(path) else pieces[key] for key, path in targets.items()},
-                      stamps)  # fmt: skip
+        targets = targets or _targets(name, entry, list(files), stamps)
+        with folders_for(name, targets.values() if entry.linked else ()):
+            replace_files(
+                {path: packed(pieces[key]) if is_packed(path) else pieces[key] for key, path in targets.items()}, stamps
+            )
     return lost
 
 
-def _relinked(files: Mapping[str, Pieces], name: str, entry: Entry) -> dict[str, Pieces]:
-    """The file that names another one, with the name that this will have."""
-    main = entry.suffixes[0]
-    text = relinked(bytes(files[main]), os.path.basename(split_name(name)[0]) + H5)
-    return {main: Pieces(lambda: [text])}
-
-
-def _targets(name: str, entry: Entry, keys: list[str], stamps: Stamps | None) -> dict[str, str]:
+def _targets(name: str, entry: Entry, keys: list[str], stamps: Stamps) -> dict[str, str]:
     """Suffix → the path of each file that is written. Files of a case that were read and do not change are not."""
     folder = case_of(name, entry.key)
-    if folder is None and H5 in keys:
-        beside, known = split_name(name)[0] + H5, stamps.known if stamps else {}
-        if os.path.abspath(beside) in known and os.path.abspath(name) not in known:
-            raise InputError(f"{beside}: holds the numbers of the mesh that was read: name another output")
-        return {key: beside if key == H5 else name for key in keys}
     if folder is None:
         return {key: _beside(name, key) if len(keys) > 1 else name for key in keys}
     paths = {key: file_in(folder, key, is_packed(name)) for key in keys}
-    own = stamps.known if stamps else {}
-    return {key: path for key, path in paths.items() if key == entry.suffixes[0] or os.path.abspath(path) not in own}
+    return {
+        key: path for key, path in paths.items()
+        if key == entry.suffixes[0] or os.path.abspath(path) not in stamps.known
+    }  # fmt: skip
 
 
 def _form_for(source: Source | None, entry: Entry, name: str) -> str:

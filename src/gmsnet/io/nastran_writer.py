@@ -15,7 +15,7 @@ from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.mesh.mesh import Mesh
 
 name = "Nastran"
-suffixes = (".bdf",)
+suffixes: tuple[str, ...] = (".bdf",)
 
 WRITTEN = {
     "line": "CROD", "triangle": "CTRIA3", "triangle6": "CTRIA6", "quad": "CQUAD4", "quad8": "CQUAD8", "quad9": "CQUAD",

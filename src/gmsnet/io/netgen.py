@@ -20,7 +20,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "Netgen"
-suffixes = (".vol",)
+suffixes: tuple[str, ...] = (".vol",)
 
 FACES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"}
 VOLUMES = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10"}

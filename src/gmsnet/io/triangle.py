@@ -25,7 +25,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "Triangle"
-suffixes = (".node", ".ele")
+suffixes: tuple[str, ...] = (".node", ".ele")
 
 MARKER = "triangle:marker"  # the point data that keeps the boundary markers
 ATTRIBUTE = "triangle:attribute"  # + its number: further attributes of points and triangles

@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 from gmsnet.kernels.simplex.bernstein import (
     COEFFICIENTS,
     CORNER_COEFFICIENTS,
+    CORNERS,
     NODES,
     QUAD9,
-    TRIANGLE6,
     coefficients_of_quad,
     coefficients_of_triangle,
     differences_of_quad,
     differences_of_triangle,
     split_quad,
     split_triangle,
+    straighten_edges,
 )
 from gmsnet.kernels.simplex.jacobian import DEPTH, judge_cells
 from gmsnet.kernels.star.guard import Precision
@@ -73,10 +74,13 @@ def exact_sign(nodes: NDArray[np.float64], kind: int) -> int:
 def _coefficients(nodes: NDArray[np.float64], kind: int) -> NDArray[Any]:
     """The Bernstein coefficients as whole numbers, times a common positive one, by the source of the kernels."""
     exact = [[Fraction(v) for v in p] for p in nodes.tolist()]
-    relative = np.array([[v - w for v, w in zip(p, exact[0], strict=True)] for p in exact], dtype=object)
-    count = 3 if kind == TRIANGLE6 else 6
+    relative = np.zeros((max(len(exact), 2 * CORNERS[kind]), 2), dtype=object)
+    relative[: len(exact)] = [[v - w for v, w in zip(p, exact[0], strict=True)] for p in exact]
+    if NODES[kind] == CORNERS[kind]:
+        _source(straighten_edges)(relative, CORNERS[kind])
+    count = 3 if CORNERS[kind] == 3 else 6
     work, first, second, out = (np.zeros(shape, dtype=object) for shape in ((9, 2), (count, 2), (count, 2), 16))
-    if kind == TRIANGLE6:
+    if CORNERS[kind] == 3:
         _source(differences_of_triangle)(relative, work, first, second)
         _source(coefficients_of_triangle)(first, second, out)
     else:
@@ -101,7 +105,7 @@ def _quarters(kind: int) -> list[NDArray[Any]]:
     for k in range(count):
         whole = np.zeros(16)
         whole[k] = 64.0
-        if kind == TRIANGLE6:
+        if CORNERS[kind] == 3:
             split_triangle(whole, children, 0)
         else:
             split_quad(whole, children, 0, np.empty((2, 16)))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.descend import improve_nodes, straighten, untangling_sweep
-from gmsnet.kernels.curved.stars import CENTRE, NO_EDGE, CurvedMesh
+from gmsnet.kernels.curved.stars import CENTRE, NO_EDGE, CurvedMesh, dragged
 from gmsnet.kernels.simplex.bernstein import QUAD9
 from gmsnet.kernels.simplex.jacobian import judge_cells, straight_signs
 from gmsnet.kernels.star.guard import Guard, Precision
@@ -51,7 +51,7 @@ class PlanarCells(NamedTuple):
     @property
     def corner(self) -> Flags:
         """(N,) the corners that may move."""
-        found: Flags = self.free & (np.diff(self.mesh.edge_start) > 0)
+        found: Flags = self.free & self.mesh.corner
         return found
 
     def judged(self) -> tuple[Signs, Floats]:
@@ -83,6 +83,20 @@ class PlanarCells(NamedTuple):
     def keep(self, at: tuple[Ints, Ints], offsets: tuple[Floats, Floats]) -> None:
         """Keeps that of them."""
         self.mesh.ratio[at[0]], self.mesh.centre_ratio[at[1]] = offsets
+
+    def copied(self) -> PlanarCells:
+        """The same, that changes for itself."""
+        mesh = self.mesh._replace(ratio=self.mesh.ratio.copy(), centre_ratio=self.mesh.centre_ratio.copy())
+        return self._replace(points=self.points.copy(), mesh=mesh)
+
+    def become(self, other: PlanarCells) -> None:
+        """Takes over the places and offsets of a copy."""
+        self.points[:], self.mesh.ratio[:] = other.points, other.mesh.ratio
+        self.mesh.centre_ratio[:] = other.mesh.centre_ratio
+
+    def go(self, nodes: Ints, places: Floats) -> None:
+        """Puts corners at their places (K, 2) with what they drag along; nothing is judged."""
+        dragged(self.points, self.mesh, nodes, places, self.precision.single)
 
     def straighten(self, nodes: Ints) -> None:
         """Puts middles and centres at their straight places."""

@@ -89,6 +89,18 @@ class SolidCells(NamedTuple):
         """Keeps that of them."""
         self.mesh.kept[at] = offsets
 
+    def copied(self) -> SolidCells:
+        """The same, that changes for itself."""
+        return self._replace(points=self.points.copy(), mesh=self.mesh._replace(kept=self.mesh.kept.copy()))
+
+    def become(self, other: SolidCells) -> None:
+        """Takes over the places and offsets of a copy."""
+        self.points[:], self.mesh.kept[:] = other.points, other.mesh.kept
+
+    def go(self, nodes: Ints, places: Floats) -> None:
+        """Puts corners at their places (K, 3 or more) with what follows them; nothing is judged."""
+        put_all(self.points, self.points.copy(), self.mesh, nodes, places[:, :3], self.precision.single)
+
     def straighten(self, nodes: Ints) -> None:
         """Puts nodes that are no corners at their straight places."""
         straighten3(self.points, self.mesh, nodes, self.precision.single)
@@ -135,24 +147,6 @@ class SolidCells(NamedTuple):
             share[nodes] *= 0.5 if rounds < ROUNDS else 0.0
             share[nodes[share[nodes] < 0.5**HALVINGS]] = 0.0
         return np.flatnonzero(share)
-
-    def take(self, places: Floats) -> None:
-        """Takes the corners to their places together, if that makes more cells valid and none invalid.
-
-        Where a cell would become invalid its corners go back, and so on.
-        """
-        start, before = self.points.copy(), self.signs(np.arange(len(self.mesh.cells)))
-        goes = self.corner & (places[:, :3] != start[:, :3]).any(axis=1)
-        nodes = np.flatnonzero(goes)
-        while len(nodes):
-            targets = np.where(goes[nodes, None], places[nodes, :3], start[nodes, :3])
-            put_all(self.points, start, self.mesh, nodes, targets, self.precision.single)
-            sign = self.signs(np.arange(len(before)))
-            nodes = self._corners(np.flatnonzero((before == 1) & (sign != 1)))
-            nodes = nodes[goes[nodes]]
-            goes[nodes] = False
-            if not len(nodes) and (sign != 1).sum() >= (before != 1).sum():
-                self.points[:] = start
 
     def _refused(self, cells: Ints, guard: Guard, room: float) -> Flags:
         found = np.empty(len(cells), dtype=bool)

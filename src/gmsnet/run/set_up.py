@@ -30,7 +30,8 @@ from gmsnet.parallel.threads import side_by_side
 from gmsnet.preserve.protection import Protection, protected, protected_volume
 from gmsnet.run.metric_stage import check_given
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.second_order import second_order_of, second_order_solids_of
+from gmsnet.run.second_order import second_order_of
+from gmsnet.run.second_order_volumes import second_order_solids_of
 from gmsnet.run.set_up_surface import first_of_surface
 from gmsnet.run.state import State
 from gmsnet.topology.held import REASONS
@@ -60,6 +61,7 @@ def first_state(
     given, restore = to_mesh(mesh)
     check_mesh(given, target)
     check_cells(given, options.method_name, options.objective or options.variant)
+    check_surface_options(given, options)
     if given.plane is None:
         check_in_space(options)
     remarks = []
@@ -169,6 +171,15 @@ def _first_of_volume(
         given, restore, smoother, before, protection, start, start, nothing, tuple(remarks), sliding=sliding,
         second_order=second,
     )  # fmt: skip
+
+
+def check_surface_options(mesh: Mesh, options: SmoothOptions) -> None:
+    """InputError for options of surfaces where the mesh is none."""
+    if mesh.plane is None and not mesh.has_volumes:
+        return
+    for name, given in (("hausdorff", options.hausdorff is not None), ("free_needles", options.free_needles)):
+        if given:
+            raise InputError(f"{name} is of surfaces in space, and this mesh is none: leave it out")
 
 
 def check_in_space(options: SmoothOptions) -> None:

@@ -88,7 +88,9 @@ class Topology(Connectivity):
         nodes, corners = len(mesh.points), check_size(mesh)
         refuse_unless_free(nodes * PER_NODE + corners * PER_CORNER, f"the connectivity of {nodes:,} nodes")
         planar = planar_points(mesh) if mesh.plane else space_points(mesh)
-        (memory, position), written = side_by_side(threads, partial(memory_order, planar), partial(Faces.of, mesh))
+        (memory, position), written = side_by_side(
+            threads, partial(memory_order, planar, mesh.box), partial(Faces.of, mesh)
+        )
         faces, planar = side_by_side(threads, partial(written.renumbered, position), partial(taken, planar, memory))
         marks = known_marks(mesh, fixed, position)
         points = None if mesh.plane is None else planar

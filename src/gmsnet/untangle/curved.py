@@ -15,6 +15,14 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.star.guard import Precision
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
+from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
+from gmsnet.untangle import untangle
+from gmsnet.untangle.space import untangle_volume
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -32,6 +40,11 @@ class Cells(Protocol):
     @property
     def mesh(self) -> Any:
         """With ``cells``, ``cell_start`` and ``cell_of``."""
+        ...
+
+    @property
+    def precision(self) -> Precision:
+        """How exactly coordinates are known."""
         ...
 
     @property
@@ -64,6 +77,18 @@ class Cells(Protocol):
         """Keeps these of them."""
         ...
 
+    def copied(self) -> Any:
+        """The same, that changes for itself."""
+        ...
+
+    def become(self, other: Any) -> None:
+        """Takes over the places and offsets of a copy."""
+        ...
+
+    def go(self, nodes: Ints, places: Floats) -> None:
+        """Puts corners there with what they take along; nothing is judged."""
+        ...
+
     def straighten(self, nodes: Ints) -> None:
         """Puts nodes that are no corners at their straight places."""
         ...
@@ -92,18 +117,59 @@ class CurvedScore(NamedTuple):
     after: int
 
 
-def untangle_curved(curved: Cells) -> CurvedScore:
-    """Moves free nodes until as many cells as can be are certainly valid."""
+def untangle_curved(
+    curved: Cells, straight: Topology | Volume | None = None, executor: Executor = serial
+) -> CurvedScore:
+    """Moves free nodes until as many cells as can be are certainly valid.
+
+    straight: the connectivity of the mesh with straight cells, of whose free nodes corners are; None: straight cells
+    are not untangled for themselves.
+    """
+    before = int((curved.signs(_all(curved)) != 1).sum())
+    if straight is not None:
+        _untangle_straight(curved, straight, executor)
+    return CurvedScore(before, _mend(curved))
+
+
+def _all(curved: Cells) -> Ints:
+    return np.arange(len(curved.mesh.cells))
+
+
+def _untangle_straight(curved: Cells, straight: Topology | Volume, executor: Executor) -> None:
+    """Takes the mesh with its straight cells untangled, and mended, if fewer cells are invalid and no other ones."""
+    every = _all(curved)
+    was, before = curved.signs(every), curved.straight_signs(every)
+    inverted = int((before != 1).sum())
+    if not inverted:
+        return
+    if isinstance(straight, Volume):
+        untangled = untangle_volume(curved.points, straight, curved.precision, executor, inverted).points
+    else:
+        untangled = untangle(curved.points, straight, curved.precision).points
+    moved = np.flatnonzero((untangled != curved.points).any(axis=1) & curved.corner)
+    trial = curved.copied()
+    trial.go(moved, untangled[moved])
+    bad = trial.mesh.cells[trial.signs(every) != 1]
+    inner = np.flatnonzero(trial.inner)
+    trial.straighten(inner[np.isin(inner, bad)])
+    _mend(trial)
+    now, after = trial.signs(every), trial.straight_signs(every)
+    lost = ((was == 1) & (now != 1)) | ((before != -1) & (after != 1))
+    if (now != 1).sum() < (was != 1).sum() and not lost.any():
+        curved.become(trial)
+
+
+def _mend(curved: Cells) -> int:
+    """Mends a mesh patch by patch; returns how many cells are not certainly valid."""
     inner, corner = curved.inner, curved.corner
-    bad = np.flatnonzero(curved.signs(np.arange(len(curved.mesh.cells))) != 1)
-    before = len(bad)
+    bad = np.flatnonzero(curved.signs(_all(curved)) != 1)
     for rings, sweeps, thresholds in TRIES:
         for cells in _patches(curved.mesh, bad, rings):
             _Patch(curved, cells, inner, corner).untangle(sweeps, thresholds)
         bad = bad[curved.signs(bad) != 1]
         if not bad.size:
             break
-    return CurvedScore(before, len(bad))
+    return len(bad)
 
 
 def _around(mesh: Any, cells: Ints) -> Ints:

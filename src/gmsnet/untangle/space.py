@@ -38,6 +38,17 @@ class Attempt:
     points: as they are now; start: as they were. bad, inverted, ratio: of each cell, see ``find_bad``.
     """
 
+    start: Floats
+    points: Floats
+    bad: Flags
+    inverted: Flags
+    was_inverted: Flags
+    topology: Volume
+    precision: Precision
+    ratio: NDArray[np.float64]
+    left: int
+    was: NDArray[np.float64]
+
     def __init__(self, points: Floats, topology: Volume, precision: Precision, executor: Executor) -> None:
         self.start, self.points, self.topology, self.precision = points, points.copy(), topology, precision
         self.executor = executor

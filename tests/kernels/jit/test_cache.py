@@ -133,7 +133,7 @@ def test_no_flipped_bit_gets_through(tmp_path, monkeypatch, suffix):
     monkeypatch.setattr("numba.core.config.CACHE_DIR", str(tmp_path))
     compiled = kernel(increment)
     assert compiled(1) == 2
-    file = compiled._cache._cache_file
+    file = compiled.inside._cache._cache_file
     (key,) = file._load_index()
     assert file.load(key) is not None
     (path,) = tmp_path.rglob(f"*{suffix}")

@@ -5,7 +5,7 @@ A node moves together with what it drags along. The move is made if afterwards e
 - is certainly valid, or was certainly invalid before and has its smallest Bernstein coefficient certainly risen;
 - has positive determinants at the corners of its straight edges, unless it certainly had not before;
 - where the node is a corner and a floor is given, has the D/L of its straight edges certified above it at each corner;
-- has a ``quality_of`` of ``room`` or more, unless it was not certainly valid before.
+- has a ``quality_of`` of ``room`` or more, unless it was not certainly valid before, or is of first order.
 
 Else the shift is halved, or at last dropped, and all bits are as they were. With the node all cells that it or what it
 drags is in are cells around the node. So nothing else changes, and nodes without a common cell can move at once.
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.stars import CENTRE, place, remember
 from gmsnet.kernels.jit.compile import inlined, kernel, part
-from gmsnet.kernels.simplex.bernstein import CORNERS
+from gmsnet.kernels.simplex.bernstein import CORNERS, NODES
 from gmsnet.kernels.simplex.jacobian import (
     CellWorkspace,
     cell_workspace,
@@ -151,7 +151,7 @@ def judge_before(points, mesh, i, guard, work):
 @inlined
 def allowed_now(points, mesh, i, guard, room, work):
     """Do the cells around a node fulfil the rule, compared with what ``judge_before`` has found?"""
-    is_corner = mesh.edge_start[i] < mesh.edge_start[i + 1]  # else straight cells stay as they are
+    is_corner = mesh.corner[i]  # else straight cells stay as they are
     for k in range(mesh.cell_start[i], mesh.cell_start[i + 1]):
         c, at = mesh.cell_of[k], k - mesh.cell_start[i]
         kind = mesh.kinds[c]
@@ -167,7 +167,8 @@ def allowed_now(points, mesh, i, guard, room, work):
             continue
         if sign_everywhere(kind, bound, work.cell) != 1:
             return False
-        if room > -np.inf and work.sign[at] == 1 and not has_room(kind, bound, room, work.cell):
+        curved = NODES[kind] > CORNERS[kind]
+        if curved and room > -np.inf and work.sign[at] == 1 and not has_room(kind, bound, room, work.cell):
             return False
     return True
 

@@ -19,7 +19,7 @@ import numpy as np
 from gmsnet.kernels.curved.commit import commit_curved, curved_workspace, restore, save
 from gmsnet.kernels.curved.stars import CENTRE, NO_EDGE, place, remember, serendipity
 from gmsnet.kernels.jit.compile import kernel, part
-from gmsnet.kernels.simplex.bernstein import COEFFICIENTS, CORNERS, QUAD9
+from gmsnet.kernels.simplex.bernstein import COEFFICIENTS, CORNERS, NODES, QUAD9
 from gmsnet.kernels.simplex.jacobian import expand, gather_cell, quality_of
 from gmsnet.kernels.star.block import DROPPED, MOVED
 
@@ -64,7 +64,7 @@ def straight_place(points, mesh, i):
 @part
 def sample(points, mesh, i, column, work):
     """Values of all rows of the model with the node where it is, into a column."""
-    row, is_corner = 0, mesh.edge_start[i] < mesh.edge_start[i + 1]
+    row, is_corner = 0, mesh.corner[i]
     for k in range(mesh.cell_start[i], mesh.cell_start[i + 1]):
         c, at = mesh.cell_of[k], k - mesh.cell_start[i]
         kind = mesh.kinds[c]
@@ -187,10 +187,12 @@ def descent(points, mesh, i, mode, threshold, work):
 
 @part
 def least_quality(points, mesh, i, guard, work):
-    """The lowest ``quality_of`` the cells around a node."""
+    """The lowest ``quality_of`` the second-order cells around a node."""
     least = np.inf
     for k in range(mesh.cell_start[i], mesh.cell_start[i + 1]):
         c = mesh.cell_of[k]
+        if NODES[mesh.kinds[c]] == CORNERS[mesh.kinds[c]]:
+            continue
         delta = guard.unit * gather_cell(points, mesh.cells[c], mesh.kinds[c], work.cell) + guard.grain
         least = min(least, quality_of(mesh.kinds[c], expand(mesh.kinds[c], delta, work.cell), work.cell))
     return least

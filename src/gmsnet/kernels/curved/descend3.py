@@ -1,9 +1,10 @@
 """Descent of single nodes on the Bernstein coefficients of the volume cells around them: kernels.curved.descend.
 
 In the place of a node alone a coefficient is affine, for its share in the Jacobian matrix has rank one. With followers
-it is of higher degree: a model of degree 2 stands for it, from its values at ten places. With these values v over the mean size of the cell's coefficients, t the place in units of the star's
-size, and t₀ the straight place of a follower, the objectives are Σ max(0, τ − v)² and −Σ log v, with κ|t − t₀|² for
-followers. Steps are of Gauss and Newton, halved until the objective of the model falls.
+it is of higher degree: a model of degree 2 stands for it, from its values at ten places. With these values v over the
+mean size of the cell's coefficients, t the place in units of the star's size, and t₀ the straight place of a follower,
+the objectives are Σ max(0, τ − v)² and −Σ log v, with κ|t − t₀|² for followers. Steps are of Gauss and Newton, halved
+until the objective of the model falls.
 """
 
 from __future__ import annotations

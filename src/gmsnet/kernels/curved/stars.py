@@ -18,6 +18,9 @@ from gmsnet.kernels.simplex.bernstein import CORNERS, NODES, QUAD9, WIDEST
 
 NO_EDGE = -1
 CENTRE = 8  # the place of the centre in a nine-node quad
+REVERSED = (  # the nodes of each kind, read the other way round
+    (0, 2, 1, 5, 4, 3), (0, 3, 2, 1, 7, 6, 5, 4), (0, 3, 2, 1, 7, 6, 5, 4, 8), (0, 2, 1), (0, 3, 2, 1),
+)  # fmt: skip
 
 
 class CurvedMesh(NamedTuple):
@@ -27,7 +30,7 @@ class CurvedMesh(NamedTuple):
     cell_start, cell_of: CSR by node, the cells around corners, middles and centres. edge_start, edge_of: CSR by node,
     the edges around corners. edges: (E, 3) start, end and middle. dragged: (E,) whether the middle goes along when an
     end moves. edge_of_middle: (N,) NO_EDGE where a node is no middle. ratio: (E, 2) ρ of edges; centre_ratio: (C, 2) ρ
-    of centres. centre_dragged: (C,).
+    of centres. centre_dragged: (C,). corner: (N,) which nodes are corners.
     """
 
     cells: NDArray[np.int32]
@@ -42,23 +45,29 @@ class CurvedMesh(NamedTuple):
     ratio: NDArray[np.float64]
     centre_dragged: NDArray[np.bool_]
     centre_ratio: NDArray[np.float64]
+    corner: NDArray[np.bool_]
 
 
 def curved_mesh(
     points: NDArray[np.float64], cells: NDArray[np.int32], kinds: NDArray[np.int8], held: NDArray[np.bool_]
 ) -> CurvedMesh:
-    """A mesh of second-order cells with the offsets that ``points`` (N, 2) have.
+    """A mesh of second-order cells with the offsets that ``points`` (N, 2) have, and first-order cells beside them.
 
     cells, kinds: see CurvedMesh. held: (N,) nodes that stay whatever moves. A middle goes along if its edge is in two
     cells, which agree on its ends, and it is not held: middles on the boundary stay, and so do those that the caller
-    holds (interfaces, markers).
+    holds (interfaces, markers). One of the two cells may be of first order; its edge is straight.
     """
-    rows, places, ends = [], [], []
+    rows, places, ends, straight = [], [], [], [np.empty((0, 2), dtype=cells.dtype)]
+    corner = np.zeros(len(points), dtype=bool)
     for kind in range(len(CORNERS)):
         of_kind = np.flatnonzero(kinds == kind)
+        corner[cells[of_kind, : CORNERS[kind]]] = True
         for k in range(CORNERS[kind]):
             after = (k + 1) % CORNERS[kind]
-            ends.append(cells[of_kind][:, [k, after, CORNERS[kind] + k]])
+            if NODES[kind] > CORNERS[kind]:
+                ends.append(cells[of_kind][:, [k, after, CORNERS[kind] + k]])
+            else:
+                straight.append(cells[of_kind][:, [k, after]])
     for k in range(WIDEST):
         of_place = np.flatnonzero(cells[:, k] >= 0)
         rows.append(of_place)
@@ -73,14 +82,22 @@ def curved_mesh(
     edge_start, edge_of = _by_node(edges[:, :2].T.ravel(), np.concatenate([numbers, numbers]), len(points))
     edge_of_middle = np.full(len(points), NO_EDGE, dtype=np.int32)
     edge_of_middle[edges[:, 2]] = numbers
-    dragged = (count == 2) & ~torn & ~held[edges[:, 2]]
+    beside = _uses_of(np.sort(np.concatenate(straight), axis=1), pairs[first], len(points))
+    dragged = (count + beside == 2) & ~torn & ~held[edges[:, 2]]
     made = CurvedMesh(
         np.ascontiguousarray(cells, dtype=np.int32), np.ascontiguousarray(kinds, dtype=np.int8), cell_start, cell_of,
         edge_start, edge_of, edges, dragged, edge_of_middle, np.zeros((len(edges), 2)),
-        (kinds == QUAD9) & ~held[cells[:, CENTRE]], np.zeros((len(cells), 2)),
+        (kinds == QUAD9) & ~held[cells[:, CENTRE]], np.zeros((len(cells), 2)), corner,
     )  # fmt: skip
     remember_all(np.ascontiguousarray(points, dtype=np.float64), made)
     return made
+
+
+def _uses_of(pairs: NDArray[np.int32], wanted: NDArray[np.int32], nodes: int) -> NDArray[np.int64]:
+    """How often each of the wanted pairs of nodes (E, 2) is among some (K, 2), the lesser node first in both."""
+    known, key = (each[:, 0].astype(np.int64) * nodes + each[:, 1] for each in (pairs, wanted))
+    known.sort()
+    return np.searchsorted(known, key, side="right") - np.searchsorted(known, key, side="left")
 
 
 def _by_node(
@@ -96,7 +113,7 @@ def counter_clockwise(
 ) -> NDArray[np.int32]:
     """The table of cells with those that are wound clockwise (``turned``) read the other way round."""
     made = cells.copy()
-    for kind, order in ((0, (0, 2, 1, 5, 4, 3)), (1, (0, 3, 2, 1, 7, 6, 5, 4)), (2, (0, 3, 2, 1, 7, 6, 5, 4, 8))):
+    for kind, order in enumerate(REVERSED):
         rows = np.flatnonzero(turned & (kinds == kind))
         made[rows[:, None], np.arange(NODES[kind])] = cells[rows][:, list(order)]
     return made

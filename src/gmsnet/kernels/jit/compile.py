@@ -54,14 +54,30 @@ def options(version: tuple[int, ...]) -> tuple[dict[str, Any], dict[str, Any], d
 KERNEL, PART, INLINED = options(numba.version_info.short)
 
 
+class Kernel:
+    """A function that Python calls, and kernels may. Numba is told of it when it is first called: most are not."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.py_func = function
+
+    @cached_property
+    def inside(self) -> Callable[..., Any]:
+        """What Numba makes of it."""
+        try:
+            compiled: Callable[..., Any] = numba.njit(cache=True, **KERNEL)(self.py_func)
+        except RuntimeError:  # no folder for the cache can be written
+            return numba.njit(**KERNEL)(self.py_func)  # type: ignore[no-any-return]
+        make_trustworthy(compiled._cache)  # type: ignore[attr-defined]
+        return compiled
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Compiled, or taken from the disk, once for each set of types."""
+        return self.inside(*arguments)
+
+
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile for Python to call, releasing the GIL, and keep on disk."""
-    try:
-        compiled: Callable[..., Any] = numba.njit(cache=True, **KERNEL)(function)
-    except RuntimeError:  # no folder for the cache can be written
-        return numba.njit(**KERNEL)(function)  # type: ignore[no-any-return]
-    make_trustworthy(compiled._cache)  # type: ignore[attr-defined]
-    return compiled
+    return update_wrapper(Kernel(function), function)
 
 
 class Part:
@@ -90,9 +106,10 @@ class Part:
         return kernel(self.py_func)
 
 
+@typeof_impl.register(Kernel)
 @typeof_impl.register(Part)
-def _inside(part: Part, _: Any) -> Any:
-    return numba.typeof(part.inside)
+def _inside(of: Kernel | Part, _: Any) -> Any:
+    return numba.typeof(of.inside)
 
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -24,14 +24,15 @@ from __future__ import annotations
 
 from gmsnet.kernels.jit.compile import part
 
-TRIANGLE6, QUAD8, QUAD9 = range(3)  # the kinds of cells
+TRIANGLE6, QUAD8, QUAD9, TRIANGLE, QUAD = range(5)  # the kinds of cells
 NAMES = ("triangle6", "quad8", "quad9")
-CORNERS = (3, 4, 4)
-NODES = (6, 8, 9)
+KINDS = (*NAMES, "triangle", "quad")  # the last two beside second-order cells, their middles those of straight edges
+CORNERS = (3, 4, 4, 3, 4)
+NODES = (6, 8, 9, 3, 4)
 WIDEST = 9  # nodes of a cell at maximum, the width of a table of cells of several kinds
-COEFFICIENTS = (6, 16, 16)
+COEFFICIENTS = (6, 16, 16, 6, 16)
 # Coefficients that are values of det J at corners; a triangle's first one stands twice.
-CORNER_COEFFICIENTS = ((0, 1, 2, 0), (0, 12, 15, 3), (0, 12, 15, 3))
+CORNER_COEFFICIENTS = ((0, 1, 2, 0), (0, 12, 15, 3), (0, 12, 15, 3), (0, 1, 2, 0), (0, 12, 15, 3))
 # Control points of quads lie on a grid, 3·i + j for i along 01 and j along 03.
 GRID_CORNERS, GRID_MIDDLES, GRID_CENTRE = (0, 6, 8, 2), (3, 7, 5, 1), 4
 # For each coefficient of a triangle, in the order 200, 020, 002, 110, 011, 101, its α and β.
@@ -39,6 +40,15 @@ FIRST, SECOND = (0, 1, 2, 0, 1, 0), (0, 1, 2, 1, 2, 2)
 # Control points α + e_k of a triangle by α and k: a corner where α = e_k, else a middle.
 LIFTED = ((0, 3, 5), (3, 1, 4), (5, 4, 2))
 BINOMIAL2, BINOMIAL3 = (1, 2, 1), (1, 3, 3, 1)
+
+
+@part
+def straighten_edges(nodes, corners):
+    """The middles of a first-order cell's edges, behind its corners (3 or 4). nodes: (8 or more, 2)."""
+    for k in range(corners):
+        after = (k + 1) % corners
+        for axis in range(2):
+            nodes[corners + k, axis] = (nodes[k, axis] + nodes[after, axis]) / 2
 
 
 @part

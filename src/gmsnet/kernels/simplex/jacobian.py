@@ -5,7 +5,8 @@ Write δ for how far a coordinate may be off (see kernels.simplex.predicates), u
 axis, and w for the sum of the absolute weights of two control points: 6 (triangle6), 10 (quad8), 12 (quad9).
 
 1. A difference of control points is a sum of nodes with weights of at most w together. Each node goes through at most
-   8 roundings. So it is off by at most η = w (δ + 16·u·s) along that axis, twice the rounding to first order.
+   8 roundings, 10 where middles are those of a first-order cell's edges. So it is off by at most η = w (δ + 16·u·s)
+   along that axis, 1.6 times the rounding to first order or more.
 2. Let a and b be the largest |U| and |V| along an axis. A cross product is then off by at most
    (a_x + b_x) η_y + (a_y + b_y) η_x + 2 η_x η_y and, for its own rounding, 3u (a_x b_y + a_y b_x).
 3. A coefficient is 4 times a mean of cross products with positive weights, and so is each coefficient on a part of the
@@ -29,7 +30,6 @@ from gmsnet.kernels.simplex.bernstein import (
     CORNERS,
     NODES,
     QUAD9,
-    TRIANGLE6,
     WIDEST,
     coefficients_of_quad,
     coefficients_of_triangle,
@@ -37,12 +37,13 @@ from gmsnet.kernels.simplex.bernstein import (
     differences_of_triangle,
     split_quad,
     split_triangle,
+    straighten_edges,
 )
 from gmsnet.kernels.simplex.predicates import UNDERFLOW, UNIT, determinant_and_bound
 
 DEPTH = 7  # a cell is cut into quarters at most so many times
 STACK = 3 * DEPTH + 4  # parts that wait at once, at maximum
-WEIGHTS = (6.0, 10.0, 12.0)  # w by kind
+WEIGHTS = (6.0, 10.0, 12.0, 6.0, 10.0)  # w by kind
 DATA, ROUNDING = 4.5, 512.0 * UNIT
 TOLERANCE = 2.0**-8  # of a lower bound, in units of the largest coefficient
 
@@ -78,13 +79,15 @@ def gather_cell(points, cell, kind, work):
         px, py = points[cell[k], 0], points[cell[k], 1]
         work.nodes[k, 0], work.nodes[k, 1] = px - x, py - y
         reach = max(reach, max(abs(px), abs(py)))
+    if NODES[kind] == CORNERS[kind]:
+        straighten_edges(work.nodes, CORNERS[kind])
     return reach
 
 
 @inlined
 def expand(kind, delta, work):
     """Coefficients of det J of the gathered cell, into the workspace; returns their error bound B."""
-    if kind == TRIANGLE6:
+    if CORNERS[kind] == 3:
         count = 3
         differences_of_triangle(work.nodes, work.control, work.first, work.second)
         coefficients_of_triangle(work.first, work.second, work.coefficients)
@@ -131,7 +134,7 @@ def replace_by_quarters(kind, top, work):
     deeper = work.depth[top - 1] + 1
     for k in range(COEFFICIENTS[kind]):
         work.whole[k] = work.stack[top - 1, k]
-    if kind == TRIANGLE6:
+    if CORNERS[kind] == 3:
         split_triangle(work.whole, work.stack, top - 1)
     else:
         split_quad(work.whole, work.stack, top - 1, work.halves)
@@ -218,7 +221,7 @@ def straight_sign(kind, delta, work):
 def straight_mean(kind, work):
     """The mean of det J over the cell with straight edges: a quad's area, twice a triangle's."""
     nodes = work.nodes
-    if kind == TRIANGLE6:
+    if CORNERS[kind] == 3:
         return abs(nodes[1, 0] * nodes[2, 1] - nodes[1, 1] * nodes[2, 0])
     across_x, across_y = nodes[3, 0] - nodes[1, 0], nodes[3, 1] - nodes[1, 1]
     return 0.5 * abs(nodes[2, 0] * across_y - nodes[2, 1] * across_x)
@@ -240,13 +243,15 @@ def take(nodes, kind, work):
     """As ``gather_cell``, from the nodes themselves."""
     for k in range(NODES[kind]):
         work.nodes[k, 0], work.nodes[k, 1] = nodes[k, 0] - nodes[0, 0], nodes[k, 1] - nodes[0, 1]
+    if NODES[kind] == CORNERS[kind]:
+        straighten_edges(work.nodes, CORNERS[kind])
 
 
 @kernel
 def certified_positive(nodes, kind, delta):
     """Is det J positive everywhere in a cell? +1 certainly, −1 certainly not, 0 undecided.
 
-    nodes: (6, 8 or 9, 2) float64, counter-clockwise, known up to ±delta. kind: TRIANGLE6, QUAD8 or QUAD9.
+    nodes: (6, 8, 9, 3 or 4, 2) float64, counter-clockwise, known up to ±delta. kind: see kernels.simplex.bernstein.
     """
     work = cell_workspace()
     take(nodes, kind, work)
