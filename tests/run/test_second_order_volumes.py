@@ -233,3 +233,16 @@ def test_kinds_without_a_known_determinant_are_refused():
     )
     with pytest.raises(InputError, match="second order without pyramids"):
         gmsnet.smooth(mesh)
+
+
+@pytest.mark.parametrize("kind", BASES)
+def test_single_cells_that_are_inside_out_are_told_by_their_neighbours(kind):
+    _, mesh = twins(kind)
+    block = mesh.cells[0]
+    nodes = block.nodes.copy()
+    nodes[3] = nodes[3, np.array(mirrored(kind))]
+    one = Mesh(mesh.points, (CellBlock(kind, nodes, block.regions),))
+    found = gmsnet.quality(one)
+    assert found.inverted == 0
+    assert found.summary()["read_inside_out"] == {kind: 1}
+    assert gmsnet.smooth(one).after.inverted == 0
