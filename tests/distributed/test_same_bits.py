@@ -104,6 +104,15 @@ def test_any_partition(seed, ranks, kind, how):
     assert same(mesh, options, parts_at_random(mesh, ranks, rng, how), ranks, fixed).gathered == ""
 
 
+@pytest.mark.parametrize("kind", MESHES)
+def test_ranks_that_have_no_cells_or_one_kind_of_them(kind):
+    mesh = MESHES[kind]
+    options = SmoothOptions(method="barrier", max_sweeps=3, preserve="none", threads=1)
+    same(mesh, options, parts_at_random(mesh, 5, np.random.default_rng(0), "lonely"), 5)
+    by_kind = [np.full(len(block.nodes), k % 3, dtype=np.int32) for k, block in enumerate(mesh.cells)]
+    same(mesh, options, by_kind, 3)
+
+
 def test_more_ranks_than_cells():
     points = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [0.3, 0.4]])
     mesh = Mesh(points, (CellBlock("triangle", [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], [0] * 4),))

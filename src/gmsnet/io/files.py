@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from gmsnet.errors import FormatError, InputError
+from gmsnet.io import foreign
 from gmsnet.io.atomic import reason, refuse_folder, replace_files
 from gmsnet.io.cells import sealed
 from gmsnet.io.contents import Data, is_open_pipe, load, refuse_unless_regular
@@ -47,6 +48,9 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     """
     name = _name(path)
     shown = "standard input" if name in STANDARD_INPUT else name
+    suffix = os.path.splitext(name)[1].lower()
+    if format is None and suffix in foreign.READ and os.path.isfile(name):
+        return foreign.read(name, suffix)
     entry, opened = _open(name, shown, format)
     files = {suffix: data for suffix, (_, data, _) in opened.items()}
     if len(files) > 1 and not entry.linked:
@@ -270,6 +274,8 @@ def _rounded(mesh: Mesh, source: FileSource) -> list[str]:
 
 def _unread(source: Source | None) -> Iterator[str]:
     """What a conversion leaves behind in the file that was read, in words."""
+    if isinstance(source, foreign.ForeignSource):
+        yield f"what meshlane does not read of a file of {source.title}: left out"
     if isinstance(source, FileSource) and source.unread:
         title = FORMATS[source.format].title
         yield f"only the {title} file that was read holds {listed(source.unread)}: left out"
@@ -295,7 +301,7 @@ def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
     refuse_folder(path)
     if format is not None:
         entry = entry_of(format)
-    elif stream and mesh.source is not None:
+    elif stream and mesh.source is not None and mesh.source.format:
         entry = entry_of(mesh.source.format)
     elif stream:
         raise InputError(f"{shown}: name the format with --format ({', '.join(FORMATS)})")

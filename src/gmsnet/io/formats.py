@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import cast
 
 from gmsnet.errors import FormatError, InputError
+from gmsnet.io import foreign
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Format, Written
 from gmsnet.io.hdf5 import MAGIC
@@ -53,6 +54,8 @@ class Entry:
     def write(self, mesh: Mesh, form: str) -> Written:
         """The mesh in one of the forms. Raises FormatError where it cannot hold the cells at all."""
         module = self.load()
+        if self.own and self.key in foreign.WRITTEN:
+            return foreign.written(mesh, self.key, self.title, self.suffixes[0], module)
         return module.write_as(mesh, form) if form else module.write(mesh)  # type: ignore[attr-defined]
 
 
@@ -107,7 +110,6 @@ for _key, _entry in FORMATS.items():
         BY_SUFFIX.setdefault(_suffix, _key)
 
 MENDS = {  # files that one may well have, but that are not read
-    ".meshb": "binary Medit is not read: convert it to text (.mesh)",
     ".poly": "a .poly file is the input of Triangle: run Triangle on it and give the .node file",
     ".geo": "a .geo file is a geometry: mesh it with Gmsh and give the .msh file",
     ".zip": "unpack it first",

@@ -22,7 +22,10 @@ WRITTEN = {
     "tetra": "CTETRA", "tetra10": "CTETRA", "pyramid": "CPYRAM", "pyramid13": "CPYRAM", "wedge": "CPENTA",
     "wedge15": "CPENTA", "hexahedron": "CHEXA", "hexahedron20": "CHEXA",
 }  # fmt: skip
-ORDER = {"wedge15": (*range(9), 12, 13, 14, 9, 10, 11), "hexahedron20": (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)}
+ORDER: dict[str, tuple[int, ...]] = {
+    "wedge15": (*range(9), 12, 13, 14, 9, 10, 11),
+    "hexahedron20": (*range(12), 16, 17, 18, 19, 12, 13, 14, 15),
+}
 MOST = 99_999_999  # that a field of 8 columns can hold
 WIDTH = 16
 _AT_ONCE = 1 << 12

@@ -35,7 +35,7 @@ ELEMENTS: dict[str, tuple[int, int, int, dict[int, str]]] = {
 }  # fmt: skip
 NAMES = {"materials": 0, "bcnames": 1, "cd2names": 2, "cd3names": 3}  # how many dimensions below the mesh's
 # Where the middles come in another order than in a Mesh, the place in the file of each of a Mesh's nodes.
-ORDERS = {"triangle6": (0, 1, 2, 5, 3, 4), "quad8": (0, 1, 2, 3, 4, 7, 5, 6),
+ORDERS: dict[str, tuple[int, ...]] = {"triangle6": (0, 1, 2, 5, 3, 4), "quad8": (0, 1, 2, 3, 4, 7, 5, 6),
           "tetra10": (0, 1, 2, 3, 4, 7, 5, 6, 8, 9)}  # fmt: skip
 FROM_ZERO = "edgesegmentsgi3"  # its regions are counted from 0
 COUNTED = ("facedescriptors", "edgedescriptors", "identifications",

@@ -186,21 +186,28 @@ class Mesh:
         return None
 
     def as_part(
-        self, plane: tuple[int, int] | None, has_volumes: bool, exponent: int, box: NDArray[np.float64]
+        self, plane: tuple[int, int] | None, kinds: tuple[bool, bool], exponent: int, box: NDArray[np.float64]
     ) -> Mesh:
         """The same as a part of a mesh with this plane and exponent, and of whose nodes these are.
 
-        box: (2, D) the least and the greatest coordinates of all its nodes, in the plane if there is one, over 2 to
-        the power of the exponent. They are numbered in memory as in the whole mesh: nodes that come first come first.
+        kinds: whether the mesh has_volumes and has_quads. box: (2, D) the least and the greatest coordinates of all its
+        nodes, in the plane if there is one, over 2 to the power of the exponent. They are numbered in memory as in the
+        whole mesh: nodes that come first come first.
         """
         made = self._twin()
-        made.__dict__.update({"plane": plane, "has_volumes": has_volumes, "exponent": exponent, "box": box})
+        made.__dict__.update(plane=plane, exponent=exponent, box=box)
+        made.__dict__["has_volumes"], made.__dict__["has_quads"] = kinds
         return made
 
     @cached_property
     def has_volumes(self) -> bool:
         """Whether cells fill space; faces, lines and vertices are then marks on them."""
         return any(block.dimension == 3 and len(block.nodes) for block in self.cells)
+
+    @cached_property
+    def has_quads(self) -> bool:
+        """Whether some faces have four corners."""
+        return any(block.dimension == 2 and block.corners == 4 and len(block.nodes) for block in self.cells)
 
     @cached_property
     def exponent(self) -> int:

@@ -80,8 +80,13 @@ def _sweeps(state: State) -> int:
 
 def floor_for_angles(state: State, level: int, shape: float, executor: Executor) -> float:
     """c of D/S^(3/2) for an η, or for the level of the guard to hold from the untangled input on, if that is more."""
-    start, floor = state.start if state.untangled is None else state.untangled, math.sqrt(shape**3 / K3)
+    start, floor = state.start if state.untangled is None else state.untangled, floor_of(shape)
     return floor if level == VALID else max(floor, Floor().of(start, state.topology, state.precision, executor))
+
+
+def floor_of(shape: float) -> float:
+    """c of D/S^(3/2) for an η."""
+    return math.sqrt(shape**3 / K3)
 
 
 def merit(totals: Totals, least: float) -> float:

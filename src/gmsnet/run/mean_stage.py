@@ -9,14 +9,15 @@ from gmsnet.measure.totals import totals_of
 from gmsnet.methods.base import Field
 from gmsnet.methods.mean_in_space import MeanInSpace
 from gmsnet.parallel.executor import Executor
-from gmsnet.run.dihedral_stage import floor_for_angles, totals_at_end, with_sweep
+from gmsnet.run.dihedral_stage import floor_of, totals_at_end, with_sweep
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.topology.volume import Volume
 
-# Shares of the η above which no cell has so small an angle as the smallest: the first with which no angle falls below
-# that is taken, as with the last of them none can.
-SHARES = (0.94, 1.0)
+# Shares of the η above which no cell has so small an angle as the smallest. With less than all of it angles rarely fall
+# below that; where one does, as on large meshes, all of it is taken.
+SHARES, LARGE = (0.94, 1.0), 50_000  # free nodes
+ROUNDING = 1e-6  # relative, of a floor above the least η
 GAIN = 1e-4  # in the mean η: with less the mesh stays as it was
 
 
@@ -31,14 +32,14 @@ def improve_mean(state: State, options: SmoothOptions, executor: Executor) -> St
     topology = state.topology
     assert isinstance(topology, Volume)
     least = float(worst(state.points, topology.scored, 1, WIDE, executor).measure[0])
-    for share in SHARES:
-        shape = max(share * min(most_shape_below(least, WIDE), 1.0), totals.shape_min)
-        smoother = MeanInSpace(floor_for_angles(state, level, shape, executor))
+    for share in SHARES if len(topology.free) <= LARGE else SHARES[-1:]:
+        shape = max(share * min(most_shape_below(least, WIDE), 1.0), totals.shape_min * (1.0 + ROUNDING))
         field = Field(state.points.copy(), topology, state.precision, level, constraint=state.constraint)
         if isinstance(state.constraint, Surface):
             locate3(state.constraint, field.points)
+        smoother = MeanInSpace(floor_of(shape))
         tally = smoother.sweep(field, executor, lambda: False)
-        if not len(below(field.points, topology.scored, least * (1.0 - 1e-9), WIDE, executor).rows):
+        if share == SHARES[-1] or not len(below(field.points, topology.scored, least, WIDE, executor).rows):
             break
     after = totals_of(field.points, topology.scored, executor)
     assert after is not None

@@ -18,7 +18,6 @@ from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.star import pattern as kernels_stars
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.topology import connectivity, layout, patch
-from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
@@ -123,7 +122,7 @@ class Topology(Connectivity):
             near_origin=faces.origin[whole],
             sliding=slid,
         )
-        if near_sliding.any() or any(map(_is_quad, mesh.cells)):
+        if near_sliding.any() or mesh.has_quads:
             topology = topology.linked(Links.of(faces, near_orientation, start, topology.near_ring, near_sliding))
             four, quads = written.with_corners(4)
             topology = replace(
@@ -292,7 +291,3 @@ class Topology(Connectivity):
     def colours(self) -> Ints:
         """(N,) colour of each node by id, −1 where held."""
         return self.near_colours[self.places]
-
-
-def _is_quad(block: CellBlock) -> bool:
-    return block.dimension == 2 and block.corners == 4 and len(block.nodes) > 0

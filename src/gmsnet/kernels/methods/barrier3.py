@@ -38,20 +38,24 @@ FLAT = 1e-5  # of F: a node with less to gain stays, for float32 does not tell i
 
 
 class Power3(NamedTuple):
-    """number: k of p = 3·2^k, from −2 on. constants: see kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m."""
+    """number: k of p = 3·2^k, from −2 on. constants: see kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m.
+
+    trials: of a step, each half as long as the one before.
+    """
 
     number: int
     constants: NDArray[np.float32]
     isotropic: float
     ratio: float
+    trials: int = TRIALS
 
     @classmethod
-    def of(cls, number: int, worst: float = 1.0) -> Power3:
+    def of(cls, number: int, worst: float = 1.0, trials: int = TRIALS) -> Power3:
         """Of a power, of (q/q_worst)^p. worst: q_worst³, so that high powers stay within float32."""
         p = 3.0 * 2.0**number
         scale, m = 1.0 / (K3 * worst), 2.0 * p / 3.0
         constants = (scale, math.sqrt(scale), 2.0 * p, m, 0.5 * (1.0 + 1.0 / m), 1.0 - 1.0 / p)
-        return cls(number, np.array(constants, dtype=np.float32), 6.0 * p, 1.0 + 1.0 / m)
+        return cls(number, np.array(constants, dtype=np.float32), 6.0 * p, 1.0 + 1.0 / m, trials)
 
 
 @part
@@ -92,9 +96,9 @@ def smooth_some(points, blocks, first, last, guard, power, relaxation, workspace
         derive3(blocks, block, power, None, workspace)
         restrict3(guard.constraint, blocks, block, power.isotropic, workspace)
         propose3(workspace.sums, power, relaxation, workspace.step)
-        for trial in range(TRIALS):
+        for trial in range(power.trials):
             judge3(blocks, block, power, None, floor, workspace, guard.constraint)
-            if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1, blocks.mixture) == 0:
+            if settle3(workspace, guard.unit, guard.grain, trial == power.trials - 1, blocks.mixture) == 0:
                 break
         if store3(points, blocks, block, workspace, guard, tally):
             return block
