@@ -15,9 +15,9 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 TARGET = Path(__file__).with_name("licences.md")
-EXTRAS = ("train", "view", "hdf5", "docs")
+EXTRAS = ("train", "view", "hdf5", "convert", "docs")
 PERMISSIVE = re.compile(
-    r"(MIT(-CMU)?|0?BSD(-[23]-Clause)?|Apache(-2\.0)?|ISC|Zlib|CC0-1\.0|PSF-2\.0|HPND|BSL-1\.0|Unlicense"
+    r"(MIT(-CMU)?|(3-clause )?0?BSD(-[23]-Clause)?|Apache(-2\.0)?|ISC|Zlib|CC0-1\.0|PSF-2\.0|HPND|BSL-1\.0|Unlicense"
     r"|Python Software Foundation)\b.*"
 )  # what follows are versions and exceptions, which only permit more
 TEXTS = {  # words of a licence's text, where the metadata hold that instead of a name

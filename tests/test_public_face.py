@@ -6,6 +6,7 @@ import importlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -109,3 +110,15 @@ def test_what_is_packaged_elsewhere_is_what_is_packaged_here():
     assert extras
     assert set(extras) <= set(project["optional-dependencies"])
     assert ".ci/run" in (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / ".github" / "workflows").glob("*.yml")), ids=lambda path: path.stem)
+def test_workflows_have_few_rights_and_steps_that_parse(path):
+    """They cannot run here: their form alone is looked at."""
+    workflow = library("yaml").safe_load(path.read_text(encoding="utf-8"))
+    assert set(workflow["permissions"]) <= {"contents"}
+    for job in workflow["jobs"].values():
+        for step in job["steps"]:
+            assert ("run" in step) != ("uses" in step)
+            if "run" in step and shutil.which("bash"):
+                subprocess.run(["bash", "-n"], input=re.sub(r"\$\{\{.*?\}\}", "x", step["run"]), text=True, check=True)

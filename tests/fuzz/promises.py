@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import resource
 import shutil
 import time
@@ -24,7 +25,7 @@ SECONDS = 5.0  # of the processor, for one file
 MEMORY = 200_000_000  # bytes beyond the length of the file
 LONGEST = 500  # characters of a message, without the name of the file
 PAIR = b"\0"  # between the two files of Triangle, where both are one input
-NEXT = b"\0next file\0"  # between those of a folder
+NEXT = b"\0next file\0"  # between those of a folder, and those that a file names
 
 
 # What is looked at together, so small that a file of a few lines has many seams; and any file counts as large.
@@ -50,6 +51,10 @@ def parts(key: str, data: bytes) -> dict[str, bytes]:
         split = data.split(NEXT)
         split += [b""] * (len(suffixes) - len(split))
         return dict(zip((*suffixes, *FORMATS[key].optional), split, strict=False))
+    if FORMATS[key].within:  # a file that names others
+        split = data.split(NEXT)
+        kind = ".vtp" if key == "pvtp" else ".vtu"
+        return {suffixes[0]: split[0], **{f"{k}{kind}": part for k, part in enumerate(split[1:])}}
     return {suffixes[0]: data} if len(suffixes) == 1 else dict(zip(suffixes, (*data.split(PAIR, 1), b""), strict=False))
 
 
@@ -93,14 +98,17 @@ def _write(files: Mapping[str, bytes], stem: Path) -> Path:
         stem.mkdir()
         stem = stem / "polyMesh"
         stem.mkdir()
-    paths = [stem / name if stem.name == "polyMesh" else stem.with_suffix(name) for name in files]
+    folder = stem if stem.name == "polyMesh" else stem.parent
+    for old in folder.glob("[0-9]*.vt[up]"):  # pieces of an earlier one
+        old.unlink()
+    paths = [stem.with_suffix(name) if name.startswith(".") else folder / name for name in files]
     for path, part in zip(paths, files.values(), strict=True):
         path.write_bytes(part)
     return paths[0]
 
 
 def _checked(message: str, path: Path, files: Mapping[str, bytes]) -> str:
-    beside = (path.with_suffix(suffix) for suffix in files if path.stem == "mesh")
+    beside = (path.with_suffix(suffix) for suffix in files if path.stem == "mesh" and suffix.startswith("."))
     name = next((f"{one}: " for one in (path, *beside) if message.startswith(f"{one}: ")), "")
     if not name:
         raise Broken(f"the message does not begin with the file: {message[:200]!r}")
@@ -115,9 +123,13 @@ def _checked(message: str, path: Path, files: Mapping[str, bytes]) -> str:
 def _check_splice(mesh: Mesh, files: Mapping[str, bytes], folder: Path, random: np.random.Generator) -> None:
     source = mesh.source
     assert isinstance(source, FileSource)
-    if _spliced(source, mesh.points.copy()) != files:
+    same = _spliced(source, mesh.points.copy())
+    if same != {name: files[name] for name in same}:
         raise Broken("the same points do not give the same file")
     new = moved(mesh, random)
+    if source.shares:  # points of one piece at one place, which are held: apart, they would be other nodes
+        held = np.concatenate([[], *(b.nodes.ravel() for b in mesh.cells if b.kind == "vertex")]).astype(int)
+        new[held] = mesh.points[held]
     again = gmsnet.read(_write(_spliced(source, new), folder / "moved"), source.format)
     if again.points.tobytes() != new.tobytes():
         raise Broken("the moved points do not read back")
@@ -133,7 +145,7 @@ def _check_splice(mesh: Mesh, files: Mapping[str, bytes], folder: Path, random: 
 
 
 def _spliced(source: FileSource, points: np.ndarray) -> dict[str, bytes]:
-    return {suffix: bytes(pieces) for suffix, pieces in source.splice(points).items()}
+    return {os.path.normpath(suffix): bytes(pieces) for suffix, pieces in source.splice(points).items()}
 
 
 def moved(mesh: Mesh, random: np.random.Generator) -> np.ndarray:

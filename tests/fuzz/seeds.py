@@ -34,10 +34,11 @@ import test_triangle
 import test_ugrid
 import test_volume_files
 import test_vtk
+import test_vtk_pieces
 import test_vtp
 import test_vtu
 import test_xdmf
-from support import binary_meshes, gmsh_variants
+from support import binary_meshes, gmsh_variants, pieces
 from support.damage import triangle_grid
 from support.vtk_variants import grid_of, legacy_variants, mixed_mesh, polydata_of, vtu_variants
 from test_su2_volumes import VOLUMES
@@ -217,6 +218,16 @@ def seeds() -> Iterator[tuple[str, bytes]]:
     yield "mfem", test_mfem.PLAIN
     yield "netgen", test_netgen.PLAIN
     yield "vtp", test_vtp.PLAIN
+    yield "pvtu", NEXT.join(test_vtk_pieces.in_turn(test_vtk_pieces.SQUARES.values()))
+    yield "pvtu", NEXT.join(test_vtk_pieces.in_turn(test_vtk_pieces.with_ghosts()))
+    pair = [
+        pieces.INDEX.format(pieces='<Piece Source="0.vtp"/><Piece Source="1.vtp"/>').encode(),
+        *[test_vtp.PLAIN] * 2,
+    ]
+    yield "pvtp", NEXT.join(pair).replace(b"UnstructuredGrid", b"PolyData")
+    _, *parts = test_vtk_pieces.in_turn(test_vtk_pieces.SQUARES.values())
+    named = '<Block name="a"><DataSet name="b" file="0.vtu"/><Piece><DataSet file="1.vtu"/></Piece></Block>'
+    yield "vtm", NEXT.join([pieces.BLOCKS.format(blocks=named).encode(), *parts])
     yield "xdmf", binary_meshes.xdmf()
     yield from (("xdmf", test_xdmf.tagged(*each)) for each in (test_xdmf.FACETS, test_xdmf.CELLS))
     for packed in (False, True):

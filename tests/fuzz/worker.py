@@ -59,7 +59,7 @@ def main(key: str, findings: Path, arguments: list[str]) -> None:
                     seen.add(place)
                     stem = findings / f"{key}-{name_of(place.encode())}"
                     for suffix, part in parts(key, data).items():
-                        stem.with_suffix(suffix).write_bytes(part)
+                        Path(f"{stem}{suffix}" if suffix.startswith(".") else f"{stem}-{suffix}").write_bytes(part)
                     stem.with_suffix(".txt").write_text(f"{place}\n\n{traceback.format_exc()}")
                     stem.with_suffix(".input").write_bytes(data)
 

@@ -173,8 +173,9 @@ def test_files_are_smoothed_and_written_again(suffix: str, data: bytes, tmp_path
     moved = mesh.with_points(_nudged(mesh.points))
     assert gmsnet.write(moved, out) == []
     assert gmsnet.read(out).points.tolist() == moved.points.tolist()
-    with pytest.raises(FormatError, match="only written again"):
-        gmsnet.write(gmsnet.Mesh(mesh.points, mesh.cells), out)
+    if suffix == ".cgns":
+        with pytest.raises(FormatError, match="only written again"):
+            gmsnet.write(gmsnet.Mesh(mesh.points, mesh.cells), out)
     assert "left out" in " ".join(gmsnet.write(moved, tmp_path / "b.vtu"))
 
 

@@ -118,7 +118,7 @@ def test_a_file_cut_anywhere_is_refused(single: bool) -> None:
         ("<VTKFile", '<!DOCTYPE x [<!ENTITY a "b">]><VTKFile', "line 2: a DOCTYPE is not allowed"),
         ("0 0 0 1", "&a; 0 0 1", "not well formed: undefined entity"),
         ('type="UnstructuredGrid"', 'type="PolyData"', "line 2: a VTKFile of type 'PolyData' is not supported"),
-        ('type="UnstructuredGrid"', 'type="PUnstructuredGrid"', "line 2: a PUnstructuredGrid only names other files"),
+        ('type="UnstructuredGrid"', 'type="PUnstructuredGrid"', "line 2: a VTKFile of type 'PUnstructuredGrid' is"),
         ("</Piece>", '</Piece><Piece NumberOfPoints="0"/>', "several pieces"),
         ('byte_order="LittleEndian"', 'compressor="vtkLZ4DataCompressor"', "'vtkLZ4DataCompressor' is not supported"),
         ('byte_order="LittleEndian"', 'byte_order="Middle"', "unknown byte_order 'Middle'"),

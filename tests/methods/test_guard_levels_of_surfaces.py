@@ -127,10 +127,17 @@ def check(level, before, after, stars):
     single=st.sampled_from([False, False, True]),
     fin=st.booleans(),
     slide=st.booleans(),
+    bound=st.sampled_from([None, None, 0.01]),
+    needles=st.booleans(),
 )
-def test_each_sweep_keeps_what_the_level_promises(choice, level, seed, kind, thrown, noise, where, single, fin, slide):
+def test_each_sweep_keeps_what_the_level_promises(
+    choice, level, seed, kind, thrown, noise, where, single, fin, slide, bound, needles
+):
     mesh = some_mesh(seed, kind, thrown, noise, where, single, fin)
-    options = SmoothOptions(**choice, threads=1, slide=slide or None, feature_angle=60.0, surface_tolerance=0.3)
+    options = SmoothOptions(
+        **choice, threads=1, slide=slide or None, feature_angle=60.0, surface_tolerance=0.3, hausdorff=bound,
+        free_needles=needles,
+    )  # fmt: skip
     method = options.smoother()
     state = first_state(mesh, None, method, options, serial)
     topology = state.topology

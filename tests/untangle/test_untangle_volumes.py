@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
+from support import volumes
 
 import gmsnet
 from gmsnet.kernels.star.guard import Precision
@@ -113,3 +114,19 @@ def test_untangling_can_be_off():
     result = gmsnet.smooth(thrown(cube(6), 2.0), untangle=False)
     assert result.after.inverted > 0
     assert not any("untangling" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_cannot_be_mended_takes_little_else_back(seed):
+    """A node that is held far from its place inverts cells around; those elsewhere are mended all the same."""
+    mesh = volumes.mesh_of(*volumes.cube(3000, seed))
+    random, points = np.random.default_rng(seed), mesh.points.copy()
+    inner = [node for node in Volume.of(mesh).free if (abs(points[node] - 0.5) < 0.35).all()]
+    thrown = random.choice(inner, 12, replace=False)
+    points[thrown] += 0.12 * random.normal(size=(12, 3))
+    points[thrown[0]] = mesh.points[thrown[0]] + 0.25
+    result = gmsnet.smooth(mesh.with_points(points), fixed=thrown[:1], method="barrier", max_sweeps=1)
+    at_held = (mesh.cells[0].nodes == thrown[0]).any(axis=1).sum()
+    assert result.before.inverted > 80
+    assert 0 < result.after.inverted <= at_held
+    assert result.after.shape.min() >= result.before.shape.min()

@@ -18,6 +18,7 @@ import typer
 from gmsnet.cli import deform, generate, gmsh, methods, paraview, quality, reproduce, smooth, train, warm_up
 from gmsnet.cli.failure import BAD_INPUT, DONE, print_failure
 from gmsnet.cli.moves import joined
+from gmsnet.cli.ranks import on_all_ranks
 from gmsnet.cli.signals import Interrupted
 from gmsnet.mesh.display import visible
 from gmsnet.parallel.interrupts import interruptible
@@ -73,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     before = gc.get_threshold()
     gc.set_threshold(MANY_OBJECTS)
     try:
-        return _run(arguments)
+        return on_all_ranks(lambda: _run(arguments))
     finally:
         gc.set_threshold(*before)
 

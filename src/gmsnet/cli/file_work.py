@@ -18,6 +18,7 @@ from gmsnet.parallel.interrupts import interruptible
 if TYPE_CHECKING:
     from gmsnet.cli.smooth_report import Outcome
     from gmsnet.mesh.mesh import Mesh
+    from gmsnet.run.progress import Progress
     from gmsnet.run.result import SmoothResult
     from gmsnet.run.sweep import Sweep
 
@@ -40,6 +41,20 @@ class FileWork:
     destination: None where there is none. dry_run: nothing is written. number: of one of several files, of which a line
     each is printed.
     """
+
+    input: str
+    format: str | None
+    destination: Destination | None
+    in_place: bool
+    plot: str | None
+    report: str | None
+    command: str
+    json: bool
+    quiet: bool
+    number: str
+    dry_run: bool
+    progress: Progress
+    interruption: Deferral
 
     def __init__(
         self, input: str, format: str | None, destination: Destination | None, *, in_place: bool, plot: str | None,

@@ -18,6 +18,8 @@ class Deferral:
     A second one raises KeyboardInterrupt at once. Signals that the caller ignores (``nohup``) stay ignored.
     """
 
+    caught: bool
+
     def __init__(self) -> None:
         self.caught = False
         self._before: dict[signal.Signals, Any] = {}

@@ -121,6 +121,18 @@ def smooth(
             show_default="0.05",
         ),
     ] = None,
+    hausdorff: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X",
+            help="How far facets of surfaces may go from the input's, over the diagonal of the whole: 0.001, say.",
+            show_default="no bound",
+        ),
+    ] = None,
+    free_needles: Annotated[
+        bool,
+        typer.Option(help="Edges of surfaces that look sharp only because a facet is thin are no features."),
+    ] = False,
     threads: Annotated[
         int | None,
         typer.Option(min=1, help="Use at most so many processors (default: all). Same result for any number."),
@@ -192,8 +204,8 @@ def smooth(
     from gmsnet.cli.file_work import Done, FileWork
     from gmsnet.cli.fix import fixed_nodes
     from gmsnet.cli.metric import values_at_nodes
+    from gmsnet.cli.ranks import smooth_function
     from gmsnet.cli.smooth_report import Outcome
-    from gmsnet.run.api import smooth_with
     from gmsnet.run.options import SmoothOptions
     from gmsnet.run.set_up import check_mesh
 
@@ -203,7 +215,8 @@ def smooth(
         preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, weights=weights,
         best_by=best_by,
         slide=True if slide and "all" in slide else slide or None, feature_angle=feature_angle,
-        surface_tolerance=surface_tolerance, **values_at_nodes(metric, size),
+        surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles,
+        **values_at_nodes(metric, size),
     )  # fmt: skip
 
     def one(job: Job, destination: Destination | None) -> tuple[int, bool]:
@@ -214,7 +227,7 @@ def smooth(
         options = replace(asked, callback=work.after_sweep)
 
         def make(mesh: Mesh) -> Callable[[], SmoothResult]:
-            return partial(smooth_with, mesh, options, fixed_nodes(mesh, fix) if fix else None)
+            return partial(smooth_function(), mesh, options, fixed_nodes(mesh, fix) if fix else None)
 
         def told(done: Done) -> Outcome:
             return Outcome(done.mesh, done.result, done.compiled, job.source, done.written, done.lost, plot, report)

@@ -151,8 +151,14 @@ def _on_a_line(points: Floats, rounding: float) -> bool:
 
 def lengths_of(vectors: Floats) -> Floats:
     """Of vectors (…, 2) or (…, 3)."""
-    lengths: Floats = np.hypot.reduce(vectors, axis=-1)
-    return lengths
+    lengths: Floats = np.hypot(vectors[..., 0], vectors[..., 1])
+    return lengths if vectors.shape[-1] == 2 else np.hypot(lengths, vectors[..., 2])
+
+
+def dot(one: Floats, other: Floats) -> Floats:
+    """Products of vectors (K, 3), by operations that round alike everywhere."""
+    products: Floats = (one[:, 0] * other[:, 0] + one[:, 1] * other[:, 1]) + one[:, 2] * other[:, 2]
+    return products
 
 
 def _crossed(one: Floats, other: Floats) -> Floats:

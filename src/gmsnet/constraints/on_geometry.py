@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets
-from gmsnet.constraints.features import lengths_of
+from gmsnet.constraints.features import dot, lengths_of
 from gmsnet.constraints.geometry import Entity, Geometry, checked, named
 from gmsnet.constraints.outline import Flags, Longs
 from gmsnet.constraints.patches import NOTHING, Patches
-from gmsnet.constraints.smooth_patches import Skin, dot
+from gmsnet.constraints.smooth_patches import Skin
 from gmsnet.errors import InputError
 
 Floats = NDArray[np.float64]

@@ -7,12 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.constraints.features import COLLINEAR, rounding_of
+from gmsnet.constraints.features import COLLINEAR, dot, rounding_of
 from gmsnet.constraints.on_geometry import PER_EDGE, OnGeometry
 from gmsnet.constraints.outline import Flags, Longs
 from gmsnet.constraints.patches import NOTHING, Patches
-from gmsnet.constraints.smooth_patches import controls_of, dot, handles, skin_of, summed
-from gmsnet.kernels.star.surface import CONTROLS, CURVE, CURVED, FLAT, LINE, NOWHERE, Surface
+from gmsnet.constraints.smooth_patches import controls_of, handles, skin_of, summed
+from gmsnet.kernels.star.pieces import NOWHERE
+from gmsnet.kernels.star.surface import CONTROLS, CURVE, CURVED, FLAT, LINE, Surface
+from gmsnet.kernels.whole import skin as kernels
 from gmsnet.topology.polygons import Ints
 
 Floats = NDArray[np.float64]
@@ -30,13 +32,14 @@ class Rows(NamedTuple):
 def surface_of(
     patches: Patches, points: Floats, memory: Ints, single: bool, limit: Floats | None = None,
     geometry: OnGeometry | None = None, folds: bool = True,
-    normals: Floats | None = None,
+    normals: Floats | None = None, bound: float | None = None,
 ) -> Surface | None:  # fmt: skip
     """The constraint for kernels, with the nodes where they are; None where none slides.
 
     points: (N, 3) by node ids. memory: (N,) node ids in memory order. limit: (N,) how far each may go from the facets
     or edges; None: as far as the cubics are. geometry: the true shape of what is not plane or straight. folds: the
-    facets around nodes are listed, so that none turns over. normals: see ``normals_of``, where they are known.
+    facets around nodes are listed, so that none turns over. normals: see ``normals_of``, where they are known. bound:
+    how far any place on a facet may be.
     """
     slides = patches.slides | patches.curves.slides
     if not slides.any():
@@ -67,6 +70,7 @@ def surface_of(
         pieces, before, after, bool(single),
         np.full(len(nodes), np.inf) if limit is None else limit[nodes[order]],
         *_around(patches.rows if folds else patches.rows[:0], patches.unit, row, memory),
+        bound,
     )  # fmt: skip
 
 
@@ -93,13 +97,9 @@ def _planes(patches: Patches, points: Floats, single: bool) -> tuple[Longs, tupl
     length = np.sqrt(dot(normal, normal))
     normal = np.divide(normal, length[:, None], out=np.zeros_like(normal), where=length[:, None] > 0.0)
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    corners, owner = patches.rows.ravel(), np.repeat(patches.patch, 3)
-    np.minimum.at(low, owner, points[corners])
-    np.maximum.at(high, owner, points[corners])
-    origin = np.zeros((count, 3))
-    origin[owner] = points[corners]
-    away = np.zeros(count)
-    np.maximum.at(away, owner, abs(dot(points[corners] - origin[owner], normal[owner])))
+    origin, away = np.zeros((count, 3)), np.zeros(count)
+    kernels.bound_patches(patches.rows, patches.patch, points, low, high, origin)
+    kernels.leave_planes(patches.rows, patches.patch, points, origin, normal, away)
     near = away <= COLLINEAR * (high - low).max(axis=1, initial=0.0) + rounding_of(points, single)
     same = low == high
     normal[same.any(axis=1)] = same[same.any(axis=1)]

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets
-from gmsnet.constraints.features import COLLINEAR, SLACK, Curves, curves_along, lengths_of, rounding_of
+from gmsnet.constraints.features import COLLINEAR, SLACK, Curves, curves_along, dot, lengths_of, rounding_of
+from gmsnet.constraints.needles import free_edges
 from gmsnet.constraints.outline import Flags, Longs, Outline, edge_keys
 
 Floats = NDArray[np.float64]
@@ -36,8 +37,12 @@ class Patches:
     flat: Flags
 
 
-def patches_of(facets: Facets, points: Floats, feature_angle: float, single: bool, may: Flags) -> Patches:
+def patches_of(
+    facets: Facets, points: Floats, feature_angle: float, single: bool, may: Flags, free_needles: bool = False
+) -> Patches:
     """The patches of a surface. points: (N, 3). feature_angle: degrees. may: (N,) bool, which nodes may slide.
+
+    free_needles: edges are not sharp that are so only because a facet there is thin (constraints/needles.py).
 
     An edge is sharp where its two facets turn by more than the feature angle, differ in their region or marks, or have
     no area, where it belongs to one facet or more than two, and where there is a line cell.
@@ -48,21 +53,30 @@ def patches_of(facets: Facets, points: Floats, feature_angle: float, single: boo
     unit = np.divide(normal, area[:, None], out=np.zeros_like(normal), where=area[:, None] > 0.0)
     keys = edge_keys(rows, np.roll(rows, -1, axis=1), nodes).ravel()
     order = np.argsort(keys, kind="stable")
-    found, first, count = np.unique(keys[order], return_index=True, return_counts=True)
+    begins = np.diff(keys[order], prepend=-1) != 0
+    first = np.flatnonzero(begins)
+    found, count = keys[order[first]], np.diff(first, append=len(keys))
     two = count == 2
     one, other = order[first], order[first + two]  # numbers 3f + k; the same one where there is no other
     f, g = one // 3, other // 3
     turning, size = _of_cells(facets, normal, unit, area)
-    cosine = (turning[f] * turning[g]).sum(axis=1)
+    cosine = dot(turning[f], turning[g])
     smooth = two & (size[f] > 0.0) & (size[g] > 0.0) & (facets.label[f] == facets.label[g])
-    smooth &= cosine >= math.cos(math.radians(feature_angle)) - SLACK
+    least = math.cos(math.radians(feature_angle)) - SLACK
+    gentle = smooth & (cosine >= least)
+    if free_needles:
+        triangles = len(rows) - facets.halves
+        alike = two & (facets.label[f] == facets.label[g]) & (np.maximum(f, g) < triangles)
+        freed, unit = free_edges(points[rows], unit, area, one, other, gentle, alike, least)
+        gentle |= freed
+    smooth = gentle
     line_keys = edge_keys(facets.lines[:, 0], facets.lines[:, 1], nodes)
     smooth &= ~np.isin(found, line_keys)
 
     beside, flat = np.full(len(keys), NOTHING, dtype=np.int64), np.zeros(len(keys), dtype=bool)
     beside[one[smooth]], beside[other[smooth]] = g[smooth], f[smooth]
     beyond = points[rows[g, (other + 2) % 3]] - points[rows[f, 0]]
-    away = abs((beyond * unit[f]).sum(axis=1))
+    away = abs(dot(beyond, unit[f]))
     level = smooth & (away <= COLLINEAR * lengths_of(beyond) + rounding_of(points, single)) & (cosine > 0.0)
     flat[one[level]] = flat[other[level]] = True
 
@@ -97,10 +111,12 @@ def _of_cells(facets: Facets, normal: Floats, unit: Floats, area: Floats) -> tup
 
 def linked(beside: Longs, chosen: Flags | None = None) -> Longs:
     """(F,) the number of the part of each facet, of those that are joined across their edges; chosen: (F, 3) which."""
+    joins = beside != NOTHING if chosen is None else chosen
+    if not joins.any():
+        return np.arange(len(beside), dtype=np.int64)
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components  # loads what few runs need
 
-    joins = beside != NOTHING if chosen is None else chosen
     one, _ = np.nonzero(joins)
     shape = (len(beside), len(beside))
     graph = coo_array((np.ones(len(one), dtype=np.int8), (one, beside[joins])), shape=shape)

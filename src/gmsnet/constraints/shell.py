@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets, surface_itself
-from gmsnet.constraints.features import lengths_of, may_slide
+from gmsnet.constraints.features import dot, lengths_of, may_slide
 from gmsnet.constraints.outline import Flags
 from gmsnet.constraints.patches import Patches, patches_of
-from gmsnet.constraints.smooth_patches import dot
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import space_points
 from gmsnet.topology.topology import Topology
@@ -26,15 +25,17 @@ FEATURE = "feature of the surface"  # why nodes of sharp edges are held
 
 
 def patches_of_surface(
-    mesh: Mesh, topology: Topology, names: Sequence[str] | None, feature_angle: float, held: Flags
-) -> tuple[Facets, Patches]:
+    mesh: Mesh, topology: Topology, names: Sequence[str] | None, feature_angle: float, held: Flags,
+    free_needles: bool = False,
+) -> tuple[Facets, Patches]:  # fmt: skip
     """The facets of a mesh in no plane and its patches; which of its nodes slide: (N,) by id.
 
-    names: of the markers whose nodes slide along curves: as ``check_slide`` gives them. held: (N,) bool.
+    names: of the markers whose nodes slide along curves: as ``check_slide`` gives them. held: (N,) bool. free_needles:
+    see ``patches_of``.
     """
     facets = surface_itself(mesh, topology)
     points = space_points(mesh)[:, :3].copy()
-    patches = patches_of(facets, points, feature_angle, mesh.single, ~held)
+    patches = patches_of(facets, points, feature_angle, mesh.single, ~held, free_needles)
     along = patches.curves.slides & may_slide(mesh, names, held)
     return facets, replace(patches, curves=replace(patches.curves, slides=along))
 

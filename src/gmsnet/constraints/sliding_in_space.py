@@ -17,6 +17,7 @@ from gmsnet.constraints.on_surface import surface_of
 from gmsnet.constraints.options import FEATURE_ANGLE
 from gmsnet.constraints.outline import Flags
 from gmsnet.constraints.patches import Patches, patches_of
+from gmsnet.kernels.star.chords import CLOSER
 from gmsnet.kernels.star.off_surface import farthest
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.mesh.mesh import Mesh
@@ -47,22 +48,27 @@ class SurfaceSliding:
     @classmethod
     def of(
         cls, mesh: Mesh, facets: Facets, patches: Patches, memory: Ints, free: Ints, tolerance: float = math.inf,
-        geometry: Geometry | None = None, normals: Floats | None = None,
+        geometry: Geometry | None = None, normals: Floats | None = None, hausdorff: float | None = None,
     ) -> SurfaceSliding:  # fmt: skip
         """Of a mesh and the patches of its boundary; memory, free: of its topology.
 
         tolerance: how far from the facets nodes may go, over the mean length of their edges. geometry: their
-        true shape, which is asked once. normals: see ``surface_of``.
+        true shape, which is asked once. normals: see ``surface_of``. hausdorff: how far facets may go from them, over
+        the diagonal of the box around all.
         """
         points = space_points(mesh)[:, :3].copy()
         nodes = np.zeros(len(points), dtype=bool)
         nodes[free] = True
         nodes &= patches.slides | patches.curves.slides
         limit = tolerance * edge_lengths(facets, points) if tolerance < math.inf else None
+        bound = None
+        if hausdorff is not None:
+            bound = CLOSER * hausdorff * float(np.linalg.norm(np.ptp(points[facets.rows.ravel()], axis=0)))
+            limit = np.minimum(np.inf if limit is None else limit, np.full(len(points), bound))
         on = None if geometry is None else OnGeometry(geometry, facets, mesh.exponent)
         constraint = None
         if nodes.any():
-            constraint = surface_of(patches, points, memory, mesh.single, limit, on, facets.closed, normals)
+            constraint = surface_of(patches, points, memory, mesh.single, limit, on, facets.closed, normals, bound)
         return cls(facets, patches, points, mesh.exponent, memory, nodes, constraint)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:

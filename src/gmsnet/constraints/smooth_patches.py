@@ -12,9 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.features import dot
 from gmsnet.constraints.outline import Longs
 from gmsnet.constraints.patches import NOTHING, Patches, linked
-from gmsnet.kernels.star.surface import CENTRE, CONTROLS
+from gmsnet.kernels.star.surface import CONTROLS
+from gmsnet.kernels.whole import skin as kernels
 
 Floats = NDArray[np.float64]
 
@@ -47,16 +49,10 @@ def normals_of(patches: Patches, points: Floats) -> Floats:
     (Max: Weights for computing vertex normals from facet normals, 1999). At nodes of plane parts it is theirs.
     """
     rows, nodes = patches.rows, len(points)
-    _, owner = np.unique(patches.patch[:, None] * nodes + rows, return_inverse=True)
-    owner = owner.reshape(rows.shape)  # a node in each of its patches
-    count = int(owner.max(initial=-1)) + 1
-    corner, weighted = points[rows], np.empty((3, len(rows), 3))
-    for k in range(3):
-        a, b = corner[:, (k + 1) % 3] - corner[:, k], corner[:, (k + 2) % 3] - corner[:, k]
-        weight = dot(a, a) * dot(b, b)
-        share = np.divide(patches.area, weight, out=np.zeros(len(rows)), where=weight > 0.0)
-        weighted[k] = patches.unit * share[:, None]
-    total = summed(owner.T.ravel(), weighted.reshape(-1, 3), count)
+    owner, numbers = np.empty(rows.shape, dtype=np.int64), np.full(rows.size + nodes, NOTHING, dtype=np.int64)
+    count = kernels.number_corners(rows, patches.patch, nodes, numbers, numbers.copy(), owner)  # nodes in each patch
+    total = np.zeros((count, 3))
+    kernels.add_normals(points[rows], patches.unit, patches.area, owner, total)
     plane, parts = _planes(patches, owner, count)
     total[plane != NOTHING] = parts[plane[plane != NOTHING]]
     length = np.sqrt(dot(total, total))
@@ -90,13 +86,7 @@ def summed(owner: Longs, vectors: Floats, count: int) -> Floats:
 def controls_of(corner: Floats, normals: Floats) -> Floats:
     """(F, CONTROLS, 3) the inner control points of the cubics (kernels.star.surface) over facets (F, 3, 3)."""
     made = np.empty((len(corner), CONTROLS, 3))
-    for k in range(3):
-        j = (k + 1) % 3
-        edge = corner[:, j] - corner[:, k]
-        made[:, 2 * k] = corner[:, k] + handles(edge, across(edge, normals[:, k]))
-        made[:, 2 * k + 1] = corner[:, j] - handles(edge, across(edge, normals[:, j]))
-    edges, middle = made[:, :CENTRE].mean(axis=1), corner.mean(axis=1)
-    made[:, CENTRE] = edges + 0.5 * (edges - middle)
+    kernels.write_controls(np.ascontiguousarray(corner), np.ascontiguousarray(normals), made)
     return made
 
 
@@ -113,9 +103,3 @@ def handles(edge: Floats, tangent: Floats) -> Floats:
     cosine = np.divide(dot(unit, edge), length, out=np.ones(len(edge)), where=length > 0.0)
     reach = 2.0 * length / (3.0 * (1.0 + np.maximum(cosine, 0.0)))
     return unit * reach[:, None]
-
-
-def dot(one: Floats, other: Floats) -> Floats:
-    """Products of vectors (K, 3), by operations that round alike everywhere."""
-    products: Floats = (one[:, 0] * other[:, 0] + one[:, 1] * other[:, 1]) + one[:, 2] * other[:, 2]
-    return products

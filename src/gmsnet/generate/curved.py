@@ -15,7 +15,7 @@ from gmsnet.mesh.mesh import Mesh
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Projection = Callable[[Floats], Floats]
-KINDS = {"triangle": ("triangle6",), "quad": ("quad8", "quad9"), "line": ("line3",)}
+KINDS: dict[str, tuple[str, ...]] = {"triangle": ("triangle6",), "quad": ("quad8", "quad9"), "line": ("line3",)}
 CORNERS = {"triangle": 3, "quad": 4, "line": 2}
 
 

@@ -66,6 +66,10 @@ def _checked(size: Size | float) -> Size:
 class Relaxation:
     """Inner nodes on their way to good places; the nodes of the boundary stand still."""
 
+    outline: Boundary
+    size: Size
+    inner: NDArray[np.float64]
+
     def __init__(self, outline: Boundary, size: Size) -> None:
         self.outline, self.size = outline, size
         self.inner = np.empty((0, 2))

@@ -21,6 +21,8 @@ class Cad:
     curves: tag → those that have a geometry.
     """
 
+    curves: dict[int, CadCurve]
+
     def __init__(self, gmsh: Any, live: Live) -> None:
         plane = live.mesh.plane or (0, 1)
         (off,) = {0, 1, 2} - set(plane)

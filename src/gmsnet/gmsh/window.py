@@ -11,7 +11,7 @@ from gmsnet.gmsh.smoothing import HOLD, SLIDE, smooth
 ACTION, BUTTON, SMOOTH = "ONELAB/Action", "ONELAB/Button", "gmsnet: smooth"
 TARGET, GEOMETRY, LAYERS = "gmsnet/1Target quality", "gmsnet/2Nodes on CAD curves", "gmsnet/3Layers of stretched cells"
 HELD, SLIDING, STAY, FREE = "stay", "slide", "stay", "smoothed, too"
-PARAMETERS = [
+PARAMETERS: list[dict[str, object]] = [
     {"type": "string", "name": BUTTON, "values": ["Smooth", SMOOTH], "visible": False},
     {"type": "number", "name": TARGET, "values": [0], "min": 0, "max": 1, "step": 0.05,
      "help": "Smooth only around cells with a lower 1/q; 0: smooth all"},

@@ -43,6 +43,8 @@ class Section:
 class Deck:
     """A deck and its sections. Commas end tokens as blanks do, and lines of comments are none."""
 
+    text: Text
+
     def __init__(self, data: Data) -> None:
         self.text = Text(data, comment=b"*", ends=b",")
         self.data = data

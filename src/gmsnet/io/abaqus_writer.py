@@ -17,7 +17,7 @@ from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.mesh.mesh import Mesh
 
 name = "Abaqus"
-suffixes = (".inp",)
+suffixes: tuple[str, ...] = (".inp",)
 
 _LONGEST = 80  # characters of a name
 _PER_LINE = 16  # numbers

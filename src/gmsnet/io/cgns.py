@@ -25,7 +25,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "CGNS"
-suffixes = (".cgns",)
+suffixes: tuple[str, ...] = (".cgns",)
 
 Ints = NDArray[np.int64]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
 from gmsnet.io.pieces import Pieces
-from gmsnet.io.splice import Slots
+from gmsnet.io.splice import Share, Slots
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.rounding import Rounding
@@ -25,7 +25,8 @@ class Parsed:
     unread: what else the file holds, in words; it stays in the file, but no conversion can keep it. matched: (pairs, 2)
     nodes that the file says to be images of each other, such as those of periodic boundaries; None where it has none.
     node_sets, rounding: see Mesh. form: which of its format's forms the file has (see Entry). main: which of several
-    files has the coordinates, where that is not the first.
+    files has the coordinates, where that is not the first. shares: of a mesh whose coordinates stand in several files,
+    the part of each of these.
     """
 
     points: NDArray[np.float64]
@@ -41,6 +42,7 @@ class Parsed:
     rounding: Rounding | None = None
     form: str = ""
     main: str = ""
+    shares: Mapping[str, Share] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "Exodus II"
-suffixes = (".e",)
+suffixes: tuple[str, ...] = (".e",)
 
 
 class Store(Protocol):
@@ -55,6 +55,9 @@ class Store(Protocol):
 
 class Classic:
     """See Store: of the classic form."""
+
+    data: Data
+    header: netcdf3.Header
 
     def __init__(self, data: Data) -> None:
         self.data, self.header = data, netcdf3.Header(data)
@@ -104,6 +107,9 @@ class Classic:
 
 class Modern:
     """See Store: of version 4."""
+
+    data: Data
+    file: File
 
     def __init__(self, data: Data) -> None:
         self.data, self.file = data, File(data)

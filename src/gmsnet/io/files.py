@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from gmsnet.errors import FormatError, InputError
+from gmsnet.io import foreign
 from gmsnet.io.atomic import reason, refuse_folder
 from gmsnet.io.cells import sealed
 from gmsnet.io.contents import Data, is_open_pipe, load, refuse_unless_regular
@@ -22,12 +23,12 @@ from gmsnet.io.formats import (
     format_of_suffix,
     sniff,
 )  # fmt: skip
+from gmsnet.io.linked import links_of
 from gmsnet.io.packed import MAGIC, is_packed, split_name, unpacked
 from gmsnet.io.paths import beside, name_of
 from gmsnet.io.splice import FileSource
 from gmsnet.io.stamps import Stamp, Stamps
 from gmsnet.io.streams import STANDARD_INPUT
-from gmsnet.io.xdmf_xml import H5, linked
 from gmsnet.mesh.mesh import Mesh
 
 
@@ -44,9 +45,12 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     """
     name = name_of(path)
     shown = "standard input" if name in STANDARD_INPUT else name
+    suffix = os.path.splitext(name)[1].lower()
+    if format is None and suffix in foreign.READ and os.path.isfile(name):
+        return foreign.read(name, suffix)
     entry, opened = _open(name, shown, format)
     files = {suffix: data for suffix, (_, data, _) in opened.items()}
-    if len(files) > 1:
+    if len(files) > 1 and not entry.linked:
         shown = opened[entry.suffixes[0]][0]
     try:
         check_contents(files[entry.suffixes[0]], entry.key)
@@ -98,17 +102,15 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
 
 
 def _linked(entry: Entry, name: str, shown: str, data: Data, stream: bool) -> dict[str, tuple[str, Data, Stamp | None]]:
-    """The file beside it that an XDMF file names."""
+    """The files that a file names, by their keys."""
     try:
-        called = linked(data) if entry.linked else None
+        named = links_of(entry, data)
     except FormatError as error:
         raise FormatError(f"{shown}: {error}") from None
-    if called is None:
-        return {}
-    if stream:
+    if named and stream:
         raise InputError(f"{shown}: {entry.title} that names another file cannot be read from a stream")
     try:
-        return {H5: _loaded(os.path.join(os.path.dirname(name), called))}
+        return {key: _loaded(os.path.join(os.path.dirname(name), path)) for key, path in named.items()}
     except InputError as error:
         raise type(error)(f"{shown}: the file that it names cannot be read: {error}") from None
 
@@ -170,6 +172,6 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamp
     source = FileSource(
         entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions,
         mesh.region_names, mesh.point_data, mesh.cell_data, tuple(parsed.unread), stamps, parsed.matched,
-        mesh.node_sets, parsed.form,
+        mesh.node_sets, parsed.form, parsed.shares,
     )  # fmt: skip
     return replace(mesh, source=source)

@@ -25,7 +25,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "Fluent"
-suffixes = (".msh",)
+suffixes: tuple[str, ...] = (".msh",)
 
 Ints = NDArray[np.int64]
 

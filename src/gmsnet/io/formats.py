@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import cast
 
 from gmsnet.errors import FormatError, InputError
+from gmsnet.io import foreign
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Format, Written
 from gmsnet.io.hdf5 import MAGIC
@@ -24,7 +25,8 @@ class Entry:
     file with the coordinates. aliases: other suffixes of that file. forms: of which one stands before the suffix of
     its files (``b8`` of a.b8.ugrid); without it a file has the form "". folder: the mesh is a folder, and the suffixes
     are the names of its files; those of ``optional`` may be there. own: files of this format are only written again,
-    and no other mesh is converted to it. linked: the file may name another one beside it, which holds the numbers.
+    and no other mesh is converted to it. linked: the file may name others, which hold the numbers: the module that
+    knows them (``io/linked.py``). within: the module that has the format beside others; by default it is one by itself.
     """
 
     key: str
@@ -35,7 +37,8 @@ class Entry:
     folder: bool = False
     optional: tuple[str, ...] = ()
     own: bool = False
-    linked: bool = False
+    linked: str = ""
+    within: str = ""
 
     def form_of(self, path: str) -> str:
         """The form that the name of a file says."""
@@ -45,11 +48,14 @@ class Entry:
 
     def load(self) -> Format:
         """The module that reads and writes the format, imported on first use."""
-        return cast(Format, import_module(f"gmsnet.io.{self.key}"))
+        module = import_module(f"gmsnet.io.{self.within or self.key}")
+        return cast(Format, getattr(module, self.key) if self.within else module)
 
     def write(self, mesh: Mesh, form: str) -> Written:
         """The mesh in one of the forms. Raises FormatError where it cannot hold the cells at all."""
         module = self.load()
+        if self.own and self.key in foreign.WRITTEN:
+            return foreign.written(mesh, self.key, self.title, self.suffixes[0], module)
         return module.write_as(mesh, form) if form else module.write(mesh)  # type: ignore[attr-defined]
 
 
@@ -83,12 +89,16 @@ FORMATS = {
             (),
             tuple(f"{little}{how}{real}" for real in (8, 4) for how in "br" for little in ("", "l")),
         ),
-        Entry("xdmf", "XDMF", (".xdmf",), (".xmf",), own=True, linked=True),
+        Entry("xdmf", "XDMF", (".xdmf",), (".xmf",), own=True, linked="xdmf_links"),
         Entry("exodus", "Exodus II", (".e",), (".exo", ".ex2", ".exii", ".g", ".gen"), own=True),
         Entry("cgns", "CGNS", (".cgns",), own=True),
         Entry("med", "MED", (".med",), own=True),
         Entry("vtkhdf", "VTKHDF", (".vtkhdf",), (".hdf",), own=True),
         Entry("vtp", "VTP", (".vtp",), own=True),
+        *(
+            Entry(key, key.upper(), (f".{key}",), own=True, linked="vtk_links", within="vtk_pieces")
+            for key in ("pvtu", "pvtp", "vtm")
+        ),
         Entry("netgen", "Netgen", (".vol",), own=True),
         Entry("mfem", "MFEM", (".mesh",), own=True),
         Entry("fluent", "Fluent", (".msh",), (".cas",), own=True),
@@ -100,11 +110,7 @@ for _key, _entry in FORMATS.items():
         BY_SUFFIX.setdefault(_suffix, _key)
 
 MENDS = {  # files that one may well have, but that are not read
-    ".meshb": "binary Medit is not read: convert it to text (.mesh)",
     ".poly": "a .poly file is the input of Triangle: run Triangle on it and give the .node file",
-    ".pvtu": "it names other files: smooth these, as in gmsnet smooth pieces/*.vtu --out-dir fixed",
-    ".pvtp": "it names other files: smooth these, as in gmsnet smooth pieces/*.vtp --out-dir fixed",
-    ".vtm": "it names other files: smooth these, as in gmsnet smooth blocks/*.vtu --out-dir fixed",
     ".geo": "a .geo file is a geometry: mesh it with Gmsh and give the .msh file",
     ".zip": "unpack it first",
 }
@@ -118,6 +124,9 @@ SIGNS = {
     "vtk": (NONE, rb"#\s*vtk DataFile Version"),
     "vtu": (XML, rb"<VTKFile\b[^>]*\bUnstructuredGrid"),
     "vtp": (XML, rb"<VTKFile\b[^>]*[\"']PolyData"),
+    "pvtu": (XML, rb"<VTKFile\b[^>]*[\"']PUnstructuredGrid"),
+    "pvtp": (XML, rb"<VTKFile\b[^>]*[\"']PPolyData"),
+    "vtm": (XML, rb"<VTKFile\b[^>]*[\"']vtkMultiBlockDataSet"),
     "xdmf": (rb"(?s)<\?.*?\?>|<!.*?>", rb"<Xdmf\b"),
     "exodus": (NONE, rb"CDF[\x01\x02\x05]"),
     "netgen": (HASH, rb"mesh3d\b"),

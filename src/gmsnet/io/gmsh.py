@@ -27,7 +27,7 @@ from gmsnet.io.text import quoted
 from gmsnet.mesh.mesh import Mesh
 
 name = "Gmsh"
-suffixes = (".msh",)
+suffixes: tuple[str, ...] = (".msh",)
 
 CODES = {kind.name: code for code, kind in KINDS.items()}
 _HEAD = re.compile(rb"\s*\$MeshFormat\s+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*(?:\r\n?|\n)")

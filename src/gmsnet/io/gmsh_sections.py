@@ -95,6 +95,10 @@ class Contents:
 class Cursor:
     """A Gmsh file. at: the byte that reading goes on from; order: of a binary file, empty for a text."""
 
+    data: Data
+    at: int
+    order: str
+
     def __init__(self, data: Data, at: int, order: str) -> None:
         self.data, self.at, self.order = data, at, order
 

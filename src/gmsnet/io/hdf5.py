@@ -58,6 +58,11 @@ def shown(path: str) -> str:
 class File:
     """A file that is read. budget: how many numbers may still be taken from it."""
 
+    h5py: Any
+    data: Data
+    budget: int
+    root: Node
+
     def __init__(self, data: Data) -> None:
         self.h5py, self.data = library(), data
         if bytes(data[: len(MAGIC)]) != MAGIC:
@@ -77,6 +82,10 @@ class File:
 
 class Node:
     """A group or a data set. path: within the file, for messages."""
+
+    file: File
+    path: str
+    thing: Any
 
     def __init__(self, file: File, path: str, thing: Any) -> None:
         self.file, self.path, self.thing = file, path, thing

@@ -22,7 +22,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "MED"
-suffixes = (".med",)
+suffixes: tuple[str, ...] = (".med",)
 
 Ints = NDArray[np.int64]
 

@@ -25,7 +25,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "Medit"
-suffixes = (".mesh",)
+suffixes: tuple[str, ...] = (".mesh",)
 
 REFERENCE = "medit:ref"  # the point data that keeps the references of the vertices
 

@@ -21,7 +21,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "MFEM"
-suffixes = (".mesh",)
+suffixes: tuple[str, ...] = (".mesh",)
 
 KINDS = {0: "vertex", 1: "line", 2: "triangle", 3: "quad", 4: "tetra", 5: "hexahedron", 6: "wedge", 7: "pyramid"}
 

@@ -53,6 +53,11 @@ class Cards:
 class Bulk:
     """The bulk data of a file. starts, ends: (lines,) of those that are neither empty nor comments."""
 
+    raw: NDArray[np.uint8]
+    starts: Ints
+    ends: Ints
+    odd_cards: set[int]
+
     def __init__(self, data: Data) -> None:
         self.data = data
         self.raw = np.frombuffer(data, dtype=np.uint8)

@@ -15,14 +15,17 @@ from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.mesh.mesh import Mesh
 
 name = "Nastran"
-suffixes = (".bdf",)
+suffixes: tuple[str, ...] = (".bdf",)
 
 WRITTEN = {
     "line": "CROD", "triangle": "CTRIA3", "triangle6": "CTRIA6", "quad": "CQUAD4", "quad8": "CQUAD8", "quad9": "CQUAD",
     "tetra": "CTETRA", "tetra10": "CTETRA", "pyramid": "CPYRAM", "pyramid13": "CPYRAM", "wedge": "CPENTA",
     "wedge15": "CPENTA", "hexahedron": "CHEXA", "hexahedron20": "CHEXA",
 }  # fmt: skip
-ORDER = {"wedge15": (*range(9), 12, 13, 14, 9, 10, 11), "hexahedron20": (*range(12), 16, 17, 18, 19, 12, 13, 14, 15)}
+ORDER: dict[str, tuple[int, ...]] = {
+    "wedge15": (*range(9), 12, 13, 14, 9, 10, 11),
+    "hexahedron20": (*range(12), 16, 17, 18, 19, 12, 13, 14, 15),
+}
 MOST = 99_999_999  # that a field of 8 columns can hold
 WIDTH = 16
 _AT_ONCE = 1 << 12

@@ -35,6 +35,10 @@ class Variable:
 class Header:
     """The variables of a file by name. Raises FormatError where the header is damaged or the file is cut off."""
 
+    data: Data
+    at: int
+    dimensions: dict[str, int]
+
     def __init__(self, data: Data) -> None:
         self.data, self.at = data, 4
         version = data[3] if len(data) > 3 else 0

@@ -20,7 +20,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "Netgen"
-suffixes = (".vol",)
+suffixes: tuple[str, ...] = (".vol",)
 
 FACES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8"}
 VOLUMES = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10"}
@@ -35,7 +35,7 @@ ELEMENTS: dict[str, tuple[int, int, int, dict[int, str]]] = {
 }  # fmt: skip
 NAMES = {"materials": 0, "bcnames": 1, "cd2names": 2, "cd3names": 3}  # how many dimensions below the mesh's
 # Where the middles come in another order than in a Mesh, the place in the file of each of a Mesh's nodes.
-ORDERS = {"triangle6": (0, 1, 2, 5, 3, 4), "quad8": (0, 1, 2, 3, 4, 7, 5, 6),
+ORDERS: dict[str, tuple[int, ...]] = {"triangle6": (0, 1, 2, 5, 3, 4), "quad8": (0, 1, 2, 3, 4, 7, 5, 6),
           "tetra10": (0, 1, 2, 3, 4, 7, 5, 6, 8, 9)}  # fmt: skip
 FROM_ZERO = "edgesegmentsgi3"  # its regions are counted from 0
 COUNTED = ("facedescriptors", "edgedescriptors", "identifications",

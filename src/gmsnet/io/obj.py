@@ -24,7 +24,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "OBJ"
-suffixes = (".obj",)
+suffixes: tuple[str, ...] = (".obj",)
 
 KEYS = (b"v", b"vt", b"vn", b"vp", b"f", b"l", b"p", b"o", b"g", b"s", b"usemtl", b"mtllib")
 POINT, GROUP, MATERIAL = (KEYS.index(key) for key in (b"v", b"g", b"usemtl"))

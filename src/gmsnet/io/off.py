@@ -20,7 +20,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "OFF"
-suffixes = (".off",)
+suffixes: tuple[str, ...] = (".off",)
 
 _HEADER = re.compile(rb"(ST)?(C)?(N)?OFF")
 

@@ -26,7 +26,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "OpenFOAM"
-suffixes = ("points", "faces", "owner", "neighbour", "boundary")
+suffixes: tuple[str, ...] = ("points", "faces", "owner", "neighbour", "boundary")
 optional = ZONES
 
 

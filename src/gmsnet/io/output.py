@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 
 from gmsnet.errors import FormatError, InputError
+from gmsnet.io import foreign
 from gmsnet.io.atomic import reason, refuse_folder, replace_files
 from gmsnet.io.convert import listed
 from gmsnet.io.foam_case import OPENFOAM, case_of, file_in
@@ -15,13 +16,13 @@ from gmsnet.io.formats import (
     entry_of,
     format_of_suffix,
 )  # fmt: skip
+from gmsnet.io.linked import folders_for, placed
 from gmsnet.io.packed import is_packed, packed, split_name
 from gmsnet.io.paths import beside, name_of
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import FileSource, most_rounded
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.streams import STANDARD_OUTPUT, is_special, standard_output
-from gmsnet.io.xdmf_xml import H5, relinked
 from gmsnet.mesh.mesh import Mesh, Source
 
 
@@ -58,41 +59,34 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
         raise _no_memory(shown) from None
     except InputError as error:
         raise FormatError(f"{shown}: {error}") from None
-    if H5 in files:
+    stamps = source.stamps if isinstance(source, FileSource) else Stamps()
+    targets: dict[str, str] = {}
+    if entry.linked and len(files) > 1:
         if name in STANDARD_OUTPUT or is_special(name):
             raise InputError(f"{shown}: {entry.title} in several files cannot be written to a stream")
-        files = {**files, **_relinked(files, name, entry)}
+        files, targets = placed(entry, files, name, stamps)
     pieces = {suffix: _with_memory(shown, part) for suffix, part in files.items()}
     if name in STANDARD_OUTPUT:
         _to_standard_output(*pieces.values())
     else:
-        stamps = source.stamps if isinstance(source, FileSource) else None
-        targets = _targets(name, entry, list(files), stamps)
-        replace_files({path: packed(pieces[key]) if is_packed(path) else pieces[key] for key, path in targets.items()},
-                      stamps)  # fmt: skip
+        targets = targets or _targets(name, entry, list(files), stamps)
+        with folders_for(name, targets.values() if entry.linked else ()):
+            replace_files(
+                {path: packed(pieces[key]) if is_packed(path) else pieces[key] for key, path in targets.items()}, stamps
+            )
     return lost
 
 
-def _relinked(files: Mapping[str, Pieces], name: str, entry: Entry) -> dict[str, Pieces]:
-    """The file that names another one, with the name that this will have."""
-    main = entry.suffixes[0]
-    text = relinked(bytes(files[main]), os.path.basename(split_name(name)[0]) + H5)
-    return {main: Pieces(lambda: [text])}
-
-
-def _targets(name: str, entry: Entry, keys: list[str], stamps: Stamps | None) -> dict[str, str]:
+def _targets(name: str, entry: Entry, keys: list[str], stamps: Stamps) -> dict[str, str]:
     """Suffix → the path of each file that is written. Files of a case that were read and do not change are not."""
     folder = case_of(name, entry.key)
-    if folder is None and H5 in keys:
-        numbers, known = split_name(name)[0] + H5, stamps.known if stamps else {}
-        if os.path.abspath(numbers) in known and os.path.abspath(name) not in known:
-            raise InputError(f"{numbers}: holds the numbers of the mesh that was read: name another output")
-        return {key: numbers if key == H5 else name for key in keys}
     if folder is None:
         return {key: beside(name, key) if len(keys) > 1 else name for key in keys}
     paths = {key: file_in(folder, key, is_packed(name)) for key in keys}
-    own = stamps.known if stamps else {}
-    return {key: path for key, path in paths.items() if key == entry.suffixes[0] or os.path.abspath(path) not in own}
+    return {
+        key: path for key, path in paths.items()
+        if key == entry.suffixes[0] or os.path.abspath(path) not in stamps.known
+    }  # fmt: skip
 
 
 def _form_for(source: Source | None, entry: Entry, name: str) -> str:
@@ -112,6 +106,8 @@ def _rounded(mesh: Mesh, source: FileSource) -> list[str]:
 
 def _unread(source: Source | None) -> Iterator[str]:
     """What a conversion leaves behind in the file that was read, in words."""
+    if isinstance(source, foreign.ForeignSource):
+        yield f"what meshlane does not read of a file of {source.title}: left out"
     if isinstance(source, FileSource) and source.unread:
         title = FORMATS[source.format].title
         yield f"only the {title} file that was read holds {listed(source.unread)}: left out"
@@ -137,7 +133,7 @@ def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
     refuse_folder(path)
     if format is not None:
         entry = entry_of(format)
-    elif stream and mesh.source is not None:
+    elif stream and mesh.source is not None and mesh.source.format:
         entry = entry_of(mesh.source.format)
     elif stream:
         raise InputError(f"{shown}: name the format with --format ({', '.join(FORMATS)})")

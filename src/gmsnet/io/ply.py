@@ -27,7 +27,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import names_a_region, regions_of
 
 name = "PLY"
-suffixes = (".ply",)
+suffixes: tuple[str, ...] = (".ply",)
 
 KINDS = {1: Kind("line"), 3: Kind("triangle"), 4: Kind("quad"), 5: Kind("polygon")}
 LISTS = ("vertex_indices", "vertex_index")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -127,6 +128,27 @@ class BinarySlots:
 
 
 @dataclass(frozen=True)
+class Untouched:
+    """No coordinates: they stand in the other files of the mesh."""
+
+    def replace(self, data: Data, old: Points, new: Points) -> Iterable[Piece]:
+        """See Slots: the file as it is."""
+        return [memoryview(data)]
+
+
+@dataclass(frozen=True)
+class Share:
+    """The part of a mesh that one of several files holds. slots: in that file; node: the node of each of its points."""
+
+    slots: Slots
+    node: NDArray[np.int64]
+
+    def replace(self, data: Data, old: Points, new: Points) -> Iterable[Piece]:
+        """See Slots. old, new: of all nodes of the mesh."""
+        return self.slots.replace(data, old[self.node], new[self.node])
+
+
+@dataclass(frozen=True)
 class EncodedSlots:
     """Coordinates inside an encoded block (base64, compressed), which a function of the format writes again."""
 
@@ -145,7 +167,7 @@ class FileSource:
     points, cells, region_names, point_data, cell_data, node_sets: as read (see Mesh). companions: other files of the
     same mesh by suffix, which never change (Triangle's ``.ele``). unread: what else there is in the file (see Parsed).
     stamps: of the files, so that what others write into them meanwhile is not overwritten. matched: (pairs, 2) nodes
-    that the file says to be images of each other (see Parsed), read-only. form: see Parsed.
+    that the file says to be images of each other (see Parsed), read-only. form, shares: see Parsed.
     """
 
     format: str
@@ -163,6 +185,7 @@ class FileSource:
     matched: NDArray[np.int64] | None = field(default=None, repr=False)
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict, repr=False)
     form: str = ""
+    shares: Mapping[str, Share] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle: the bytes of the files themselves."""
@@ -171,7 +194,7 @@ class FileSource:
         return FileSource, (
             self.format, self.main, self.data[:], self.points, self.slots, self.cells, files,
             names, fields, cell_fields, self.unread, self.stamps, self.matched, dict(self.node_sets),
-            self.form,
+            self.form, dict(self.shares),
         )  # fmt: skip
 
     def fits(self, mesh: Mesh) -> bool:
@@ -200,6 +223,8 @@ class FileSource:
         whole = {suffix: _whole(data) for suffix, data in ((self.main, self.data), *self.companions.items())}
         if not same:
             whole[self.main] = Pieces(lambda: self.slots.replace(self.data, self.points, points))
+            for key, share in self.shares.items():
+                whole[key] = Pieces(partial(share.replace, self.companions[key], self.points, points))
         return whole
 
 

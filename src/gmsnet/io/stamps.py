@@ -29,6 +29,8 @@ class Stamps:
     known: path → stamp, each file by its name when it was read and by the name without links.
     """
 
+    known: dict[str, Stamp]
+
     def __init__(self, known: Iterable[tuple[str, Stamp]] = ()) -> None:
         self.known = dict(known)
 

@@ -28,7 +28,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "STL"
-suffixes = (".stl",)
+suffixes: tuple[str, ...] = (".stl",)
 
 HEAD, RECORD = 84, 50  # bytes in front of the triangles of a binary file, and of each of them
 _VERTEX = [b"vertex", b"", b"", b""]
@@ -135,6 +135,8 @@ def _facets(text: Text, tokens: Starts, stop: int) -> Starts:
 
 class Weld:
     """Nodes of corners that are added in turn. points: (nodes, 3); node: (corners,) the node of each."""
+
+    node: NDArray[np.int64]
 
     def __init__(self, count: int) -> None:
         self.node = np.empty(count, dtype=np.int64)

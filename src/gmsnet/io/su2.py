@@ -27,7 +27,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "SU2"
-suffixes = (".su2",)
+suffixes: tuple[str, ...] = (".su2",)
 
 FLAT = {1: "vertex", 3: "line", 5: "triangle", 9: "quad"}
 CODES = FLAT | {10: "tetra", 12: "hexahedron", 13: "wedge", 14: "pyramid"}

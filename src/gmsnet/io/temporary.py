@@ -22,6 +22,8 @@ _NAME = re.compile(r"\.gmsnet-[0-9a-f]{12}\.tmp")
 class Temporary:
     """A context manager: a file in a folder that is gone at the end, unless it has become another by then."""
 
+    name: str
+
     def __init__(self, folder: str) -> None:
         self._folder = folder
         self.name = ""  # once it is created

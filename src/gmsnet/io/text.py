@@ -90,6 +90,11 @@ class Text:
     that end a token as a blank does.
     """
 
+    data: Data
+    comment: bytes
+    ends: bytes
+    stop: int
+
     def __init__(self, data: Data, comment: bytes = b"", stop: int | None = None, ends: bytes = b"") -> None:
         self.data, self.comment, self.ends = data, comment, ends
         self.stop = len(data) if stop is None else stop

@@ -25,7 +25,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "Triangle"
-suffixes = (".node", ".ele")
+suffixes: tuple[str, ...] = (".node", ".ele")
 
 MARKER = "triangle:marker"  # the point data that keeps the boundary markers
 ATTRIBUTE = "triangle:attribute"  # + its number: further attributes of points and triangles
@@ -36,7 +36,10 @@ MOST_ATTRIBUTES = 1000  # each is an array of its own
 ORDER = {"triangle6": [0, 1, 2, 5, 3, 4], "tetra10": [0, 1, 2, 3, 6, 7, 9, 5, 8, 4]}
 KINDS = {2: {3: "triangle", 6: "triangle6"}, 3: {4: "tetra", 10: "tetra10"}}  # dimension → nodes → kind
 TITLES = {2: name, 3: "TetGen"}
-MARKED = {2: ("line", "line3", "vertex"), 3: ("triangle", "triangle6", "line", "line3", "vertex")}
+MARKED: dict[int, tuple[str, ...]] = {
+    2: ("line", "line3", "vertex"),
+    3: ("triangle", "triangle6", "line", "line3", "vertex"),
+}
 
 
 def read(files: Mapping[str, Data]) -> Parsed:

@@ -28,7 +28,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "UGRID"
-suffixes = (".ugrid",)
+suffixes: tuple[str, ...] = (".ugrid",)
 
 KINDS = ("triangle", "quad", "tetra", "pyramid", "wedge", "hexahedron")  # in the order of the counts and of the lists
 FACES = 2  # of them

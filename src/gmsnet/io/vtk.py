@@ -29,7 +29,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX
 
 name = "VTK"
-suffixes = (".vtk",)
+suffixes: tuple[str, ...] = (".vtk",)
 
 LISTS = {"VERTICES": POLYVERTEX, "LINES": POLYLINE, "POLYGONS": POLYGON}
 TYPE_NAMES = {kind: called for called, kind in TYPES.items() if called not in ("vtkidtype", "signed_char")} | {

@@ -58,6 +58,10 @@ class Array:
 class Stream:
     """Reads on from byte ``at``."""
 
+    data: Data
+    at: int
+    binary: bool
+
     def __init__(self, data: Data, at: int, binary: bool) -> None:
         self.data, self.at, self.binary = data, at, binary
 

@@ -20,7 +20,7 @@ from gmsnet.io.stored import Part, coordinates
 from gmsnet.mesh.mesh import Mesh
 
 name = "VTKHDF"
-suffixes = (".vtkhdf",)
+suffixes: tuple[str, ...] = (".vtkhdf",)
 
 
 def read(files: Mapping[str, Data]) -> Parsed:

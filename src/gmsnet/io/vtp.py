@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 
 from gmsnet.errors import FormatError
-from gmsnet.io import vtu
+from gmsnet.io import vtk_ghosts, vtu
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.vtu_reader import Reader
@@ -16,17 +16,30 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX, STRIP
 
 name = "VTP"
-suffixes = (".vtp",)
+suffixes: tuple[str, ...] = (".vtp",)
 
 SECTIONS = {"Verts": POLYVERTEX, "Lines": POLYLINE, "Strips": STRIP, "Polys": POLYGON}  # as the cell data are in order
 
 
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
-    reader = Reader(files[".vtp"], "PolyData")
+    return vtk_ghosts.held(facts(Reader(files[".vtp"], "PolyData")))
+
+
+def is_empty(reader: Reader) -> bool:
+    """Whether there are no cells."""
+    return not reader.document.pieces or not any(_count(reader, section) for section in SECTIONS)
+
+
+def _count(reader: Reader, section: str) -> int:
+    return reader.count(f"NumberOf{section}") if f"NumberOf{section}" in reader.document.pieces[0] else 0
+
+
+def facts(reader: Reader) -> Parsed:
+    """The facts of a file."""
     parts, codes, cuts = [], [], [0]
     for section, code in SECTIONS.items():
-        count = reader.count(f"NumberOf{section}") if f"NumberOf{section}" in reader.document.pieces[0] else 0
+        count = _count(reader, section)
         arrays = {a.attributes.get("Name", ""): a for a in reader.section(section)}
         if not count:
             continue

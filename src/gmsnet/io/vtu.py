@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io import convert, vtk_cells
+from gmsnet.io import convert, vtk_cells, vtk_ghosts
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
@@ -28,7 +28,7 @@ from gmsnet.io.vtu_xml import DataArray, Document
 from gmsnet.mesh.mesh import Mesh
 
 name = "VTU"
-suffixes = (".vtu",)
+suffixes: tuple[str, ...] = (".vtu",)
 
 NAMES = {kind: called for called, kind in TYPES.items()}
 _IS_BLANK = np.isin(np.arange(256), list(b" \t\r\n"))
@@ -36,9 +36,17 @@ _IS_BLANK = np.isin(np.arange(256), list(b" \t\r\n"))
 
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
-    reader = Reader(files[".vtu"])
-    cell_count = reader.count("NumberOfCells")
-    return parsed(reader, *_cells(reader, cell_count))
+    return vtk_ghosts.held(facts(Reader(files[".vtu"])))
+
+
+def facts(reader: Reader) -> Parsed:
+    """The facts of a file."""
+    return parsed(reader, *_cells(reader, reader.count("NumberOfCells")))
+
+
+def is_empty(reader: Reader) -> bool:
+    """Whether there are no cells, as in the pieces of processes that had none."""
+    return not reader.document.pieces or not reader.count("NumberOfCells")
 
 
 def _cells(reader: Reader, count: int) -> tuple[NDArray[np.int64], Listed]:

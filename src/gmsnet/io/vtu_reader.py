@@ -13,7 +13,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
 from gmsnet.io.text import Text, fail
 from gmsnet.io.vtu_arrays import Encoded, Encoding, decode
-from gmsnet.io.vtu_xml import DataArray, parse
+from gmsnet.io.vtu_xml import DataArray, Document, parse
 from gmsnet.io.words import TextWords, typed
 
 TYPES = {f"{word}{8 * size}": f"{code}{size}" for word, code in (("Int", "i"), ("UInt", "u")) for size in (1, 2, 4, 8)}
@@ -40,6 +40,14 @@ class Reader:
     budget: how many numbers may still be unpacked. stored: the bytes that encoded arrays have taken so far. spans:
     those of each appended array, by where its offset is written.
     """
+
+    data: Data
+    document: Document
+    budget: int
+    stored: int
+    order: str
+    header: str
+    compressed: bool
 
     def __init__(self, data: Data, kind: str = "UnstructuredGrid") -> None:
         self.data, self.document = data, parse(data, kind)

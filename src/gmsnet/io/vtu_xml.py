@@ -14,11 +14,10 @@ from xml.parsers import expat
 from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
 from gmsnet.io.text import fail
+from gmsnet.io.xml_tree import ATTRIBUTE, TAG
 
 MOST_DEEP, MOST_ARRAYS = 100, 100_000  # elements inside one another, arrays: no grid has so many
 
-_TAG = re.compile(rb"<[^<\"'>]*(?:(?:\"[^\"]*\"|'[^']*')[^<\"'>]*)*>")
-_ATTRIBUTE = re.compile(rb"\s([^\s=]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _OFFSET = re.compile(rb"\s*(\d{1,18})\s*")
 _TAIL = re.compile(rb"</AppendedData\s*>\s*</VTKFile\s*>\s*\Z")
 
@@ -43,7 +42,8 @@ class Document:
     """A VTU file. kind: the type of its VTKFile, which is the name of the element with the pieces too.
 
     hidden: first byte of comments, and of what arrays contain beside their numbers, and the byte behind, in turn. root,
-    pieces: the attributes of these elements. appended: the encoding of the appended data, and their bytes.
+    pieces: the attributes of these elements. appended: the encoding of the appended data, and their bytes. global_ids:
+    the name of the array that numbers the points over all pieces, "" where none is said to.
     """
 
     data: Data
@@ -53,6 +53,7 @@ class Document:
     pieces: list[dict[str, str]] = field(default_factory=list)
     arrays: list[DataArray] = field(default_factory=list)
     appended: tuple[str, int, int] | None = None
+    global_ids: str = ""
 
     def visible(self, start: int, stop: int) -> list[tuple[int, int]]:
         """The parts of what stands between two bytes that are not hidden."""
@@ -121,7 +122,7 @@ class _Walker:
         self.document.hidden.append((self.at, self.data.find(b"?>", self.at) + 2))
 
     def tag(self) -> tuple[int, int]:
-        match = _TAG.match(self.data, self.at)
+        match = TAG.match(self.data, self.at)
         if match is None:
             raise FormatError("the XML has an encoding that is not supported: write it as UTF-8")
         return match.span()
@@ -135,8 +136,6 @@ class _Walker:
             if name != "VTKFile":
                 self.fail(f"the root element is {name[:24]!r} instead of 'VTKFile'")
             kind = attributes.get("type")
-            if kind == "PUnstructuredGrid":
-                self.fail("a PUnstructuredGrid only names other files: smooth each of its pieces, or merge them first")
             if kind != self.document.kind:
                 wanted = self.document.kind
                 self.fail(f"a VTKFile of type {str(kind)[:24]!r} is not supported here: write it as {wanted}")
@@ -151,6 +150,8 @@ class _Walker:
             self.document.appended = encoding, self.tag()[1], -1
             if encoding == "raw":
                 raise _RawDataFollow
+        elif name == "PointData" and depth == 3:
+            self.document.global_ids = attributes.get("GlobalIds", "")
         elif name in ("DataArray", "Array") and self.open is None:
             section = self.path[-1] if self.path[:3] == ["VTKFile", self.document.kind, "Piece"] and depth == 4 else ""
             self.open = section, name, attributes, self.tag()
@@ -177,7 +178,7 @@ class _Walker:
 
     def offset(self, tag: tuple[int, int]) -> tuple[int, int, int] | None:
         """The offset in a start tag, and the bytes where it is written: it may have to be written anew."""
-        for attribute in _ATTRIBUTE.finditer(self.data, *tag):
+        for attribute in ATTRIBUTE.finditer(self.data, *tag):
             if attribute[1] == b"offset":
                 place = 2 if attribute[2] is not None else 3
                 found = _OFFSET.fullmatch(self.data, *attribute.span(place))

@@ -51,6 +51,11 @@ class Words(Protocol):
 class TextWords:
     """See Words: the tokens of a text."""
 
+    text: Text
+    starts: Starts
+    at: int
+    end: int
+
     def __init__(self, text: Text, starts: Starts) -> None:
         self.text, self.starts, self.at, self.end = text, starts, 0, len(starts)
 
@@ -90,6 +95,11 @@ class TextWords:
 
 class ByteWords:
     """See Words: binary numbers. order: ``<`` little endian or ``>`` big endian."""
+
+    data: Data
+    order: str
+    at: int
+    end: int
 
     def __init__(self, data: Data, order: str, at: int = 0) -> None:
         self.data, self.order, self.at, self.end = data, order, at, len(data)

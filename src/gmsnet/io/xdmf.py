@@ -24,13 +24,14 @@ from gmsnet.io.places import ranges
 from gmsnet.io.splice import Points, Slots, TextSlots
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.io.text import Text
+from gmsnet.io.xdmf_links import H5
 from gmsnet.io.xdmf_tags import MIXED, SHORT, TABLE, TYPES, Mark, Tags
-from gmsnet.io.xdmf_xml import H5, Element, blame, check_plain, parse
+from gmsnet.io.xml_tree import Element, blame, check_plain, parse
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import combined, regions_of
 
 name = "XDMF"
-suffixes = (".xdmf",)
+suffixes: tuple[str, ...] = (".xdmf",)
 
 Ints = NDArray[np.int64]
 
@@ -39,6 +40,10 @@ COUNTED = (1, 2, 3)  # in a list of mixed types the number of their nodes follow
 
 class Items:
     """The numbers of the items of a file."""
+
+    data: Data
+    text: Text
+    h5: File | None
 
     def __init__(self, files: Mapping[str, Data]) -> None:
         self.data, self.text = files[".xdmf"], Text(files[".xdmf"], ends=b"<")
@@ -93,7 +98,7 @@ class Items:
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
     data = files[".xdmf"]
-    root, items = parse(data), Items(files)
+    root, items = parse(data, "Xdmf"), Items(files)
     grids = [grid for grid in root.all("Grid") if grid.of("Geometry") and grid.of("Geometry")[0].of("DataItem")]
     if not grids:
         raise FormatError("no Grid has a Geometry with its own DataItem")

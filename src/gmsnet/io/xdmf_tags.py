@@ -38,6 +38,11 @@ class Mark(NamedTuple):
 class Tags:
     """What other grids say of a mesh. lower: their cells of fewer dimensions; used: how many grids say something."""
 
+    codes: Ints
+    sizes: Ints
+    nodes: Ints
+    used: int
+
     def __init__(self, codes: Ints, sizes: Ints, nodes: Ints) -> None:
         self.codes, self.sizes, self.nodes = codes, sizes, nodes
         self.lower: list[CellBlock] = []

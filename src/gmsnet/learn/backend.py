@@ -16,12 +16,12 @@ try:
         from torch_geometric.data import Data
         from torch_geometric.nn import GCNConv, GraphNorm
         from torch_geometric.nn.conv.gcn_conv import gcn_norm
-except ModuleNotFoundError as error:
-    if error.name not in ("torch", "torch_geometric"):
+except ModuleNotFoundError as _error:
+    if _error.name not in ("torch", "torch_geometric"):
         raise  # it is there, but something that it needs is not
     raise MissingExtraError(
-        f'training needs {error.name}, which is not installed: install the extra "train", in the folder of the sources '
-        'by pip install ".[train]"'
-    ) from error
+        f'training needs {_error.name}, which is not installed: install the extra "train", in the folder of the '
+        'sources by pip install ".[train]"'
+    ) from _error
 
 __all__ = ["Data", "GCNConv", "GraphNorm", "LambdaLR", "ReduceLROnPlateau", "gcn_norm", "torch"]

@@ -48,6 +48,12 @@ class Batch:
 class GMSNetTrainee(Trainee):
     """See trainee.Trainee; one network, "gmsnet"."""
 
+    net: GMSNet
+    sizes: list[int]
+    training: Batch
+    validation: Batch
+    testing: Batch
+
     def __init__(self, options: TrainOptions, meshes: Sequence[Mesh]) -> None:
         parts = [data.Stars.of_mesh(mesh) for mesh in meshes]
         self.options = options

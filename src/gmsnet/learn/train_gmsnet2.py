@@ -43,6 +43,14 @@ def _clipped(gradient: torch.Tensor) -> torch.Tensor:
 class GMSNet2Trainee(Trainee):
     """See trainee.Trainee; one network, "gmsnet2"."""
 
+    net: GMSNet2
+    groups: list[Meshes]
+    small: list[Meshes]
+    points: list[Any]
+    judged: dict[str, Meshes]
+    epoch: int
+    judgement: tuple[float, float]
+
     def __init__(self, options: GMSNet2Options, meshes: Sequence[Mesh]) -> None:
         self.options = options
         self.net = GMSNet2(options.hidden, options.activation)

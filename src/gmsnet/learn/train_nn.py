@@ -81,6 +81,10 @@ class Rings:
 class NNTrainee(Trainee):
     """See trainee.Trainee; the networks are "degree3" … "degree9"."""
 
+    model: NNSmoothing
+    rings: dict[str, dict[int, Rings]]
+    raw: dict[str, dict[int, Rings]]
+
     def __init__(self, options: NNOptions, meshes: Sequence[Mesh]) -> None:
         self.options = options
         self.model = NNSmoothing()

@@ -36,7 +36,7 @@ class MeasuredCells:
     quad_orientation: NDArray[np.int8]
     order: NDArray[np.intp] | None
 
-    names = ("min_angle", "max_angle", "shape", "aspect")  # of the columns
+    names: tuple[str, ...] = ("min_angle", "max_angle", "shape", "aspect")  # of the columns
     symbol = "1/q"  # of the shape
 
     @property

@@ -30,6 +30,7 @@ REGULAR = math.degrees(math.acos(1.0 / 3.0))  # the dihedral angles of a regular
 # The weight of what an angle lacks to 180°: 45° and 120°, as cells at the faces of a lattice have, count alike. With
 # 0.64, by which those of a regular tetrahedron do, lattices keep 42°.
 WIDE = 0.75
+STRIDE = 32  # one value in so many tells about how large the largest are
 MORE = 4  # times as many cells of the least η are looked at first
 SHARE = 1.0 + 1e-6  # times an η: for its rounding
 
@@ -82,6 +83,20 @@ def ratios_of(points: Floats, cells: Tetrahedra, executor: Executor = serial) ->
     return out
 
 
+def largest(values: Floats, count: int) -> Rows:
+    """Where so many of the largest values stand, or all, if they are fewer; in no order."""
+    if count >= len(values):
+        return np.arange(len(values), dtype=np.int32)
+    some = values[::STRIDE]
+    few = min(2 * count // STRIDE + STRIDE, len(some) - 1)
+    likely = np.flatnonzero(values >= np.partition(some, -few - 1)[-few - 1])
+    if len(likely) < count:
+        likely = np.arange(len(values))
+    rest = len(likely) - count
+    chosen: Rows = likely[np.argpartition(values[likely], rest)[rest:]].astype(np.int32)
+    return chosen
+
+
 def below(points: Floats, cells: Tetrahedra, measure: float, wide: float, executor: Executor = serial) -> Ranked:
     """The cells whose measure is less than this, or that are inverted."""
     ratios = ratios_of(points, cells, executor)
@@ -95,10 +110,9 @@ def below(points: Floats, cells: Tetrahedra, measure: float, wide: float, execut
 def worst(points: Floats, cells: Tetrahedra, count: int, wide: float, executor: Executor = serial) -> Ranked:
     """So many cells of the least measure, all if they are fewer; of valid meshes."""
     ratios = ratios_of(points, cells, executor)
-    first = max(len(ratios) - MORE * count, 0)
-    rows = np.argpartition(ratios, first)[first:].astype(np.int32) if first else np.arange(len(ratios), dtype=np.int32)
+    rows = largest(ratios, MORE * count)
     found = measures_of(columns_of(points, cells, rows), wide)
-    if first:
+    if len(rows) < len(ratios):
         limit = most_shape_below(float(np.partition(found, count - 1)[count - 1]), wide)
         rows = np.flatnonzero(~(ratios < 432.0 / limit**3)).astype(np.int32)
         found = measures_of(columns_of(points, cells, rows), wide)

@@ -50,7 +50,7 @@ class MeasuredSolids:
     blocks: tuple[Solids, ...]
     order: NDArray[np.intp] | None = None
 
-    names = ("min_dihedral", "max_dihedral", "shape", "scaled_jacobian", "volume")  # of the columns
+    names: tuple[str, ...] = ("min_dihedral", "max_dihedral", "shape", "scaled_jacobian", "volume")  # of the columns
     symbol = "η"  # of the shape
     plane = None
 

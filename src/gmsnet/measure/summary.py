@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-THRESHOLDS = {
+THRESHOLDS: dict[str, tuple[float, ...]] = {
     "min_angle": (5.0, 10.0, 20.0, 30.0), "max_angle": (120.0, 150.0, 170.0), "shape": (0.1, 0.2, 0.3, 0.5),
     "min_dihedral": (5.0, 10.0, 20.0, 30.0), "max_dihedral": (150.0, 165.0, 175.0),
 }  # fmt: skip

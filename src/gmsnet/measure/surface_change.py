@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.whole import extent as extent_kernels
 from gmsnet.kernels.whole import nearest as kernels
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 BOXES, ENTRIES = 16, 16  # of the grid, for each facet, at most
-SAMPLES = 200_000  # of each kind of places on facets, and nodes as they were, at which distances are taken at most
+SAMPLES = 100_000  # of each kind of places on facets, and nodes as they were, at which distances are taken at most
 # Barycentric coordinates of the places on each facet: its middle, the middles of its edges, and between.
 PLACES = np.array([[2, 2, 2], [3, 3, 0], [0, 3, 3], [3, 0, 3], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
 
@@ -63,15 +64,14 @@ class Compared(NamedTuple):
 
 
 class Grid:
-    """Facets (T, 3, 3), in boxes, so that the nearest ones are found."""
+    """Facets (T, 3, 3), in boxes, so that the nearest ones are found. sums: see ``measure_triangles``."""
 
     def __init__(self, triangles: Floats) -> None:
         self._triangles = np.ascontiguousarray(triangles)
-        flat = triangles.reshape(-1, 3)
-        self._low, extent = flat.min(axis=0), np.ptp(flat, axis=0)
-        count = len(triangles)
-        spans = np.ptp(triangles, axis=1).max(axis=1)
-        self._width = max(float(spans.mean()), float(extent.max()) * 1e-6) or 1.0
+        self._low, high, count = np.empty(3), np.empty(3), len(triangles)
+        self.sums = extent_kernels.measure_triangles(self._triangles, self._low, high)
+        extent = high - self._low
+        self._width = max(float(self.sums[extent_kernels.SPAN]) / count, float(extent.max()) * 1e-6) or 1.0
         while True:
             self._shape = np.maximum(np.ceil(extent / self._width), 1.0).astype(np.int64)
             if np.prod(self._shape.astype(float)) <= BOXES * count + 64:
@@ -96,15 +96,16 @@ def surface_change(compared: Compared) -> SurfaceChange | None:
     rows = compared.rows
     if not len(rows):
         return None
-    ids, rows = np.unique(rows, return_inverse=True)
-    rows = rows.reshape(-1, 3)
+    used = np.zeros(len(compared.before), dtype=bool)
+    used[rows] = True
+    ids, rows = np.flatnonzero(used), (np.cumsum(used) - 1)[rows]
     middle = compared.before[ids].mean(axis=0)
     before, after = compared.before[ids] - middle, compared.after[ids] - middle
     exponent = int(np.frexp(max(abs(before).max(), abs(after).max()))[1])
     before, after = np.ldexp(before, -exponent), np.ldexp(after, -exponent)
     was, now = before[rows], after[rows]
     first, second = Grid(was), Grid(now)
-    far, _ = first.nearest(after)
+    far, _ = first.nearest(_thinned(after))
     back, _ = second.nearest(_thinned(before))
     places = _thinned(np.arange(len(rows)), len(PLACES))
     there, _ = first.nearest(_places(now[places]))
@@ -112,17 +113,16 @@ def surface_change(compared: Compared) -> SurfaceChange | None:
     middles = _thinned(np.arange(len(rows)))
     centre, which = first.nearest(now[middles].mean(axis=1))
     hausdorff = max(float(each.max()) for each in (far, back, there, here, centre))
-    edges = np.concatenate([was[:, k] - was[:, k - 1] for k in range(3)])
-    closed = _closed(rows)
+    shares = [_share(one, other) for one, other in zip(first.sums, second.sums, strict=True)]
     return SurfaceChange(
         largest=_scaled(far.max(), exponent),
         mean=_scaled(far.mean(), exponent),
         hausdorff=_scaled(hausdorff, exponent),
         diagonal=_scaled(np.linalg.norm(np.ptp(before, axis=0)), exponent),
-        edge=_scaled(np.linalg.norm(edges, axis=1).mean(), exponent),
-        normal=_largest_turn(_normals(now[middles]), _normals(was)[which]),
-        area=_share(np.linalg.norm(_normals(was), axis=1).sum(), np.linalg.norm(_normals(now), axis=1).sum()),
-        volume=_share(_volume(was), _volume(now)) if closed else None,
+        edge=_scaled(first.sums[extent_kernels.EDGE] / (3 * len(rows)), exponent),
+        normal=_largest_turn(_normals(now[middles]), _normals(was[which])),
+        area=shares[extent_kernels.AREA],
+        volume=shares[extent_kernels.VOLUME] if _closed(rows) else None,
     )
 
 
@@ -147,11 +147,6 @@ def _largest_turn(one: Floats, other: Floats) -> float:
     sine, cosine = np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1)
     there = one.any(axis=1) & other.any(axis=1)
     return float(np.degrees(np.arctan2(sine, cosine))[there].max(initial=0.0))
-
-
-def _volume(triangles: Floats) -> float:
-    a, b, c = triangles.transpose(1, 0, 2)
-    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
 
 
 def _closed(rows: Ints) -> bool:

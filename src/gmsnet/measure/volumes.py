@@ -30,7 +30,7 @@ class MeasuredTetrahedra:
     corners: NDArray[np.int32]
     orientation: Signs
 
-    names = ("min_dihedral", "max_dihedral", "shape", "scaled_jacobian", "volume")  # of the columns
+    names: tuple[str, ...] = ("min_dihedral", "max_dihedral", "shape", "scaled_jacobian", "volume")  # of the columns
     symbol = "η"  # of the shape
     plane = None
 

@@ -26,7 +26,7 @@ from gmsnet.mesh.checks import (
     rows_of,
 )
 from gmsnet.mesh.display import amount, html_table, listed
-from gmsnet.mesh.plane import exponent_of
+from gmsnet.mesh.plane import exponent_of, flat_axes
 from gmsnet.mesh.rounding import Rounding
 
 
@@ -178,16 +178,36 @@ class Mesh:
             used[block.nodes] = True
         if not used.any():
             return (0, 1)
-        extent = np.ptp(0.25 * self.points[used], axis=0)  # a quarter, lest it overflow
-        for flat in (2, 1, 0):
-            if extent[flat] <= 1e-9 * extent.max():
-                return {2: (0, 1), 1: (0, 2), 0: (1, 2)}[flat]
+        return flat_axes(np.ptp(0.25 * self.points[used], axis=0))  # a quarter, lest it overflow
+
+    @cached_property
+    def box(self) -> NDArray[np.float64] | None:
+        """None; of a part of a mesh see ``as_part``."""
         return None
+
+    def as_part(
+        self, plane: tuple[int, int] | None, kinds: tuple[bool, bool], exponent: int, box: NDArray[np.float64]
+    ) -> Mesh:
+        """The same as a part of a mesh with this plane and exponent, and of whose nodes these are.
+
+        kinds: whether the mesh has_volumes and has_quads. box: (2, D) the least and the greatest coordinates of all its
+        nodes, in the plane if there is one, over 2 to the power of the exponent. They are numbered in memory as in the
+        whole mesh: nodes that come first come first.
+        """
+        made = self._twin()
+        made.__dict__.update(plane=plane, exponent=exponent, box=box)
+        made.__dict__["has_volumes"], made.__dict__["has_quads"] = kinds
+        return made
 
     @cached_property
     def has_volumes(self) -> bool:
         """Whether cells fill space; faces, lines and vertices are then marks on them."""
         return any(block.dimension == 3 and len(block.nodes) for block in self.cells)
+
+    @cached_property
+    def has_quads(self) -> bool:
+        """Whether some faces have four corners."""
+        return any(block.dimension == 2 and block.corners == 4 and len(block.nodes) for block in self.cells)
 
     @cached_property
     def exponent(self) -> int:

@@ -12,6 +12,14 @@ def in_plane(points: NDArray[np.float64], plane: tuple[int, int] | None) -> NDAr
     return points[:, first : second + 1 : second - first]
 
 
+def flat_axes(extent: NDArray[np.float64]) -> tuple[int, int] | None:
+    """The two axes in which nodes vary that extend by so much (3,); None if no coordinate is constant."""
+    for flat in (2, 1, 0):
+        if extent[flat] <= 1e-9 * extent.max():
+            return {2: (0, 1), 1: (0, 2), 0: (1, 2)}[flat]
+    return None
+
+
 def exponent_of(points: NDArray[np.float64], plane: tuple[int, int] | None, single: bool) -> int:
     """The power of two that brings the largest coordinate in the plane, or in space, near 1.
 

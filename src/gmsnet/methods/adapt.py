@@ -152,8 +152,14 @@ class Adapt(Smoother):
     made anew with a barrier, and with the nodes of the cells held that fell below all the same.
     """
 
+    rounds: int
+    passes: int
+    gained: float
+    step: Callable[[Field], int]
+    converged: bool
+
     stops_when_idle = False
-    phase = PHASE
+    phase: str = PHASE
 
     def __init__(self, metric: Metric) -> None:
         self.metric = metric

@@ -55,7 +55,7 @@ AHEAD = 50  # times the last gain are at most expected to come
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
-LARGE_VOLUME, LARGE_GAIN = 50_000, 0.005  # free nodes of meshes in space of which a pass must gain more
+LARGE_VOLUME, LARGE_GAIN = 50_000, 0.008  # free nodes of meshes in space of which a pass must gain more
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
 GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
@@ -66,6 +66,25 @@ NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh 
 
 class Auto(Smoother):
     """The phases one after the other. Without any: those for the size of the mesh."""
+
+    phases: Sequence[Phase]
+    at: int
+    whole: int
+    slow: bool
+    last: bool
+    ideal: bool
+    pass_gain: float
+    passes: int
+    least: float
+    again: int
+    made: int
+    rounds: int
+    gained: float
+    converged: bool
+    smoother: Smoother
+    mean: float
+    phase: str
+    looks: bool
 
     stops_when_idle = False
 

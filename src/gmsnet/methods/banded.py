@@ -67,7 +67,14 @@ class Kept(NamedTuple):
 class Banded(StarSmoother):
     """start: (N, 2) points in memory order, whose areas count. kept: in memory order, too."""
 
+    start: NDArray[np.float64]
+    kept: Kept
+    at: int
+    inverse: float
+    converged: bool
+
     stops_when_idle = False
+    shared_out = False
 
     def __init__(self, start: NDArray[np.float64], kept: Kept) -> None:
         self.start, self.kept = start, kept

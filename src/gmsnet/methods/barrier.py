@@ -46,6 +46,14 @@ class Barrier(StarSmoother):
     a node goes STRETCH times the way to the mean of its ring instead, where its objective falls by that.
     """
 
+    power: Power
+    power3: Power3
+    doublings: int
+    relaxation: float
+    relaxed: int
+    means: int
+    sweeps: int
+
     def __init__(
         self, objective: str, relaxation: float = RELAXATION, relaxed: int = RELAXED, means: int = MEANS
     ) -> None:

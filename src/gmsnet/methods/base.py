@@ -77,6 +77,7 @@ class Field:
             of_stars = star_floors3 if isinstance(self.topology, Volume) else star_floors
             of_stars = star_floors_of_shell if isinstance(self.topology, Shell) else of_stars
             of_stars(self.points, self.topology.changeable, ringed, guard.unit, guard.grain, floors)
+            executor.exchange(floors)
             return StarGuard(*guard, floors)
         return guard
 
@@ -86,13 +87,15 @@ class Smoother(ABC):
 
     settled: it has its own rule when to stop, and that has come true. reached: so has the target that it was made for.
     looks: the mesh is worth measuring after the last sweep. stops_when_idle: a sweep that moved nothing is the last.
-    phase: what of the method the last sweep was, "" for methods of one phase.
+    shared_out: each rank can do the same with a part of the mesh (gmsnet.distributed), else one does all. phase: what
+    of the method the last sweep was, "" for methods of one phase.
     """
 
     converged = False
     target_reached = False
     looks = True
     stops_when_idle = True
+    shared_out = False
     phase = ""
 
     @abstractmethod
@@ -107,6 +110,8 @@ class Smoother(ABC):
 
 class StarSmoother(Smoother):
     """A method that looks at one star at a time: a sweep visits colour after colour."""
+
+    shared_out = True
 
     @abstractmethod
     def visit(
@@ -159,10 +164,12 @@ class StarSmoother(Smoother):
         return tally
 
     def _stars(self, field: Field) -> Stars:
-        """Those that a sweep visits. At the level STAR most moves are judged star by star anyway."""
-        topology = field.topology
-        if self.in_lanes and isinstance(topology, Shell) and field.level != STAR and topology.in_lanes is not None:
-            return topology.in_lanes
+        """Those that a sweep visits. At the level STAR, and where facets are bound to the reference, moves are judged
+        star by star anyway."""
+        topology, surface = field.topology, field.constraint
+        bound = isinstance(surface, Surface) and surface.bound is not None
+        if self.in_lanes and isinstance(topology, Shell) and field.level != STAR and not bound:
+            return topology.in_lanes or topology.stars
         return topology.stars
 
 
@@ -176,7 +183,7 @@ def by_colour(
     for colour in range(stars.colours):
         tally += sum(executor.map(visit, int(stars.first[colour]), int(stars.first[colour + 1])))
         executor.after_colour(colour, points)
-    return tally
+    return executor.total(tally)
 
 
 def over_stars(

@@ -40,6 +40,12 @@ WIDE = (Round(5, 2), Round(6, 2), Round(6, 2))
 class Below(Smoother):
     """See the module; one sweep, all rounds. everywhere: the first round visits all free nodes there are."""
 
+    least: float
+    everywhere: bool
+    limits: tuple[float, float]
+    converged: bool
+    target_reached: bool
+
     def __init__(self, target: Target, plan: Sequence[Round], everywhere: bool) -> None:
         self.least, self.plan, self.everywhere = target.shape, np.array(plan), everywhere
         self.limits = target.limits

@@ -48,6 +48,12 @@ class BelowInSpace(Smoother):
     everywhere: the first round visits all free nodes there are.
     """
 
+    target: Target
+    floor: float
+    everywhere: bool
+    converged: bool
+    target_reached: bool
+
     def __init__(self, target: Target, floor: float, everywhere: bool) -> None:
         self.target, self.floor, self.everywhere = target, floor, everywhere
         self.converged = self.target_reached = False

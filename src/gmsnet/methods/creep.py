@@ -25,6 +25,9 @@ WORTHWHILE = 0.01
 class Creep:
     """Some nodes, and where they were before a sweep. nodes: (n, WINDOW) places in memory. free: how many move."""
 
+    nodes: NDArray[np.intp]
+    free: int
+
     def __init__(self, nodes: NDArray[np.intp], free: int) -> None:
         self.nodes, self.free = nodes, free
         self.before: NDArray[np.float64] | None = None

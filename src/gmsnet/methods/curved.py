@@ -39,6 +39,15 @@ class Corners(Smoother):
     stopped the copy goes on from there.
     """
 
+    smoother: Smoother
+    curved: Curved
+    stops_when_idle: bool
+    order: NDArray[np.int64]
+    converged: bool
+    target_reached: bool
+    looks: bool
+    phase: str
+
     def __init__(self, smoother: Smoother, curved: Curved) -> None:
         self.smoother, self.curved = smoother, curved
         self.stops_when_idle = smoother.stops_when_idle

@@ -47,8 +47,13 @@ class Dihedral(Smoother):
     more is asked. wide: the weight of what angles lack to 180°. least: the least measure when a cycle began.
     """
 
+    cycles: Sequence[Cycle]
+    floor: float | None
+    goal: float
+    wide: float
+
     phase = "dihedral angles"
-    least = math.inf
+    least: float = math.inf
 
     def __init__(
         self, cycles: Sequence[Cycle] = CYCLES, floor: float | None = None, goal: float = math.inf, wide: float = WIDE

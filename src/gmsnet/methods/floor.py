@@ -30,6 +30,10 @@ class Floor:
     worst cells can name them (``watch``).
     """
 
+    enough: int
+    looks: int
+    unhindered: int
+
     LOOKS, MOST_LOOKS, SHARE, FEWEST = 3, 12, 16, 64
     WATCHED = 64  # cells
 
@@ -62,18 +66,18 @@ class Floor:
         simplices = topology.changeable
         blocks = self.blocks
         if blocks is None or self.unhindered < self.looks >= self.enough:
-            count, watched = -(-len(simplices.rows) // LANES), blocks
-            blocks = np.arange(count, dtype=np.int32)
+            watched, blocks = blocks, np.arange(-(-len(simplices.rows) // LANES), dtype=np.int32)
             least = _least(points, simplices, blocks, precision, executor)
+            floor = executor.minimum(float(least.min(initial=math.inf)))
             if watched is not None:
-                there = least[watched].min(initial=math.inf) == least.min(initial=math.inf)
+                there = executor.minimum(float(least[watched].min(initial=math.inf))) == floor
                 self.enough = min(2 * self.enough, self.MOST_LOOKS) if there else self.LOOKS
-            worst = max(self.FEWEST, count // self.SHARE)
-            self._watch(blocks if worst >= count else np.sort(np.argpartition(least, worst)[:worst]).astype(np.int32))
+            self._watch(executor.lowest(least, self.SHARE, self.FEWEST))
         else:
             least = _least(points, simplices, blocks, precision, executor)
+            floor = executor.minimum(float(least.min(initial=math.inf)))
         self.looks += 1
-        return executor.minimum(float(least.min(initial=math.inf)))
+        return floor
 
     def _watch(self, blocks: NDArray[np.int32]) -> None:
         self.blocks, self.looks, self.unhindered = blocks, 0, 0

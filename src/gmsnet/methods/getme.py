@@ -60,6 +60,9 @@ class SequentialGetme(Smoother):
     on, for penalties have changed, until a node moves or the method has settled.
     """
 
+    converged: bool
+    without_gain: int
+
     def __init__(self, transformation: Transformation) -> None:
         self.transformation = transformation
         self.converged = False

@@ -17,6 +17,9 @@ from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
 class GmsNet(StarSmoother):
     """The network with one set of weights."""
 
+    hidden: int
+    folded: NDArray[np.float32]
+
     def __init__(self, trained: weights.Weights) -> None:
         self.hidden = trained.hidden
         self.folded = fold(trained)

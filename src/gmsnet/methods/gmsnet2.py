@@ -18,6 +18,8 @@ ACTIVATIONS = {"silu": kernels.SILU, "relu": kernels.RELU}
 class GmsNet2(StarSmoother):
     """The network with one set of weights."""
 
+    network: kernels.Network
+
     def __init__(self, trained: weights.Weights) -> None:
         self.network = fold(trained)
 

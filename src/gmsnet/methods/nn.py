@@ -24,6 +24,9 @@ from gmsnet.weights.shapes import NN_HIDDEN
 class NNSmoothing(StarSmoother):
     """The networks with one set of weights."""
 
+    table: NDArray[np.int64]
+    flat: NDArray[np.float32]
+
     def __init__(self, trained: weights.Weights) -> None:
         self.table, self.flat = fold(trained)
 

@@ -30,6 +30,9 @@ from gmsnet.methods.base import ALL_CELLS, TRIANGLES, Method, MethodOptions, Sta
 class Adam(StarSmoother):
     """Adam steps on one objective. sizes: of each step, relative to the star's size."""
 
+    objective: int
+    sizes: NDArray[np.float64]
+
     def __init__(self, objective: str, sizes: NDArray[np.float64] | None = None) -> None:
         self.objective = objectives.NAMES.index(objective)
         self.sizes = step_sizes() if sizes is None else sizes
@@ -53,6 +56,9 @@ class Newton(StarSmoother):
     floor: of 1/q. If the guard has a floor, no cell may come below this one, nor below MARGIN times the guard's. For
     bounded objectives, which make many cells as bad as they may become for the mean of the others.
     """
+
+    objective: int
+    floor: float | None
 
     MARGIN = 1.05
 

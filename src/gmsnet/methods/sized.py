@@ -27,6 +27,7 @@ class Sized(StarSmoother):
     start: (N, 2) in memory order, points whose areas are kept instead.
     """
 
+    shared_out = False
     start: NDArray[np.float64] | None = None
 
     def __init__(self, weight: float = WEIGHT) -> None:

@@ -170,6 +170,9 @@ class WholeMesh(Smoother):
     what gains in the least 1/q at least TRADE times what it costs in the mean. settled: see SETTLED.
     """
 
+    doublings: Sequence[int]
+    settled: float
+
     stops_when_idle = False
 
     def __init__(self, doublings: Sequence[int] = (0,), settled: float = SETTLED) -> None:

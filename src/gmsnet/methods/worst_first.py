@@ -63,6 +63,14 @@ class WorstFirst(Smoother):
     last cycle of it has brought.
     """
 
+    gained: float
+    least: float
+    cycles: tuple[Cycle, ...]
+    at_once: int
+    enough: float
+    converged: bool
+    next: int
+
     least = gained = -math.inf
 
     def __init__(self, cycles: tuple[Cycle, ...] = CYCLES, at_once: int = 1, enough: float = math.inf) -> None:

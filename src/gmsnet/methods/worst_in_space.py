@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.space import SpaceBlocks
-from gmsnet.measure.dihedral import ratios_of
+from gmsnet.kernels.topology.connectivity import touching
+from gmsnet.measure.dihedral import largest, ratios_of
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume
@@ -29,6 +30,9 @@ FEWEST, WATCHED = 12, 64  # cells
 class WorstInSpace(Smoother):
     """One sweep is all CYCLES. least: the minimum η after the last one; gained: what it has brought."""
 
+    gained: float
+    least: float
+
     least = gained = -math.inf
 
     def sweep(self, field: Field, executor: Executor, test: object) -> Tally:
@@ -36,11 +40,13 @@ class WorstInSpace(Smoother):
         topology, tally = field.topology, np.zeros(3, dtype=np.int64)
         assert isinstance(topology, Volume)
         guard, cells = field.guard(executor), topology.changeable
-        ratios = _ratios(field.points, cells, topology.near_free, executor)
+        ratios = ratios_of(field.points, cells, executor)
+        tangled = _set_aside(ratios, cells, topology.near_free)
         before = after = float(ratios.max(initial=K3))
         for share, number, sweeps in CYCLES:
-            nodes = np.unique(cells.rows[_largest(ratios, max(FEWEST, math.ceil(share * len(ratios))))])
-            stars = topology.stars_of(nodes[topology.near_free[nodes]].astype(np.int64))
+            nodes = np.unique(cells.rows[largest(ratios, max(FEWEST, math.ceil(share * len(ratios))))])
+            nodes = nodes[topology.near_free[nodes]]
+            stars = topology.stars_of(nodes.astype(np.int64))
             power = Power3.of(number, min(after / K3, 1e30))
 
             def visit(blocks: SpaceBlocks, first: int, last: int, counts: Tally, power: Power3 = power) -> None:
@@ -48,30 +54,36 @@ class WorstInSpace(Smoother):
 
             for _ in range(sweeps):
                 tally += over_stars(visit, stars, field.points, executor)
-            ratios = _ratios(field.points, cells, topology.near_free, executor)
+            if tangled:
+                ratios = ratios_of(field.points, cells, executor)
+                _set_aside(ratios, cells, topology.near_free)
+            else:
+                _renew(ratios, field.points, cells, nodes, executor)
             after = float(ratios.max(initial=K3))
         least = (K3 / after) ** (1.0 / 3.0)
         self.least, self.gained = least, least - (K3 / before) ** (1.0 / 3.0)
-        few = _largest(ratios, WATCHED)
+        few = largest(ratios, WATCHED)
         field.floor.watch(few, 1.0 / np.maximum(ratios[few], 1.0))
         return tally
 
 
-def _largest(values: Floats, count: int) -> NDArray[np.int32]:
-    """Where so many of the largest values stand, or all, if they are fewer."""
-    rest = max(len(values) - count, 0)
-    return np.argpartition(values, rest)[rest:].astype(np.int32)
+def _renew(ratios: Floats, points: Floats, cells: Tetrahedra, nodes: NDArray[np.int32], executor: Executor) -> None:
+    """Those of the simplices at these nodes, which alone have moved."""
+    moved = np.zeros(len(points), dtype=bool)
+    moved[nodes] = True
+    rows = touching(cells.rows, moved)
+    ratios[rows] = ratios_of(points, cells.take(rows), executor)
 
 
-def _ratios(points: Floats, cells: Tetrahedra, free: NDArray[np.bool_], executor: Executor) -> Floats:
-    """S³/D² of each; 0, and so the last to be chosen, where no node moves: stars with an inverted cell stay.
+def _set_aside(ratios: Floats, cells: Tetrahedra, free: NDArray[np.bool_]) -> bool:
+    """Makes those 0, and so the last to be chosen, where no node moves: stars with an inverted cell stay.
 
-    free: (N,) which nodes are.
+    free: (N,) which nodes are. Returns whether there are inverted cells.
     """
-    out = ratios_of(points, cells, executor)
-    inverted = np.isinf(out)
-    if inverted.any():
-        movable = free.copy()
-        movable[cells.rows[inverted]] = False
-        out[~movable[cells.rows].any(axis=1)] = 0.0
-    return out
+    inverted = np.isinf(ratios)
+    if not inverted.any():
+        return False
+    movable = free.copy()
+    movable[cells.rows[inverted]] = False
+    ratios[~movable[cells.rows].any(axis=1)] = 0.0
+    return True

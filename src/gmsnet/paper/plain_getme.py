@@ -56,6 +56,15 @@ class PlainGetme:
     now.
     """
 
+    mesh: PlainMesh
+    parameters: tuple[float, float, float]
+    success: float
+    elements: list[Element]
+    shapes: list[float]
+    penalties: list[float]
+    heap: list[tuple[float, int]]
+    last: int
+
     def __init__(
         self,
         mesh: PlainMesh,

@@ -40,6 +40,17 @@ class Executor(Protocol):
         """All nodes of a colour are where they will be; points: (N, 2) of all nodes, in memory order."""
         ...
 
+    def exchange(self, values: NDArray[np.float64]) -> None:
+        """Values (N,) at nodes, in memory order, become everywhere what they are where the node moves."""
+        ...
+
+    def lowest(self, values: NDArray[np.float64], share: int, fewest: int) -> NDArray[np.int32]:
+        """Which blocks of cells have the lowest values: one in ``share`` of all that there are, at least so many.
+
+        values: one for each block of this process. Of equal ones those of the lower number come first.
+        """
+        ...
+
     def minimum(self, value: Figure) -> Figure:
         """The least of what all processes give; of an array, for each of its places."""
         ...

@@ -25,6 +25,19 @@ class Process:
     def after_colour(self, colour: int, points: NDArray[np.float64]) -> None:
         """See Executor. All threads see the same points."""
 
+    def exchange(self, values: NDArray[np.float64]) -> None:
+        """See Executor."""
+
+    def lowest(self, values: NDArray[np.float64], share: int, fewest: int) -> NDArray[np.int32]:
+        """See Executor."""
+        many = max(fewest, len(values) // share)
+        if many >= len(values):
+            return np.arange(len(values), dtype=np.int32)
+        least = np.partition(values, many - 1)[many - 1]
+        chosen = values < least
+        chosen[np.flatnonzero(values == least)[: many - np.count_nonzero(chosen)]] = True
+        return np.flatnonzero(chosen).astype(np.int32)
+
     def minimum(self, value: Figure) -> Figure:
         """See Executor."""
         return value
@@ -48,7 +61,7 @@ class Serial(Process):
         return self
 
 
-serial = Serial()
+serial: Serial = Serial()
 
 
 class Threads(Process):

@@ -66,6 +66,12 @@ def layers_of_volume(topology: Volume, points: Floats) -> Layers:
     return Layers(held, cells, float(np.median(found)), float(found.max()), 0)
 
 
+def feet(points: Floats, topology: Volume, wall: Flags) -> Ints:
+    """At which of these nodes of walls (N,) layers may start, by places; of fewer than FEWEST there are none."""
+    broad = BROAD_THIRDS if topology.simplices.shapes is None else BROAD
+    return _feet(points, topology.near, wall, broad)[0]
+
+
 def _wall_nodes(topology: Volume) -> Flags:
     """(N,) by places in memory: nodes of boundaries and interfaces, whether they slide or not."""
     wall = np.zeros(len(topology.memory), dtype=bool)

@@ -13,6 +13,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import near_points
 from gmsnet.topology.stars import Ints
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -41,13 +42,17 @@ class Survey:
     @classmethod
     def of(cls, mesh: Mesh, topology: Topology, near: Floats | None = None) -> Survey:
         """Of a mesh with triangles. near: ``near_points(mesh, topology)``, where they are known."""
-        near = near_points(mesh, topology) if near is None else near
-        nodes = np.zeros(len(near), dtype=np.uint8)
-        for reason, bit in (("boundary", kernels.BOUNDARY), ("interface between regions", kernels.INTERFACE)):
-            for found in (topology.held, topology.sliding):
-                nodes[found.get(reason, np.empty(0, dtype=np.int64))] = bit
-        rim = np.take(nodes, topology.memory)
+        near, rim = near_points(mesh, topology) if near is None else near, rim_of(topology)
         ring = np.zeros((len(rim), 4), dtype=np.float32)
         beside, total = kernels.first_ring(near, topology.near, rim, MOST, ring)
         suspects = kernels.suspects(topology.near, rim, MOST, FEW, SEED - SLACK, ring)
         return cls(near, rim, suspects, beside, total / len(topology.near))
+
+
+def rim_of(topology: Topology | Volume) -> NDArray[np.uint8]:
+    """(N,) by places in memory: BOUNDARY and INTERFACE of kernels.simplex.survey where a node is one of those."""
+    nodes = np.zeros(len(topology.memory), dtype=np.uint8)
+    for reason, bit in (("boundary", kernels.BOUNDARY), ("interface between regions", kernels.INTERFACE)):
+        for found in (topology.held, topology.sliding):
+            nodes[found.get(reason, np.empty(0, dtype=np.int64))] = bit
+    return np.take(nodes, topology.memory)

@@ -57,7 +57,7 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
     survey = survey or Survey.of(mesh, topology)
     points = survey.points
     largest = REFINED * float(_edge(survey.double))
-    if not (_edge(_double(points, triangles.take(survey.beside, axis=0))) <= largest).any():
+    if not refined(points, triangles.take(survey.beside, axis=0), survey.double):
         return kept  # so it is with most meshes
     rough: Floats | None = None
     for wall, cells in _walls(topology.simplices, survey):
@@ -77,6 +77,11 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
     if kept.nodes.any():
         _leave_out_inverted(kept, topology, points)
     return kept
+
+
+def refined(points: Floats, beside: Ints, double: float) -> bool:
+    """Are some of the cells (B, 3) beside a boundary small? double: the mean of twice the area over the mesh."""
+    return bool((_edge(_double(points, beside)) <= REFINED * float(_edge(double))).any())
 
 
 def _keep(kept: Kept, topology: Topology, points: Floats, rows: NDArray[np.int64], rough: Floats) -> None:

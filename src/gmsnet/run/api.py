@@ -45,6 +45,8 @@ def smooth(
     feature_angle: float = 30.0,
     geometry: Any = None,
     surface_tolerance: float | None = None,
+    hausdorff: float | None = None,
+    free_needles: bool = False,
     metric: Any = None,
     size: Any = None,
 ) -> SmoothResult:
@@ -77,7 +79,8 @@ def smooth(
     feature_angle: degrees; curves end, and edges of surfaces are sharp, where they turn by more. geometry: what to
     slide on in the plane instead of arcs through the input's nodes (docs/sliding.md). surface_tolerance: how far from
     the input's facets nodes of surfaces may go, over the mean length of their edges (default: 0.05; with a geometry
-    without a bound).
+    without a bound). hausdorff: how far their facets may go from the input's, over the diagonal of the box around it
+    (default: no bound). free_needles: edges that look sharp only because a facet of a surface is thin are no features.
     metric: the tensors of which the cells are to be unit cells, by shape and size (docs/metric.md): an array (N, 3) of
     m11, m12, m22 at the nodes, or a function from points (n, 2) to such an array. size: the same for lengths h of
     edges: an array (N,), or a function from points (n, 2) to one (n,); its metric is h⁻²·I.
@@ -91,7 +94,7 @@ def smooth(
         target_quality=target_quality, target_angle=target_angle, target_dihedral=target_dihedral,
         preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, callback=callback,
         weights=weights, best_by=best_by, slide=slide, feature_angle=feature_angle, geometry=geometry,
-        surface_tolerance=surface_tolerance, metric=metric, size=size,
+        surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles, metric=metric, size=size,
     )  # fmt: skip
     return smooth_with(mesh, options, fixed)
 

@@ -63,6 +63,15 @@ class Journey:
     were not positive when the boundary began to move; shapes: (T,) 1/q then; least: the minimum.
     """
 
+    slides: Flags | None
+    held: Topology
+    path: Path
+    start: Complex
+    follower: Follower
+    wrong: Flags
+    shapes: Floats
+    least: float
+
     def __init__(self, state: State, prescribed: Prescribed) -> None:
         base = state.protection.base
         assert isinstance(base, Topology)

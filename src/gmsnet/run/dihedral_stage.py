@@ -6,13 +6,12 @@ import math
 from dataclasses import replace
 
 from gmsnet.kernels.methods.barrier3 import K3
-from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.guard import LEVELS, VALID
 from gmsnet.kernels.star.surface import Surface, locate3
-from gmsnet.measure.dihedral import REGULAR, WIDE, worst
+from gmsnet.measure.dihedral import REGULAR, WIDE, Floats, worst
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.methods.auto import Auto
-from gmsnet.methods.base import Field
+from gmsnet.methods.base import Field, Tally
 from gmsnet.methods.dihedral import Dihedral
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
@@ -32,13 +31,11 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     No q = 1/η becomes more than the largest one and SPENT, nor, but at the level ``valid``, than the largest of the
     input. The result is taken where the merit gains GAIN.
     """
-    topology, sweeps = state.topology, state.history[-1].index if state.history else 0
-    ended = state.stop_reason == NO_PROGRESS and sweeps < options.max_sweeps
-    if not (isinstance(topology, Volume) and isinstance(state.smoother, Auto) and ended) or options.target:
+    totals = totals_at_end(state, options, executor)
+    if totals is None:
         return state
-    totals = state.totals or totals_of(state.points, topology.scored, executor)
-    if totals is None or totals.uncertain or topology.scored.shapes is not None:  # the angles are those of tetrahedra
-        return state
+    topology = state.topology
+    assert isinstance(topology, Volume)
     level = LEVELS.index(options.guard)
     floor = floor_for_angles(state, level, 1.0 / (1.0 / totals.shape_min + SPENT), executor)
     field = Field(state.points.copy(), topology, state.precision, level, constraint=state.constraint)
@@ -52,19 +49,44 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     gained = merit(after, least) - merit(totals, smoother.least)
     if gained < GAIN or after.uncertain:
         return state
+    return with_sweep(state, options, field.points, after, smoother.phase, tally)
+
+
+def totals_at_end(state: State, options: SmoothOptions, executor: Executor) -> Totals | None:
+    """Those of a volume of tetrahedra, all valid, on which ``auto`` has ended of itself, without a target; or None."""
+    topology, auto = state.topology, isinstance(state.smoother, Auto)
+    ended = state.stop_reason == NO_PROGRESS and _sweeps(state) < options.max_sweeps
+    if not (isinstance(topology, Volume) and auto and ended) or options.target or topology.scored.shapes is not None:
+        return None
+    totals = state.totals or totals_of(state.points, topology.scored, executor)
+    return None if totals is None or totals.uncertain else totals
+
+
+def with_sweep(state: State, options: SmoothOptions, points: Floats, totals: Totals, phase: str, tally: Tally) -> State:
+    """The state after a sweep to these points, recorded and told."""
+    moved, truncated, dropped = tally.tolist()
     sweep = Sweep(
-        sweeps + 1, smoother.phase, int(tally[MOVED]), int(tally[TRUNCATED]), int(tally[DROPPED]), after.inverted,
-        after.qhat, after.shape_min, after.shape_mean,
+        _sweeps(state) + 1, phase, moved, truncated, dropped, totals.inverted, totals.qhat, totals.shape_min,
+        totals.shape_mean,
     )  # fmt: skip
-    state = replace(state, points=field.points, totals=after, history=(*state.history, sweep))
+    state = replace(state, points=points, totals=totals, history=(*state.history, sweep))
     stopped = options.callback is not None and options.callback(sweep)
     return state.ended(CALLBACK) if stopped else state
 
 
+def _sweeps(state: State) -> int:
+    return state.history[-1].index if state.history else 0
+
+
 def floor_for_angles(state: State, level: int, shape: float, executor: Executor) -> float:
     """c of D/S^(3/2) for an η, or for the level of the guard to hold from the untangled input on, if that is more."""
-    start, floor = state.start if state.untangled is None else state.untangled, math.sqrt(shape**3 / K3)
+    start, floor = state.start if state.untangled is None else state.untangled, floor_of(shape)
     return floor if level == VALID else max(floor, Floor().of(start, state.topology, state.precision, executor))
+
+
+def floor_of(shape: float) -> float:
+    """c of D/S^(3/2) for an η."""
+    return math.sqrt(shape**3 / K3)
 
 
 def merit(totals: Totals, least: float) -> float:

@@ -54,6 +54,8 @@ class SmoothOptions:
     feature_angle: float = FEATURE_ANGLE
     geometry: Geometry | None = None
     surface_tolerance: float | None = None
+    hausdorff: float | None = None
+    free_needles: bool = False
     metric: Any = field(default=None, compare=False)
     size: Any = field(default=None, compare=False)
 
@@ -91,6 +93,12 @@ class SmoothOptions:
                 "surface_tolerance is how far from the input's surface nodes may go, over the length of their edges, "
                 f"and must be above 0, got {self.surface_tolerance!r}"
             )
+        if self.hausdorff is not None and not _is_number(self.hausdorff, 1.0):
+            raise InputError(
+                "hausdorff is how far facets of a surface may go from the input's, over the diagonal of the box around "
+                f"it, and must lie in (0, 1], got {self.hausdorff!r}"
+            )
+        _check_flag("free_needles", self.free_needles)
         self._method()
         check_adapting(self)
 

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 
 def write_back(state: State, options: SmoothOptions, executor: Executor) -> State:
     """The last stage: the best points in the order of the input, and their measures."""
-    rank = options.target.rank if options.target else rank_by(options.best_by)
+    rank: Callable[[QualityReport], Any] = options.target.rank if options.target else rank_by(options.best_by)
     if state.second_order is not None and state.second_order.invalid[0]:  # whose mending may cost straight cells shape
         rank = inverted_alone
     if state.motion is not None or state.metric is not None:  # in which meshes were compared
@@ -139,7 +139,7 @@ def outcome(
     """
     if start is None:
         start = near_points(mesh, topology)
-    plane, factors = mesh.plane or (0, 1, 2), _factors(mesh.exponent)
+    plane, factors = mesh.plane or (0, 1, 2), factors_of(mesh.exponent)
     points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
     count, exact = put_back(best, start, topology.memory, plane, *factors, points, moved)
     if count and mesh.rounding is not None:
@@ -159,7 +159,7 @@ def outcome(
     return Final(mesh.points, moved, before)
 
 
-def _factors(exponent: int) -> tuple[float, float]:
+def factors_of(exponent: int) -> tuple[float, float]:
     """Two normal powers of two by which to multiply one after the other for 2 to the power of the exponent.
 
     The first one is 1 unless the exponent is too large or too small for a single float.
@@ -173,10 +173,24 @@ def inverted_alone(report: QualityReport) -> int:
     return report.inverted
 
 
-def rank_by(best_by: str) -> Callable[[QualityReport], Any]:
+class Judged(Protocol):
+    """What meshes are compared by: a QualityReport."""
+
+    @property
+    def inverted(self) -> int:
+        """How many cells are not valid."""
+        ...
+
+    @property
+    def totals(self) -> Totals | None:
+        """Means and extremes."""
+        ...
+
+
+def rank_by(best_by: str) -> Callable[[Judged], Any]:
     """Fewer inverted cells first, then the larger q̂, or the larger least and then mean 1/q if not all are triangles."""
 
-    def rank(report: QualityReport) -> tuple[float, ...]:
+    def rank(report: Judged) -> tuple[float, ...]:
         totals = report.totals
         if totals is None:
             return (report.inverted,)

@@ -24,6 +24,8 @@ class Progress:
     standard error is a terminal).
     """
 
+    compilation: Compilation
+
     def __init__(self, sweeps: int, *, enabled: bool = True, bar: bool | None = None) -> None:
         self.compilation = Compilation(self._say_so if enabled else None)
         shown = sys.stderr.isatty() if bar is None else bar

@@ -68,6 +68,18 @@ class Run:
     ended the sweeps, if they were interrupted.
     """
 
+    topology: Topology | Volume
+    options: SmoothOptions
+    missing: Callable[[Floats], NDArray[np.int32]] | None
+    metric: Metric | None
+    smoother: Smoother | Corners
+    executor: Executor
+    field: Field
+    sweeps: int
+    first: int
+    best: Floats
+    best_score: Score
+
     def __init__(
         self, start: Start, smoother: Smoother, options: SmoothOptions, executor: Executor = serial,
         missing: Callable[[Floats], NDArray[np.int32]] | None = None,
@@ -91,7 +103,7 @@ class Run:
 
     def to_the_end(self, most: int | None = None) -> str:
         """Sweeps until a stop rule says why to stop. most: sweeps, if fewer than the options allow."""
-        if not len(self.topology.free):
+        if not self.executor.total(np.array(len(self.topology.free))):
             return NOTHING_TO_MOVE
         if self._reached():
             return TARGET_REACHED
@@ -126,7 +138,6 @@ class Run:
     def _sweep(self) -> int:
         """One sweep; returns how many nodes moved."""
         tally = self.smoother.sweep(self.field, self.executor, lambda: self._keep_if_best(self._score()))
-        tally = self.executor.total(tally)
         self.tally += tally
         self.phases[self.smoother.phase] = None
         self.sweeps += 1

@@ -59,6 +59,7 @@ def first_state(
     given, restore = to_mesh(mesh)
     check_mesh(given, target)
     check_cells(given, options.method_name, options.objective or options.variant)
+    check_surface_options(given, options)
     if given.plane is None:
         check_in_space(options)
     remarks = []
@@ -161,6 +162,15 @@ def _first_of_volume(
     nothing = np.empty(0, dtype=np.float32)
     protection = protected_volume(topology, options.preserved, options.fix_layers, start, firm=before.inverted > 0)
     return State(given, restore, smoother, before, protection, start, start, nothing, tuple(remarks), sliding=sliding)
+
+
+def check_surface_options(mesh: Mesh, options: SmoothOptions) -> None:
+    """InputError for options of surfaces where the mesh is none."""
+    if mesh.plane is None and not mesh.has_volumes:
+        return
+    for name, given in (("hausdorff", options.hausdorff is not None), ("free_needles", options.free_needles)):
+        if given:
+            raise InputError(f"{name} is of surfaces in space, and this mesh is none: leave it out")
 
 
 def check_in_space(options: SmoothOptions) -> None:

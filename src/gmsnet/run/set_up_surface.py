@@ -33,14 +33,22 @@ def first_of_surface(
     """The state of a mesh in no plane before the first stage. asked: (N,) bool, nodes to hold."""
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     topology, start = Topology.and_points(given, asked, options.thread_count)
-    facets, patches = patches_of_surface(given, topology, names, options.feature_angle, asked)
+    facets, patches = patches_of_surface(given, topology, names, options.feature_angle, asked, options.free_needles)
     slides = patches.slides | patches.curves.slides
     if (patches.curves.slides & ~_flagged(topology.free, len(slides))).any():
         topology, start = Topology.and_points(given, asked, options.thread_count, patches.curves.slides)
     normals = normals_of(patches, space_points(given)[:, :3])
     shell = Shell.made(topology, sides_of(given, topology, patches, normals)).holding(~slides, FEATURE)
     sliding = SurfaceSliding.of(
-        given, facets, patches, shell.memory, shell.free, options.distance, options.geometry, normals
+        given,
+        facets,
+        patches,
+        shell.memory,
+        shell.free,
+        options.distance,
+        options.geometry,
+        normals,
+        options.hausdorff,
     )
     others = unmeasured(given)
     remarks = (f"not measured, and their nodes are held: {others}",) if others else ()

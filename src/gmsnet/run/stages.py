@@ -8,6 +8,7 @@ from typing import Protocol
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.run.dihedral_stage import improve_dihedrals
+from gmsnet.run.mean_stage import improve_mean
 from gmsnet.run.metric_stage import take_metric
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import write_back
@@ -30,8 +31,8 @@ class Stage(Protocol):
 
 
 STAGES: tuple[Stage, ...] = (
-    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_dihedrals, improve_near_walls,
-    untangle_second_order, smooth_corners, make_room,
+    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_dihedrals, improve_mean,
+    improve_near_walls, untangle_second_order, smooth_corners, make_room,
 )  # fmt: skip
 
 

@@ -19,13 +19,14 @@ def inverse(order: Ints) -> Ints:
     return place
 
 
-def memory_order(points: NDArray[np.float64]) -> tuple[Ints, Ints]:
-    """The ids in memory order, and the place of each."""
+def memory_order(points: NDArray[np.float64], box: NDArray[np.float64] | None = None) -> tuple[Ints, Ints]:
+    """The ids in memory order, and the place of each. box: of the mesh that these are a part of."""
     nodes = len(points)
     memory, position = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
     keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
     order = layout.morton_order if points.shape[1] == 2 else layout.morton_order3
-    order(points, keys, other, memory, position)
+    box = np.empty((0, min(points.shape[1], 3))) if box is None else box
+    order(points, box, keys, other, memory, position)
     return memory, position
 
 

@@ -51,7 +51,7 @@ class Faces:
                 cells.append(np.arange(before, before + len(block.nodes)))
             before += len(block.nodes)
         return cls(
-            first=_first(blocks),
+            first=_first(blocks, mesh.has_quads),
             corner=_joined([block.nodes[:, : block.corners].reshape(-1) for block in blocks], np.int32),
             region=_joined([block.regions for block in blocks] if _differ(blocks) else [], np.int64),
             cell=cells[0] if len(cells) == 1 else _joined(cells, np.int64),
@@ -106,10 +106,11 @@ def check_size(mesh: Mesh) -> int:
     return sum(len(block.nodes) * block.corners for block in blocks)
 
 
-def _first(blocks: list[CellBlock]) -> Offsets | None:
-    if all(block.corners == 3 for block in blocks):
+def _first(blocks: list[CellBlock], has_quads: bool) -> Offsets | None:
+    """None where all are triangles, elsewhere in the mesh, too."""
+    if not has_quads and all(block.corners == 3 for block in blocks):
         return None
-    return _starts(np.repeat([block.corners for block in blocks], [len(block.nodes) for block in blocks]))
+    return _starts(np.repeat([block.corners for block in blocks], [len(block.nodes) for block in blocks]).astype(int))
 
 
 def _starts(sizes: NDArray[Any]) -> Offsets:

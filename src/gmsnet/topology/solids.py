@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gmsnet.cells.jacobian import form_of
 from gmsnet.cells.table import CELLS
 from gmsnet.kernels.simplex.mean_ratio3 import WEIGHTS3, Solids, Tetrahedra
-from gmsnet.kernels.topology import connectivity, layout
+from gmsnet.kernels.topology import connectivity
 from gmsnet.kernels.topology import solids as kernels
 from gmsnet.kernels.topology.facets import ALONE, OPPOSITE
 from gmsnet.kernels.topology.solids import FACETS, NONE, Tables
@@ -20,7 +20,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.topology.fans import Marks
-from gmsnet.topology.ordering import space_points
+from gmsnet.topology.ordering import memory_order, space_points
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.wound import refuse_flat
 
@@ -113,9 +113,7 @@ class WoundSolids:
         nodes = len(mesh.points)
         refuse_unless_free(len(cells) * BYTES_PER_CELL, f"the connectivity of {len(cells):,} cells")
         points = space_points(mesh)
-        memory, position = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
-        keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
-        layout.morton_order3(points, keys, other, memory, position)
+        memory, position = memory_order(points, mesh.box)
         place = position[cells]
         origin = np.argsort(place.min(axis=1), kind="stable").astype(np.int32) if len(place) else np.empty(0, np.int32)
         near, kind = place[origin], kind[origin]

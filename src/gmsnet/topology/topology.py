@@ -18,7 +18,6 @@ from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.star import pattern as kernels_stars
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.topology import connectivity, layout, patch
-from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
@@ -88,7 +87,9 @@ class Topology(Connectivity):
         nodes, corners = len(mesh.points), check_size(mesh)
         refuse_unless_free(nodes * PER_NODE + corners * PER_CORNER, f"the connectivity of {nodes:,} nodes")
         planar = planar_points(mesh) if mesh.plane else space_points(mesh)
-        (memory, position), written = side_by_side(threads, partial(memory_order, planar), partial(Faces.of, mesh))
+        (memory, position), written = side_by_side(
+            threads, partial(memory_order, planar, mesh.box), partial(Faces.of, mesh)
+        )
         faces, planar = side_by_side(threads, partial(written.renumbered, position), partial(taken, planar, memory))
         marks = known_marks(mesh, fixed, position)
         points = None if mesh.plane is None else planar
@@ -121,7 +122,7 @@ class Topology(Connectivity):
             near_origin=faces.origin[whole],
             sliding=slid,
         )
-        if near_sliding.any() or any(map(_is_quad, mesh.cells)):
+        if near_sliding.any() or mesh.has_quads:
             topology = topology.linked(Links.of(faces, near_orientation, start, topology.near_ring, near_sliding))
             four, quads = written.with_corners(4)
             topology = replace(
@@ -290,7 +291,3 @@ class Topology(Connectivity):
     def colours(self) -> Ints:
         """(N,) colour of each node by id, −1 where held."""
         return self.near_colours[self.places]
-
-
-def _is_quad(block: CellBlock) -> bool:
-    return block.dimension == 2 and block.corners == 4 and len(block.nodes) > 0

@@ -143,7 +143,7 @@ class Volume(Connectivity):
         rows = connectivity.touching(self.near, self.near_free)
         return self.simplices if len(rows) == len(self.near) else self.simplices.take(rows)
 
-    @property
+    @cached_property
     def scored(self) -> Tetrahedra:
         """Those by which meshes on the way are compared."""
         return self.changeable

@@ -53,7 +53,7 @@ class Wound:
         nodes = len(mesh.points)
         refuse_unless_free(len(cells) * BYTES_PER_CELL, f"the connectivity of {len(cells):,} tetrahedra")
         points = space_points(mesh)
-        memory, position = memory_order(points)
+        memory, position = memory_order(points, mesh.box)
         place, origin = np.empty_like(cells), np.empty(len(cells), dtype=np.int32)
         used = np.zeros(nodes, dtype=np.bool_)
         facets.order_cells(cells, position, np.zeros(nodes + 2, dtype=np.int32), place, origin, used)

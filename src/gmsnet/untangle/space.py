@@ -26,6 +26,7 @@ Flags = NDArray[np.bool_]
 
 RINGS = (2, 6, 10**9)  # around the cells that are bad
 SWEEPS = (30, 40, 60)  # at most
+CLOSE = (0, 1, 2)  # rings, where some cells are left
 EARLY, MANY = 2, 0.1  # after so many rounds, with so many of the cells bad still, another start is taken
 SHRINK, FINEST = 0.6, 1e-4  # of ε from sweep to sweep, and of the median of |D| at last
 HARMONIC, ITERATIONS = 1e-6, 2000
@@ -37,6 +38,17 @@ class Attempt:
 
     points: as they are now; start: as they were. bad, inverted, ratio: of each cell, see ``find_bad``.
     """
+
+    start: Floats
+    points: Floats
+    bad: Flags
+    inverted: Flags
+    was_inverted: Flags
+    topology: Volume
+    precision: Precision
+    ratio: NDArray[np.float64]
+    left: int
+    was: NDArray[np.float64]
 
     def __init__(self, points: Floats, topology: Volume, precision: Precision, executor: Executor) -> None:
         self.start, self.points, self.topology, self.precision = points, points.copy(), topology, precision
@@ -172,6 +184,33 @@ def _from_the_means(attempt: Attempt) -> list[UntanglingStep]:
     return steps
 
 
+def _take_best(attempt: Attempt, places: list[Floats]) -> list[UntanglingStep]:
+    """Takes those of the places on the way, or those as they are, at which the fewest cells are bad in the end; then
+    tries once more close around what is left.
+
+    Where some cells cannot be mended, what was done far around them would take all others back.
+    """
+    best, left, steps = attempt.points.copy(), attempt.left, list[UntanglingStep]()
+
+    def settle() -> None:
+        nonlocal best, left
+        attempt.give_back()
+        if attempt.left < left:
+            best, left = attempt.points.copy(), attempt.left
+        attempt.points[:] = best
+        attempt.look()
+
+    for points in places:
+        attempt.points[:] = points
+        attempt.look()
+        settle()
+    for rings in CLOSE:
+        if attempt.left:
+            steps.append(attempt.sweeps(rings, SWEEPS[0]))
+            settle()
+    return steps
+
+
 def untangle_volume(
     points: Floats, topology: Volume, precision: Precision, executor: Executor, before: int
 ) -> Untangled:
@@ -179,15 +218,18 @@ def untangle_volume(
 
     points: (N, 4) by places in memory; not changed. before: how many are inverted. As ``untangle`` of cells in a plane.
     """
-    attempt = Attempt(points, topology, precision, executor)
+    attempt, places = Attempt(points, topology, precision, executor), list[Floats]()
     steps: list[UntanglingStep] = []
     for rounds, (rings, most) in enumerate(zip(RINGS, SWEEPS, strict=True)):
         if not attempt.left or (rounds == EARLY and attempt.left > MANY * len(topology.near)):
             break
         steps.append(attempt.sweeps(rings, most))
+        places.append(attempt.points.copy())
     if attempt.left and len(topology.free):
         steps += _from_the_means(attempt)
     broken = attempt.give_back()
+    if attempt.left:
+        steps += _take_best(attempt, places)
     tried, moved = any(step.nodes for step in steps), attempt.moved.any()
     why = f"{broken} cells that were positive, or better, would have been inverted" if broken else ""
     if not tried:

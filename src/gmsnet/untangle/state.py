@@ -22,6 +22,15 @@ class UntanglingState:
     frozen: (N,) free nodes that stand still all the same. work: iterations of L-BFGS so far, times nodes.
     """
 
+    before: Floats
+    topology: Topology
+    precision: Precision
+    points: Floats
+    was_bad: Flags
+    bad: Flags
+    frozen: Flags
+    left: int
+
     def __init__(self, points: Floats, topology: Topology, precision: Precision) -> None:
         self.before, self.topology, self.precision = points, topology, precision
         self.points = points.copy()

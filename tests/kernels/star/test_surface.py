@@ -12,13 +12,13 @@ from support.surfaces import constraint, cylinder, sphere, turned
 
 from gmsnet.kernels.jit.compile import kernel
 from gmsnet.kernels.star.off_surface import farthest
+from gmsnet.kernels.star.pieces import follow_curve
 from gmsnet.kernels.star.surface import (
     CURVE,
     CURVED,
     FLAT,
     LINE,
     directions_at,
-    follow_curve,
     locate3,
     snap3,
     walk,
@@ -65,7 +65,7 @@ def test_a_walk_ends_at_the_nearest_facet(seed, count):
             * rng.uniform(*((0.97, 1.06) if count == 40 else (1.0, 1.005)))
         )
         begin = rng.choice(np.flatnonzero(np.isin(rows, rows[f]).any(axis=1)))
-        g, *shares = walk(surface, int(begin), *place)
+        g, *shares = walk(surface.corner, surface.beside, int(begin), *place)
         assert min(shares) >= 0.0
         assert sum(shares) == pytest.approx(1.0, abs=1e-15)
         away, least = np.linalg.norm(shares @ surface.corner[g] - place), from_facets(place, points[rows]).min()
@@ -80,7 +80,7 @@ def test_a_walk_stops_at_the_rim():
     patches, surface = constraint(points, rows)
     side = int(patches.patch[0])
     for z, wanted in ((-1.0, 0.0), (3.0, 2.0)):
-        g, *shares = walk(surface, 0, 0.999, 0.01, z)
+        g, *shares = walk(surface.corner, surface.beside, 0, 0.999, 0.01, z)
         assert (np.array(shares) @ surface.corner[g])[2] == wanted
         x, y, height, _ = snap3(surface, surface.row[30], 0.999, 0.01, z)
         assert height == wanted
@@ -224,7 +224,7 @@ def test_curves_end():
     points, rows = cylinder(24, 5)
     _, surface = constraint(points, rows, still=[3, 15])
     row = surface.row[4]
-    p, t = follow_curve(surface, surface.place[row], *(points[2] * 1.1))
+    p, t = follow_curve(surface.piece, surface.before, surface.after, surface.place[row], *(points[2] * 1.1))
     assert tuple(snap3(surface, row, *points[2])[:3]) == tuple(points[3])
     assert (surface.piece[p, 0] == points[3]).all() or (surface.piece[p, 3] == points[3]).all()
     assert t in (0.0, 1.0)

@@ -161,6 +161,6 @@ def test_order_in_memory_along_a_curve(seed, nodes, flat):
     points[rng.integers(nodes)] = points[0]
     keys, other = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
     memory, position = np.empty(nodes, dtype=np.int32), np.empty(nodes, dtype=np.int32)
-    morton_order3(points, keys, other, memory, position)
+    morton_order3(points, np.empty((0, 3)), keys, other, memory, position)
     assert memory.tolist() == naive.morton_order3(points[:, :3])
     assert position[memory].tolist() == list(range(nodes))

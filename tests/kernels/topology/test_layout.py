@@ -14,7 +14,9 @@ from gmsnet.kernels.topology import layout
 def memory_order(points):
     n = len(points)
     memory, position = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
-    layout.morton_order(points, np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), memory, position)
+    layout.morton_order(
+        points, np.empty((0, 2)), np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), memory, position
+    )
     np.testing.assert_array_equal(position[memory], np.arange(n))
     return memory.tolist()
 
@@ -49,3 +51,20 @@ def test_faces_by_their_first_node_in_memory_and_else_as_in_the_file():
     new_first, taken = np.concatenate([[0], np.cumsum(sizes[order])]), np.empty_like(corner)
     layout.take_faces(first, place, order, new_first, taken)
     assert taken.tolist() == [c for f in order for c in place[first[f] : first[f + 1]].tolist()]
+
+
+def test_points_of_a_part_stand_in_the_order_of_the_whole():
+    rng = np.random.default_rng(2)
+    points = rng.normal(size=(2000, 2))
+    box = np.stack([points.min(axis=0), points.max(axis=0)])
+    codes = np.empty(len(points), dtype=np.int64)
+    layout.morton_codes(points, box, codes)
+    whole = memory_order(points)
+    assert whole == np.lexsort((np.arange(len(points)), codes)).tolist()
+    some = np.sort(rng.choice(len(points), 300, replace=False))
+    memory, position = np.empty((2, 300), dtype=np.int32)
+    layout.morton_order(
+        points[some], box, np.empty(300, dtype=np.int64), np.empty(300, dtype=np.int64), memory, position
+    )
+    chosen = set(some.tolist())
+    assert some[memory].tolist() == [i for i in whole if i in chosen]

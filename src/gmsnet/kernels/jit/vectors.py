@@ -19,7 +19,7 @@ from gmsnet.kernels.jit.compile import Part
 
 WIDTH = 16  # lanes
 REAL, DOUBLE, NUMBER, INDEX, BYTE = ir.FloatType(), ir.DoubleType(), ir.IntType(32), ir.IntType(64), ir.IntType(8)
-REALS, NUMBERS = ir.VectorType(REAL, WIDTH), ir.VectorType(NUMBER, WIDTH)
+REALS, NUMBERS, DOUBLES = (ir.VectorType(kind, WIDTH) for kind in (REAL, NUMBER, DOUBLE))
 
 
 def index(value: int) -> ir.Constant:
@@ -27,19 +27,19 @@ def index(value: int) -> ir.Constant:
     return ir.Constant(INDEX, value)
 
 
-def constant(value: float) -> ir.Constant:
+def constant(value: float, kind: Any = REALS) -> ir.Constant:
     """The same number in all lanes."""
-    return ir.Constant(REALS, [ir.Constant(REAL, float(np.float32(value)))] * WIDTH)
+    return ir.Constant(kind, [ir.Constant(kind.element, float(np.float32(value)) if kind == REALS else value)] * WIDTH)
 
 
 class Vector:
-    """WIDTH floats in a register."""
+    """WIDTH floats in a register, or float64 in two."""
 
     def __init__(self, builder: Any, value: Any) -> None:
         self.builder, self.value = builder, value
 
     def _of(self, other: Vector | float) -> Any:
-        return other.value if isinstance(other, Vector) else constant(other)
+        return other.value if isinstance(other, Vector) else constant(other, self.value.type)
 
     def __add__(self, other: Vector | float) -> Vector:
         return Vector(self.builder, self.builder.fadd(self.value, self._of(other)))
@@ -50,8 +50,26 @@ class Vector:
     def __mul__(self, other: Vector | float) -> Vector:
         return Vector(self.builder, self.builder.fmul(self.value, self._of(other)))
 
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Vector | float) -> Vector:
+        return Vector(self.builder, self.builder.fdiv(self.value, self._of(other)))
+
     def __rtruediv__(self, other: float) -> Vector:
-        return Vector(self.builder, self.builder.fdiv(constant(other), self.value))
+        return Vector(self.builder, self.builder.fdiv(self._of(other), self.value))
+
+    def size(self) -> Vector:
+        """Without its sign."""
+        return Vector(self.builder, self.builder.select(self.below(-1.0 * self), (-1.0 * self).value, self.value))
+
+    def widened(self) -> Vector:
+        """In float64."""
+        return Vector(self.builder, self.builder.fpext(self.value, DOUBLES))
+
+    def above(self, least: float) -> Vector:
+        """This where it is at least so large, and elsewhere zero; what is not a number stays so."""
+        small = self.builder.fcmp_ordered("<", self.value, self._of(least))
+        return self.where(self.builder.not_(small), 0.0)
 
     def below(self, other: Vector) -> Any:
         """A mask: where this is less."""
@@ -65,6 +83,11 @@ class Vector:
 def smaller(one: Vector, other: Vector) -> Vector:
     """The smaller of the two in each lane; ``other`` where one is not a number."""
     return Vector(one.builder, one.builder.select(one.below(other), one.value, other.value))
+
+
+def larger(one: Vector, other: Vector) -> Vector:
+    """The larger of the two in each lane; ``other`` where one is not a number."""
+    return Vector(one.builder, one.builder.select(other.below(one), one.value, other.value))
 
 
 def root(x: Vector) -> Vector:
@@ -105,8 +128,9 @@ def store(builder: Any, base: Any, offset: Any, value: Any, align: int = 4) -> N
 
 
 def broadcast(builder: Any, number: Any) -> Vector:
-    """A float in all lanes."""
-    one = builder.insert_element(ir.Constant(REALS, ir.Undefined), number, ir.Constant(NUMBER, 0))
+    """A number in all lanes."""
+    kind = ir.VectorType(number.type, WIDTH)
+    one = builder.insert_element(ir.Constant(kind, ir.Undefined), number, ir.Constant(NUMBER, 0))
     return Vector(builder, builder.shuffle_vector(one, one, ir.Constant(NUMBERS, [ir.Constant(NUMBER, 0)] * WIDTH)))
 
 
@@ -116,20 +140,23 @@ def mask_of(*lanes: int) -> ir.Constant:
 
 
 def transposed(builder: Any, rows: Sequence[Any]) -> list[Vector]:
-    """The components x, y and z of WIDTH vectors (x, y, z, ·) of four floats each."""
-    found: list[list[Any]] = [[], [], []]
-    for k in range(0, WIDTH, 4):
-        first = builder.shuffle_vector(rows[k], rows[k + 1], mask_of(0, 4, 1, 5))
-        second = builder.shuffle_vector(rows[k + 2], rows[k + 3], mask_of(0, 4, 1, 5))
-        third = builder.shuffle_vector(rows[k], rows[k + 1], mask_of(2, 6, 3, 7))
-        fourth = builder.shuffle_vector(rows[k + 2], rows[k + 3], mask_of(2, 6, 3, 7))
-        found[0].append(builder.shuffle_vector(first, second, mask_of(0, 1, 4, 5)))
-        found[1].append(builder.shuffle_vector(first, second, mask_of(2, 3, 6, 7)))
-        found[2].append(builder.shuffle_vector(third, fourth, mask_of(0, 1, 4, 5)))
-    return [Vector(builder, _joined(builder, parts)) for parts in found]
+    """The components x, y and z of WIDTH vectors (x, y, z, ·) of four floats each.
+
+    Every fourth one goes into one register first: so one shuffle does for all.
+    """
+    parts = [_joined(builder, rows[k::4]) for k in range(4)]
+
+    def mixed(one: Any, other: Any, *lanes: int) -> Any:
+        places = (4 * part + lane + (WIDTH - 4) * (lane > 3) for part in range(WIDTH // 4) for lane in lanes)
+        return builder.shuffle_vector(one, other, mask_of(*places))
+
+    first, second = mixed(parts[0], parts[1], 0, 4, 1, 5), mixed(parts[2], parts[3], 0, 4, 1, 5)
+    third, fourth = mixed(parts[0], parts[1], 2, 6, 3, 7), mixed(parts[2], parts[3], 2, 6, 3, 7)
+    found = mixed(first, second, 0, 1, 4, 5), mixed(first, second, 2, 3, 6, 7), mixed(third, fourth, 0, 1, 4, 5)
+    return [Vector(builder, component) for component in found]
 
 
-def _joined(builder: Any, parts: list[Any]) -> Any:
+def _joined(builder: Any, parts: Sequence[Any]) -> Any:
     while len(parts) > 1:
         size = parts[0].type.count
         parts = [

@@ -17,14 +17,11 @@ from numpy.typing import NDArray
 from gmsnet.kernels.jit.compile import kernel, part
 from gmsnet.kernels.star.slide3 import restrict3
 from gmsnet.kernels.star.space import (
-    AFTER,
     GX,
     GY,
     GZ,
     ISO,
     LANES3,
-    LEAST,
-    MARGIN,
     VALUE,
     XX,
     XY,
@@ -33,7 +30,7 @@ from gmsnet.kernels.star.space import (
     YZ,
     ZZ,
 )
-from gmsnet.kernels.star.stars3 import certify3, derive3, fetch3, judge3, store3, workspace3_for
+from gmsnet.kernels.star.stars3 import derive3, fetch3, judge3, settle3, store3, try_alone, workspace3_for
 
 TRIALS = 10
 K3 = 432.0  # S³/D² of a regular tetrahedron
@@ -41,20 +38,24 @@ FLAT = 1e-5  # of F: a node with less to gain stays, for float32 does not tell i
 
 
 class Power3(NamedTuple):
-    """number: k of p = 3·2^k, −1 for p = 3/2. constants: see kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m."""
+    """number: k of p = 3·2^k, from −2 on. constants: see kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m.
+
+    trials: of a step, each half as long as the one before.
+    """
 
     number: int
     constants: NDArray[np.float32]
     isotropic: float
     ratio: float
+    trials: int = TRIALS
 
     @classmethod
-    def of(cls, number: int, worst: float = 1.0) -> Power3:
+    def of(cls, number: int, worst: float = 1.0, trials: int = TRIALS) -> Power3:
         """Of a power, of (q/q_worst)^p. worst: q_worst³, so that high powers stay within float32."""
-        p = 1.5 if number < 0 else 3.0 * 2.0**number
+        p = 3.0 * 2.0**number
         scale, m = 1.0 / (K3 * worst), 2.0 * p / 3.0
         constants = (scale, math.sqrt(scale), 2.0 * p, m, 0.5 * (1.0 + 1.0 / m), 1.0 - 1.0 / p)
-        return cls(number, np.array(constants, dtype=np.float32), 6.0 * p, 1.0 + 1.0 / m)
+        return cls(number, np.array(constants, dtype=np.float32), 6.0 * p, 1.0 + 1.0 / m, trials)
 
 
 @part
@@ -87,40 +88,29 @@ def propose3(sums, power, relaxation, step):
 
 
 @part
-def settle3(workspace, unit, grain, last, mixture=None):
-    """Which lanes may go as they are: certified, and F falls. Where F does not fall the step is halved; counts them.
-
-    mixture: of the blocks. last: there is no further trial, and such steps become zero. What falls and is not certified
-    may be so in float64: halved, a sliver's step would be no more certain, and lead nowhere.
-    """
-    certify3(workspace, unit, grain, mixture)
-    sums, step, refused = workspace.sums, workspace.step, 0
-    for lane in range(LANES3):
-        before, after = sums[VALUE * LANES3 + lane], sums[AFTER * LANES3 + lane]
-        # Beyond the rim, where D < 0, powers of q are small: that is no gain.
-        inside = min(sums[LEAST * LANES3 + lane], sums[MARGIN * LANES3 + lane]) > np.float32(0.0)
-        falls = (after < before) and inside
-        still = step[lane] == 0.0 and step[LANES3 + lane] == 0.0 and step[2 * LANES3 + lane] == 0.0
-        workspace.allowed[lane] = workspace.allowed[lane] and falls
-        refused += not (falls or still)
-        factor = np.float32(1.0) if falls else np.float32(0.0 if last else 0.5)
-        for k in range(3):
-            step[k * LANES3 + lane] *= factor
-    return refused
-
-
-@kernel
-def sweep3(points, blocks, first, last, guard, power, relaxation, tally):
-    """Visits the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
-    workspace = workspace3_for(blocks.most, blocks.most_simplices)
+def smooth_some(points, blocks, first, last, guard, power, relaxation, workspace, tally):
+    """Visits the blocks first…last until lanes of one are to be tried alone. Returns which one, or the last."""
     floor = max(guard.floor, 0.0)
     for block in range(first, last):
         fetch3(points, blocks, block, workspace)
         derive3(blocks, block, power, None, workspace)
         restrict3(guard.constraint, blocks, block, power.isotropic, workspace)
         propose3(workspace.sums, power, relaxation, workspace.step)
-        for trial in range(TRIALS):
+        for trial in range(power.trials):
             judge3(blocks, block, power, None, floor, workspace, guard.constraint)
-            if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1, blocks.mixture) == 0:
+            if settle3(workspace, guard.unit, guard.grain, trial == power.trials - 1, blocks.mixture) == 0:
                 break
-        store3(points, blocks, block, workspace, guard, tally)
+        if store3(points, blocks, block, workspace, guard, tally):
+            return block
+    return last
+
+
+@kernel
+def sweep3(points, blocks, first, last, guard, power, relaxation, tally):
+    """Visits the blocks first…last (of one colour) once: gather, propose, guard, commit. tally: (3,), added to."""
+    workspace, block = workspace3_for(blocks.most, blocks.most_simplices), first
+    while block < last:
+        block = smooth_some(points, blocks, block, last, guard, power, relaxation, workspace, tally)
+        if block < last:
+            try_alone(points, blocks, block, workspace, guard, tally)
+            block += 1

@@ -158,7 +158,7 @@ def newton_step3(sums):
 def newton3(aim, scale, way, ends, count, steps, lowest, sums, mixture):
     """Where so many Newton steps lead from the origin. sums: as ``evaluate3`` leaves them there, with derivatives."""
     x, y, z = 0.0, 0.0, 0.0
-    for _ in range(steps):
+    for step in range(steps):
         confine(way, sums)
         value, gx, gy, gz = sums[VALUE], sums[GX], sums[GY], sums[GZ]
         dx, dy, dz = newton_step3(sums)
@@ -177,7 +177,7 @@ def newton3(aim, scale, way, ends, count, steps, lowest, sums, mixture):
                 x, y, z, taken = tx, ty, tz, True
                 break
             share *= 0.5
-        if not taken:
+        if not taken or step == steps - 1:
             break
         evaluate3(aim, scale, ends, count, x, y, z, lowest, True, sums, mixture)
     return x, y, z

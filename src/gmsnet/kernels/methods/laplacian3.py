@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
-from gmsnet.kernels.methods.barrier3 import TRIALS, settle3
+from gmsnet.kernels.methods.barrier3 import TRIALS
 from gmsnet.kernels.star.space import LANES3
-from gmsnet.kernels.star.stars3 import certify3, derive3, fetch3, judge3, store3, workspace3_for
+from gmsnet.kernels.star.stars3 import certify3, derive3, fetch3, judge3, settle3, store3, try_alone, workspace3_for
 
 
 @inlined
@@ -34,10 +34,9 @@ def to_mean(blocks, block, workspace):
         step[lane], step[LANES3 + lane], step[2 * LANES3 + lane] = share * x, share * y, share * z
 
 
-@kernel
-def sweep3(points, blocks, first, last, guard, power, smart, tally):
-    """Visits the blocks first…last (of one colour) once. smart: only as far as the sum of q^(3/2) of the star falls."""
-    workspace = workspace3_for(blocks.most, blocks.most_simplices)
+@part
+def smooth_some(points, blocks, first, last, guard, power, smart, workspace, tally):
+    """Visits the blocks first…last until lanes of one are to be tried alone. Returns which one, or the last."""
     floor = max(guard.floor, 0.0)
     for block in range(first, last):
         fetch3(points, blocks, block, workspace)
@@ -50,4 +49,17 @@ def sweep3(points, blocks, first, last, guard, power, smart, tally):
                 break
             if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1, blocks.mixture) == 0:
                 break
-        store3(points, blocks, block, workspace, guard, tally)
+        if store3(points, blocks, block, workspace, guard, tally):
+            return block
+    return last
+
+
+@kernel
+def sweep3(points, blocks, first, last, guard, power, smart, tally):
+    """Visits the blocks first…last (of one colour) once. smart: only as far as the sum of q^(3/2) of the star falls."""
+    workspace, block = workspace3_for(blocks.most, blocks.most_simplices), first
+    while block < last:
+        block = smooth_some(points, blocks, block, last, guard, power, smart, workspace, tally)
+        if block < last:
+            try_alone(points, blocks, block, workspace, guard, tally)
+            block += 1

@@ -23,6 +23,7 @@ from gmsnet.kernels.methods.barrier_star import newton_step
 from gmsnet.kernels.methods.worst_first import power
 from gmsnet.kernels.simplex.mean_ratio2 import pull, roundness
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
+from gmsnet.kernels.star.chords import near
 from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at, weights_of
 from gmsnet.kernels.star.shell import allowed, crossed, gather, half_lengths3, square
 from gmsnet.kernels.star.surface import directions_at, land_on, on_curves
@@ -155,7 +156,8 @@ def go(points, i, stars, guard, star, n, pattern, floors, reach, dx, dy, dz, val
             break
         after, _ = value_at(star, n, pattern, x, y, z, inverse, doublings)
         falls = after < value
-        if falls and allowed(star, n, pattern, stars, stars.first[i], floors, guard, reach, x, y, z, was, normal):
+        falls = falls and allowed(star, n, pattern, stars, stars.first[i], floors, guard, reach, x, y, z, was, normal)
+        if falls and near(surface.bound, surface, row, star, n, pattern, place, x, y, z, was):
             points[i, 0], points[i, 1], points[i, 2] = x, y, z
             surface.place[row] = place
             tally[MOVED] += 1
@@ -234,7 +236,8 @@ def go_once(points, i, stars, guard, star, n, pattern, floors, reach, dx, dy, dz
     x, y, z, place = landed(surface, row, was[0] + dx, was[1] + dy, was[2] + dz, normal)
     after, _ = value_at(star, n, pattern, x, y, z, inverse, doublings)
     falls = after < value
-    if falls and allowed(star, n, pattern, stars, stars.first[i], floors, guard, reach, x, y, z, was, normal):
+    falls = falls and allowed(star, n, pattern, stars, stars.first[i], floors, guard, reach, x, y, z, was, normal)
+    if falls and near(surface.bound, surface, row, star, n, pattern, place, x, y, z, was):
         points[i, 0], points[i, 1], points[i, 2] = x, y, z
         surface.place[row] = place
         tally[MOVED] += 1
@@ -245,12 +248,13 @@ def go_once(points, i, stars, guard, star, n, pattern, floors, reach, dx, dy, dz
 @inlined
 def tangled(star, n, pattern, stars, at, x, y, z):
     """Is a simplex of the star not upright?"""
+    side = stars.side
     for k in range(count_of(pattern, n)):
         i, j = pair_of(pattern, n, k)
         ax, ay, az = star[3 * i] - x, star[3 * i + 1] - y, star[3 * i + 2] - z
         bx, by, bz = star[3 * j] - x, star[3 * j + 1] - y, star[3 * j + 2] - z
         cx, cy, cz = crossed(ax, ay, az, bx, by, bz)
-        if not (cx * stars.side[at + k, 0] + cy * stars.side[at + k, 1]) + cz * stars.side[at + k, 2] > 0.0:
+        if not (cx * side[at + k, 0] + cy * side[at + k, 1]) + cz * side[at + k, 2] > 0.0:
             return True
     return False
 

@@ -19,7 +19,7 @@ from gmsnet.kernels.methods.shell import MOST, improve
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.certificate import COARSE, WIDER
 from gmsnet.kernels.star.shell import LEAN, crossed, square
-from gmsnet.kernels.star.surface import land_on, on_curves
+from gmsnet.kernels.star.surface import CURVED, land_curved, land_on, on_curves
 
 FLAT = 300.0  # mean Q of a star: beyond, float32 does not tell enough
 VALUE, GX, GY, GZ, XX, YY, ZZ, XY, XZ, YZ, ISO, SX, SY, SZ, LEAST, AFTER, MARGIN, LEANS = range(18)
@@ -30,9 +30,9 @@ ROUNDING = 1024.0
 @part
 def relate(points, blocks, block, n, centre, inverse, wide, local):
     """Ring minus centre over the length of the first spoke, into ``local``; the largest component into ``wide``."""
-    offset = blocks.offset[block]
+    offset, nodes, rings = blocks.offset[block], blocks.centre, blocks.rings
     for lane in range(LANES):
-        i, j = np.uint32(blocks.centre[block * LANES + lane]), np.uint32(blocks.rings[offset + lane])
+        i, j = np.uint32(nodes[block * LANES + lane]), np.uint32(rings[offset + lane])
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         centre[lane], centre[LANES + lane], centre[2 * LANES + lane] = x, y, z
         size = abs(points[j, 0] - x) + abs(points[j, 1] - y) + abs(points[j, 2] - z)
@@ -41,7 +41,7 @@ def relate(points, blocks, block, n, centre, inverse, wide, local):
     for j in range(n):
         at = 3 * j * LANES
         for lane in range(LANES):
-            k = np.uint32(blocks.rings[offset + j * LANES + lane])
+            k = np.uint32(rings[offset + j * LANES + lane])
             local[at + lane] = (points[k, 0] - centre[lane]) * inverse[lane]
             local[at + LANES + lane] = (points[k, 1] - centre[LANES + lane]) * inverse[lane]
             local[at + 2 * LANES + lane] = (points[k, 2] - centre[2 * LANES + lane]) * inverse[lane]
@@ -53,11 +53,12 @@ def relate(points, blocks, block, n, centre, inverse, wide, local):
 @part
 def take_sides(stars, blocks, block, n, sides):
     """The vectors n of the simplices of a block, [simplex][axis][lane]."""
+    first, side, nodes = stars.first, stars.side, blocks.centre
     for lane in range(LANES):
-        at = stars.first[blocks.centre[block * LANES + lane]]
+        at = first[nodes[block * LANES + lane]]
         for k in range(n):
             for axis in range(3):
-                sides[(3 * k + axis) * LANES + lane] = stars.side[at + k, axis]
+                sides[(3 * k + axis) * LANES + lane] = side[at + k, axis]
 
 
 @part
@@ -151,21 +152,24 @@ def to_mean(local, n, stretch, step):
 @part
 def land(surface, blocks, block, centre, inverse, done, step, target, normal, place):
     """Where the nodes that are not done come to lie, and the steps that lead there."""
+    rows, kinds, places, limits, single = surface.row, surface.kind, surface.place, surface.limit, surface.single
+    corner, beside, control, normals = surface.corner, surface.beside, surface.control, surface.normal
+    nodes, first = blocks.centre, block * LANES
     for lane in range(LANES):
-        row = surface.row[blocks.centre[block * LANES + lane]]
-        if done[lane] or row < 0 or on_curves(surface.kind[row]):
+        row = np.int64(rows[nodes[first + lane]])
+        if done[lane] or row < 0 or on_curves(kinds[row]):
             continue
         dx, dy, dz = np.float64(step[lane]), np.float64(step[LANES + lane]), np.float64(step[2 * LANES + lane])
         if not np.isfinite(dx + dy + dz):
             dx = dy = dz = 0.0
         size = 1.0 / inverse[lane]
-        x, y, z, place[lane], u, v, w = land_on(
-            surface,
-            row,
-            centre[lane] + size * dx,
-            centre[LANES + lane] + size * dy,
-            centre[2 * LANES + lane] + size * dz,
-        )
+        x, y, z = centre[lane] + size * dx, centre[LANES + lane] + size * dy, centre[2 * LANES + lane] + size * dz
+        if kinds[row] == CURVED:
+            x, y, z, place[lane], u, v, w = land_curved(
+                corner, beside, control, normals, limits[row], single, np.int64(places[row]), x, y, z
+            )
+        else:
+            x, y, z, place[lane], u, v, w = land_on(surface, row, x, y, z)
         target[lane], target[LANES + lane], target[2 * LANES + lane] = x, y, z
         normal[lane], normal[LANES + lane], normal[2 * LANES + lane] = u, v, w
         step[lane] = (x - centre[lane]) * inverse[lane]
@@ -204,10 +208,11 @@ def judge(local, sides, n, step, normal, floor, sums):
 def settle(points, surface, blocks, block, unit, grain, most, centre, inverse, wide, step, target, place, sums, done,
            tally):  # fmt: skip
     """Commits what is certain, of the lanes that hold stars of their own."""
+    nodes, rows, kinds, places = blocks.centre, surface.row, surface.kind, surface.place
     for lane in range(blocks.filled[block]):
-        i = blocks.centre[block * LANES + lane]
-        row = surface.row[i]
-        if done[lane] or row < 0 or on_curves(surface.kind[row]):
+        i = nodes[block * LANES + lane]
+        row = rows[i]
+        if done[lane] or row < 0 or on_curves(kinds[row]):
             continue
         tx, ty, tz = abs(step[lane]), abs(step[LANES + lane]), abs(step[2 * LANES + lane])
         m = np.float64(max(wide[lane], max(tx, max(ty, tz))))
@@ -220,7 +225,7 @@ def settle(points, surface, blocks, block, unit, grain, most, centre, inverse, w
             x, y, z = target[lane], target[LANES + lane], target[2 * LANES + lane]
             tally[MOVED] += (x != points[i, 0]) | (y != points[i, 1]) | (z != points[i, 2])
             points[i, 0], points[i, 1], points[i, 2] = x, y, z
-            surface.place[row] = place[lane]
+            places[row] = place[lane]
             done[lane] = True
 
 

@@ -138,9 +138,27 @@ def squared_edges(ax, ay, az, bx, by, bz, cx, cy, cz):
 @kernel
 def cubed_ratios(points, rows, orientation, shapes, first, last, out):
     """S³/D² of the corner simplices first…last, 432·η⁻³, into out (T,); infinite where the volume is not positive."""
-    for t in range(first, last):
-        ax, ay, az, bx, by, bz, cx, cy, cz = spokes_of(points, rows, t)
-        weights = weights_at(shapes, t)
-        double, lengths, _, _, _, _, _, _ = measured_as(ax, ay, az, bx, by, bz, cx, cy, cz, weights)
-        double *= orientation[t]
-        out[t] = lengths * lengths * lengths / (double * double) if double > 0.0 else np.inf
+    if shapes is None:
+        work = np.ones(10 * LANES)
+        for start in range(first, last, LANES):
+            count = min(LANES, last - start)
+            gather(points, rows, orientation, start, count, work)
+            for lane in range(count):
+                out[start + lane] = cubed_ratio(
+                    work[lane], work[LANES + lane], work[2 * LANES + lane], work[3 * LANES + lane],
+                    work[4 * LANES + lane], work[5 * LANES + lane], work[6 * LANES + lane], work[7 * LANES + lane],
+                    work[8 * LANES + lane], None, work[9 * LANES + lane],
+                )  # fmt: skip
+    else:
+        for t in range(first, last):
+            ax, ay, az, bx, by, bz, cx, cy, cz = spokes_of(points, rows, t)
+            weights = weights_at(shapes, t)
+            out[t] = cubed_ratio(ax, ay, az, bx, by, bz, cx, cy, cz, weights, np.float64(orientation[t]))
+
+
+@inlined
+def cubed_ratio(ax, ay, az, bx, by, bz, cx, cy, cz, weights, sign):
+    """The same of one."""
+    double, lengths, _, _, _, _, _, _ = measured_as(ax, ay, az, bx, by, bz, cx, cy, cz, weights)
+    double *= sign
+    return lengths * lengths * lengths / (double * double) if double > 0.0 else np.inf

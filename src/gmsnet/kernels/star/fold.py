@@ -33,7 +33,7 @@ def side_of_facet(surface, row, place, e, points, x, y, z):
     nx, ny, nz = surface.own[e, 0], surface.own[e, 1], surface.own[e, 2]
     if surface.kind[row] == CURVED:
         mx, my, mz = points[i, 0] + points[j, 0], points[i, 1] + points[j, 1], points[i, 2] + points[j, 2]
-        f, a, b, c = walk(surface, place, (x + mx) / 3.0, (y + my) / 3.0, (z + mz) / 3.0)
+        f, a, b, c = walk(surface.corner, surface.beside, place, (x + mx) / 3.0, (y + my) / 3.0, (z + mz) / 3.0)
         nx, ny, nz = normal_on(surface.normal, f, a, b, c)
     return cosine_of(points, i, j, x, y, z, nx, ny, nz)
 

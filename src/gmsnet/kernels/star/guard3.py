@@ -99,11 +99,9 @@ def ratio_upper_bound3(ax, ay, az, bx, by, bz, cx, cy, cz, delta, weights=None):
     value, bound = determinant_and_bound(ax, ay, az, bx, by, bz, cx, cy, cz, delta)
     lengths, error = length_bounds_by(ax, ay, az, bx, by, bz, cx, cy, cz, delta, weights)
     least = lengths - error
-    if value + bound <= 0.0:
-        return 0.0
-    if not least > 0.0:
-        return LARGEST3
-    return min((value + bound) / (least * math.sqrt(least)) * (1.0 + 16.0 * UNIT), LARGEST3)
+    ratio = min((value + bound) / (least * math.sqrt(max(least, 0.0))) * (1.0 + 16.0 * UNIT), LARGEST3)
+    ratio = ratio if least > 0.0 else LARGEST3
+    return 0.0 if value + bound <= 0.0 else ratio
 
 
 @inlined
@@ -124,12 +122,55 @@ def ratio_of_row3(points, simplices, t, unit, grain):
 @kernel
 def ratio_upper_bounds3(points, simplices, blocks, unit, grain, first, last, least):
     """As guard.ratio_upper_bounds: the minimum over each of the blocks of LANES simplices, into ``least``."""
+    work = np.ones(11 * LANES)
     for number in range(first, last):
         start = blocks[number] * LANES
-        ratio = np.inf
-        for t in range(start, min(start + LANES, len(simplices.rows))):
-            ratio = min(ratio, ratio_of_row3(points, simplices, t, unit, grain))
+        end, ratio = min(start + LANES, len(simplices.rows)), np.inf
+        if simplices.shapes is None:
+            gather3(points, simplices, start, end, work)
+            for lane in range(end - start):
+                work[10 * LANES + lane] = ratio_in_lane(work, lane, unit, grain)
+            for lane in range(end - start):
+                ratio = min(ratio, work[10 * LANES + lane])
+        else:
+            for t in range(start, end):
+                ratio = min(ratio, ratio_of_row3(points, simplices, t, unit, grain))
         least[number] = ratio
+
+
+@inlined
+def gather3(points, simplices, first, last, work):
+    """The spokes of rows first…last, read in their orientation, into rows 0 to 8 of a workspace; into row 9 how far
+    their first nodes are from zero.
+    """
+    rows, orientation = simplices.rows, simplices.orientation
+    for t in range(first, last):
+        lane, forth = t - first, orientation[t] > 0
+        v, x, y, z = place_of(points, rows[t, 0])
+        for k, node in enumerate((rows[t, 1], rows[t, 2 if forth else 3], rows[t, 3 if forth else 2])):
+            work[3 * k * LANES + lane] = points[np.uint32(node), 0] - x
+            work[(3 * k + 1) * LANES + lane] = points[np.uint32(node), 1] - y
+            work[(3 * k + 2) * LANES + lane] = points[np.uint32(node), 2] - z
+        work[9 * LANES + lane] = v
+
+
+@inlined
+def place_of(points, node):
+    """How far a node is from zero in any direction, and where it is."""
+    i = np.uint32(node)
+    x, y, z = points[i, 0], points[i, 1], points[i, 2]
+    return max(max(abs(x), abs(y)), abs(z)), x, y, z
+
+
+@inlined
+def ratio_in_lane(work, lane, unit, grain):
+    """``ratio_upper_bound3`` of what ``gather3`` has left."""
+    ax, ay, az = work[lane], work[LANES + lane], work[2 * LANES + lane]
+    bx, by, bz = work[3 * LANES + lane], work[4 * LANES + lane], work[5 * LANES + lane]
+    cx, cy, cz = work[6 * LANES + lane], work[7 * LANES + lane], work[8 * LANES + lane]
+    m = largest_component(ax, ay, az, bx, by, bz, cx, cy, cz)
+    delta = unit * (work[9 * LANES + lane] + m) + grain
+    return ratio_upper_bound3(ax, ay, az, bx, by, bz, cx, cy, cz, delta, None)
 
 
 @kernel

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
-from gmsnet.kernels.star.surface import CURVE, CURVED, follow_curve, walk
+from gmsnet.kernels.star.pieces import follow_curve
+from gmsnet.kernels.star.surface import CURVE, CURVED, walk
 
 
 @inlined
@@ -24,10 +25,9 @@ def edge_length(corner, f, k):
 
 
 @part
-def off_facet(surface, place, x, y, z):
+def off_facet(corner, beside, place, x, y, z):
     """The distance of a point from the facet nearest to it, from ``place`` on, over the mean length of its edges."""
-    corner = surface.corner
-    f, a, b, c = walk(surface, place, x, y, z)
+    f, a, b, c = walk(corner, beside, place, x, y, z)
     px = a * corner[f, 0, 0] + b * corner[f, 1, 0] + c * corner[f, 2, 0]
     py = a * corner[f, 0, 1] + b * corner[f, 1, 1] + c * corner[f, 2, 1]
     pz = a * corner[f, 0, 2] + b * corner[f, 1, 2] + c * corner[f, 2, 2]
@@ -36,10 +36,9 @@ def off_facet(surface, place, x, y, z):
 
 
 @part
-def off_edge(surface, place, x, y, z):
+def off_edge(piece, before, after, place, x, y, z):
     """The same of the edge of a curve."""
-    piece = surface.piece
-    p, t = follow_curve(surface, place, x, y, z)
+    p, t = follow_curve(piece, before, after, place, x, y, z)
     ax, ay, az = piece[p, 0, 0], piece[p, 0, 1], piece[p, 0, 2]
     bx, by, bz = piece[p, 3, 0], piece[p, 3, 1], piece[p, 3, 2]
     away = distance(ax + t * (bx - ax), ay + t * (by - ay), az + t * (bz - az), x, y, z)
@@ -52,14 +51,16 @@ def farthest(surface, points, moved):
 
     points: (N, 3 or 4). Nodes on planes and lines are on them. No place that is kept changes.
     """
-    most = 0.0
-    for node in range(len(surface.row)):
-        row = surface.row[node]
+    most, rows, kinds, places = 0.0, surface.row, surface.kind, surface.place
+    corner, beside = surface.corner, surface.beside
+    piece, before, after = surface.piece, surface.before, surface.after
+    for node in range(len(rows)):
+        row = rows[node]
         if row < 0 or not moved[node]:
             continue
-        kind, place = surface.kind[row], surface.place[row]
-        if kind == CURVED:
-            most = max(most, off_facet(surface, place, points[node, 0], points[node, 1], points[node, 2]))
-        elif kind == CURVE:
-            most = max(most, off_edge(surface, place, points[node, 0], points[node, 1], points[node, 2]))
+        x, y, z = points[node, 0], points[node, 1], points[node, 2]
+        if kinds[row] == CURVED:
+            most = max(most, off_facet(corner, beside, places[row], x, y, z))
+        elif kinds[row] == CURVE:
+            most = max(most, off_edge(piece, before, after, places[row], x, y, z))
     return most

@@ -202,7 +202,7 @@ def allowed(star, n, pattern, stars, at, floors, guard, reach, x, y, z, was, nor
     reference at (x, y, z), zero where there is none.
     """
     reach = max(max(reach, abs(x)), max(abs(y), abs(z)))
-    delta = guard.unit * reach + guard.grain
+    delta, side = guard.unit * reach + guard.grain, stars.side
     for k in range(count_of(pattern, n)):
         i, j = pair_of(pattern, n, k)
         other = other_of(pattern, k, i)
@@ -210,7 +210,7 @@ def allowed(star, n, pattern, stars, at, floors, guard, reach, x, y, z, was, nor
         bx, by, bz = star[3 * j] - x, star[3 * j + 1] - y, star[3 * j + 2] - z
         cx, cy, cz = crossed(ax, ay, az, bx, by, bz)
         bound = error_bound_of(largest6(ax, ay, az, bx, by, bz), delta)
-        nx, ny, nz = stars.side[at + k, 0], stars.side[at + k, 1], stars.side[at + k, 2]
+        nx, ny, nz = side[at + k, 0], side[at + k, 1], side[at + k, 2]
         if not (cx * nx + cy * ny) + cz * nz > bound:
             return False
         double = math.sqrt(square(cx, cy, cz))

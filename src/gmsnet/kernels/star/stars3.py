@@ -12,12 +12,11 @@ from gmsnet.kernels.simplex.orientation3 import largest_component
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.fold import folds, refuse_folds
 from gmsnet.kernels.star.guard import WITH_FLOORS
-from gmsnet.kernels.star.guard3 import MIXED_BOUND, WIDER, certified, error_bound3, floor_at, sound
+from gmsnet.kernels.star.guard3 import MIXED_BOUND, WIDER, certified, floor_at, sound
 from gmsnet.kernels.star.slide3 import land3, note_places, on_surface, take_place
 from gmsnet.kernels.star.space import (
     KEPT,
     LANES3,
-    MARGIN,
     SUMS,
     derive,
     is_present,
@@ -26,17 +25,20 @@ from gmsnet.kernels.star.space import (
     rows_in,
     weights_in_row,
 )
+from gmsnet.kernels.star.verdict3 import certify, settle
 
+LINE = 64  # bytes
 HALVINGS = 12  # of a step that is not allowed
 
 
 class Workspace3(NamedTuple):
-    """The arrays that a sweep works in. star: the centres. size: of each star, inverse: 1/size in float32. width: the
-    largest component of each star, over its size. allowed: which lanes may be moved as they are. row: of the nodes that
-    slide, else below 0; target, place: where these go (slide3).
+    """The arrays that a sweep works in. star: the centres. reach: their largest component. size: of each star, inverse:
+    1/size in float32. width: the largest component of each star, over its size. allowed: which lanes may be moved as
+    they are. row: of the nodes that slide, else below 0; target, place: where these go (slide3).
     """
 
     star: NDArray[np.float64]
+    reach: NDArray[np.float64]
     size: NDArray[np.float64]
     inverse: NDArray[np.float32]
     local: NDArray[np.float32]
@@ -51,15 +53,23 @@ class Workspace3(NamedTuple):
     place: NDArray[np.int64]
 
 
+@inlined
+def aligned(count, kind):
+    """An array that begins with a line of the cache: a vector that lies in two of them takes twice as long."""
+    whole = np.empty(count + LINE, dtype=kind)
+    first = (-whole.ctypes.data % LINE) // whole.itemsize
+    return whole[first : first + count]
+
+
 @part
 def workspace3_for(most, most_simplices):
     """For stars of up to so many nodes around and simplices."""
     return Workspace3(
-        np.empty(4 * LANES3), np.empty(LANES3), np.empty(LANES3, dtype=np.float32),
-        np.empty(4 * most * LANES3, dtype=np.float32), np.empty(KEPT * most_simplices * LANES3, dtype=np.float32),
-        np.empty(SUMS * LANES3, dtype=np.float32), np.empty(3 * LANES3, dtype=np.float32),
-        np.empty(4 * LANES3, dtype=np.float32), np.empty(LANES3, dtype=np.float32), np.empty(LANES3, dtype=np.bool_),
-        np.empty(LANES3, dtype=np.int32), np.empty(4 * LANES3), np.empty(LANES3, dtype=np.int64),
+        np.empty(4 * LANES3), aligned(LANES3, np.float64), aligned(LANES3, np.float64), aligned(LANES3, np.float32),
+        aligned(4 * most * LANES3, np.float32), aligned(KEPT * most_simplices * LANES3, np.float32),
+        aligned(SUMS * LANES3, np.float32), aligned(3 * LANES3, np.float32), aligned(4 * LANES3, np.float32),
+        aligned(LANES3, np.float32), np.empty(LANES3, dtype=np.bool_), np.empty(LANES3, dtype=np.int32),
+        np.empty(4 * LANES3), np.empty(LANES3, dtype=np.int64),
     )  # fmt: skip
 
 
@@ -74,6 +84,7 @@ def fetch3(points, blocks, block, workspace):
             star[4 * lane + k] = points[i, k]
         size = abs(points[j, 0] - points[i, 0]) + abs(points[j, 1] - points[i, 1]) + abs(points[j, 2] - points[i, 2])
         size = size if size > 0.0 else 1.0
+        workspace.reach[lane] = max(abs(star[4 * lane]), max(abs(star[4 * lane + 1]), abs(star[4 * lane + 2])))
         workspace.size[lane] = size
         workspace.inverse[lane] = np.float32(1.0 / size)
     relate(points, blocks.ring, offset, n, star, workspace.inverse, workspace.local)
@@ -93,7 +104,7 @@ def derive3(blocks, block, power, soft, workspace):
     _derive(blocks.mixture, blocks, block, power, soft, workspace)
 
 
-@part
+@inlined
 def _derive(mixture, blocks, block, power, soft, workspace):
     rows = np.int64(blocks.simplices[block])
     if mixture is None:
@@ -115,7 +126,7 @@ def judge3(blocks, block, power, soft, floor, workspace, surface=None):
     _judge(blocks.mixture, blocks, block, power, soft, floor, workspace)
 
 
-@part
+@inlined
 def _judge(mixture, blocks, block, power, soft, floor, workspace):
     rows, at = np.int64(blocks.simplices[block]), blocks.at[block]
     if mixture is None:
@@ -130,17 +141,26 @@ def _judge(mixture, blocks, block, power, soft, floor, workspace):
         )  # fmt: skip
 
 
-@part
+@inlined
 def certify3(workspace, unit, grain, mixture):
     """``allowed``: which lanes are certified above the floor that their row MARGIN was made with, after their step."""
-    star, step, doubt = workspace.star, workspace.step, doubt_of(mixture)
-    for lane in range(LANES3):
-        far = max(abs(step[lane]), max(abs(step[LANES3 + lane]), abs(step[2 * LANES3 + lane])))
-        m = np.float64(max(workspace.width[lane], far))
-        size = workspace.size[lane]
-        reach = max(abs(star[4 * lane]), max(abs(star[4 * lane + 1]), abs(star[4 * lane + 2]))) + size * m
-        delta = WIDER * (unit * reach + grain) / size
-        workspace.allowed[lane] = workspace.sums[MARGIN * LANES3 + lane] > doubt * error_bound3(m, delta)
+    certify(
+        workspace.sums, workspace.step, workspace.width, workspace.reach, workspace.size, unit, grain,
+        doubt_of(mixture), workspace.allowed,
+    )  # fmt: skip
+
+
+@inlined
+def settle3(workspace, unit, grain, last, mixture=None):
+    """Which lanes may go as they are: certified, and F falls. Where F does not fall the step is halved; counts them.
+
+    mixture: of the blocks. last: there is no further trial, and such steps become zero. What falls and is not certified
+    may be so in float64: halved, a sliver's step would be no more certain, and lead nowhere.
+    """
+    return settle(
+        workspace.sums, workspace.step, workspace.width, workspace.reach, workspace.size, unit, grain,
+        doubt_of(mixture), workspace.allowed, last,
+    )  # fmt: skip
 
 
 @inlined
@@ -166,7 +186,7 @@ def place_after(workspace, guard, lane):
     return x, y, z
 
 
-@part
+@inlined
 def look_inside(mixture, points, blocks, block, workspace, guard):
     """Lanes a cell of which is not certified to be valid between its corners are no longer allowed."""
     if mixture is not None:
@@ -177,23 +197,46 @@ def look_inside(mixture, points, blocks, block, workspace, guard):
                 workspace.allowed[lane] = sound(mixture, points, i, x, y, z, guard.unit, guard.grain)
 
 
-@part
+@inlined
 def store3(points, blocks, block, workspace, guard, tally):
-    """Moves the free nodes of the lanes that are allowed, and tries the others one by one."""
-    step, count = workspace.step, blocks.filled[block]
+    """Moves the free nodes of the lanes that are allowed; returns whether others have steps, to be tried alone.
+
+    Those are rare, and what tries them counts references to each array that it hands on: it is called outside the loop
+    over blocks.
+    """
     if len(guard) != WITH_FLOORS:
         refuse_folds(points, blocks, block, guard.constraint, workspace)
         look_inside(blocks.mixture, points, blocks, block, workspace, guard)
         note_places(guard.constraint, workspace)
+    return commit3(points, blocks.centre, block, blocks.filled[block], workspace, guard, tally)
+
+
+@part
+def commit3(points, centre, block, count, workspace, guard, tally):
+    """Moves the free nodes of the lanes that are allowed; returns whether others have steps."""
+    step, rest, moved = workspace.step, False, 0
     for lane in range(count):
-        i = np.uint32(blocks.centre[block * LANES3 + lane])
+        if len(guard) != WITH_FLOORS and workspace.allowed[lane]:
+            i = np.uint32(centre[block * LANES3 + lane])
+            x, y, z = place_after(workspace, guard, lane)
+            moved += (x != points[i, 0]) | (y != points[i, 1]) | (z != points[i, 2])
+            points[i, 0], points[i, 1], points[i, 2] = x, y, z
+        else:
+            rest |= step[lane] != 0.0 or step[LANES3 + lane] != 0.0 or step[2 * LANES3 + lane] != 0.0
+    tally[MOVED] += moved
+    return rest
+
+
+@part
+def try_alone(points, blocks, block, workspace, guard, tally):
+    """The lanes that are not allowed, one by one."""
+    step = workspace.step
+    for lane in range(blocks.filled[block]):
         size = 1.0 / np.float64(workspace.inverse[lane])
         dx, dy, dz = size * step[lane], size * step[LANES3 + lane], size * step[2 * LANES3 + lane]
         if len(guard) != WITH_FLOORS and workspace.allowed[lane]:
-            x, y, z = place_after(workspace, guard, lane)
-            tally[MOVED] += (x != points[i, 0]) | (y != points[i, 1]) | (z != points[i, 2])
-            points[i, 0], points[i, 1], points[i, 2] = x, y, z
-        elif dx != 0.0 or dy != 0.0 or dz != 0.0:
+            continue
+        if dx != 0.0 or dy != 0.0 or dz != 0.0:
             truncate3(points, blocks, block, lane, dx, dy, dz, guard, tally)
 
 

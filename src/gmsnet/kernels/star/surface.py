@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
+from gmsnet.kernels.star.pieces import LONGEST_WALK, NOWHERE, follow_curve, on_piece, piece_tangent
 
 FLAT, CURVED, LINE, CURVE = range(4)  # kinds of rows; the last two have one way to go
-LONGEST_WALK = 100  # facets or pieces from one place to the next
-NOWHERE = -1
 # Where the control points of the edges stand: the one after corner k towards k + 1 is 2k, the other one 2k + 1.
 CENTRE, CONTROLS = 6, 7
 
@@ -34,7 +33,8 @@ class Surface(NamedTuple):
     (F, CONTROLS, 3). Of pieces (P,): piece (P, 4, 3) control points, before, after (P,) int32. single: new coordinates
     are rounded to float32. limit: (R,) how far from the facets, or edges, themselves each row may go. Of facets of a
     volume's boundary around each row (M,), in CSR form by start (R + 1,): ring (M, 2) int32, the other two nodes, seen
-    counter-clockwise from outside; own (M, 3) its unit normal at first.
+    counter-clockwise from outside; own (M, 3) its unit normal at first. bound: how far places on facets may lie from
+    the reference's (kernels.star.chords).
     """
 
     row: NDArray[np.int32]
@@ -56,6 +56,7 @@ class Surface(NamedTuple):
     start: NDArray[np.int32]
     ring: NDArray[np.int32]
     own: NDArray[np.float64]
+    bound: float | None = None
 
 
 @inlined
@@ -88,9 +89,12 @@ def along_edge(corner, f, k, x, y, z):
 
 
 @part
-def walk(surface, f, x, y, z):
-    """The facet nearest to a point, from facet f on, and the three barycentric coordinates there, none below 0."""
-    corner, beside, last = surface.corner, surface.beside, NOWHERE
+def walk(corner, beside, f, x, y, z):
+    """The facet nearest to a point, from facet f on, and the three barycentric coordinates there, none below 0.
+
+    Told no more of the surface than it needs: all that is passed to a part is copied.
+    """
+    last = NOWHERE
     for _ in range(LONGEST_WALK):
         b, c = barycentric(corner, f, x, y, z)
         a = 1.0 - b - c
@@ -137,55 +141,6 @@ def normal_on(normal, f, a, b, c):
 
 
 @inlined
-def along_piece(piece, p, x, y, z):
-    """How far along the chord of a piece the foot of a point is: below 0 before its beginning, above 1 behind it."""
-    ux, uy, uz = piece[p, 3, 0] - piece[p, 0, 0], piece[p, 3, 1] - piece[p, 0, 1], piece[p, 3, 2] - piece[p, 0, 2]
-    square = ux * ux + uy * uy + uz * uz
-    if not square > 0.0:
-        return 0.0
-    return ((x - piece[p, 0, 0]) * ux + (y - piece[p, 0, 1]) * uy + (z - piece[p, 0, 2]) * uz) / square
-
-
-@part
-def follow_curve(surface, p, x, y, z):
-    """The piece nearest to a point, from piece p on, and how far along its chord, from 0 to 1."""
-    way = 0
-    for _ in range(LONGEST_WALK):
-        t = along_piece(surface.piece, p, x, y, z)
-        if t < 0.0 and way <= 0 and surface.before[p] != NOWHERE:
-            p, way = surface.before[p], -1
-        elif t > 1.0 and way >= 0 and surface.after[p] != NOWHERE:
-            p, way = surface.after[p], 1
-        else:
-            return p, min(max(t, 0.0), 1.0)
-    return p, min(max(t, 0.0), 1.0)
-
-
-@inlined
-def on_piece(piece, p, k, t):
-    """Coordinate k of the place on a piece: its very ends at 0 and 1."""
-    r = 1.0 - t
-    ends = r * r * r * piece[p, 0, k] + t * t * t * piece[p, 3, k]
-    return ends + 3.0 * r * t * (r * piece[p, 1, k] + t * piece[p, 2, k])
-
-
-@part
-def piece_tangent(piece, p, t):
-    """The unit tangent of a piece."""
-    r = 1.0 - t
-    x = r * r * (piece[p, 1, 0] - piece[p, 0, 0]) + 2.0 * r * t * (piece[p, 2, 0] - piece[p, 1, 0])
-    y = r * r * (piece[p, 1, 1] - piece[p, 0, 1]) + 2.0 * r * t * (piece[p, 2, 1] - piece[p, 1, 1])
-    z = r * r * (piece[p, 1, 2] - piece[p, 0, 2]) + 2.0 * r * t * (piece[p, 2, 2] - piece[p, 1, 2])
-    x += t * t * (piece[p, 3, 0] - piece[p, 2, 0])
-    y += t * t * (piece[p, 3, 1] - piece[p, 2, 1])
-    z += t * t * (piece[p, 3, 2] - piece[p, 2, 2])
-    length = np.sqrt(x * x + y * y + z * z)
-    if not length > 0.0:
-        return 1.0, 0.0, 0.0
-    return x / length, y / length, z / length
-
-
-@inlined
 def within(limit, px, py, pz, x, y, z):
     """(x, y, z), or the place on the way there from (px, py, pz) at this distance from it."""
     if limit == np.inf:
@@ -199,17 +154,16 @@ def within(limit, px, py, pz, x, y, z):
 
 
 @inlined
-def over_facet(surface, row, f, a, b, c):
+def over_facet(corner, control, limit, f, a, b, c):
     """The place of a row over facet f."""
-    corner = surface.corner
     return within(
-        surface.limit[row],
+        limit,
         a * corner[f, 0, 0] + b * corner[f, 1, 0] + c * corner[f, 2, 0],
         a * corner[f, 0, 1] + b * corner[f, 1, 1] + c * corner[f, 2, 1],
         a * corner[f, 0, 2] + b * corner[f, 1, 2] + c * corner[f, 2, 2],
-        on_cubic(corner, surface.control, f, 0, a, b, c),
-        on_cubic(corner, surface.control, f, 1, a, b, c),
-        on_cubic(corner, surface.control, f, 2, a, b, c),
+        on_cubic(corner, control, f, 0, a, b, c),
+        on_cubic(corner, control, f, 1, a, b, c),
+        on_cubic(corner, control, f, 2, a, b, c),
     )
 
 
@@ -222,10 +176,10 @@ def snap3(surface, row, x, y, z):
     """
     kind, place = surface.kind[row], np.int64(surface.place[row])
     if kind == CURVED:
-        place, a, b, c = walk(surface, place, x, y, z)
-        x, y, z = over_facet(surface, row, place, a, b, c)
+        place, a, b, c = walk(surface.corner, surface.beside, place, x, y, z)
+        x, y, z = over_facet(surface.corner, surface.control, surface.limit[row], place, a, b, c)
     elif kind == CURVE:
-        place, t = follow_curve(surface, place, x, y, z)
+        place, t = follow_curve(surface.piece, surface.before, surface.after, place, x, y, z)
         piece = surface.piece
         x, y, z = within(
             surface.limit[row],
@@ -259,16 +213,25 @@ def on_curves(kind):
 
 
 @inlined
+def land_curved(corner, beside, control, normal, limit, single, place, x, y, z):
+    """As ``land_on``, on a curved patch, from the facet ``place`` on. In loops arrays are told: counted once."""
+    place, a, b, c = walk(corner, beside, place, x, y, z)
+    u, v, w = normal_on(normal, place, a, b, c)
+    x, y, z = over_facet(corner, control, limit, place, a, b, c)
+    if single:
+        x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
+    return x, y, z, place, u, v, w
+
+
+@inlined
 def land_on(surface, row, x, y, z):
     """As ``snap3``, and the unit normal there, which is zero on curves."""
     kind = surface.kind[row]
     if kind == CURVED:
-        place, a, b, c = walk(surface, np.int64(surface.place[row]), x, y, z)
-        u, v, w = normal_on(surface.normal, place, a, b, c)
-        x, y, z = over_facet(surface, row, place, a, b, c)
-        if surface.single:
-            x, y, z = np.float64(np.float32(x)), np.float64(np.float32(y)), np.float64(np.float32(z))
-        return x, y, z, place, u, v, w
+        return land_curved(
+            surface.corner, surface.beside, surface.control, surface.normal, surface.limit[row], surface.single,
+            np.int64(surface.place[row]), x, y, z,
+        )  # fmt: skip
     x, y, z, place = snap3(surface, row, x, y, z)
     if on_curves(kind):
         return x, y, z, place, 0.0, 0.0, 0.0
@@ -281,10 +244,10 @@ def directions_at(surface, row, x, y, z):
     """The unit normal of the patch, or the unit tangent of the curve, of a row at (x, y, z)."""
     kind, place = surface.kind[row], np.int64(surface.place[row])
     if kind == CURVED:
-        place, a, b, c = walk(surface, place, x, y, z)
+        place, a, b, c = walk(surface.corner, surface.beside, place, x, y, z)
         return normal_on(surface.normal, place, a, b, c)
     if kind == CURVE:
-        place, t = follow_curve(surface, place, x, y, z)
+        place, t = follow_curve(surface.piece, surface.before, surface.after, place, x, y, z)
         return piece_tangent(surface.piece, place, t)
     e = surface.of[row]
     return surface.direction[e, 0], surface.direction[e, 1], surface.direction[e, 2]
@@ -293,8 +256,14 @@ def directions_at(surface, row, x, y, z):
 @kernel
 def locate3(surface, points):
     """Writes anew where each node that slides is, of coordinates (N, 3 or 4) that were kept without that."""
-    for node in range(len(surface.row)):
-        row = surface.row[node]
-        if row >= 0:
-            _, _, _, place = snap3(surface, row, points[node, 0], points[node, 1], points[node, 2])
-            surface.place[row] = place
+    rows, kind, kept, corner, beside = surface.row, surface.kind, surface.place, surface.corner, surface.beside
+    for node in range(len(rows)):
+        row = rows[node]
+        if row < 0:
+            continue
+        x, y, z = points[node, 0], points[node, 1], points[node, 2]
+        if kind[row] == CURVED:
+            place, _, _, _ = walk(corner, beside, np.int64(kept[row]), x, y, z)
+        else:
+            _, _, _, place = snap3(surface, row, x, y, z)
+        kept[row] = place

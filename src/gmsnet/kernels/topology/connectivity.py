@@ -48,7 +48,7 @@ def touching(cells, chosen):
     for t in range(len(cells)):
         a, b, c, last = cells[t, 0], cells[t, 1], cells[t, 2], cells[t, -1]
         rows[count] = t
-        count += chosen[a] or chosen[b] or chosen[c] or chosen[last]
+        count += chosen[a] | chosen[b] | chosen[c] | chosen[last]
     return rows[:count].copy()
 
 

@@ -22,9 +22,10 @@ def spread(x):
 
 
 @kernel
-def morton_order(points, keys, other, memory, position):
+def morton_order(points, box, keys, other, memory, position):
     """Orders the points (N, 2) along a Morton curve over a grid of 2¹⁶ × 2¹⁶; those of one square by their ids.
 
+    box: (2, 2) the least and the greatest coordinates that the grid spans; none (0, 2) where those of the points do.
     Writes memory (N,), the ids in that order, and position (N,), the place of each id in it. keys, other: (N,) int64,
     to work with.
     """
@@ -33,6 +34,8 @@ def morton_order(points, keys, other, memory, position):
     for i in range(n):
         left, right = min(left, points[i, 0]), max(right, points[i, 0])
         bottom, top = min(bottom, points[i, 1]), max(top, points[i, 1])
+    if len(box):
+        left, right, bottom, top = box[0, 0], box[1, 0], box[0, 1], box[1, 1]
     extent = max(right - left, top - bottom)
     scale = 65535.0 / extent if extent > 0.0 else 0.0
     at = no_counts()
@@ -43,13 +46,33 @@ def morton_order(points, keys, other, memory, position):
 
 
 @kernel
-def morton_order3(points, keys, other, memory, position):
-    """The same of points (N, 3 or more) in space, over a grid of 2¹⁰ × 2¹⁰ × 2¹⁰."""
+def morton_codes(points, box, codes):
+    """Writes where points lie along the curves of ``morton_order`` and ``morton_order3``. box: as there, not none.
+
+    points: (N, 2), or (N, 3 or more) where the box is (2, 3). codes: (N,) int64.
+    """
+    axes, extent = box.shape[1], 0.0
+    for axis in range(axes):
+        extent = max(extent, box[1, axis] - box[0, axis])
+    scale = (65535.0 if axes == 2 else 1023.0) / extent if extent > 0.0 else 0.0
+    for i in range(len(points)):
+        code = np.int64(0)
+        for axis in range(axes):
+            at = np.int64((points[i, axis] - box[0, axis]) * scale)
+            code |= (spread(at) if axes == 2 else spread3(at)) << axis
+        codes[i] = code
+
+
+@kernel
+def morton_order3(points, box, keys, other, memory, position):
+    """The same of points (N, 3 or more) in space, over a grid of 2¹⁰ × 2¹⁰ × 2¹⁰. box: (2, 3), or none (0, 3)."""
     low, extent = np.empty(3), 0.0
     for axis in range(3):
         low[axis], high = np.inf, -np.inf
         for i in range(len(points)):
             low[axis], high = min(low[axis], points[i, axis]), max(high, points[i, axis])
+        if len(box):
+            low[axis], high = box[0, axis], box[1, axis]
         extent = max(extent, high - low[axis])
     scale = 1023.0 / extent if extent > 0.0 else 0.0
     at = no_counts()

@@ -1,4 +1,4 @@
-"""The XML of an XDMF file: its elements, and at which bytes what they contain stands."""
+"""Small XML files as a tree: their elements, and at which bytes what they contain stands."""
 
 from __future__ import annotations
 
@@ -7,19 +7,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NoReturn
 from xml.parsers import expat
-from xml.sax.saxutils import escape, unescape
 
 from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
 from gmsnet.io.text import fail
 
-H5 = ".h5"  # what the file beside it goes by in a mesh
 MOST_DEEP, MOST_ELEMENTS = 100, 200_000
-# The text of an item that is kept in HDF5: the name of the file, a colon, the path within it.
-_HDF = rb"\bFormat\s{0,9}=\s{0,9}[\"']HDF[\"']"
-REFERENCE = re.compile(  # all lengths are bounded, so that no file takes long
-    rb"(<DataItem\b[^<>]{0,500}" + _HDF + rb"[^<>]{0,500}>\s{0,99})([^<>:\"/\\]{1,255}):(/[^<>]{0,999}?)(?=\s{0,99}</)"
-)
+TAG = re.compile(rb"<[^<\"'>]*(?:(?:\"[^\"]*\"|'[^']*')[^<\"'>]*)*>")
+ATTRIBUTE = re.compile(rb"\s([^\s=]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+_ENCODING = "the XML has an encoding that is not supported: write it as UTF-8"
 
 
 @dataclass(eq=False)
@@ -48,10 +44,10 @@ class Element:
         return next((self.attributes[key] for key in keys if key in self.attributes), default)
 
 
-def parse(data: Data) -> Element:
-    """The element Xdmf. Raises FormatError where the XML is not well formed or no XDMF file."""
+def parse(data: Data, root_tag: str) -> Element:
+    """The root element. Raises FormatError where the XML is not well formed, or its root has another name."""
     if not re.match(rb"[\xef\xbb\xbf \t\r\n]*<", data):
-        raise FormatError("line 1: not an XML file: an XDMF file starts with '<Xdmf' or '<?xml'")
+        raise FormatError(f"line 1: not an XML file: such a file starts with '<{root_tag}' or '<?xml'")
     walker = _Walker(data)
     try:
         walker.parser.Parse(data[:], True)
@@ -60,10 +56,10 @@ def parse(data: Data) -> Element:
     except (LookupError, ValueError) as error:
         if isinstance(error, FormatError):
             raise
-        raise FormatError("the XML has an encoding that is not supported: write it as UTF-8") from None
+        raise FormatError(_ENCODING) from None
     root = walker.root.children[0]
-    if root.tag != "Xdmf":
-        fail(data, root.start, f"the root element is {root.tag[:24]!r} instead of 'Xdmf'")
+    if root.tag != root_tag:
+        fail(data, root.start, f"the root element is {root.tag[:24]!r} instead of {root_tag!r}")
     return root
 
 
@@ -97,37 +93,28 @@ class _Walker:
 
 def check_plain(data: Data, element: Element) -> tuple[int, int]:
     """The bytes of an element that contains a text alone. Raises FormatError where there is more than that."""
-    tag = _START.match(data, element.start)
-    if tag is None:
-        raise FormatError("the XML has an encoding that is not supported: write it as UTF-8")
-    first, stop = tag.end(), element.stop
+    first, stop = _tag(data, element)[1], element.stop
     if element.children or data.find(b"<", first, stop) >= 0:
         blame(data, element, "nothing but numbers may stand in it")
     return (first, stop) if first <= stop else (stop, stop)
 
 
-_START = re.compile(rb"<[^<\"'>]*(?:(?:\"[^\"]*\"|'[^']*')[^<\"'>]*)*>")
+def span_of(data: Data, element: Element, attribute: str) -> tuple[int, int]:
+    """The bytes of the value of an attribute that an element has, without the quotes."""
+    for found in ATTRIBUTE.finditer(data, *_tag(data, element)):
+        if found[1] == attribute.encode():
+            return found.span(2 if found[2] is not None else 3)
+    raise FormatError(_ENCODING)
+
+
+def _tag(data: Data, element: Element) -> tuple[int, int]:
+    """The bytes of the start tag of an element."""
+    tag = TAG.match(data, element.start)
+    if tag is None:
+        raise FormatError(_ENCODING)
+    return tag.span()
 
 
 def blame(data: Data, element: Element, message: str) -> NoReturn:
     """Raises FormatError with the line and the name of an element."""
     fail(data, element.start, f"{element.tag[:40]}: {message}")
-
-
-def linked(data: Data) -> str | None:
-    """The name of the HDF5 file that the items name, which lies beside; None where there is none.
-
-    Raises FormatError where they name several, or one in another folder.
-    """
-    names = {unescape(found[2].decode("utf-8", "replace")).strip() for found in REFERENCE.finditer(data)}
-    if len(names) > 1:
-        raise FormatError(f"the items name {len(names)} HDF5 files: put the arrays into one")
-    if not names and re.search(_HDF, data):
-        raise FormatError("an item of Format HDF must name a file beside this one, as in mesh.h5:/points")
-    return names.pop() if names else None
-
-
-def relinked(data: bytes, called: str) -> bytes:
-    """The file with another name for the HDF5 file."""
-    new = escape(called).encode()
-    return REFERENCE.sub(lambda found: found[1] + new + b":" + found[3], data)

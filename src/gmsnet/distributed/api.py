@@ -1,0 +1,91 @@
+"""smooth() over ranks: what codes call whose mesh is spread over a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from gmsnet.distributed.agreement import agreed, everywhere
+from gmsnet.distributed.library import mpi
+from gmsnet.distributed.piece import Cells, Piece
+from gmsnet.distributed.result import RankResult
+from gmsnet.distributed.smoothing import smoothed
+from gmsnet.errors import InputError
+from gmsnet.mesh.adapters import to_mesh
+from gmsnet.mesh.arrays import whole_numbers
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.selection import fixed_mask
+from gmsnet.run.options import SmoothOptions
+
+
+def smooth(
+    mesh: Any, ids: Any, method: str = "auto", *, numbers: Any = None, fixed: Any = None, comm: Any = None,
+    **options: Any,
+) -> RankResult:  # fmt: skip
+    """Smooths a mesh that is spread over the ranks of a communicator; all ranks call it.
+
+    The result has the same bits as ``gmsnet.smooth`` of the whole mesh, for any number of ranks and any partition.
+
+    mesh: the cells of this rank, each cell of the mesh on one rank, and their nodes: anything that ``gmsnet.smooth``
+    takes. ids: (n,) the global id of each of its nodes. numbers: for each kind of cells, (C,) the place of each cell
+    among all of that kind; without, those of rank 0 come first. Places decide between cells at one node, and so may
+    change bits. fixed: nodes of this rank to be held, as for ``gmsnet.smooth``; a node is held if any rank says so.
+    comm: an mpi4py communicator (default: all ranks). method, options: as for ``gmsnet.smooth``, the same on all ranks.
+
+    What is not shared out is done by the first rank, which needs memory for the whole mesh then; ``gathered`` of the
+    result says why. Raises InputError on all ranks where pieces do not fit together, and MissingExtraError without
+    mpi4py.
+    """
+    comm = mpi().COMM_WORLD if comm is None else comm
+    asked = everywhere(comm, lambda: SmoothOptions(method=method, **options))
+    agreed(comm, asked.asked, "the options")
+    given = everywhere(comm, lambda: _given(mesh, ids, fixed))
+    numbered = _numbered(comm, given[0], numbers)
+    piece = everywhere(comm, lambda: _piece(*given, numbered))
+    return smoothed(piece, asked, comm)
+
+
+def _given(mesh: Any, ids: Any, fixed: Any) -> tuple[Mesh, Any, Any]:
+    """The mesh, its ids and a mask of its fixed nodes."""
+    found = to_mesh(mesh)[0]
+    return found, whole_numbers(ids, "the global ids of nodes"), fixed_mask(found, fixed)
+
+
+Numbered = Sequence[tuple[str, int, Any]]
+
+
+def _numbered(comm: Any, mesh: Mesh, numbers: Any) -> Numbered:
+    """The kinds of cells over all ranks, how many nodes each has, and the numbers of those that are here."""
+    own: dict[str, int] = {}
+    for block in mesh.cells:
+        own[block.kind] = own.get(block.kind, 0) + len(block.nodes)
+    width = {block.kind: block.nodes.shape[1] for block in mesh.cells}
+    kinds: dict[str, int] = {}
+    for each in comm.allgather(width):
+        kinds |= each
+    found = []
+    given = numbers if isinstance(numbers, Mapping) else {} if numbers is None else dict.fromkeys(own, numbers)
+    for kind, nodes in kinds.items():
+        count = own.get(kind, 0)
+        first = comm.exscan(count) or 0
+        some = comm.allreduce(kind in given and count > 0, mpi().LOR)
+        found.append((kind, nodes, given.get(kind, np.empty(0, dtype=np.int64)) if some else first + np.arange(count)))
+    return found
+
+
+def _piece(mesh: Mesh, ids: Any, fixed: Any, numbered: Numbered) -> Piece:
+    """From the arrays of one rank."""
+    if len(ids) != len(mesh.points):
+        raise InputError(f"{len(mesh.points):,} nodes need one global id each, got {len(ids):,}")
+    blocks = []
+    for kind, width, numbers in numbered:
+        parts = [block for block in mesh.cells if block.kind == kind]
+        nodes = np.concatenate([*(ids[block.nodes] for block in parts), np.empty((0, width), dtype=np.int64)])
+        regions = np.concatenate([*(block.regions for block in parts), np.empty(0, dtype=np.int64)])
+        places = whole_numbers(numbers, f"the numbers of {kind} cells")
+        if places.shape != (len(nodes),):
+            raise InputError(f"{len(nodes):,} {kind} cells need one number each, got shape {places.shape}")
+        blocks.append(Cells(kind, nodes, regions, places))
+    return Piece(ids, mesh.points, fixed, tuple(blocks), mesh.single)

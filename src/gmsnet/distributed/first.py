@@ -1,0 +1,74 @@
+"""A mesh that the first rank has, smoothed by all: what the command line does under mpiexec."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.distributed.gathered import Whole
+from gmsnet.distributed.library import mpi
+from gmsnet.distributed.partition import partition
+from gmsnet.distributed.piece import pieces_of
+from gmsnet.distributed.result import RankResult
+from gmsnet.distributed.smoothing import smoothed
+from gmsnet.errors import GmsnetError
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.selection import fixed_mask
+from gmsnet.parallel.threads import serial
+from gmsnet.run.call import ended
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.outcome import result_of, write_back
+from gmsnet.run.result import SmoothResult
+from gmsnet.run.set_up import first_state
+from gmsnet.run.state import State
+from gmsnet.topology.ordering import near_points
+
+Floats = NDArray[np.float64]
+
+
+def follow(comm: Any = None) -> None:
+    """What all but the first rank do: they take part in what it smooths, until it says that this is all."""
+    comm = mpi().COMM_WORLD if comm is None else comm
+    while (options := comm.bcast(None)) is not None:
+        piece = comm.scatter(None)
+        with contextlib.suppress(GmsnetError):  # the first rank raises it, too, and says it
+            found = smoothed(piece, options, comm)
+            if found.gathered == "" or found.interrupted:
+                comm.gather(found.points)
+
+
+def release(comm: Any = None) -> None:
+    """The first rank has nothing more to be smoothed."""
+    (mpi().COMM_WORLD if comm is None else comm).bcast(None)
+
+
+def smooth_from_first(mesh: Mesh, options: SmoothOptions, fixed: Any = None, comm: Any = None) -> SmoothResult:
+    """``gmsnet.smooth`` of a mesh that the first rank has, while the others ``follow``. Errors: see there."""
+    began, comm = time.perf_counter(), mpi().COMM_WORLD if comm is None else comm
+    chosen = fixed_mask(mesh, fixed)
+    pieces = pieces_of(mesh, chosen, partition(mesh, comm.size), comm.size)
+    comm.bcast(replace(options, callback=None))
+    whole = Whole(mesh, np.arange(len(mesh.points)), chosen)
+    found = smoothed(comm.scatter(pieces), options, comm, whole)
+    if found.whole is not None and not found.interrupted:
+        return found.whole
+    points = mesh.points.copy()
+    for piece, places in zip(pieces, comm.gather(found.points), strict=True):
+        points[piece.ids] = places
+    done = partial(_as_a_state, mesh, points, fixed, options, found)
+    return ended(done, lambda state: result_of(state, options, began))
+
+
+def _as_a_state(mesh: Mesh, points: Floats, fixed: Any, options: SmoothOptions, found: RankResult) -> State:
+    """The end of a serial run that came to the same points (N, dim)."""
+    state = first_state(mesh, fixed, options.smoother(), options, serial)
+    near = near_points(mesh.with_points(points), state.topology)
+    interruption = KeyboardInterrupt() if found.interrupted else None
+    state = replace(state, points=near, totals=None, history=tuple(found.history))
+    return write_back(state.ended(found.stop_reason, interruption), options, serial)

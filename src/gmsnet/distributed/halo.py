@@ -1,0 +1,95 @@
+"""What ranks tell each other of the nodes that they share: lists are made once, and buffers used again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.distributed.library import mpi
+
+Floats = NDArray[np.float64]
+Places = NDArray[np.integer[Any]]
+
+
+class Messages:
+    """One exchange: values at some places go to each neighbour, and theirs come to others.
+
+    give, take: for each neighbour in turn, the places whose values it gets, and those whose values come from it. The
+    request is set up once (MPI 4); where the library is older, each exchange names its buffers anew.
+    """
+
+    def __init__(self, graph: Any, give: Sequence[Places], take: Sequence[Places], columns: int) -> None:
+        self.graph, self.columns = graph, columns
+        self.out, self.into = (np.concatenate([*each, np.empty(0, dtype=np.int64)]) for each in (give, take))
+        self.sent, self.got = (np.empty((len(each), columns)) for each in (self.out, self.into))
+        give_counts, take_counts = ([columns * len(places) for places in each] for each in (give, take))
+        buffers = [self.sent, give_counts], [self.got, take_counts]
+        self.messages, self.bytes = sum(count > 0 for count in give_counts), self.sent.nbytes
+        persistent = mpi().VERSION >= 4 and len(give)
+        self.request = graph.Neighbor_alltoallv_init(*buffers) if persistent else None
+        self.buffers = buffers
+
+    def exchange(self, values: Floats) -> None:
+        """values: (n, ``columns`` or more); of more, the first are exchanged."""
+        np.take(values[:, : self.columns], self.out, axis=0, out=self.sent)
+        if self.request is None:
+            self.graph.Neighbor_alltoallv(*self.buffers)
+        else:
+            self.request.Start()
+            self.request.Wait()
+        values[self.into, : self.columns] = self.got
+
+    def free(self) -> None:
+        """Gives the request back."""
+        if self.request is not None:
+            self.request.Free()
+            self.request = None
+
+
+class Halo:
+    """The nodes that this rank shares with each of its neighbours.
+
+    own: neighbour → the places of the nodes that this rank moves and the neighbour has, too; others: neighbour → the
+    places of the nodes that the neighbour moves and this rank has. Both in the order of the global ids.
+    messages, bytes: sent so far, of the exchanges after colours.
+    """
+
+    def __init__(self, comm: Any, own: dict[int, Places], others: dict[int, Places]) -> None:
+        self.neighbours = sorted({*own, *others})
+        nothing = np.empty(0, dtype=np.int64)
+        self.give = [own.get(rank, nothing) for rank in self.neighbours]
+        self.take = [others.get(rank, nothing) for rank in self.neighbours]
+        self.graph = comm.Create_dist_graph_adjacent(self.neighbours, self.neighbours)
+        self.whole = Messages(self.graph, self.give, self.take, 1)
+        self.by_colour: list[Messages] = []
+        self.messages = self.bytes = 0
+
+    def coloured(self, colours: NDArray[np.int32], count: int, columns: int) -> None:
+        """Sets up the exchanges after each of so many colours. colours: (n,) of the nodes, −1 of those held."""
+        for colour in range(count):
+            give, take = (
+                [places[colours[places] == colour] for places in each] for each in (self.give, self.take)
+            )  # fmt: skip
+            self.by_colour.append(Messages(self.graph, give, take, columns))
+
+    def after(self, colour: int, points: Floats) -> None:
+        """The nodes of a colour are where they will be."""
+        messages = self.by_colour[colour]
+        messages.exchange(points)
+        self.messages += messages.messages
+        self.bytes += messages.bytes
+
+    def spread(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values (n,) at nodes with those of their owners; of numbers that a float64 can hold."""
+        wide = values.astype(np.float64).reshape(-1, 1)
+        self.whole.exchange(wide)
+        return wide[:, 0].astype(values.dtype)
+
+    def free(self) -> None:
+        """Gives back what MPI keeps."""
+        for messages in (self.whole, *self.by_colour):
+            messages.free()
+        self.graph.Free()

@@ -1,0 +1,43 @@
+"""The numbers that cells have in the whole mesh, without anybody having the whole mesh.
+
+Cells stand in memory by the first of their nodes, and nodes along a Morton curve. So the first corner simplex of a
+cell has as many before it as belong to the nodes before its own, and to the cells before it at that node. Nodes are
+sorted over all ranks for that, by their places on the curve.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ids = NDArray[np.int64]
+
+SAMPLES = 64  # of each rank's nodes, by which the curve is shared out
+
+
+def before(comm: Any, codes: Ids, ids: Ids, counts: Ids) -> Ids:
+    """For each node of this rank, the sum of the counts of all nodes of all ranks that come before it.
+
+    codes: (n,) places on the curve, by which nodes come, those of one place by their ids (n,). counts: (n,). Each node
+    is given by one rank.
+    """
+    size, order = comm.size, np.lexsort((ids, codes))
+    sample = codes[order[np.linspace(0, len(order) - 1, SAMPLES).astype(np.int64)]] if len(order) else codes[:0]
+    every = np.sort(np.concatenate(comm.allgather(sample)))
+    ends = every[np.arange(1, size) * len(every) // size] if len(every) else np.zeros(size - 1, dtype=np.int64)
+    to = np.searchsorted(ends, codes, side="right")
+    lists = [np.flatnonzero(to == rank) for rank in range(size)]
+    came = comm.alltoall([(codes[rows], ids[rows], counts[rows]) for rows in lists])
+    code, number, count = (np.concatenate(each) for each in zip(*came, strict=True))
+    sequence = np.lexsort((number, code))
+    sums = np.concatenate([[0], np.cumsum(count[sequence])])
+    first = comm.exscan(int(sums[-1])) or 0
+    found = np.empty(len(code), dtype=np.int64)
+    found[sequence] = first + sums[:-1]
+    back = comm.alltoall(np.split(found, np.cumsum([len(each[0]) for each in came])[:-1]))
+    out = np.empty(len(codes), dtype=np.int64)
+    for rows, values in zip(lists, back, strict=True):
+        out[rows] = values
+    return out

@@ -1,0 +1,102 @@
+"""The whole mesh smoothed by the first rank, for what is not shared out."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.distributed.agreement import raise_everywhere
+from gmsnet.distributed.gathered import Whole, gathered, scattered
+from gmsnet.distributed.piece import Piece
+from gmsnet.distributed.result import RankResult
+from gmsnet.errors import GmsnetError
+from gmsnet.measure.report import connectivity_of
+from gmsnet.mesh.display import amount
+from gmsnet.preserve.protection import protected, protected_volume
+from gmsnet.run.api import smooth_with
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.result import SmoothResult
+from gmsnet.run.stop import INTERRUPTED
+from gmsnet.topology.ordering import near_points
+from gmsnet.topology.volume import Volume
+
+
+class Intent(NamedTuple):
+    """What of the mesh is there on purpose. layers: (n,) of the piece, held. walls: whether some are refined."""
+
+    layers: NDArray[np.bool_] | None
+    walls: bool
+    notes: list[str]
+
+
+def intent_of(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | None) -> Intent:
+    """What is there on purpose, told by the first rank of the whole mesh. known: see ``gathered``."""
+    whole, layers, told = gathered(piece, comm, known), None, None
+    if whole is not None:
+        topology = connectivity_of(whole.mesh, whole.fixed)
+        near = near_points(whole.mesh, topology)
+        if isinstance(topology, Volume):
+            found = protected_volume(topology, options.preserved, options.fix_layers, near, firm=False)
+        else:
+            found = protected(whole.mesh, topology, options.preserved, options.fix_layers, near)
+        layers = np.zeros(len(whole.ids), dtype=bool) if found.layers is None else found.layers
+        told = found.walls is not None, found.notes
+    walls, notes = comm.bcast(told)
+    return Intent(scattered(whole, layers, piece, comm), walls, notes)
+
+
+def smoothed_on_first(
+    piece: Piece, options: SmoothOptions, comm: Any, why: str, began: float, known: Whole | None
+) -> RankResult:
+    """All ranks call it. why: it is not shared out. known: see ``gathered``."""
+    whole, wrong, result = gathered(piece, comm, known), "", None
+    if whole is not None:
+        try:
+            result = _smoothed(whole, options)
+            result = replace(result, notes=[*result.notes, _note(whole, why)])
+        except GmsnetError as error:
+            wrong = str(error)
+    raise_everywhere(comm, wrong)
+    figures: dict[str, Any] | None = None
+    if whole is not None and result is not None:
+        figures = _figures(whole, result)
+    told = comm.bcast(figures)
+    points = scattered(whole, None if result is None else result.points, piece, comm)
+    moved = scattered(whole, None if result is None else result.moved, piece, comm)
+    interruption = told.pop("interruption")
+    seconds = time.perf_counter() - began
+    return RankResult(points, moved, **told, gathered=why, seconds=seconds, interrupted=interruption, whole=result)
+
+
+def _smoothed(whole: Whole, options: SmoothOptions) -> SmoothResult:
+    try:
+        return smooth_with(whole.mesh, options, whole.fixed)
+    except KeyboardInterrupt as interruption:
+        result: SmoothResult | None = getattr(interruption, "result", None)
+        if result is None:
+            raise
+        return result
+
+
+def _figures(whole: Whole, result: SmoothResult) -> dict[str, Any]:
+    """What all ranks are told."""
+    return {
+        "before": result.before.totals,
+        "after": result.after.totals,
+        "sweeps": result.sweeps,
+        "stop_reason": result.stop_reason,
+        "history": result.history,
+        "notes": result.notes,
+        "held": {reason: len(ids) for reason, ids in result.held.items()},
+        "nodes": len(whole.ids),
+        "cells": sum(len(block.nodes) for block in whole.mesh.cells),
+        "interruption": result.stop_reason == INTERRUPTED,
+    }
+
+
+def _note(whole: Whole, why: str) -> str:
+    return f"ranks: the first one smoothed all {amount(len(whole.ids), 'node')}, for {why}"

@@ -1,0 +1,230 @@
+"""The part of a mesh that one rank smooths: the connectivity of the serial run, of its own stars and what is around.
+
+Nodes stand in memory in the order that they have in the whole mesh, and colours are those of the whole mesh: greedy, by
+global ids. A rank colours its nodes as far as their neighbours of lower ids have colours, and tells others, until all
+have one. So each star is judged and moved by the same operations as in the serial run, and every bit is the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.distributed.frame import framed
+from gmsnet.distributed.ghosts import Surrounded
+from gmsnet.distributed.halo import Halo
+from gmsnet.distributed.library import mpi
+from gmsnet.distributed.numbering import before
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.simplex.mean_ratio2 import Simplices
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
+from gmsnet.kernels.topology.layout import morton_codes
+from gmsnet.kernels.topology.ready import colour_ready
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.mixed_volume import volume_of, wound_of
+from gmsnet.topology.ordering import planar_points, space_points, taken
+from gmsnet.topology.stars import Colouring, Ints, Stars
+from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Ids = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Known(Colouring):
+    """Colours that are known. known: (N,) by places in memory, −1 where no node is free."""
+
+    known: Ints
+
+    @property
+    def colours(self) -> Ints:
+        """See Colouring."""
+        return self.known
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """What a rank has of the mesh, nodes by ascending global ids.
+
+    mesh: its cells, and those around. topology: with the nodes free that it moves. points: in memory order. codes: (n,)
+    places on the curve, in memory order. moves: (n,) by places in memory, the nodes that this rank has to move or hold.
+    own_rows: of ``topology.simplices``, those of its own cells: each cell is one rank's. colours: how many there are.
+    """
+
+    comm: Any
+    around: Surrounded
+    mesh: Mesh
+    topology: Topology | Volume
+    points: Floats
+    halo: Halo
+    codes: Ids
+    moves: Flags
+    own_rows: Ints
+    colours: int
+
+    @classmethod
+    def of(cls, around: Surrounded, comm: Any, single: bool) -> Part:
+        """Of what a rank has and what lies around."""
+        ids = around.nodes.ids
+        cells = [CellBlock(block.kind, np.searchsorted(ids, block.nodes), block.regions) for block in around.blocks]
+        mesh = framed(comm, Mesh(around.nodes.points, tuple(cells), single=single))
+        moves = around.nodes.owner == comm.rank
+        held = around.nodes.fixed | ~moves
+        topology = volume_of(wound_of(mesh, held)) if mesh.has_volumes else Topology.of(mesh, held)
+        near = taken(planar_points(mesh) if mesh.plane else space_points(mesh), topology.memory)
+        halo = around.halo(comm, topology.places)
+        topology, colours = _coloured(comm, topology, halo)
+        codes = np.empty(len(near), dtype=np.int64)
+        morton_codes(near, mesh.box, codes)
+        own = np.concatenate([*around.own, np.empty(0, dtype=bool)])
+        rows = np.arange(len(topology.simplices.rows), dtype=np.int32)
+        own_rows = rows[own[topology.cells_of(rows.astype(np.intp))]]
+        return cls(comm, around, mesh, topology, near, halo, codes, moves[topology.memory], own_rows, colours)
+
+    @property
+    def simplices(self) -> Simplices | Tetrahedra:
+        """Those of its own cells."""
+        return self.topology.simplices.take(self.own_rows)
+
+    def ready(self, topology: Topology | Volume) -> tuple[Topology | Volume, Ids]:
+        """The connectivity as a run wants it, and the numbers that its blocks of cells have in the whole mesh.
+
+        topology: this one, or with more nodes held. Its stars have as many colours as those of all ranks.
+        ``changeable`` stands in the blocks of the whole mesh, as far as their cells have a node that this rank moves;
+        the rest of a block are repetitions. ``scored`` are those of its own cells.
+        """
+        free = self.halo.spread(topology.near_free)
+        stars, first = topology.stars, np.zeros(self.colours + 1, dtype=np.int32)
+        first[: len(stars.first)] = stars.first
+        first[len(stars.first) :] = stars.first[-1]
+        rows, numbers = self._blocks(topology, free)
+        scored = self.own_rows
+        if isinstance(topology, Volume) or topology.near_shapes is not None:
+            scored = scored[_of_whole_cells(topology.simplices, _with_a_free_node(topology.simplices, free))[scored]]
+        found = replace(topology)
+        found.__dict__.update(
+            stars=Stars(stars.blocks, first),
+            changeable=topology.simplices.take(rows),
+            scored=topology.simplices.take(scored),
+        )
+        return found, numbers
+
+    def _blocks(self, topology: Topology | Volume, free: Flags) -> tuple[Ints, Ids]:
+        """The rows of ``changeable``, and the numbers of their blocks of LANES.
+
+        free: (n,) by places in memory, the nodes that any rank moves.
+        """
+        simplices = topology.simplices
+        chosen = np.flatnonzero(_with_a_free_node(simplices, free)).astype(np.int32)
+        cell = chosen if simplices.cells is None else simplices.cells[chosen]
+        _, begin, size = np.unique(cell, return_index=True, return_counts=True)  # rows of a cell stand together
+        begin, size = begin.astype(np.int64), size.astype(np.int64)
+        lowest = _lowest(simplices)[chosen[begin]] if len(chosen) else np.empty(0, dtype=np.int64)
+        own = np.flatnonzero(self.moves)
+        counts = np.bincount(lowest, size, minlength=len(self.codes)).astype(np.int64)
+        first = np.zeros(len(self.codes), dtype=np.int64)
+        ids = self.around.nodes.ids[topology.memory]
+        first[own] = before(self.comm, self.codes[own], ids[own], counts[own])
+        within = np.concatenate([[0], np.cumsum(size)])[:-1]
+        starts = np.flatnonzero(np.diff(lowest, prepend=-1) != 0)  # cells stand by their first node
+        within -= np.repeat(within[starts], np.diff(np.append(starts, len(lowest)))) if len(starts) else 0
+        place = first[lowest] + within
+        known = self.moves[lowest]
+        place, known = self._told(topology, chosen[begin] if len(chosen) else chosen, place, known)
+        row_place = np.repeat(place, size) + _counted(size)
+        row_known = np.repeat(known, size)
+        return _aligned(chosen[row_known], row_place[row_known])
+
+    def _told(self, topology: Topology | Volume, rows: Ints, place: Ids, known: Flags) -> tuple[Ids, Flags]:
+        """The places of cells, one row each, whose first node another rank moves: it tells those who move another."""
+        number = self.around.numbers[topology.cells_of(rows.astype(np.intp))]
+        ranks = self.around.nodes.owner[topology.memory]
+        simplices = topology.simplices
+        solids = simplices.solids if isinstance(simplices, Tetrahedra) else None
+        if solids is not None and simplices.cells is not None:
+            nodes = solids.nodes[simplices.cells[rows]]
+        elif simplices.cells is not None:  # the corners of a quad: those of its first two rows
+            second = np.minimum(rows + 1, len(simplices.rows) - 1)
+            same = simplices.cells[second] == simplices.cells[rows]
+            nodes = np.hstack([simplices.rows[rows], simplices.rows[np.where(same, second, rows)]])
+        else:
+            nodes = simplices.rows[rows]
+        owner = ranks[nodes]
+        parcels = []
+        for rank in range(self.comm.size):
+            chosen = known & (owner == rank).any(axis=1) if rank != self.comm.rank else np.zeros(len(known), dtype=bool)
+            parcels.append((number[chosen], place[chosen]))
+        came = self.comm.alltoall(parcels)
+        told, where = (np.concatenate(each) for each in zip(*came, strict=True))
+        if len(told):
+            order = np.argsort(told)
+            at = np.minimum(np.searchsorted(told[order], number), len(told) - 1)
+            found = told[order][at] == number
+            place, known = np.where(found, where[order][at], place), known | found
+        return place, known
+
+
+def _coloured(comm: Any, topology: Topology | Volume, halo: Halo) -> tuple[Topology | Volume, int]:
+    """The same with the colours of the whole mesh, and how many there are."""
+    places, free = topology.colouring.places, halo.spread(topology.near_free)
+    colours = np.full(len(free), -1, dtype=np.int32)
+    start, ring = topology.colouring.start, topology.colouring.ring
+    while True:
+        colour_ready(places, start, ring, topology.memory, free, colours)
+        colours = halo.spread(colours)
+        if not comm.allreduce(int(np.count_nonzero(colours[places] < 0))):
+            break
+    count = int(comm.allreduce(int(colours.max(initial=-1)) + 1, mpi().MAX))
+    axes = 2 if isinstance(topology, Topology) else 3
+    halo.coloured(colours, count, axes)
+    return replace(topology, colouring=Known(places, start, ring, colours)), count
+
+
+def _with_a_free_node(simplices: Simplices | Tetrahedra, free: Flags) -> Flags:
+    """(S,) bool, the rows that have a free node, of volumes all rows of a cell that has one."""
+    if isinstance(simplices, Tetrahedra) and simplices.solids is not None:
+        of_cell: Flags = np.asarray(free[simplices.solids.nodes].any(axis=1))
+        return of_cell[simplices.cells]
+    return np.asarray(free[simplices.rows].any(axis=1))
+
+
+def _of_whole_cells(simplices: Simplices | Tetrahedra, chosen: Flags) -> Flags:
+    """(S,) bool, the rows of the cells that have a chosen row."""
+    if simplices.cells is None:
+        return chosen
+    cells = np.zeros(int(simplices.cells.max(initial=-1)) + 1, dtype=bool)
+    cells[np.asarray(simplices.cells)[chosen]] = True
+    return np.asarray(cells[simplices.cells])
+
+
+def _lowest(simplices: Simplices | Tetrahedra) -> Ids:
+    """(S,) the lowest place in memory among the nodes of the cell of each row."""
+    if isinstance(simplices, Tetrahedra) and simplices.solids is not None:
+        found: Ids = simplices.solids.nodes.min(axis=1).astype(np.int64)[simplices.cells]
+        return found
+    low: Ids = simplices.rows.min(axis=1).astype(np.int64)
+    if simplices.cells is None:
+        return low
+    of_cell = np.full(int(simplices.cells.max(initial=-1)) + 1, np.iinfo(np.int64).max)
+    np.minimum.at(of_cell, simplices.cells, low)
+    return of_cell[simplices.cells]
+
+
+def _counted(size: Ids) -> Ids:
+    """0, 1, 2, … for each of so many."""
+    return np.arange(size.sum()) - np.repeat(np.cumsum(size) - size, size)
+
+
+def _aligned(rows: Ints, place: Ids) -> tuple[Ints, Ids]:
+    """Rows at some places in blocks of LANES, where the last of a block stands for those that are not there."""
+    order = np.argsort(place)
+    rows, block = rows[order], place[order] // LANES
+    numbers, begin, size = np.unique(block, return_index=True, return_counts=True)
+    lane = np.minimum(np.arange(LANES), size[:, None] - 1)
+    return rows[begin[:, None] + lane].reshape(-1).astype(np.int32), numbers

@@ -1,0 +1,89 @@
+"""What one rank brings: nodes by global ids, and the cells that are its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import InputError
+from gmsnet.mesh.arrays import plain_array, whole_numbers
+from gmsnet.mesh.checks import finite_points
+from gmsnet.mesh.mesh import Mesh
+
+Ids = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Some cells of one block of a mesh. nodes: (C, k) global ids. regions: (C,). numbers: (C,) their places among all
+    cells of this block, over all ranks."""
+
+    kind: str
+    nodes: Ids
+    regions: Ids
+    numbers: Ids
+
+    def take(self, rows: NDArray[np.integer[Any]] | Flags) -> Cells:
+        """Some of them."""
+        return Cells(self.kind, self.nodes[rows], self.regions[rows], self.numbers[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Some cells of a mesh and their nodes.
+
+    ids: (n,) the global id of each node, each once. points: (n, dim). fixed: (n,) bool, to be held. blocks: the same on
+    all ranks, though some may be empty. single: as of the Mesh.
+
+    Raises InputError for ids that are negative or come twice, points that are not finite, and cells of other nodes.
+    """
+
+    ids: Ids
+    points: NDArray[np.float64]
+    fixed: Flags
+    blocks: tuple[Cells, ...]
+    single: bool = False
+
+    def __post_init__(self) -> None:
+        ids = whole_numbers(self.ids, "the global ids of nodes")
+        points = finite_points(plain_array(self.points, "points"))
+        if ids.shape != (len(points),):
+            raise InputError(f"{len(points):,} nodes need one global id each, got shape {ids.shape}")
+        if len(ids) and ids.min() < 0:
+            raise InputError(f"global ids count from 0, got {ids.min()}")
+        known, first = np.unique(ids, return_index=True)
+        if len(known) != len(ids):
+            twice = np.delete(ids, first)[0]
+            raise InputError(f"the global id {twice} is given to two nodes of one piece: give each node once")
+        for block in self.blocks:
+            wrong = block.nodes[~np.isin(block.nodes, known)]
+            if wrong.size:
+                raise InputError(f"a {block.kind} cell names the global id {wrong[0]}, which no node of its piece has")
+        object.__setattr__(self, "ids", ids)
+        object.__setattr__(self, "points", points)
+
+
+def pieces_of(mesh: Mesh, fixed: Flags, parts: Sequence[NDArray[np.int32]], ranks: int) -> list[Piece]:
+    """A mesh cut up. fixed: (N,) bool. parts: for each block, the rank of each cell.
+
+    A node that no cell has goes to the first rank.
+    """
+    found = []
+    used = np.zeros(len(mesh.points), dtype=bool)
+    for block in mesh.cells:
+        used[block.nodes] = True
+    for rank in range(ranks):
+        inside = ~used if rank == 0 else np.zeros(len(mesh.points), dtype=bool)
+        blocks = []
+        for block, part in zip(mesh.cells, parts, strict=True):
+            rows = np.flatnonzero(part == rank)
+            blocks.append(Cells(block.kind, block.nodes[rows], block.regions[rows], rows))
+            inside[block.nodes[rows]] = True
+        ids = np.flatnonzero(inside)
+        found.append(Piece(ids, mesh.points[ids], fixed[ids], tuple(blocks), mesh.single))
+    return found

@@ -1,0 +1,68 @@
+"""What ranks know of a smoothed mesh: their own nodes, and the figures of all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.measure.totals import Totals
+from gmsnet.mesh.display import plain
+from gmsnet.run.result import SmoothResult
+from gmsnet.run.sweep import Sweep
+
+
+@dataclass(frozen=True, eq=False)
+class RankResult:
+    """What ``gmsnet.distributed.smooth`` returns on each rank; all but points and moved is the same on all.
+
+    points: (n, dim) the nodes of this rank's piece, in its order; moved: (n,) bool. before, after: the figures of all
+    cells of the mesh. sweeps, stop_reason, history, notes: as of a SmoothResult. held: reason → how many nodes of the
+    mesh. nodes, cells: of the mesh. gathered: why the mesh was smoothed on the first rank, "" where it was shared out.
+    seconds: for the whole call. messages, bytes: that this rank sent after colours. interrupted: this is the best mesh
+    so far. whole: the SmoothResult of the first rank, where that has one.
+    """
+
+    points: NDArray[np.float64]
+    moved: NDArray[np.bool_]
+    before: Totals | None
+    after: Totals | None
+    sweeps: int
+    stop_reason: str
+    history: list[Sweep]
+    notes: list[str]
+    held: dict[str, int]
+    nodes: int
+    cells: int
+    gathered: str
+    seconds: float
+    messages: int = 0
+    bytes: int = 0
+    interrupted: bool = False
+    whole: SmoothResult | None = field(default=None, repr=False)
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers, ready for JSON."""
+        return {
+            "nodes": self.nodes, "cells": self.cells, "held": self.held, "sweeps": self.sweeps,
+            "stop_reason": self.stop_reason, "gathered": self.gathered, "seconds": self.seconds,
+            **{name: _figures(totals) for name, totals in (("before", self.before), ("after", self.after))},
+        }  # fmt: skip
+
+    def __repr__(self) -> str:
+        """What was done, on a screen."""
+        before, after = (_figures(totals) for totals in (self.before, self.after))
+        lines = [
+            f"RankResult: {self.nodes:,} nodes, {self.sweeps} sweeps in {plain(self.seconds)} s, {self.stop_reason}"
+        ]
+        lines += [f"{name}: {before[name]:.6g} → {after[name]:.6g}" for name in before]
+        return "\n".join([*lines, *self.notes])
+
+
+def _figures(totals: Totals | None) -> dict[str, float]:
+    """The figures that all kinds of cells have."""
+    if totals is None:
+        return {}
+    return {"inverted": totals.inverted, "least shape": totals.shape_min, "mean shape": totals.shape_mean}

@@ -1,0 +1,81 @@
+"""Whether facets stay near the surface that they stand for, where a node of theirs goes.
+
+A node may lie on a surface while the facets at it cut off a bend. So distances are taken at places on these, too: in
+the middle, on the edges that move, and between. Each is from the facet of the reference to which a walk leads; and
+places on that one count, too, where they lie over the facet.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gmsnet.kernels.jit.compile import inlined, part
+from gmsnet.kernels.star.pattern import count_of, pair_of
+from gmsnet.kernels.star.surface import CURVED, walk
+
+# Barycentric coordinates on a facet: of the node that moves, and of the two others.
+PLACES = np.array([[3, 0, 3], [3, 3, 0], [2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
+# The same on a facet of the reference.
+BACK = np.array([[6, 0, 0], [0, 6, 0], [0, 0, 6], [2, 2, 2], [3, 3, 0], [0, 3, 3], [3, 0, 3]]) / 6.0
+BESIDE = 0.15  # in barycentric coordinates: so far beside a facet what lies over its edge counts, too
+CLOSER = 0.85  # times what is asked for, since there are places between
+
+
+@inlined
+def off_plane(px, py, pz, ux, uy, uz, vx, vy, vz):
+    """The squared distance of the point p from the plane of the triangle 0, u, v if it lies over that, else 0."""
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    square = nx * nx + ny * ny + nz * nz
+    if not square > 0.0:
+        return 0.0
+    s = (py * vz - pz * vy) * nx + (pz * vx - px * vz) * ny + (px * vy - py * vx) * nz
+    t = (uy * pz - uz * py) * nx + (uz * px - ux * pz) * ny + (ux * py - uy * px) * nz
+    height = px * nx + py * ny + pz * nz
+    least = -BESIDE * square
+    return height * height / square if s >= least and t >= least and s + t <= square - least else 0.0
+
+
+@part
+def off_reference(corner, beside, f, x, y, z, ax, ay, az, bx, by, bz):
+    """The largest squared distance of these places on a facet from the reference, by walks from its facet f on; and of
+    the corners of the facets there from this one."""
+    most = 0.0
+    ux, uy, uz, vx, vy, vz = ax - x, ay - y, az - z, bx - x, by - y, bz - z
+    for k in range(len(PLACES)):
+        p, q, r = PLACES[k, 0], PLACES[k, 1], PLACES[k, 2]
+        sx, sy, sz = p * x + q * ax + r * bx, p * y + q * ay + r * by, p * z + q * az + r * bz
+        f, a, b, c = walk(corner, beside, f, sx, sy, sz)
+        dx = a * corner[f, 0, 0] + b * corner[f, 1, 0] + c * corner[f, 2, 0] - sx
+        dy = a * corner[f, 0, 1] + b * corner[f, 1, 1] + c * corner[f, 2, 1] - sy
+        dz = a * corner[f, 0, 2] + b * corner[f, 1, 2] + c * corner[f, 2, 2] - sz
+        most = max(most, dx * dx + dy * dy + dz * dz)
+        for j in range(len(BACK)):
+            p, q, r = BACK[j, 0], BACK[j, 1], BACK[j, 2]
+            px = p * corner[f, 0, 0] + q * corner[f, 1, 0] + r * corner[f, 2, 0] - x
+            py = p * corner[f, 0, 1] + q * corner[f, 1, 1] + r * corner[f, 2, 1] - y
+            pz = p * corner[f, 0, 2] + q * corner[f, 1, 2] + r * corner[f, 2, 2] - z
+            most = max(most, off_plane(px, py, pz, ux, uy, uz, vx, vy, vz))
+    return most
+
+
+@inlined
+def near(bound, surface, row, star, n, pattern, place, x, y, z, was):
+    """Do all facets of a star stay within the bound with its node at (x, y, z), or come nearer than they are?
+
+    bound: None where there is none. place: the reference's facet there. was: (3,) where the node is.
+    """
+    if bound is None:
+        return True
+    if surface.kind[row] != CURVED:
+        return True
+    corner, beside, here = surface.corner, surface.beside, np.int64(surface.place[row])
+    for k in range(count_of(pattern, n)):
+        i, j = pair_of(pattern, n, k)
+        ax, ay, az = star[3 * i], star[3 * i + 1], star[3 * i + 2]
+        bx, by, bz = star[3 * j], star[3 * j + 1], star[3 * j + 2]
+        off = off_reference(corner, beside, place, x, y, z, ax, ay, az, bx, by, bz)
+        if off > bound * bound:
+            before = off_reference(corner, beside, here, was[0], was[1], was[2], ax, ay, az, bx, by, bz)
+            if not off < before:
+                return False
+    return True

@@ -1,0 +1,38 @@
+"""The mean η of a volume last: Newton steps on Σq^(3/4) over stars whose cells are all good, and stay so.
+
+The sum of a low power is led by the many cells, that of q^(3/2) by the bad ones. No cell may fall below a floor, so
+that no star with a cell below it moves: what the worst cells and the smallest angles have reached is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from gmsnet.kernels.methods.barrier3 import Power3, sweep3
+from gmsnet.kernels.star.guard import MeshGuard
+from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.methods.base import Field, Smoother, Tally, over_stars
+from gmsnet.parallel.executor import Executor
+from gmsnet.topology.volume import Volume
+
+POWER = Power3.of(-2, trials=3)  # p = 3/4; stars with a cell below the floor refuse all
+RELAXATION = 1.3  # ω, as of the barrier
+
+
+class MeanInSpace(Smoother):
+    """floor: of D/S^(3/2), in the place of the guard's."""
+
+    phase = "mean of η"
+
+    def __init__(self, floor: float) -> None:
+        self.floor = floor
+
+    def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
+        """See Smoother."""
+        assert isinstance(field.topology, Volume)
+        guard = MeshGuard(*field.precision, self.floor, field.constraint)
+
+        def visit(blocks: SpaceBlocks, first: int, last: int, counts: Tally) -> None:
+            sweep3(field.points, blocks, first, last, guard, POWER, RELAXATION, counts)
+
+        return over_stars(visit, field.topology.stars, field.points, executor)

@@ -1,0 +1,121 @@
+"""Under mpiexec: the command line, and what happens where a rank ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import gmsnet
+
+pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+MPIEXEC = shutil.which("mpiexec") or shutil.which("mpiexec", path=os.path.dirname(sys.executable))
+pytestmark = pytest.mark.skipif(MPIEXEC is None, reason="mpiexec is not installed")
+
+LIMIT = 300  # seconds: ranks that wait for each other end then
+
+
+def mpiexec(ranks, *command, cwd):
+    environment = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    environment |= {"PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe", "OMP_NUM_THREADS": "1"}
+    return subprocess.run(
+        [MPIEXEC, "-n", str(ranks), sys.executable, *command],
+        cwd=cwd, env=environment, timeout=LIMIT, capture_output=True, text=True,
+    )  # fmt: skip
+
+
+def smooth(ranks, *arguments, cwd):
+    return mpiexec(ranks, "-m", "gmsnet", "smooth", *arguments, cwd=cwd)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    gmsnet.write(gmsnet.random_mesh(800, seed=1), tmp_path / "in.su2")
+    return tmp_path
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("method", ["barrier", "auto"])
+def test_the_same_file_as_without_ranks(folder, ranks, method):
+    gmsnet.write(gmsnet.smooth(gmsnet.read(folder / "in.su2"), method).mesh, folder / "serial.su2")
+    done = smooth(ranks, "in.su2", "out.su2", "--method", method, "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert (folder / "out.su2").read_bytes() == (folder / "serial.su2").read_bytes()
+    report = json.loads(done.stdout)  # of one rank
+    assert report["method"] == method
+    assert any("ranks: the first one" in note for note in report["notes"]) == (method == "auto")
+
+
+def test_errors_are_said_once(folder):
+    done = smooth(2, "missing.su2", "out.su2", cwd=folder)
+    assert done.returncode == 2
+    assert done.stderr.count("gmsnet: error: missing.su2: there is no such file") == 1
+    assert "Traceback" not in done.stderr
+    assert not (folder / "out.su2").exists()
+
+
+def test_a_rank_that_dies_ends_all_and_nothing_is_written(folder):
+    script = (
+        "import os, sys\n"
+        "from gmsnet.distributed.halo import Halo\n"
+        "after = Halo.after\n"
+        "def die(self, colour, points):\n"
+        "    if os.environ.get('OMPI_COMM_WORLD_RANK', os.environ.get('PMI_RANK')) == '1':\n"
+        "        os.kill(os.getpid(), 9)\n"
+        "    after(self, colour, points)\n"
+        "Halo.after = die\n"
+        "from gmsnet.cli import main\n"
+        "sys.exit(main(['smooth', 'in.su2', 'out.su2', '--method', 'barrier']))\n"
+    )
+    before = (folder / "in.su2").read_bytes()
+    done = mpiexec(2, "-c", script, cwd=folder)
+    assert done.returncode != 0
+    assert sorted(path.name for path in folder.iterdir()) == ["in.su2"]
+    assert (folder / "in.su2").read_bytes() == before
+
+
+def test_a_bug_on_one_rank_ends_all(folder):
+    script = (
+        "import os, sys\n"
+        "import gmsnet.distributed.part as part\n"
+        "def fail(*arguments):\n"
+        "    raise ZeroDivisionError('on purpose')\n"
+        "if os.environ.get('OMPI_COMM_WORLD_RANK', os.environ.get('PMI_RANK')) == '1':\n"
+        "    part.before = fail\n"
+        "from gmsnet.cli import main\n"
+        "sys.exit(main(['smooth', 'in.su2', 'out.su2', '--method', 'barrier']))\n"
+    )
+    done = mpiexec(2, "-c", script, cwd=folder)
+    assert done.returncode != 0
+    assert "internal error: ZeroDivisionError: on purpose" in done.stderr
+    assert not (folder / "out.su2").exists()
+
+
+def test_messages_and_bytes_are_those_of_the_shared_nodes(folder):
+    """After each colour, one message to each neighbour that has a node of this colour, of its coordinates alone."""
+    script = (
+        "import numpy as np, gmsnet, gmsnet.distributed\n"
+        "from gmsnet.distributed.library import mpi\n"
+        "comm = mpi().COMM_WORLD\n"
+        "mesh = gmsnet.read('in.su2')\n"
+        "cells = mesh.cells[0].nodes\n"
+        "mine = cells[(mesh.points[cells[:, 0], 0] > 0.5) == comm.rank]\n"
+        "ids, local = np.unique(mine, return_inverse=True)\n"
+        "given = mesh.points[ids], local.reshape(-1, 3)\n"
+        "result = gmsnet.distributed.smooth(given, ids, 'barrier', preserve='none', max_sweeps=3, threads=1)\n"
+        "print(comm.rank, result.sweeps, result.messages, result.bytes, len(ids), flush=True)\n"
+    )
+    done = mpiexec(2, "-c", script, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    rows = np.array([[int(word) for word in line.split()] for line in done.stdout.splitlines()])
+    assert sorted(rows[:, 0]) == [0, 1]
+    shared = rows[:, 4].sum() - len(gmsnet.read(folder / "in.su2").points)
+    assert (rows[:, 1] == 3).all()
+    assert (rows[:, 2] <= 3 * 12).all()
+    assert (rows[:, 3] % (3 * 16) == 0).all()
+    assert 0 < rows[:, 3].max() <= 3 * 16 * 4 * shared
