@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 from gmsnet.errors import InputError
 from gmsnet.io.atomic import check_writable, refuse_folder
-from gmsnet.io.files import files_of
 from gmsnet.io.foam_case import OPENFOAM, case_of
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, entry_of, format_of_suffix
 from gmsnet.io.packed import split_name
+from gmsnet.io.paths import files_of
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, is_standard_output, standard_output
 
 if TYPE_CHECKING:
