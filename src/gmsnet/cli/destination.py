@@ -55,6 +55,11 @@ def destination_of(source: str, output: str | None, in_place: bool, format: str 
         return Destination(output, format, aside)
     if case_of(output, format) is not None:
         key = OPENFOAM
+    elif format is None and _case(source) and not os.path.splitext(output)[1] and not os.path.exists(output):
+        raise InputError(
+            f"{output}: an OpenFOAM mesh is written into a case: copy the case there first, "
+            "or give --in-place, or --out-dir FOLDER for the mesh alone"
+        )
     else:
         refuse_folder(output)
         key = format or format_of_suffix(output, split_name(output)[1], "--output-format", reading=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -259,7 +259,16 @@ def _has_solids(mesh: Mesh) -> bool:
 def _of_any_volumes(mesh: Mesh) -> QualityReport:
     """``measure`` of a mesh of volumes of any kinds."""
     refuse_flat(mesh)
-    cells, cell = MeasuredSolids.of(mesh)
+    return _of_solids_at(*MeasuredSolids.of(mesh))
+
+
+def measured_again(before: QualityReport, mesh: Mesh) -> QualityReport:
+    """The measures of the same cells, volumes of any kinds, with their nodes at other places."""
+    assert isinstance(before.cells, MeasuredSolids)
+    return _of_solids_at(replace(before.cells, points=mesh.points), before.cell)
+
+
+def _of_solids_at(cells: MeasuredSolids, cell: NDArray[np.int64]) -> QualityReport:
     columns, signs = cells.columns(), cells.signs()
     nan, shape, bad = math.nan, columns[cells.names.index(SHAPE)], int((signs <= 0).sum())
     mean = math.fsum(shape) / len(shape)
