@@ -8,6 +8,7 @@ from support import curved_meshes
 
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.measure.curved import judge_curved
+from gmsnet.methods.planar_cells import PlanarCells
 from gmsnet.untangle.curved import untangle_curved
 
 
@@ -15,7 +16,7 @@ from gmsnet.untangle.curved import untangle_curved
 def test_a_hundred_thrown_meshes_are_valid_afterwards(seed):
     mesh = curved_meshes.thrown(seed)
     points, tables, free = curved_meshes.tables(mesh)
-    score = untangle_curved(points, tables, free)
+    score = untangle_curved(PlanarCells(points, tables, free))
     assert score.before > 0
     assert score.after == 0
     assert (judge_curved(points, tables.cells, tables.kinds)[0] == 1).all()
@@ -26,7 +27,7 @@ def test_a_hundred_thrown_meshes_are_valid_afterwards(seed):
 def test_a_hundred_valid_meshes_stay_as_they_are(seed):
     mesh = curved_meshes.known_valid(seed)
     points, tables, free = curved_meshes.tables(mesh)
-    assert untangle_curved(points, tables, free) == (0, 0)
+    assert untangle_curved(PlanarCells(points, tables, free)) == (0, 0)
     np.testing.assert_array_equal(points, mesh.points)
 
 
@@ -39,7 +40,7 @@ def test_what_cannot_be_mended_is_left_and_no_valid_cell_is_lost():
     mesh = mesh.with_points(points)
     points, tables, free = curved_meshes.tables(mesh)
     before = judge_curved(points, tables.cells, tables.kinds)[0]
-    score = untangle_curved(points, tables, free)
+    score = untangle_curved(PlanarCells(points, tables, free))
     after = judge_curved(points, tables.cells, tables.kinds)[0]
     assert 1 <= score.after < score.before
     assert (after[before == 1] == 1).all()
@@ -49,5 +50,5 @@ def test_in_single_precision_the_result_is_valid_as_the_file_keeps_it():
     mesh = curved_meshes.thrown(7)
     mesh = mesh.with_points(np.float64(np.float32(mesh.points)))
     points, tables, free = curved_meshes.tables(mesh)
-    assert untangle_curved(points, tables, free, Precision.of(single=True, exponent=0)).after == 0
+    assert untangle_curved(PlanarCells(points, tables, free, Precision.of(single=True, exponent=0))).after == 0
     np.testing.assert_array_equal(points, np.float32(points))

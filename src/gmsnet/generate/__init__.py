@@ -3,6 +3,7 @@
 from gmsnet.generate.adapted import Front, adapted_mesh
 from gmsnet.generate.c_grid import c_grid_mesh
 from gmsnet.generate.curved import disc_of_quads, on_circle, second_order, throw, waved
+from gmsnet.generate.curved_volumes import on_sphere, second_order_volume
 from gmsnet.generate.curves import Curve
 from gmsnet.generate.deformed import moved_hole_mesh, sheared_mesh, swirled_mesh, terrain_mesh, zigzag_mesh
 from gmsnet.generate.disturb import disturb
@@ -49,6 +50,7 @@ __all__ = [
     "moved_hole_mesh",
     "o_grid_section",
     "on_circle",
+    "on_sphere",
     "organic_surface",
     "part_volume",
     "random_mesh",
@@ -56,6 +58,7 @@ __all__ = [
     "random_volume",
     "recombine",
     "second_order",
+    "second_order_volume",
     "settle",
     "sheared_mesh",
     "sphere_surface",

@@ -17,8 +17,10 @@ from gmsnet.measure.corners import of_corners, straight_size
 from gmsnet.measure.solid import judge_volumes
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.plane import exponent_of
+from gmsnet.topology.curved_solids import has_curved, straight
+from gmsnet.topology.mixed_volume import wound_of
 from gmsnet.topology.ordering import space_points
-from gmsnet.topology.solids import WoundSolids, has_solids
+from gmsnet.topology.solids import has_solids
 
 Floats = NDArray[np.float64]
 Signs = NDArray[np.int8]
@@ -58,8 +60,8 @@ class MeasuredSolids:
     def of(cls, mesh: Mesh) -> tuple[MeasuredSolids, NDArray[np.int64]]:
         """Those of a mesh, and the index of each among all its cells.
 
-        Cells with straight edges are wound alike with those that they share facets with; others of a kind are read
-        inside out where most of them, with straight edges, have a negative size.
+        Cells are wound alike with those that they share the corners of facets with; those that name a corner twice are
+        read inside out where most of their kind, with straight edges, have a negative size.
         """
         blocks, before = [], 0
         points, wound = space_points(mesh), _wound(mesh)
@@ -201,7 +203,8 @@ class MeasuredSolids:
 def _wound(mesh: Mesh) -> Signs:
     """The orientation of each cell of a mesh, 0 for those that are not wound."""
     found = np.zeros(sum(len(block.nodes) for block in mesh.cells), dtype=np.int8)
-    if has_solids(mesh):
-        wound = WoundSolids.of(mesh)
+    curved = has_curved(mesh)
+    if curved or has_solids(mesh):
+        wound = wound_of(straight(mesh) if curved else mesh)
         found[wound.cell[wound.origin]] = wound.orientation
     return found

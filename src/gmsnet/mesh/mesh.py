@@ -247,12 +247,9 @@ def unmeasured(mesh: Mesh) -> str:
     return _counted(block for block in mesh.cells if block.dimension in (dimension, None) and not measured(mesh, block))
 
 
-MOVED = ("tetra", "hexahedron", "wedge", "pyramid")  # the volumes whose nodes may move
-
-
 def unmoved(mesh: Mesh) -> str:
     """How many volumes are of kinds whose nodes are held, in words. "" if there are none."""
-    return _counted(block for block in mesh.cells if block.dimension in (3, None) and block.kind not in MOVED)
+    return _counted(block for block in mesh.cells if block.dimension in (3, None) and not has_form(block.kind))
 
 
 def measured(mesh: Mesh, block: CellBlock) -> bool:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.kernels.topology.write_back import put_back
-from gmsnet.measure.report import ASPECT, QualityReport, measure
+from gmsnet.measure.report import ASPECT, QualityReport, measure, measured_again
 from gmsnet.measure.surface_change import Compared
 from gmsnet.measure.totals import Totals
 from gmsnet.mesh.mesh import Mesh
@@ -40,7 +40,10 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
         rank = inverted_alone
     if state.motion is not None or state.metric is not None:  # in which meshes were compared
         rank = inverted_alone
-    final = outcome(state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals)
+    final = outcome(
+        state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals,
+        again=state.second_order is not None and state.second_order.solid,
+    )  # fmt: skip
     if state.metric is not None:
         near = near_points(state.mesh.with_points(final.points), state.topology)
         state = replace(state, conformity=(*state.conformity, Conformity.of(near, state.planar, state.metric)))
@@ -117,7 +120,7 @@ def _notes(state: State) -> list[str]:
     given = state.second_order
     if given is not None and given.sign is not None and state.final is not None:
         of_order.append(given.note(state.final.moved))
-        of_order.extend(given.protection.notes)
+        of_order.extend(note for note in given.protection.notes if note not in protection.notes)
         if given.protection.walls is not None:
             of_order.append(_wall_note(given.protection, moved=False))
     return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks, *of_order]
@@ -130,12 +133,13 @@ def _wall_note(protection: Protection, *, moved: bool) -> str:
 
 def outcome(
     mesh: Mesh, topology: Topology | Volume, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
-    start: Floats | None = None, executor: Executor = serial, totals: Totals | None = None,
+    start: Floats | None = None, executor: Executor = serial, totals: Totals | None = None, *, again: bool = False,
 ) -> Final:  # fmt: skip
     """The best mesh as it is in the input's order; that of the input if the quick sums misjudged it.
 
     best: (N, 2) in memory order. All nodes that it does not move keep their very bits. rank: of two meshes that of the
     lesser rank is the better. start: ``near_points`` of the mesh, totals: of ``best``, where they are known.
+    again: the cells of ``before`` are measured, which are more than those of the topology.
     """
     if start is None:
         start = near_points(mesh, topology)
@@ -152,7 +156,10 @@ def outcome(
         if whole is not None and topology.scored is not topology.simplices:
             whole = None
         known = (best, executor, whole) if exact else (None, executor)
-        after = measure(mesh.with_points(points), topology, *known)
+        if again:
+            after = measured_again(before, mesh.with_points(points))
+        else:
+            after = measure(mesh.with_points(points), topology, *known)
         if rank(after) <= rank(before):
             return Final(points, moved, after)
         moved[:] = False

@@ -1,9 +1,10 @@
-"""The stage of second-order planar cells: the invalid are made valid, corners smoothed, and narrow cells given room.
+"""The stage of second-order cells: the invalid are made valid, corners smoothed, and narrow cells given room.
 
-The method of the call moves the corners, as if cells were straight, and they take their middles along
-(methods/curved.py). Nodes of first-order cells beside them move, too. Nodes of the boundary, of interfaces and of line
-cells stay, middles among them. A move is taken if all cells around it are certified valid by the coefficients of their
-determinants (docs/guarantees.md).
+The method of the call moves the corners, as if cells were straight, and they take their middles along: in a plane after
+each of its sweeps (methods/curved.py), in space all together at the end (methods/solid_cells.py). In a plane nodes of
+first-order cells beside them move, too. Nodes of the boundary, of interfaces and of line cells stay, middles among
+them. A move is taken if all cells around it are certified valid by the coefficients of their determinants
+(docs/guarantees.md).
 """
 
 from __future__ import annotations
@@ -14,27 +15,28 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.curved.descend import improve_nodes
-from gmsnet.kernels.curved.stars import CurvedMesh, counter_clockwise, curved_mesh
+from gmsnet.kernels.curved.stars import counter_clockwise, curved_mesh
 from gmsnet.kernels.simplex.bernstein import CORNERS, KINDS, NAMES, WIDEST
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import LEVELS, VALID
-from gmsnet.measure.curved import judge_curved
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, method_named
 from gmsnet.methods.curved import Curved
+from gmsnet.methods.planar_cells import PlanarCells
+from gmsnet.methods.solid_cells import SolidCells
 from gmsnet.parallel.executor import Executor
-from gmsnet.preserve.protection import Protection, protected
+from gmsnet.preserve.protection import Protection, protected, protected_volume
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import SecondOrder, State
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS, NOTHING_TO_MOVE
 from gmsnet.run.sweep_stage import sweep
+from gmsnet.topology.curved_solids import curved_solids
 from gmsnet.topology.held import OF_SECOND_ORDER
 from gmsnet.topology.ordering import near_points, planar_points
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
-LOW = 0.5  # a cell whose certified bound over its straight size is less gets more room
 SWEEPS = 10
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -44,7 +46,7 @@ def second_order_of(mesh: Mesh, topology: Topology, options: SmoothOptions) -> S
     """The second-order cells of a planar mesh, those beside them, and which of their nodes may move; None where there
     are none."""
     blocks = [block for block in mesh.cells if block.kind in NAMES and len(block.nodes)]
-    if not blocks or mesh.plane is None:
+    if not blocks or mesh.plane is None or mesh.has_volumes:
         return None
     cells, kinds, regions, index, before = [], [], [], [], 0
     lines = list[NDArray[np.int64]]()
@@ -112,26 +114,24 @@ def _held_middles(
 
 
 def untangle_second_order(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """Makes the invalid second-order cells valid, and first-order ones beside them, as many as can be."""
+    """Makes the invalid second-order cells valid, and in a plane first-order ones beside them, as many as can be."""
     given = state.second_order
     if given is None:
         return state
-    points, mesh, free = _opened(state)
-    sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
-    by_id = np.empty_like(free)
-    by_id[state.topology.memory] = free
+    cells = _opened(state)
+    sign, quality = cells.judged()
+    by_id = np.empty_like(cells.free)
+    by_id[state.topology.memory] = cells.free
     known = replace(given, free=by_id, sign=sign)
     invalid, least = known.figures(sign, quality)
     known = replace(known, invalid=(invalid, invalid), least=(least, least), unable=_unable(given, options))
     state = replace(state, second_order=known)
-    if not (options.untangle and (sign != 1).any() and free.any()):
+    if not (options.untangle and (sign != 1).any() and cells.free.any()):
         return state
     from gmsnet.untangle.curved import untangle_curved  # untangling takes 0.15 s more to import
 
-    corners = _corners(known).topology
-    assert isinstance(corners, Topology)
-    untangle_curved(points, mesh, free, state.precision, corners)
-    return _protected_anew(_judged(state, points, mesh), options)
+    untangle_curved(cells, _corners(known).topology, executor)
+    return _protected_anew(_judged(state, cells), options)
 
 
 def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -139,20 +139,26 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     given = state.second_order
     if given is None or given.unable or state.stop_reason == CALLBACK or not given.free.any():
         return state
-    points, mesh, _ = _opened(state)
-    room = -math.inf
+    cells, room = _opened(state), -math.inf
     if options.guard != LEVELS[VALID]:
-        sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
-        room = float(quality[(sign == 1) & given.curved].min(initial=LOW))
+        sign, quality = cells.judged()
+        room = float(quality[(sign == 1) & given.curved].min(initial=cells.low))
+    corners = _corners(given)
+    curved = Curved(cells.mesh, room) if isinstance(cells, PlanarCells) else None
     ready = replace(
-        state, points=points, totals=None, protection=_corners(given), released=False, sliding=None,
-        smoother=options.smoother(), curved=Curved(mesh, room),
+        state, points=cells.points, totals=None, protection=corners, released=False, sliding=None,
+        smoother=options.smoother(), curved=curved,
     )  # fmt: skip
     done = sweep(ready, options, executor)
     if done.stop_reason == NOTHING_TO_MOVE:
         return state
     state = replace(state, history=done.history, interruption=done.interruption, stop_reason=done.stop_reason)
-    return _judged(state, done.points, mesh)
+    if isinstance(cells, PlanarCells):
+        return _judged(state, cells._replace(points=done.points))
+    level = LEVELS.index(options.guard)
+    guard = Field(cells.points, corners.topology, state.precision, level).guard(executor)
+    cells.advance(done.points, guard, room)
+    return _judged(state, cells)
 
 
 def make_room(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -160,53 +166,47 @@ def make_room(state: State, options: SmoothOptions, executor: Executor) -> State
     given = state.second_order
     if given is None or state.stop_reason == CALLBACK or not given.free.any():
         return state
-    points, mesh, free = _opened(state)
+    cells = _opened(state)
     topology = given.protection.topology
-    inner = np.flatnonzero(_inner(mesh, free))
-    corners = np.flatnonzero(free & topology.near_free)
+    inner, corners = np.flatnonzero(cells.inner), np.flatnonzero(cells.free & topology.near_free)
     level, tally = LEVELS.index(options.guard), np.zeros(3, dtype=np.int64)
     for _ in range(min(SWEEPS, options.max_sweeps)):
         moved = int(tally[MOVED])
-        guard = Field(points, topology, state.precision, level).guard(executor)
-        improve_nodes(points, mesh, inner, LOW, guard, tally)
-        improve_nodes(points, mesh, corners, LOW, guard, tally)
+        guard = Field(cells.points, topology, state.precision, level).guard(executor)
+        cells.improve(inner, cells.low, guard, tally)
+        cells.improve(corners, cells.low, guard, tally)
         if tally[MOVED] == moved:
             break
     if state.stop_reason == NOTHING_TO_MOVE:
         state = state.ended(NO_PROGRESS)
-    return _judged(state, points, mesh)
+    return _judged(state, cells)
 
 
-def _opened(state: State) -> tuple[Floats, CurvedMesh, Flags]:
+def _opened(state: State) -> PlanarCells | SolidCells:
     """A copy of the points, the second-order cells, and which nodes may move, all by places in memory."""
     given = state.second_order
     assert given is not None
     topology, points = state.topology, state.points.copy()
     table = np.where(given.cells >= 0, topology.places[given.cells], np.int32(-1))
     free = given.free[topology.memory]
+    if given.solid:
+        return SolidCells(points, curved_solids(points, table, given.kinds, ~free), free, state.precision)
     mesh = curved_mesh(points, table, given.kinds, ~free)
     free[mesh.edges[~mesh.dragged].ravel()] = False  # ends and middles of edges with one cell
-    return points, mesh, free
+    return PlanarCells(points, mesh, free, state.precision)
 
 
-def _inner(mesh: CurvedMesh, free: Flags) -> Flags:
-    """(N,) the middles and centres that may move by themselves."""
-    from gmsnet.untangle.curved import free_inner  # which takes 0.15 s to import
-
-    return free_inner(mesh, free)
-
-
-def _judged(state: State, points: Floats, mesh: CurvedMesh) -> State:
+def _judged(state: State, cells: PlanarCells | SolidCells) -> State:
     """The state with these points, and how its cells are now; as it was if one of them has lost its validity."""
     given = state.second_order
     assert given is not None
     assert given.sign is not None
-    sign, quality = judge_curved(points, mesh.cells, mesh.kinds, state.precision)
+    sign, quality = cells.judged()
     if ((given.sign == 1) & (sign != 1)).any():
         return state
     invalid, least = given.figures(sign, quality)
     known = replace(given, sign=sign, invalid=(given.invalid[0], invalid), least=(given.least[0], least))
-    return replace(state, points=points, totals=None, second_order=known)
+    return replace(state, points=cells.points, totals=None, second_order=known)
 
 
 def _corners(given: SecondOrder) -> Protection:
@@ -218,6 +218,9 @@ def _protected_anew(state: State, options: SmoothOptions) -> State:
     """What is protected as the cells are once they are untangled: tangles are no layers."""
     given = state.second_order
     assert given is not None
+    if isinstance(given.whole, Volume):
+        volume = protected_volume(given.whole, options.preserved, options.fix_layers, state.points, firm=True)
+        return replace(state, second_order=replace(given, protection=volume))
     points = np.empty_like(state.points)
     points[given.whole.memory] = state.points
     mesh = Mesh(points, ())
@@ -228,6 +231,8 @@ def _protected_anew(state: State, options: SmoothOptions) -> State:
 
 def _unable(given: SecondOrder, options: SmoothOptions) -> str:
     """Why the method does not move corners, to be added to the note; "" if it does."""
+    if given.solid:
+        return ""  # the method was asked for the kinds of straight cells when the call began
     quads = any(CORNERS[kind] == 4 for kind in np.unique(given.kinds))
     if not quads or method_named(options.method_name).moves("quad", options.objective):
         return ""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.jacobian import has_form
 from gmsnet.constraints.options import check_slide
 from gmsnet.constraints.sliding import Sliding, curves_to_slide_on
 from gmsnet.constraints.sliding_in_space import SurfaceSliding, patches_to_slide_on
@@ -30,12 +31,13 @@ from gmsnet.preserve.protection import Protection, protected, protected_volume
 from gmsnet.run.metric_stage import check_given
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.second_order import second_order_of
+from gmsnet.run.second_order_volumes import second_order_solids_of
 from gmsnet.run.set_up_surface import first_of_surface
 from gmsnet.run.state import State
 from gmsnet.topology.held import REASONS
 from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
 from gmsnet.topology.ordering import space_points, taken
-from gmsnet.topology.solids import KINDS, has_solids
+from gmsnet.topology.solids import has_solids
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 from gmsnet.topology.wound import refuse_flat
@@ -156,12 +158,19 @@ def _first_of_volume(
         remarks.append(f"not measured, and their nodes are held: {others}")
     if isinstance(topology, MixedVolume) and (turned := topology.inside_out):
         remarks.append(f"read with their corners in the other order, for they are inside out: {turned}")
-    given = given.without_cells()
     start = taken(space_points(given), topology.memory)
-    before = measure(given, topology, start, executor.for_blocks(0))
+    second = second_order_solids_of(given, topology, options)
+    if second is None:
+        before = measure(given.without_cells(), topology, start, executor.for_blocks(0))
+    else:
+        before = measure(given)
+    given = given.without_cells()
     nothing = np.empty(0, dtype=np.float32)
     protection = protected_volume(topology, options.preserved, options.fix_layers, start, firm=before.inverted > 0)
-    return State(given, restore, smoother, before, protection, start, start, nothing, tuple(remarks), sliding=sliding)
+    return State(
+        given, restore, smoother, before, protection, start, start, nothing, tuple(remarks), sliding=sliding,
+        second_order=second,
+    )  # fmt: skip
 
 
 def check_surface_options(mesh: Mesh, options: SmoothOptions) -> None:
@@ -204,11 +213,11 @@ def check_mesh(mesh: Mesh, target: Target) -> None:
             f"a target is asked of triangles and quads, and this mesh has none: {others} cannot be measured so far"
         )
     if mesh.has_volumes:
-        if not any(block.kind in KINDS and len(block.nodes) for block in mesh.cells):
+        if not any(has_form(block.kind) and len(block.nodes) for block in mesh.cells):
             kinds = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
             raise InputError(
                 f"this is a mesh of {', '.join(kinds)} cells: of volumes, only tetrahedra, hexahedra, wedges and "
-                "pyramids with straight edges move so far"
+                "pyramids move so far, those of second order without pyramids"
             )
         refuse_flat(mesh)
         return

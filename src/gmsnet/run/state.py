@@ -27,6 +27,7 @@ from gmsnet.run.run import Start, precision_of
 from gmsnet.run.score import Score
 from gmsnet.run.stop import INTERRUPTED
 from gmsnet.run.sweep import Sweep
+from gmsnet.topology.curved_solids import CORNERS3, CURVED
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -46,17 +47,19 @@ class SecondOrder:
     """The second-order cells of a mesh (run/second_order.py).
 
     cells: (C, 9) ids, counter-clockwise, −1 past the last node; kinds: (C,) (kernels.simplex.bernstein), first-order
-    cells of the mesh among them. free: (N,) bool by ids. whole: the connectivity of the mesh with straight cells, where
-    corners are free, too; protection: of that, and what of it is protected. sign: (C,) of det J in each cell, as it is
-    now. invalid: how many second-order cells are not certified valid, least: the least certified bound over a straight
-    cell's size, both at first and now. None of the three is known before the first stage. unable: why the method does
+    cells of the mesh among them. Of volumes (C, 27) of positive sense, and numbers of topology.curved_solids.CURVED.
+    free: (N,) bool by ids. whole: the connectivity of the mesh with straight cells, where corners are free, too;
+    protection: of that, and what of it is protected. sign: (C,) of det J in each cell, as it is now. invalid: how many
+    second-order cells are not certified valid, least: the least certified bound over a straight cell's size, of volumes
+    over its least determinant at a corner, both at first and now. None of the three is known before the first stage.
+    unable: why the method does
     not move corners.
     """
 
     cells: NDArray[np.int32]
     kinds: NDArray[np.int8]
     free: NDArray[np.bool_]
-    whole: Topology
+    whole: Topology | Volume
     protection: Protection
     sign: NDArray[np.int8] | None = None
     invalid: tuple[int, int] = (0, 0)
@@ -64,15 +67,20 @@ class SecondOrder:
     unable: str = ""
 
     @property
+    def solid(self) -> bool:
+        """Are they volumes?"""
+        return isinstance(self.whole, Volume)
+
+    @property
     def curved(self) -> NDArray[np.bool_]:
         """(C,) which cells are of the second order."""
-        return np.asarray(self.kinds < len(NAMES))
+        return np.asarray(self.kinds < (len(CURVED) if self.solid else len(NAMES)))
 
     @property
     def corners(self) -> NDArray[np.bool_]:
         """(N,) by id: which nodes are a corner."""
         found = np.zeros(len(self.free), dtype=bool)
-        for kind, count in enumerate(CORNERS):
+        for kind, count in enumerate(CORNERS3 if self.solid else CORNERS):
             found[self.cells[self.kinds == kind, :count]] = True
         return found
 

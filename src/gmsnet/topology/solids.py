@@ -22,7 +22,7 @@ from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.topology.fans import Marks
 from gmsnet.topology.ordering import memory_order, space_points
 from gmsnet.topology.polygons import Ints
-from gmsnet.topology.wound import refuse_flat
+from gmsnet.topology.wound import mark_of, refuse_flat
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -130,7 +130,7 @@ class WoundSolids:
             near = np.where(np.arange(8) < corners[:, None], near, near[:, :1])
             kernels.match_solids(near, kind, tables(), nodes, twin)
         kernels.mark_solids(near, kind, tables(), twin, region, _halved(near, kind, twin), *BITS, marks)
-        others = np.uint16(connectivity.LINE | connectivity.UNSUPPORTED_CELL)
+        others = np.uint16(connectivity.LINE | connectivity.UNSUPPORTED_CELL | connectivity.SECOND_ORDER)
         marks[~used & (marks & others == 0)] |= np.uint16(connectivity.UNUSED)
         solids = Solids(near, kind, form_of("hexahedron"), form_of("wedge"))
         return cls(cell, cells, solids, corners, orientation, region, origin, twin, marks, memory, position)
@@ -211,8 +211,7 @@ def _cells(
             number = np.full(len(nodes), KINDS.index(block.kind), dtype=np.uint8)
             parts.append((wide, number, before + np.flatnonzero(whole), block.regions[whole]))
         else:
-            volume = block.dimension in (3, None)
-            marks[block.nodes] |= np.uint16(connectivity.UNSUPPORTED_CELL if volume else connectivity.LINE)
+            marks[block.nodes] |= np.uint16(mark_of(block))
         before += len(block.nodes)
     if fixed is not None:
         marks[fixed] |= np.uint16(connectivity.CHOSEN)

@@ -8,9 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.jacobian import has_form
 from gmsnet.errors import InputError
 from gmsnet.kernels.simplex import orientation3
 from gmsnet.kernels.topology import connectivity, facets
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.topology.fans import Marks
@@ -60,7 +62,7 @@ class Wound:
         rows, region = place.take(origin, axis=0), region.take(origin) if len(region) else region
         marks = _known_marks(mesh, fixed, position)
         orientation = _wound(points[memory], rows, region, marks)
-        others = np.uint16(connectivity.LINE | connectivity.UNSUPPORTED_CELL)
+        others = np.uint16(connectivity.LINE | connectivity.UNSUPPORTED_CELL | connectivity.SECOND_ORDER)
         marks[~used & (marks & others == 0)] |= np.uint16(connectivity.UNUSED)
         return cls(cell, cells, rows, orientation, region, origin, marks, memory, position)
 
@@ -116,14 +118,19 @@ def _tetrahedra(mesh: Mesh) -> tuple[Ints, NDArray[np.int64], NDArray[np.int64]]
     return cells, numbers[0] if len(numbers) == 1 else np.concatenate(numbers), region
 
 
+def mark_of(block: CellBlock) -> int:
+    """Why the nodes of cells of other kinds are held."""
+    if block.dimension not in (3, None):
+        return connectivity.LINE
+    return connectivity.SECOND_ORDER if has_form(block.kind) else connectivity.UNSUPPORTED_CELL
+
+
 def _known_marks(mesh: Mesh, fixed: Flags | None, position: Ints) -> NDArray[np.uint16]:
     """(N,) by places in memory: of cells that are not smoothed, of faces and lines, and of chosen nodes."""
     marks = np.zeros(len(position), dtype=np.uint16)
     for block in mesh.cells:
         if block.kind not in SMOOTHED:
-            volume = block.dimension in (3, None)
-            mark = connectivity.UNSUPPORTED_CELL if volume else connectivity.LINE
-            marks[position[block.nodes.ravel()]] |= np.uint16(mark)
+            marks[position[block.nodes.ravel()]] |= np.uint16(mark_of(block))
     if fixed is not None and fixed.any():
         marks[position[fixed]] |= np.uint16(connectivity.CHOSEN)
     return marks

@@ -9,7 +9,8 @@ from support import curved_meshes
 from gmsnet.kernels.curved.descend import improve_nodes
 from gmsnet.kernels.star.guard import MeshGuard
 from gmsnet.measure.curved import judge_curved
-from gmsnet.untangle.curved import free_inner, untangle_curved
+from gmsnet.methods.planar_cells import PlanarCells
+from gmsnet.untangle.curved import untangle_curved
 
 VALID = MeshGuard(2.0**-53, 0.0, False, -np.inf)
 
@@ -21,8 +22,8 @@ def qualities(points, mesh):
 @pytest.mark.parametrize("seed", range(20))
 def test_the_least_quality_never_falls_and_all_cells_stay_valid(seed):
     points, mesh, free = curved_meshes.tables(curved_meshes.thrown(seed))
-    assert untangle_curved(points, mesh, free).after == 0
-    before, nodes = points.copy(), np.flatnonzero(free_inner(mesh, free))
+    assert untangle_curved(PlanarCells(points, mesh, free)).after == 0
+    before, nodes = points.copy(), np.flatnonzero(PlanarCells(points, mesh, free).inner)
     least = qualities(points, mesh)[1].min()
     for _ in range(3):
         tally = np.zeros(3, dtype=np.int64)
@@ -39,7 +40,14 @@ def test_cells_above_the_threshold_are_left_alone():
     points, mesh, free = curved_meshes.tables(curved_meshes.known_valid(1))
     before = points.copy()
     tally = np.zeros(3, dtype=np.int64)
-    improve_nodes(points, mesh, np.flatnonzero(free_inner(mesh, free)), qualities(points, mesh)[1].min(), VALID, tally)
+    improve_nodes(
+        points,
+        mesh,
+        np.flatnonzero(PlanarCells(points, mesh, free).inner),
+        qualities(points, mesh)[1].min(),
+        VALID,
+        tally,
+    )
     np.testing.assert_array_equal(points, before)
     assert not tally.any()
 
@@ -52,5 +60,12 @@ def test_a_bent_edge_between_straight_ones_becomes_nearly_straight():
     straight = points[m].copy()
     points[m] += [0.05, 0.05]
     for _ in range(10):
-        improve_nodes(points, mesh, np.flatnonzero(free_inner(mesh, free)), 0.99, VALID, np.zeros(3, dtype=np.int64))
+        improve_nodes(
+            points,
+            mesh,
+            np.flatnonzero(PlanarCells(points, mesh, free).inner),
+            0.99,
+            VALID,
+            np.zeros(3, dtype=np.int64),
+        )
     assert np.abs(points[m] - straight).max() < 0.01

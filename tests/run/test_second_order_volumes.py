@@ -1,0 +1,248 @@
+"""Second-order volumes: corners become as good as those of the straight twin, and all cells stay valid everywhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import gmsnet
+from gmsnet.cells.table import CELLS
+from gmsnet.errors import InputError
+from gmsnet.generate import ball_volume, block_volume, disturb, lattice_volume, o_grid_section, swept_volume
+from gmsnet.generate.curved_volumes import on_sphere, second_order_volume
+from gmsnet.measure.report import connectivity_of
+from gmsnet.measure.solid import judge_volumes
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.run import stop
+from gmsnet.topology.curved_solids import CURVED, STRAIGHT, mirrored
+
+
+def volumes(mesh):
+    return Mesh(mesh.points, tuple(block for block in mesh.cells if block.dimension == 3))
+
+
+def thrown(mesh, amount=0.2, seed=1, **options):
+    mesh = volumes(mesh)
+    return disturb(mesh, connectivity_of(mesh).free, amount, seed=seed, **options)
+
+
+BASES = {
+    "tetra10": (lambda: lattice_volume(4), False),
+    "hexahedron27": (lambda: block_volume(4), False),
+    "hexahedron20": (lambda: block_volume(4), True),
+    "wedge18": (lambda: block_volume(3, "wedge"), False),
+    "wedge15": (lambda: block_volume(3, "wedge"), True),
+}
+
+
+def twins(kind, seed=1, bend=0.0):
+    """The same thrown, valid mesh of straight cells, of the first order and of the second."""
+    made, serendipity = BASES[kind]
+    first = thrown(made(), seed=seed)
+    return first, second_order_volume(first, serendipity=serendipity, bend=bend, seed=seed)
+
+
+def rim(mesh):
+    """(N,) bool: the nodes of facets of one cell alone."""
+    rows = {}
+    for block in mesh.cells:
+        for facet in CELLS[block.kind].facets:
+            for nodes in block.nodes[:, list(facet)].tolist():
+                rows.setdefault(frozenset(nodes), []).append(nodes)
+    found = np.zeros(len(mesh.points), dtype=bool)
+    for nodes, uses in rows.items():
+        found[list(nodes)] |= len(uses) == 1
+    return found
+
+
+def signs(mesh, points):
+    blocks = [block for block in mesh.cells if block.kind in CURVED]
+    found = [
+        judge_volumes(points, b.nodes.astype(np.int32), b.kind, np.ones(len(b.nodes), dtype=np.int8))[0] for b in blocks
+    ]
+    return np.concatenate(found)
+
+
+def assert_sound(mesh, result, before=None):
+    """What was valid is, by exact arithmetic; the boundary and what is held have their bits."""
+    before = signs(mesh, mesh.points) if before is None else before
+    after = signs(mesh, result.points)
+    assert (after[before == 1] == 1).all()
+    assert result.after.inverted == (after != 1).sum()
+    changed = (result.points != mesh.points).any(axis=1)
+    np.testing.assert_array_equal(changed, result.moved)
+    assert not changed[rim(mesh)].any()
+    for ids in result.held.values():
+        assert not changed[ids].any()
+
+
+@pytest.mark.parametrize("guard", ["worst", "star", "valid"])
+@pytest.mark.parametrize("kind", BASES)
+def test_corners_become_as_good_as_those_of_the_first_order_twin(kind, guard):
+    first, second = twins(kind)
+    expected, result = gmsnet.smooth(first, guard=guard), gmsnet.smooth(second, guard=guard)
+    assert_sound(second, result)
+    assert result.after.inverted == 0
+    assert result.after.shape.min() >= expected.after.shape.min() - 0.02
+    assert result.after.shape.mean() >= expected.after.shape.mean() - 0.01
+    assert result.after.shape.min() >= result.before.shape.min()
+    assert result.sweeps > 0
+    assert result.stop_reason == stop.NO_PROGRESS
+
+
+@pytest.mark.parametrize("kind", BASES)
+def test_nodes_of_straight_edges_stay_in_their_middle(kind):
+    _, mesh = twins(kind)
+    result = gmsnet.smooth(mesh, "laplacian", max_sweeps=2)
+    assert_sound(mesh, result)
+    assert result.moved.any()
+    for block in mesh.cells:
+        for start, end, middle in CELLS[block.kind].edges:
+            ends = result.points[block.nodes[:, [start, end]]].mean(axis=1)
+            np.testing.assert_allclose(result.points[block.nodes[:, middle]], ends, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", BASES)
+def test_cells_that_are_thrown_out_of_validity_become_valid(kind, seed):
+    _, mesh = twins(kind, seed, bend=0.4)
+    assert (signs(mesh, mesh.points) != 1).sum() > 5
+    result = gmsnet.smooth(mesh)
+    assert_sound(mesh, result)
+    assert result.after.inverted == 0
+    assert result.invalid_curved == 0
+
+
+@pytest.mark.parametrize("kind", BASES)
+def test_tangled_corners_are_mended_with_what_follows_them(kind):
+    made, serendipity = BASES[kind]
+    first = thrown(made(), 0.6, keep_valid=False)
+    mesh = second_order_volume(first, serendipity=serendipity)
+    assert gmsnet.quality(mesh).inverted > 0
+    result = gmsnet.smooth(mesh)
+    assert_sound(mesh, result)
+    assert result.after.inverted == 0
+
+
+def test_a_ball_stays_on_its_sphere_and_its_bound_rises():
+    first = thrown(volumes(ball_volume(200).mesh), 0.1)
+    radius = np.linalg.norm(first.points, axis=1).max()
+    mesh = second_order_volume(first, project=on_sphere(radius))
+    result = gmsnet.smooth(mesh)
+    assert_sound(mesh, result)
+    assert result.after.cells.curved_bounds().min() >= min(0.5, result.before.cells.curved_bounds().min())
+    assert result.after.shape.mean() > result.before.shape.mean()
+
+
+def test_a_swept_o_grid_keeps_its_round_wall():
+    section = o_grid_section(2, 2)
+    first = thrown(volumes(swept_volume(section, 4, 2.0)), 0.15)
+    outer = np.linalg.norm(first.points[:, :2], axis=1).max()
+
+    def wall(points):
+        radius = np.linalg.norm(points[:, :2], axis=1)
+        found, near = points.copy(), np.abs(radius - outer) < 0.2 * outer
+        found[near, :2] *= (outer / radius[near])[:, None]
+        return found
+
+    mesh = second_order_volume(first, project=wall)
+    before = signs(mesh, mesh.points)
+    result = gmsnet.smooth(mesh)
+    assert_sound(mesh, result, before)
+    assert result.after.inverted <= result.before.inverted
+
+
+@pytest.mark.parametrize("kind", BASES)
+def test_cells_that_are_inside_out_are_read_the_other_way_round(kind):
+    _, mesh = twins(kind, bend=0.05)
+    order = np.array(mirrored(kind))
+    turned = Mesh(mesh.points, tuple(CellBlock(b.kind, b.nodes[:, order], b.regions) for b in mesh.cells))
+    expected, result = gmsnet.smooth(mesh), gmsnet.smooth(turned)
+    assert result.after.inverted == 0
+    np.testing.assert_allclose(result.points, expected.points, atol=0.02)
+    assert_sound(mesh, expected)
+
+
+@pytest.mark.parametrize("kind", CURVED)
+def test_the_mirrored_order_turns_the_reference_cell_over(kind):
+    corners = CELLS[STRAIGHT[kind]].corners
+    assert sorted(mirrored(kind)) == list(range(CELLS[kind].nodes))
+    assert sorted(mirrored(kind)[:corners]) == list(range(corners))
+
+
+def test_what_is_fixed_and_interfaces_stay():
+    first, _ = twins("tetra10")
+    block = first.cells[0]
+    left = first.points[block.nodes].mean(axis=1)[:, 0] < 0.5
+    regions = left.astype(np.int64)
+    first = Mesh(first.points, (CellBlock("tetra", block.nodes, regions),))
+    mesh = second_order_volume(first)
+    inner = np.flatnonzero(~rim(mesh))
+    chosen = inner[::7]
+    result = gmsnet.smooth(mesh, fixed=chosen)
+    assert not result.moved[chosen].any()
+    nodes = mesh.cells[0].nodes
+    between = np.intersect1d(nodes[left], nodes[~left])
+    assert not result.moved[between].any()
+    assert result.moved.any()
+    assert_sound(mesh, result)
+
+
+def test_first_order_cells_beside_them_move_in_their_own_sweeps():
+    first, second = twins("tetra10")
+    nodes = first.cells[0].nodes
+    left = first.points[nodes].mean(axis=1)[:, 0] < 0.5
+    cells = (
+        CellBlock("tetra", nodes[~left], np.zeros((~left).sum(), dtype=np.int64)),
+        CellBlock("tetra10", second.cells[0].nodes[left], np.zeros(left.sum(), dtype=np.int64)),
+    )
+    mesh = Mesh(second.points, cells)
+    result = gmsnet.smooth(mesh)
+    between = np.intersect1d(nodes[left], nodes[~left])
+    assert not result.moved[between].any()
+    for chosen in (left, ~left):
+        own = np.setdiff1d(nodes[chosen], between)
+        assert result.moved[own].any()
+    assert result.after.inverted == 0
+    assert len(result.after.cell) == len(nodes)
+
+
+def test_a_node_in_the_middle_of_two_edges_is_held():
+    _, mesh = twins("tetra10")
+    nodes = mesh.cells[0].nodes.copy()
+    inner = ~rim(mesh)
+    middles = np.unique(nodes[:, 4:][inner[nodes[:, 4:]]])
+    torn, other = middles[:2]
+    nodes[nodes == other] = torn
+    broken = Mesh(mesh.points, (CellBlock("tetra10", nodes, mesh.cells[0].regions),))
+    result = gmsnet.smooth(broken)
+    assert not result.moved[torn]
+    assert result.moved.any()
+
+
+def test_threads_make_the_same_bits():
+    _, mesh = twins("hexahedron27", bend=0.1)
+    one, two = gmsnet.smooth(mesh, threads=1), gmsnet.smooth(mesh, threads=2)
+    np.testing.assert_array_equal(one.points, two.points)
+
+
+def test_kinds_without_a_known_determinant_are_refused():
+    mesh = Mesh(
+        np.random.default_rng(1).random((13, 3)), (CellBlock("pyramid13", np.arange(13)[None], np.zeros(1, dtype=int)),)
+    )
+    with pytest.raises(InputError, match="second order without pyramids"):
+        gmsnet.smooth(mesh)
+
+
+@pytest.mark.parametrize("kind", BASES)
+def test_single_cells_that_are_inside_out_are_told_by_their_neighbours(kind):
+    _, mesh = twins(kind)
+    block = mesh.cells[0]
+    nodes = block.nodes.copy()
+    nodes[3] = nodes[3, np.array(mirrored(kind))]
+    one = Mesh(mesh.points, (CellBlock(kind, nodes, block.regions),))
+    found = gmsnet.quality(one)
+    assert found.inverted == 0
+    assert found.summary()["read_inside_out"] == {kind: 1}
+    assert gmsnet.smooth(one).after.inverted == 0
