@@ -97,7 +97,9 @@ def libigl_flow(points: Floats, rows: NDArray[np.int64]) -> Found:
 
 TOOLS: dict[str, Tool] = {
     "gmsnet auto": gmsnet_with(),
-    "gmsnet, feature angle 60°": gmsnet_with(feature_angle=60),
+    "gmsnet, Hausdorff 0.1 %": gmsnet_with(hausdorff=HAUSDORFF),
+    "gmsnet, needles free": gmsnet_with(free_needles=True),
+    "gmsnet, needles free, 0.1 %": gmsnet_with(free_needles=True, hausdorff=HAUSDORFF),
     "Mmgs (no insertion, no swap)": mmgs,
     "VTK smooth, 100 passes": vtk_laplacian,
     "VTK Taubin, 50 passes": vtk_taubin,

@@ -213,3 +213,13 @@ def test_a_dry_run_makes_no_folder_of_a_case(run, tmp_path, monkeypatch):
         (folder / file).write_bytes(data)
     assert run("smooth", tmp_path / "one", "--out-dir", tmp_path / "fixed", "--dry-run").code == 0
     assert not (tmp_path / "fixed").exists()
+
+
+def test_a_case_without_a_place_to_go_is_told_where(run, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "io")
+    openfoam = importlib.import_module("test_openfoam")
+    openfoam.save(openfoam.in_text(openfoam.layer()), tmp_path / "cavity")
+    monkeypatch.chdir(tmp_path)
+    done = run("smooth", "cavity", "fixed")
+    assert done.code == 2
+    assert "fixed: an OpenFOAM mesh is written into a case: copy the case there first, or give --in-place" in done.err

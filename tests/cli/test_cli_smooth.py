@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import gmsnet
+from gmsnet.generate import random_mesh
 from gmsnet.run import stop
 from gmsnet.run.account import Account
 
@@ -276,3 +277,12 @@ def test_the_metric_by_which_the_best_mesh_is_chosen(run, square, tmp_path):
     assert refused.code == 2
     assert "best_by must be one of 'shape', 'aspect'" in refused.err
     assert not (tmp_path / "out.su2").exists()
+
+
+def test_a_mesh_of_boundary_nodes_is_told_of_sliding(run, tmp_path):
+    gmsnet.write(random_mesh(10, seed=1), tmp_path / "a.su2")
+    hint = "most nodes are at the boundary and stay there: --slide all lets them move along it"
+    assert hint in run("smooth", tmp_path / "a.su2", tmp_path / "b.su2").out
+    assert hint not in run("smooth", tmp_path / "a.su2", tmp_path / "b.su2", "--slide", "all").out
+    gmsnet.write(random_mesh(200, seed=1), tmp_path / "a.su2")
+    assert hint not in run("smooth", tmp_path / "a.su2", tmp_path / "b.su2").out

@@ -123,7 +123,7 @@ def test_a_failure_leaves_no_folder(whole: Mesh, tmp_path: Path, monkeypatch: py
     def full(*_: object) -> None:
         raise InputError("no room")
 
-    monkeypatch.setattr("gmsnet.io.files.replace_files", full)
+    monkeypatch.setattr("gmsnet.io.output.replace_files", full)
     with pytest.raises(InputError, match="no room"):
         gmsnet.write(mesh.with_points(mesh.points * 2.0), tmp_path / "b.pvtu")
     assert not (tmp_path / "b").exists()

@@ -13,8 +13,9 @@ from support.ranks import ranks_of
 import gmsnet
 from gmsnet import CellBlock, Mesh
 from gmsnet.generate.recombine import random_quad_mesh
-from gmsnet.measure.report import measure, percentile
+from gmsnet.measure.report import measure
 from gmsnet.measure.signs import exact_signs
+from gmsnet.measure.summary import percentile
 from gmsnet.measure.totals import totals_of
 from gmsnet.parallel.threads import Serial
 from gmsnet.topology.ordering import near_points

@@ -35,6 +35,14 @@ def stretched(factor, amount=0.3, seed=1):
     return mesh.with_points(mesh.points * (factor, 1.0))
 
 
+def bent(cells, amount=0.4, seed=1):
+    """Rows of one height around most of a ring: cells are three times as long at its outside."""
+    mesh = sheared_mesh(24, 20, amplitude=0.0, cells=cells)
+    angle, radius = 1.6 * np.pi * mesh.points[:, 0], 0.3 + 0.7 * mesh.points[:, 1]
+    mesh = mesh.with_points(np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
+    return disturb(mesh, Topology.of(mesh).free, amount, seed=seed, edge="shortest") if amount else mesh
+
+
 NO_LAYERS = {
     "sheared": lambda: sheared_mesh(60, 120, amplitude=0.9, waves=2),
     "sheared quads": lambda: sheared_mesh(30, 90, amplitude=0.6, waves=3, cells="quad"),
@@ -49,6 +57,12 @@ NO_LAYERS = {
     "terrain of many lines": lambda: terrain_mesh(24, ratio=1.72, seed=829),
     "stretched": lambda: stretched(2.5),
     "stretched more": lambda: stretched(6.0),
+    "hole squashed": lambda: moved_hole_mesh(0.02, shift=0.0, squash=0.115, turn=3.5),
+    "ring": lambda: bent("quad", 0.0),
+    "ring of triangles": lambda: bent("triangle", 0.0),
+    "disturbed ring": lambda: bent("quad", seed=2),
+    "another disturbed ring": lambda: bent("quad", seed=5),
+    "disturbed ring of triangles": lambda: bent("triangle"),
 }
 LAYERS = {
     "triangles": lambda: layered_mesh(),

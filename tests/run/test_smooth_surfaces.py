@@ -131,7 +131,7 @@ def test_isolated_nodes_and_doubled_and_flat_faces_are_no_trouble():
 def test_what_cannot_be_asked_of_surfaces_is_told():
     mesh = ball(100)
     for options, message in (
-        ({"target_quality": 0.5}, "target"),
+        ({"target_dihedral": 20.0}, "target_dihedral"),
         ({"method": "getme"}, "not for surfaces"),
         ({"method": "laplacian", "variant": "area"}, "not for surfaces"),
         ({"size": np.ones(100)}, "metric"),

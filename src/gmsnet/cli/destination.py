@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 from gmsnet.errors import InputError
 from gmsnet.io.atomic import check_writable, refuse_folder
-from gmsnet.io.files import files_of
 from gmsnet.io.foam_case import OPENFOAM, case_of
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, entry_of, format_of_suffix
 from gmsnet.io.packed import split_name
+from gmsnet.io.paths import files_of
 from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, is_standard_output, standard_output
 
 if TYPE_CHECKING:
@@ -55,6 +55,11 @@ def destination_of(source: str, output: str | None, in_place: bool, format: str 
         return Destination(output, format, aside)
     if case_of(output, format) is not None:
         key = OPENFOAM
+    elif format is None and _case(source) and not os.path.splitext(output)[1] and not os.path.exists(output):
+        raise InputError(
+            f"{output}: an OpenFOAM mesh is written into a case: copy the case there first, "
+            "or give --in-place, or --out-dir FOLDER for the mesh alone"
+        )
     else:
         refuse_folder(output)
         key = format or format_of_suffix(output, split_name(output)[1], "--output-format", reading=False)

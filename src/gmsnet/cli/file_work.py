@@ -158,7 +158,7 @@ def _best_so_far(interrupted: KeyboardInterrupt) -> SmoothResult:
 
 def _check_conversion(mesh: Mesh, destination: Destination) -> None:
     """Raise now what writing would raise after the work: the format of the output cannot hold the mesh."""
-    from gmsnet.io.files import output_format
+    from gmsnet.io.output import output_format
 
     entry = output_format(mesh, destination.path, destination.format)
     if mesh.source is not None and entry.key != mesh.source.format:

@@ -12,10 +12,10 @@ import typer
 from gmsnet.cli.failure import BAD_INPUT, BUG, DONE, print_failure, told
 from gmsnet.cli.signals import Interrupted
 from gmsnet.errors import InputError
-from gmsnet.io.files import files_of
 from gmsnet.io.foam_case import MESH, mesh_folder
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, entry_of, known
 from gmsnet.io.packed import split_name
+from gmsnet.io.paths import files_of
 from gmsnet.io.streams import STANDARD_INPUT
 from gmsnet.mesh.display import amount
 

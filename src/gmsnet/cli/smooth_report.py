@@ -12,6 +12,7 @@ from gmsnet.cli.destination import shown
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import counts
 from gmsnet.run.account import Account
+from gmsnet.topology.held import ON_BOUNDARY
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,8 @@ class Outcome(Account):
         if result.held and self.free:
             held = len(self.mesh.points) - self.free
             console.print(f"held: {held:,} of {amount(len(self.mesh.points), 'node')} ({self.reasons()})")
+            if len(result.held.get(ON_BOUNDARY, ())) > self.free and not any("slide:" in note for note in result.notes):
+                console.print("most nodes are at the boundary and stay there: --slide all lets them move along it")
         if self.written is None:
             console.print(f"left as it is: {self.input}")
         elif not aside:

@@ -1,23 +1,20 @@
-"""Reading and writing whole files: which format, what can go wrong, and nothing ever half-written."""
+"""Reading whole files: which format, and what can go wrong."""
 
 from __future__ import annotations
 
 import os
 from codecs import BOM_UTF8
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io import foreign
-from gmsnet.io.atomic import reason, refuse_folder, replace_files
+from gmsnet.io.atomic import reason, refuse_folder
 from gmsnet.io.cells import sealed
 from gmsnet.io.contents import Data, is_open_pipe, load, refuse_unless_regular
-from gmsnet.io.convert import listed
 from gmsnet.io.document import Parsed
 from gmsnet.io.foam_case import OPENFOAM, case_of, file_in
 from gmsnet.io.formats import (
-    BY_SUFFIX,
     FORMATS,
     Entry,
     check_contents,
@@ -26,13 +23,13 @@ from gmsnet.io.formats import (
     format_of_suffix,
     sniff,
 )  # fmt: skip
-from gmsnet.io.linked import folders_for, links_of, placed
-from gmsnet.io.packed import MAGIC, is_packed, packed, split_name, unpacked
-from gmsnet.io.pieces import Piece, Pieces
-from gmsnet.io.splice import FileSource, most_rounded
+from gmsnet.io.linked import links_of
+from gmsnet.io.packed import MAGIC, is_packed, split_name, unpacked
+from gmsnet.io.paths import beside, name_of
+from gmsnet.io.splice import FileSource
 from gmsnet.io.stamps import Stamp, Stamps
-from gmsnet.io.streams import STANDARD_INPUT, STANDARD_OUTPUT, is_special, standard_output
-from gmsnet.mesh.mesh import Mesh, Source
+from gmsnet.io.streams import STANDARD_INPUT
+from gmsnet.mesh.mesh import Mesh
 
 
 def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
@@ -46,7 +43,7 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     Raises InputError where the file cannot be opened or is no regular file, where others change it while it is read,
     or where the format is unknown; FormatError (naming the line) where it is damaged or not of that format.
     """
-    name = _name(path)
+    name = name_of(path)
     shown = "standard input" if name in STANDARD_INPUT else name
     suffix = os.path.splitext(name)[1].lower()
     if format is None and suffix in foreign.READ and os.path.isfile(name):
@@ -72,12 +69,6 @@ def _of_mark(files: Mapping[str, Data]) -> str:
     if not any(data[: len(BOM_UTF8)] == BOM_UTF8 for data in files.values()):
         return ""
     return " (the file begins with a byte-order mark, which some editors add: save it as UTF-8 without one)"
-
-
-def _name(path: Any) -> str:
-    if not isinstance(path, (str, bytes, os.PathLike)):
-        raise InputError(f"a file is given by its path, not by {path!r}")
-    return os.fsdecode(path)
 
 
 def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, tuple[str, Data, Stamp | None]]]:
@@ -107,7 +98,7 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
         return entry, {entry.suffixes[0]: opened, **_linked(entry, name, shown, opened[1], stream)}
     if stream:
         raise InputError(f"{shown}: {entry.title} takes several files and cannot be read from a stream")
-    return entry, {suffix: _loaded(_beside(name, suffix)) for suffix in entry.suffixes}
+    return entry, {suffix: _loaded(beside(name, suffix)) for suffix in entry.suffixes}
 
 
 def _linked(entry: Entry, name: str, shown: str, data: Data, stream: bool) -> dict[str, tuple[str, Data, Stamp | None]]:
@@ -161,14 +152,6 @@ def _loaded(name: str) -> tuple[str, Data, Stamp | None]:
         raise InputError(f"{name}: there is not enough memory for this file") from None
 
 
-def _beside(name: str, suffix: str) -> str:
-    """The name of a companion file, its suffix in capitals if that of ``name`` is, and compressed if that is."""
-    stem, given, gz = split_name(name)
-    if given.lower() not in BY_SUFFIX:
-        stem, given = stem + given, ""
-    return stem + (suffix.upper() if given.isupper() else suffix) + gz
-
-
 def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamps) -> Mesh:
     if not len(parsed.points):
         raise FormatError("the file holds no points")
@@ -192,144 +175,3 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamp
         mesh.node_sets, parsed.form, parsed.shares,
     )  # fmt: skip
     return replace(mesh, source=source)
-
-
-def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -> list[str]:
-    """Writes a mesh to a file and returns, in words, what the target's format could not hold.
-
-    A mesh that was read from a file of the same format, and differs from it in coordinates alone, is written as that
-    file with the new coordinates in the places of the old ones; then nothing is lost. Any other is converted. A file
-    whose name ends with ``.gz`` is compressed; what is promised byte for byte is what it unpacks to.
-
-    path: the file; ``-`` is the standard output, and pipes and devices are written straight. Everything else is
-    replaced in one step, once all is on the disk. format: as in ``read``; by default the suffix tells, or the format
-    that the mesh was read from where there is none to tell.
-
-    Raises InputError where the file cannot be written, or is the one that the mesh was read from and others have
-    changed or replaced it since; FormatError where the format cannot hold the mesh.
-    """
-    name = _name(path)
-    if not isinstance(mesh, Mesh):
-        raise InputError(f"only a gmsnet.Mesh can be written, no {type(mesh).__name__}: of a result, give its .mesh")
-    shown = "standard output" if name in STANDARD_OUTPUT else name
-    entry = output_format(mesh, name, format)
-    source = mesh.source
-    lost: list[str] = []
-    try:
-        form = _form_for(source, entry, name)
-        if isinstance(source, FileSource) and (source.format, source.form) == (entry.key, form) and source.fits(mesh):
-            lost = _rounded(mesh, source)
-            files = source.splice(mesh.points)
-        else:
-            written = entry.write(mesh, form)
-            files, lost = dict(written.files), [*written.lost, *_unread(source)]
-    except MemoryError:
-        raise _no_memory(shown) from None
-    except InputError as error:
-        raise FormatError(f"{shown}: {error}") from None
-    stamps = source.stamps if isinstance(source, FileSource) else Stamps()
-    targets: dict[str, str] = {}
-    if entry.linked and len(files) > 1:
-        if name in STANDARD_OUTPUT or is_special(name):
-            raise InputError(f"{shown}: {entry.title} in several files cannot be written to a stream")
-        files, targets = placed(entry, files, name, stamps)
-    pieces = {suffix: _with_memory(shown, part) for suffix, part in files.items()}
-    if name in STANDARD_OUTPUT:
-        _to_standard_output(*pieces.values())
-    else:
-        targets = targets or _targets(name, entry, list(files), stamps)
-        with folders_for(name, targets.values() if entry.linked else ()):
-            replace_files(
-                {path: packed(pieces[key]) if is_packed(path) else pieces[key] for key, path in targets.items()}, stamps
-            )
-    return lost
-
-
-def _targets(name: str, entry: Entry, keys: list[str], stamps: Stamps) -> dict[str, str]:
-    """Suffix → the path of each file that is written. Files of a case that were read and do not change are not."""
-    folder = case_of(name, entry.key)
-    if folder is None:
-        return {key: _beside(name, key) if len(keys) > 1 else name for key in keys}
-    paths = {key: file_in(folder, key, is_packed(name)) for key in keys}
-    return {
-        key: path for key, path in paths.items()
-        if key == entry.suffixes[0] or os.path.abspath(path) not in stamps.known
-    }  # fmt: skip
-
-
-def _form_for(source: Source | None, entry: Entry, name: str) -> str:
-    """The form that is written: what the name says, and in a stream, which has none, that of the file that was read."""
-    if name not in STANDARD_OUTPUT and not is_special(name):
-        return entry.form_of(name)
-    return source.form if isinstance(source, FileSource) and source.format == entry.key else ""
-
-
-def _rounded(mesh: Mesh, source: FileSource) -> list[str]:
-    """In words, by how much the file that was read keeps points differently. Those that ``smooth`` returns are so."""
-    most = most_rounded(mesh.rounding, source.points, mesh.points) if mesh.rounding else 0.0
-    return (
-        [f"coordinates were rounded to {mesh.rounding.words}, by at most {most:.2g}"] if mesh.rounding and most else []
-    )
-
-
-def _unread(source: Source | None) -> Iterator[str]:
-    """What a conversion leaves behind in the file that was read, in words."""
-    if isinstance(source, foreign.ForeignSource):
-        yield f"what meshlane does not read of a file of {source.title}: left out"
-    if isinstance(source, FileSource) and source.unread:
-        title = FORMATS[source.format].title
-        yield f"only the {title} file that was read holds {listed(source.unread)}: left out"
-
-
-def _with_memory(shown: str, pieces: Pieces) -> Iterator[Piece]:
-    try:
-        yield from pieces
-    except MemoryError:
-        raise _no_memory(shown) from None
-
-
-def _no_memory(shown: str) -> InputError:
-    return InputError(f"{shown}: there is not enough memory to write this mesh")
-
-
-def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
-    """The format that ``write`` takes. Raises the InputErrors of ``write`` that do not need the conversion."""
-    stream = path in STANDARD_OUTPUT or is_special(path)
-    shown = "standard output" if path in STANDARD_OUTPUT else path
-    if case_of(path, format) is not None:
-        return FORMATS[OPENFOAM]
-    refuse_folder(path)
-    if format is not None:
-        entry = entry_of(format)
-    elif stream and mesh.source is not None and mesh.source.format:
-        entry = entry_of(mesh.source.format)
-    elif stream:
-        raise InputError(f"{shown}: name the format with --format ({', '.join(FORMATS)})")
-    else:
-        suffix = split_name(path)[1]
-        entry = FORMATS[format_of_suffix(path, suffix, reading=False)]
-        own = FORMATS.get(mesh.source.format) if mesh.source is not None else None
-        if own is not None and suffix.lower() in (*own.suffixes, *own.aliases):
-            entry = own  # of several formats with this suffix the one that was read
-    if stream and len(entry.suffixes) > 1:
-        raise InputError(f"{shown}: {entry.title} takes several files and cannot be written to a stream")
-    return entry
-
-
-def files_of(name: str, entry: Entry) -> list[str]:
-    """The files that a mesh of this name and format stands in: more than one where its format says so."""
-    if (folder := case_of(name, entry.key)) is not None:
-        return [file_in(folder, key, is_packed(name)) for key in entry.suffixes]
-    return [name] if len(entry.suffixes) == 1 else [_beside(name, suffix) for suffix in entry.suffixes]
-
-
-def _to_standard_output(pieces: Iterable[Piece]) -> None:
-    stream = standard_output()
-    try:
-        for piece in pieces:
-            stream.write(piece)
-        stream.flush()
-    except BrokenPipeError:  # nobody reads any more: no fault of the user's
-        raise
-    except OSError as error:
-        raise InputError(f"standard output: cannot be written: {reason(error)}") from None

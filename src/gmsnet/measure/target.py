@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.methods.below import missed
+from gmsnet.kernels.methods.below_on_surface import missed_on_surface
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.tetra_measures import LOW, SHAPE
+from gmsnet.kernels.star.shell import ShellSimplices
 from gmsnet.measure.cells import MeasuredCells
 from gmsnet.measure.dihedral import SHARE, columns_of, most_shape_below, ratios_of
 from gmsnet.measure.report import QualityReport
@@ -109,7 +111,7 @@ class Target:
             every = np.flatnonzero(self.missed(shape, report.min_dihedral)).astype(np.int32)
             return every, shape[every]
         assert isinstance(triangles, MeasuredCells)
-        if triangles.order is not None:
+        if triangles.order is not None or triangles.plane is None:
             low, _, shape, _ = triangles.columns()
             every = np.flatnonzero(self.missed(shape, low)).astype(np.int32)
             return every, shape[every]
@@ -119,11 +121,20 @@ class Target:
         chosen = self.missed(shape, low)
         return rows[chosen], shape[chosen]
 
-    def clearly_missed(self, points: Floats, simplices: Simplices) -> bool:
-        """Do all these corner simplices miss it, however they are measured? points: (N, 2)."""
-        quality, tangent = self.limits
-        rows = missed(points, simplices, quality / SURE**2, tangent / SURE**2)
-        return len(rows) == len(simplices.rows)
+    def corners_missing(
+        self, points: Floats, simplices: Simplices | ShellSimplices, share: float = 1.0
+    ) -> NDArray[np.int32]:
+        """The rows of corner simplices that miss it, or are not clear of it. share: times the target.
+
+        points: (N, 2), or of a surface in space (N, 3).
+        """
+        find = missed_on_surface if isinstance(simplices, ShellSimplices) else missed
+        rows: NDArray[np.int32] = find(points, simplices, *(share * limit for limit in self.limits))
+        return rows
+
+    def clearly_missed(self, points: Floats, simplices: Simplices | ShellSimplices) -> bool:
+        """Do all these corner simplices miss it, however they are measured?"""
+        return len(self.corners_missing(points, simplices, SURE**-2)) == len(simplices.rows)
 
     def rank(self, report: QualityReport) -> tuple[int, int, float]:
         """Of two meshes that of the lesser rank is nearer: by inverted cells, cells that miss it, the worst one."""

@@ -8,6 +8,7 @@ patches do, in a fraction of the time.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -15,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.methods import below as kernels
-from gmsnet.kernels.methods import ranking
+from gmsnet.kernels.methods import ranking, shell
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.measure.target import Target
 from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.shell import Shell
 
 MANY = 0.25  # of the cells: where more miss the target, most of them cannot be had, and others would be lost for them
 SMALL = 1000  # cells: so few cost nothing
@@ -48,11 +51,13 @@ class Below(Smoother):
 
     def __init__(self, target: Target, plan: Sequence[Round], everywhere: bool) -> None:
         self.least, self.plan, self.everywhere = target.shape, np.array(plan), everywhere
-        self.limits = target.limits
+        self.target, self.limits = target, target.limits
         self.converged = self.target_reached = False
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother. The visits depend on each other, so that they are made on one thread."""
+        if isinstance(field.topology, Shell):
+            return self._on_surface(field, field.topology, field.guard(executor))
         topology, tally = field.planar, np.zeros(3, dtype=np.int64)
         simplices = topology.changeable
         self.converged = True
@@ -76,4 +81,27 @@ class Below(Smoother):
             MOST * len(topology.free), self.least, self.limits, self.everywhere, tally,
         )  # fmt: skip
         self.target_reached = not len(left)
+        return tally
+
+    def _on_surface(self, field: Field, topology: Shell, guard: Guard) -> Tally:
+        """The same on a surface in space."""
+        points, simplices, tally = field.points, topology.changeable, np.zeros(3, dtype=np.int64)
+        rows, self.converged = self.target.corners_missing(points, simplices), True
+        if len(rows) > max(MANY * len(simplices.rows), SMALL):
+            return tally
+        seen, everywhere = np.zeros(len(points), dtype=np.bool_), self.everywhere
+        for power, visits in self.plan:
+            if not len(rows):
+                break
+            chosen = topology.near_free.copy()
+            if not everywhere:
+                chosen[:] = False
+                chosen[simplices.rows[rows]] = True
+                chosen &= topology.near_free
+            places = np.flatnonzero(chosen).astype(np.int32)
+            nodes, everywhere = places[np.argsort(topology.memory[places])], False
+            scale = self.least / math.sqrt(3.0)
+            shell.visit(points, topology.stars_of(nodes), nodes, guard, power, visits, scale, seen, tally)
+            rows = self.target.corners_missing(points, simplices)
+        self.target_reached = not len(rows)
         return tally

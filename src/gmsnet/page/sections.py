@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from gmsnet.measure.figures import Figure, at, figures_of
-from gmsnet.measure.report import BEST_IS_LOW
+from gmsnet.measure.summary import BEST_IS_LOW
 from gmsnet.measure.worst import worst_rows
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import counts

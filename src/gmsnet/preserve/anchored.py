@@ -6,10 +6,13 @@ A layer is thinnest where it starts. So of each piece of stretched cells that ha
 edge on a wall and are stretched along it: they must be many, thin, and
 
 - much thinner than most of the piece, which has grown from row to row by much, or by less where most of the piece or
-  of its edges on walls lie so, or
+  of its edges on walls, and some of the piece, lie so, or
 - thinner, and most of the piece lies along the wall that is nearest, or
 - as even along the wall as rows of one height are made, where most of the piece lies along the wall, and the piece is
   not the mesh.
+
+Growth is told by the stretch of cells and by their height: where rows of one height go around a bend, only their length
+differs.
 """
 
 from __future__ import annotations
@@ -36,7 +39,9 @@ FEWEST = 6  # edges on walls
 THIN = math.log(2.5)  # the length of such an edge over the height of its cell, in the median
 GROWN = math.log(1.25)  # how many times as stretched those cells are as those of the piece, in the medians
 CLEARLY_THIN, CLEARLY_GROWN, GROWN_BY_MUCH = math.log(4.0), math.log(1.7), math.log(6.0)
+HIGHER = math.log(1.3)  # how many times as high as those cells the piece's are, in the medians
 OF_PIECE, OF_EDGES = 0.66, 0.7  # of the cells, of the edges on walls: a share that lies along them where it is thin
+SOME = 0.4  # of the cells, where it is the share of the edges that tells: around a flattened hole 0.2 to 0.3 lie so
 MOSTLY = 0.72  # of the cells of a layer are stretched along the wall nearest to them
 PART, EVEN = 0.6, math.log(1.05)  # of a piece without growth: share of the mesh, change from cell to cell
 UNEVEN = math.log(1.6)  # more from cell to cell is no row, but the slivers of a hull
@@ -82,6 +87,7 @@ def _at_walls(
     found = [_edges_on(triangles, points, rim, cells, a, b) for a, b in edges]
     row, length, aligned, one, two = (np.concatenate(each) for each in zip(*found, strict=True))
     height = np.log(np.maximum(np.abs(cells[row, stretch.AREA]), stretch.TINY) / length)
+    across = 0.5 * (np.log(np.maximum(np.abs(cells[:, stretch.AREA]), stretch.TINY)) - cells[:, stretch.LENGTH])
     kept = np.zeros(len(triangles), dtype=bool)
     for name in np.unique(piece[row]):
         own, here = piece == name, piece[row] == name
@@ -90,12 +96,13 @@ def _at_walls(
             continue
         thin = float(np.median((np.log(length) - height)[along]))
         grown = float(np.median(cells[row[along], stretch.LENGTH]) - np.median(cells[own, stretch.LENGTH]))
+        higher = np.median(across[own]) - np.median(across[row[along]]) >= HIGHER
         lie = _along_nearest(triangles[own], points, cells[own], one[along], two[along])
         change = _change(height[along], one[along], two[along])
         even = change <= EVEN and np.count_nonzero(own) <= PART * of_all
-        most = lie >= OF_PIECE or np.count_nonzero(along) >= OF_EDGES * np.count_nonzero(here)
-        clear = thin >= CLEARLY_THIN and grown >= (CLEARLY_GROWN if most else GROWN_BY_MUCH)
-        orderly = clear or (thin >= THIN and lie >= MOSTLY and (grown >= GROWN or even))
+        most = lie >= OF_PIECE or (lie >= SOME and np.count_nonzero(along) >= OF_EDGES * np.count_nonzero(here))
+        clear = thin >= CLEARLY_THIN and higher and grown >= (CLEARLY_GROWN if most else GROWN_BY_MUCH)
+        orderly = clear or (thin >= THIN and lie >= MOSTLY and ((higher and grown >= GROWN) or even))
         if orderly and change <= UNEVEN:
             kept |= own
     return kept

@@ -120,7 +120,7 @@ def _notes(state: State) -> list[str]:
     given = state.second_order
     if given is not None and given.sign is not None and state.final is not None:
         of_order.append(given.note(state.final.moved))
-        of_order.extend(given.protection.notes)
+        of_order.extend(note for note in given.protection.notes if note not in protection.notes)
         if given.protection.walls is not None:
             of_order.append(_wall_note(given.protection, moved=False))
     return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks, *of_order]

@@ -226,5 +226,3 @@ def check_mesh(mesh: Mesh, target: Target) -> None:
             f"the mesh varies in x, y and z and has cells of a type that gmsnet does not know ({unknown}): "
             "whether it is a surface or a volume cannot be told"
         )
-    if mesh.plane is None and target:
-        raise InputError("a target cannot be asked of surfaces in space yet: leave it out")

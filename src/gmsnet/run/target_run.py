@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.methods.below import missed
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.kernels.topology.patch import around
 from gmsnet.measure.target import Target
@@ -24,6 +23,7 @@ from gmsnet.run.run import Run, Start
 from gmsnet.run.score import Score
 from gmsnet.run.state import State
 from gmsnet.run.stop import MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
+from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -148,12 +148,10 @@ def rows_missing(
 ) -> NDArray[np.integer[Any]]:
     """The cells in ``near`` that miss the target, or are not clear of it. shapes: their 1/q, where it is known."""
     simplices = topology.simplices
-    rows: NDArray[np.integer[Any]]
-    if shapes is None:
-        rows = missed(points, simplices, *target.limits)
-    else:
-        some = np.flatnonzero(~(shapes > target.max_shape * SINGLE))
-        rows = some[missed(points, simplices.take(some), *target.limits)]
+    if shapes is None or isinstance(topology, Shell):
+        return target.corners_missing(points, simplices)
+    some = np.flatnonzero(~(shapes > target.max_shape * SINGLE))
+    rows: NDArray[np.integer[Any]] = some[target.corners_missing(points, simplices.take(some))]
     return rows
 
 

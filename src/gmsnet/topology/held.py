@@ -16,12 +16,13 @@ from gmsnet.topology.polygons import Ints
 
 SMOOTHED = ("triangle", "quad")  # the cell types whose nodes may move
 SECOND_ORDER = ("triangle6", "quad8", "quad9")  # whose nodes move in a stage of their own (run/second_order.py)
+ON_BOUNDARY = "boundary"
 OF_SECOND_ORDER = "node of a second-order cell"
 MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would no longer fit any cache
 
 REASONS = {  # mark → text, in the order in which they count
     marks_of.UNUSED: "not used by any cell",
-    marks_of.BOUNDARY: "boundary",
+    marks_of.BOUNDARY: ON_BOUNDARY,
     marks_of.INTERFACE: "interface between regions",
     marks_of.LINE: "node of a line or vertex cell",
     marks_of.UNSUPPORTED_CELL: "node of a cell that is not smoothed",

@@ -38,7 +38,7 @@ FLAT = 1e-5  # of F: a node with less to gain stays, for float32 does not tell i
 
 
 class Power3(NamedTuple):
-    """number: k of p = 3·2^k, from −2 on. constants: see kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m.
+    """number: k of p = 3·2^k. constants: see kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m.
 
     trials: of a step, each half as long as the one before.
     """

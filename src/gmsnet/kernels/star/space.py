@@ -29,7 +29,7 @@ VALUE, GX, GY, GZ, XX, YY, ZZ, XY, XZ, YZ, ISO, LEAST, AFTER, MARGIN = range(14)
 SUMS = 14
 LEAST_ROOT = 1e-15  # of an f: squares of less count as zero, for processors take long with subnormal numbers
 FAR_ABOVE = 1e30  # for simplices that a lane does not have
-# Constants of a power: of r = (S³/D²)·scale, f = r^(p/3), p = 3·2^k: √r for k = −1 and its root for k = −2.
+# Constants of a power: of r = (S³/D²)·scale, f = r^(p/3), p = 3·2^k: √r for k = −1, its root for k = −2, …
 SCALE, ROOT_OF_SCALE, TWO_P, M, MIXED, SQUARED = range(6)
 
 
@@ -145,7 +145,7 @@ def value_of(builder: Any, lengths: Vector, inverse: Vector, power: Any, constan
     with builder.if_else(plain) as (then, other):
         with then:
             builder.store((ratio * constants[ROOT_OF_SCALE]).value, place)
-            with builder.if_then(builder.icmp_signed("<", power, index(-1))):
+            with cgutils.for_range(builder, builder.sub(index(-1), power)):
                 builder.store(vectors.root(Vector(builder, builder.load(place))).value, place)
         with other:
             builder.store(((ratio * ratio) * constants[SCALE]).value, place)
