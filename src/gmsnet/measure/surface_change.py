@@ -66,6 +66,8 @@ class Compared(NamedTuple):
 class Grid:
     """Facets (T, 3, 3), in boxes, so that the nearest ones are found. sums: see ``measure_triangles``."""
 
+    sums: Any
+
     def __init__(self, triangles: Floats) -> None:
         self._triangles = np.ascontiguousarray(triangles)
         self._low, high, count = np.empty(3), np.empty(3), len(triangles)
