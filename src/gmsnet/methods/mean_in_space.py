@@ -13,6 +13,7 @@ from gmsnet.kernels.star.guard import MeshGuard
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.volume import Volume
 
 POWER = Power3.of(-3, trials=3)  # p = 3/8; stars with a cell below the floor refuse all
@@ -30,6 +31,8 @@ class MeanInSpace(Smoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         assert isinstance(field.topology, Volume)
+        if isinstance(field.topology, MixedVolume):
+            field.topology.lend_slack(field)
         guard = MeshGuard(*field.precision, self.floor, field.constraint)
 
         def visit(blocks: SpaceBlocks, first: int, last: int, counts: Tally) -> None:

@@ -19,6 +19,7 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS
 from gmsnet.run.sweep import Sweep
+from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.volume import Volume
 
 SPENT = 0.06  # by so much may the largest q = 1/η grow
@@ -52,11 +53,16 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     return with_sweep(state, options, field.points, after, smoother.phase, tally)
 
 
-def totals_at_end(state: State, options: SmoothOptions, executor: Executor) -> Totals | None:
-    """Those of a volume of tetrahedra, all valid, on which ``auto`` has ended of itself, without a target; or None."""
+def totals_at_end(state: State, options: SmoothOptions, executor: Executor, *, mixed: bool = False) -> Totals | None:
+    """Those of a volume of tetrahedra, all valid, on which ``auto`` has ended of itself, without a target; or None.
+
+    mixed: of one of other cells, too.
+    """
     topology, auto = state.topology, isinstance(state.smoother, Auto)
     ended = state.stop_reason == NO_PROGRESS and _sweeps(state) < options.max_sweeps
-    if not (isinstance(topology, Volume) and auto and ended) or options.target or topology.scored.shapes is not None:
+    if not (isinstance(topology, Volume) and auto and ended) or options.target:
+        return None
+    if isinstance(topology, MixedVolume) != mixed:
         return None
     totals = state.totals or totals_of(state.points, topology.scored, executor)
     return None if totals is None or totals.uncertain else totals
