@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.library import mpi
 from gmsnet.parallel.executor import Executor, Figure, Figures, Result
@@ -47,9 +48,7 @@ class Ranks:
             return np.arange(len(values), dtype=np.int32)
         size = self.comm.size
         home = self.numbers * size // max(self.count, 1)
-        order = np.argsort(home, kind="stable")
-        ends = np.searchsorted(home[order], np.arange(size + 1))
-        lists = [order[ends[rank] : ends[rank + 1]] for rank in range(size)]
+        lists = by_rank(home, size)
         came = self.comm.alltoall([(self.numbers[rows], values[rows]) for rows in lists])
         number = np.concatenate([numbers for numbers, _ in came])
         known, which = np.unique(number, return_inverse=True)

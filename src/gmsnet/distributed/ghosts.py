@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.agreement import agreed, raise_everywhere
+from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.piece import Cells, Ids, Piece
 
@@ -58,10 +59,8 @@ class Surrounded:
     def halo(self, comm: Any, places: NDArray[Any]) -> Halo:
         """Of all nodes that are here and elsewhere. places: (n,) of each in memory."""
         ids, owner = self.nodes.ids, self.nodes.owner
-        order = np.argsort(owner, kind="stable")
-        ends = np.searchsorted(owner[order], np.arange(comm.size + 1))
-        wanted = [order[ends[rank] : ends[rank + 1]] for rank in range(comm.size)]
-        wanted[comm.rank] = order[:0]
+        wanted = by_rank(owner, comm.size)
+        wanted[comm.rank] = wanted[comm.rank][:0]
         asked = comm.alltoall([ids[places] for places in wanted])
         own = {rank: places[np.searchsorted(ids, found)] for rank, found in enumerate(asked) if len(found)}
         return Halo(comm, own, {rank: places[found] for rank, found in enumerate(wanted) if len(found)})
@@ -96,16 +95,20 @@ def _parcels(piece: Piece, nodes: Nodes, comm: Any) -> list[tuple[Nodes, tuple[C
     chosen: list[list[Cells]] = [[] for _ in range(comm.size)]
     for block in piece.blocks:
         owner = nodes.owner[np.searchsorted(nodes.ids, block.nodes)].reshape(block.nodes.shape)
-        row, where = np.broadcast_to(np.arange(len(owner))[:, None], owner.shape), owner != comm.rank
-        pairs = np.unique(owner[where] * max(len(owner), 1) + row[where])
-        ends = np.searchsorted(pairs, np.arange(comm.size + 1) * max(len(owner), 1))
-        for rank in range(comm.size):
-            chosen[rank].append(block.take(pairs[ends[rank] : ends[rank + 1]] % max(len(owner), 1)))
+        for rank, rows in enumerate(owners_beside(owner, comm)):
+            chosen[rank].append(block.take(rows))
     found = []
     for blocks in chosen:
         ids = np.unique(np.concatenate([nodes.ids[:0], *(block.nodes.ravel() for block in blocks)]))
         found.append((nodes.of(ids), tuple(blocks) if len(ids) else ()))
     return found
+
+
+def owners_beside(owner: NDArray[np.integer[Any]], comm: Any) -> list[NDArray[np.intp]]:
+    """For each other rank the rows, ascending, that it owns a node of; none for this rank. owner: (C, k)."""
+    row, column = np.nonzero(owner != comm.rank)
+    pairs = np.unique(np.stack([owner[row, column], row], axis=1), axis=0)
+    return [pairs[rows, 1] for rows in by_rank(pairs[:, 0], comm.size)]
 
 
 def _joined(parts: list[Nodes]) -> Nodes:
@@ -120,7 +123,7 @@ def _owned(piece: Piece, comm: Any) -> Nodes:
     order = np.argsort(piece.ids)
     ids, points, fixed = piece.ids[order], np.ascontiguousarray(piece.points[order]), piece.fixed[order]
     home = ids % comm.size
-    lists = [np.flatnonzero(home == rank) for rank in range(comm.size)]
+    lists = by_rank(home, comm.size)
     came = comm.alltoall([(ids[rows], points[rows], fixed[rows]) for rows in lists])
     whose = np.repeat(np.arange(comm.size), [len(each[0]) for each in came])
     all_ids, all_points, all_fixed = (np.concatenate(each) for each in zip(*came, strict=True))
@@ -155,8 +158,8 @@ def _check_numbers(piece: Piece, sizes: tuple[int, ...], comm: Any) -> None:
     wrong = ""
     for block, size in zip(piece.blocks, sizes, strict=True):
         inside = ((block.numbers >= 0) & (block.numbers < size)).all()
-        home = block.numbers % comm.size
-        came = np.sort(np.concatenate(comm.alltoall([block.numbers[home == rank] for rank in range(comm.size)])))
+        lists = by_rank(block.numbers % comm.size, comm.size)
+        came = np.sort(np.concatenate(comm.alltoall([block.numbers[rows] for rows in lists])))
         if not inside or (came[1:] == came[:-1]).any():
             wrong = wrong or (
                 f"the {size:,} {block.kind} cells of all ranks are not numbered from 0, each with a number of its own: "

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.distributed.by_rank import by_rank
+
 Ids = NDArray[np.int64]
 
 SAMPLES = 64  # of each rank's nodes, by which the curve is shared out
@@ -28,7 +30,7 @@ def before(comm: Any, codes: Ids, ids: Ids, counts: Ids) -> Ids:
     every = np.sort(np.concatenate(comm.allgather(sample)))
     ends = every[np.arange(1, size) * len(every) // size] if len(every) else np.zeros(size - 1, dtype=np.int64)
     to = np.searchsorted(ends, codes, side="right")
-    lists = [np.flatnonzero(to == rank) for rank in range(size)]
+    lists = by_rank(to, size)
     came = comm.alltoall([(codes[rows], ids[rows], counts[rows]) for rows in lists])
     code, number, count = (np.concatenate(each) for each in zip(*came, strict=True))
     sequence = np.lexsort((number, code))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.frame import framed
-from gmsnet.distributed.ghosts import Surrounded
+from gmsnet.distributed.ghosts import Surrounded, owners_beside
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.numbering import before
@@ -155,11 +155,10 @@ class Part:
             nodes = np.hstack([simplices.rows[rows], simplices.rows[np.where(same, second, rows)]])
         else:
             nodes = simplices.rows[rows]
-        owner = ranks[nodes]
-        parcels = []
-        for rank in range(self.comm.size):
-            chosen = known & (owner == rank).any(axis=1) if rank != self.comm.rank else np.zeros(len(known), dtype=bool)
-            parcels.append((number[chosen], place[chosen]))
+        mine = np.flatnonzero(known)
+        parcels = [
+            (number[mine[chosen]], place[mine[chosen]]) for chosen in owners_beside(ranks[nodes[mine]], self.comm)
+        ]
         came = self.comm.alltoall(parcels)
         told, where = (np.concatenate(each) for each in zip(*came, strict=True))
         if len(told):
