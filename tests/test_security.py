@@ -26,6 +26,7 @@ MODULES = {  # that nothing imports
 EXCEPTIONS = {
     ("kernels/jit/cache.py", "pickle"),  # to know how an index of Numba's begins: it makes bytes, and reads none
     ("io/formats.py", "import_module"),  # of the formats in its own table alone
+    ("io/linked.py", "import_module"),  # the same
     ("paper/units.py", "multiprocessing"),  # ``gmsnet reproduce`` shares its work among processes of its own
     ("paper/units.py", "multiprocessing.synchronize"),
     ("paper/units.py", "multiprocessing.synchronize.Event"),

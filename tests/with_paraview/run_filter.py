@@ -47,5 +47,5 @@ told["least"], told["cells"] = float(np.nanmin(shape)), len(shape)
 simple.SaveData(target, proxy=smooth)
 sphere = simple.Sphere()
 told["sphere moved"] = int((points(GmsnetSmooth(Input=sphere)) != points(sphere)).any(axis=1).sum())  # noqa: F821
-GmsnetSmooth(Input=sphere, TargetQuality=0.5).UpdatePipeline()  # noqa: F821
+GmsnetSmooth(Input=sphere, Method="getme").UpdatePipeline()  # noqa: F821
 print("TOLD " + json.dumps(told))

@@ -75,7 +75,7 @@ def test_the_filter_does_what_the_api_does(pvpython, tmp_path, mesh):
     assert told["progress"] > 2
     assert np.array_equal(gmsnet.read(target).points, wanted.points)
     assert told["sphere moved"] > 0
-    assert "gmsnet: " in done.stdout + done.stderr  # of a target, which a surface cannot be asked for
+    assert "gmsnet: " in done.stdout + done.stderr  # of a method that is not for surfaces
     if not mesh.has_volumes:
         assert told["type of polygons"] == "vtkPolyData"
         assert told["polygons moved"] == told["moved"]

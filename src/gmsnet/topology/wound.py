@@ -122,7 +122,8 @@ def mark_of(block: CellBlock) -> int:
     """Why the nodes of cells of other kinds are held."""
     if block.dimension not in (3, None):
         return connectivity.LINE
-    return connectivity.SECOND_ORDER if has_form(block.kind) else connectivity.UNSUPPORTED_CELL
+    curved = has_form(block.kind) and block.cell.order > 1
+    return connectivity.SECOND_ORDER if curved else connectivity.UNSUPPORTED_CELL
 
 
 def _known_marks(mesh: Mesh, fixed: Flags | None, position: Ints) -> NDArray[np.uint16]:
