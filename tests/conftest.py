@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,11 @@ from hypothesis import settings
 # is judged by what it changes; GMSNET_RANDOM_EXAMPLES=1 draws new ones.
 settings.register_profile("gmsnet", deadline=None, derandomize=not os.environ.get("GMSNET_RANDOM_EXAMPLES"))
 settings.load_profile("gmsnet")
+
+
+def pytest_runtest_teardown() -> None:
+    """Gives Ctrl-C back to Python: a script that initialises Gmsh leaves it with the system, beyond gmsh.finalize()."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
