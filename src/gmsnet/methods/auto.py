@@ -52,6 +52,9 @@ SLOW = 0.02  # in the mean of 1/q: so much to come, by the last two gains, is mo
 POOR = 0.5  # a mean of 1/q below this is not left to sweeps alone
 FAIR = 0.8  # nor is one below this where they end
 AHEAD = 50  # times the last gain are at most expected to come
+# Turns of all nodes for the worst cells, at most; and in the least 1/q, what the last one must have gained for another.
+TURNS, TURN_GAIN = 3, 0.01
+COARSER = 10.0  # times what a phase must gain to go on, once these have been moved
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
@@ -71,7 +74,7 @@ class Auto(Smoother):
     at: int
     whole: int
     slow: bool
-    last: bool
+    turns: int
     ideal: bool
     pass_gain: float
     passes: int
@@ -93,7 +96,8 @@ class Auto(Smoother):
         self.at = -1
         self.creep: Creep | None = None
         self.whole = 0  # how often all nodes have moved at once
-        self.slow = self.last = self.ideal = False
+        self.slow = self.ideal = False
+        self.turns, self.least_before = 0, -math.inf  # how often all nodes had their turn for the worst cells
         self.pass_gain = PASS_GAIN
         self.passes, self.least = 0, -math.inf  # passes over the worst cells, and the least 1/q after the last one
         self.again = -1  # the phase to go back to in the end, if there is one
@@ -103,8 +107,9 @@ class Auto(Smoother):
             phase, self.again = self.again, -1
         self.at, self.made, self.rounds, self.gained = phase, 0, 0, math.inf
         if phase == len(self.phases):
-            self.converged = self.last or not (self.ideal or self._is_even(field))
-            self.last = True
+            gained = self.turns == 0 or self.least >= self.least_before + TURN_GAIN
+            self.converged = self.turns == TURNS or not gained or not (self.ideal or self._is_even(field))
+            self.turns, self.least_before = self.turns + 1, self.least
             return
         self.smoother = self.phases[phase].create()
         if self.phases[phase].rounds > 1 and not self.phases[phase].first:  # what those gain at first does not count
@@ -206,7 +211,8 @@ class Auto(Smoother):
                 before, self.gained = self.gained, mean - self.mean
                 lasts = not phase.lasting or self.gained >= phase.lasting * before
                 ahead = to_come(before, self.gained)
-                goes_on = ahead > phase.gain and self.gained > phase.least
+                enough = phase.gain * (COARSER if self.turns or self.whole else 1.0)
+                goes_on = ahead > enough and self.gained > phase.least
                 ahead = min(ahead, AHEAD * self.gained) if before < math.inf else 0.0
             self.mean = mean
             self.slow = self._is_slow(field, ahead, lasts) or (not goes_on and self._is_caught())

@@ -86,9 +86,10 @@ class Smoother(ABC):
     """A method ready for one run.
 
     settled: it has its own rule when to stop, and that has come true. reached: so has the target that it was made for.
-    looks: the mesh is worth measuring after the last sweep. stops_when_idle: a sweep that moved nothing is the last.
-    shared_out: each rank can do the same with a part of the mesh (gmsnet.distributed), else one does all. phase: what
-    of the method the last sweep was, "" for methods of one phase.
+    looks: the mesh is worth measuring after the last sweep. stops_when_idle: a sweep that moved nothing is the last,
+    and the run ends after many without a gain; else ``converged`` alone tells. shared_out: each rank can do the same
+    with a part of the mesh (gmsnet.distributed), else one does all. phase: what of the method the last sweep was, ""
+    for methods of one phase.
     """
 
     converged = False

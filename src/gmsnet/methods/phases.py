@@ -61,7 +61,7 @@ NEWTON = Phase("Newton on q", lambda: newton(means=1), 2, first=3, rounds=40, ga
 WORST = Phase("worst first", lambda: worst_first(3), 1)
 MEAN = Phase("Newton on q, worst kept", newton, 1, rounds=10, gain=0.002)
 SHORT = WORST._replace(create=lambda: worst_first(0))
-LONG = Phase("Newton on q, to its end", lambda: newton(1.85, means=1), 4, first=4, rounds=20, gain=0.00005)
+LONG = Phase("Newton on q, to its end", lambda: newton(1.85, means=1), 4, first=4, rounds=8, gain=0.00005)
 ABOVE = Phase("MetricLoss, above 1/q = 0.4", lambda: Newton("metric", floor=0.4), 1, rounds=8, gain=0.0003)
 POLISH = Phase("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1, rounds=8, gain=0.0003)
 
