@@ -60,7 +60,7 @@ PASSES = 8  # over the worst cells and what follows them, at most
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
 LARGE_VOLUME, LARGE_GAIN = 50_000, 0.008  # free nodes of meshes in space of which a pass must gain more
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
-WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
+WHOLE_WORST, POWERS, EARLY = "whole mesh, worst cells", (3, 2), (2, 3)  # q⁸, q⁴
 GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
 EXACT = 20_000  # free nodes: up to so many, all nodes of such a mesh go to the minimum of Σq, which is near
 IN_SPACE = (VOLUME_PLAN, MIXED_PLAN, SURFACE_PLAN)
@@ -76,6 +76,7 @@ class Auto(Smoother):
     slow: bool
     turns: int
     ideal: bool
+    early: bool
     pass_gain: float
     passes: int
     least: float
@@ -96,7 +97,7 @@ class Auto(Smoother):
         self.at = -1
         self.creep: Creep | None = None
         self.whole = 0  # how often all nodes have moved at once
-        self.slow = self.ideal = False
+        self.slow = self.ideal = self.early = False
         self.turns, self.least_before = 0, -math.inf  # how often all nodes had their turn for the worst cells
         self.pass_gain = PASS_GAIN
         self.passes, self.least = 0, -math.inf  # passes over the worst cells, and the least 1/q after the last one
@@ -128,6 +129,8 @@ class Auto(Smoother):
         if self.at == len(self.phases):
             return (self._move_all if self.ideal else self._move_all_for_worst)(field, executor, test)
         phase = self.phases[self.at]
+        if self.early:
+            return self._move_all_early(field, executor, test)
         if self.slow:
             return self._move_all(field, executor, test)
         watched = self.creep if phase.rounds > 1 and self.made + 1 == self._wanted else None
@@ -158,6 +161,15 @@ class Auto(Smoother):
             self.mean = mean_shape(field)
         else:
             self.whole = MOST_WHOLE
+        return tally
+
+    def _move_all_early(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
+        """All nodes at once on powers of q while the floor is low: where all cells are alike, q̂ may gain by that."""
+        self.early, self.looks, self.phase = False, True, WHOLE_WORST
+        tally = np.zeros(3, dtype=np.int64)
+        for power in EARLY:
+            tally += WholeMesh((power,), best=True).sweep(field, executor, test)
+        self._enter(self.at + 1, field)
         return tally
 
     def _move_all_for_worst(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
@@ -225,6 +237,10 @@ class Auto(Smoother):
             is_ideal = isinstance(self.smoother, WorstFirst) and self.smoother.least >= self.smoother.enough
             few = self.creep is not None and not self.whole and len(field.topology.free) <= EXACT
             self.ideal = is_ideal and few
+            plain = field.topology.near_shapes is None
+            self.early = self.at == 0 and self.whole > 0 and self.phases is SMALL_PLAN and plain
+            if self.early:
+                return
             self._enter(len(self.phases) if target_reached or is_ideal else self.at + 1, field)
 
 

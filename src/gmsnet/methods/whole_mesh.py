@@ -167,16 +167,18 @@ class WholeMesh(Smoother):
     """One sweep moves all nodes. Not for the level STAR, whose floors such moves do not know.
 
     doublings: of the power of q, tried in turn until something is taken. With a power, for the worst cells, that is
-    what gains in the least 1/q at least TRADE times what it costs in the mean. settled: see SETTLED.
+    what gains in the least 1/q at least TRADE times what it costs in the mean. settled: see SETTLED. best: what makes the
+    mesh the best so far, instead.
     """
 
     doublings: Sequence[int]
     settled: float
+    best: bool
 
     stops_when_idle = False
 
-    def __init__(self, doublings: Sequence[int] = (0,), settled: float = SETTLED) -> None:
-        self.doublings, self.settled = doublings, settled
+    def __init__(self, doublings: Sequence[int] = (0,), settled: float = SETTLED, *, best: bool = False) -> None:
+        self.doublings, self.settled, self.best = doublings, settled, best
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
@@ -188,11 +190,16 @@ class WholeMesh(Smoother):
                 break
             start, settled = problem.start(field.points), CLOSE if doublings else self.settled
             found = self._allowed(minimise(problem, start, settled), field, executor)
-            if found is not None and problem.is_better(found, field.points):
-                tally[MOVED] = (found != field.points).any(axis=1).sum()
-                field.points[:] = found
-                field.floor.forget()
-                break
+            if found is None or not (self.best or problem.is_better(found, field.points)):
+                continue
+            before = field.points.copy()
+            field.points[:] = found
+            field.floor.forget()
+            if self.best and not test():
+                field.points[:] = before
+                continue
+            tally[MOVED] = (found != before).any(axis=1).sum()
+            break
         return tally
 
     def _allowed(self, points: Floats, field: Field, executor: Executor) -> Floats | None:
