@@ -12,7 +12,8 @@ with every cell kept above a floor.
 
 Where nodes creep, many neighbours together one way (methods/creep.py), or much more is to come than the next rounds
 will bring, the mesh is deformed as a whole: then all nodes move at once (methods/whole_mesh.py), and the phase goes on.
-In the end, where the worst cells are many alike, all nodes move at once for these, and all phases have another turn.
+Then small meshes try powers of q at once, while no single cell is above the others. In the end, where the worst cells
+are many alike, all nodes move at once for these, and all phases have another turn, as long as that gains.
 
 A phase goes on as long as more than its ``gain`` in the mean of 1/q (of a sample of the cells) is to come, if gains go
 on as the last two did. What each phase is worth is measured by ``benchmarks/auto.py``; see docs/auto.md.
@@ -28,18 +29,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import LANES
-from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.simplex.measures import mean_shape_of_sample
-from gmsnet.kernels.simplex.shell_measures import mean_shape_of_shell
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import STAR
 from gmsnet.measure.target import Target
-from gmsnet.measure.totals import totals_of
 from gmsnet.methods.base import ALL_CELLS, Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.below_in_space import BelowInSpace
 from gmsnet.methods.creep import Creep
+from gmsnet.methods.gains import mean_shape, to_come
 from gmsnet.methods.phases import (
     LARGE_VOLUME,
     LARGE_VOLUME_PLAN,
@@ -58,7 +55,6 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 
-SAMPLE = 32  # blocks of cells
 SLOW = 0.02  # in the mean of 1/q: so much to come, by the last two gains, is more than sweeps should be left to bring
 POOR = 0.5  # a mean of 1/q below this is not left to sweeps alone
 FAIR = 0.8  # nor is one below this where they end
@@ -249,32 +245,11 @@ class Auto(Smoother):
             is_ideal = isinstance(self.smoother, WorstFirst) and self.smoother.least >= self.smoother.enough
             few = self.creep is not None and not self.whole and len(field.topology.free) <= EXACT
             self.ideal = is_ideal and few
-            plain = field.topology.near_shapes is None
-            self.early = self.at == 0 and self.whole > 0 and self.phases is SMALL_PLAN and plain
+            moved = self.at == 0 and self.whole > 0 and self.phases is SMALL_PLAN
+            self.early = moved and field.planar.near_shapes is None
             if self.early:
                 return
             self._enter(len(self.phases) if target_reached or is_ideal else self.at + 1, field)
-
-
-def mean_shape(field: Field) -> float:
-    """The mean of 1/q over some of the cells, evenly taken."""
-    simplices = field.topology.changeable
-    stride = max(1, len(simplices.rows) // (SAMPLE * LANES))
-    if isinstance(simplices, Tetrahedra):
-        totals = totals_of(field.points, simplices.take(np.arange(0, len(simplices.rows), stride, dtype=np.int32)))
-        return math.nan if totals is None else totals.shape_mean
-    if isinstance(field.topology, Shell):
-        return float(mean_shape_of_shell(field.points, simplices, stride))
-    return float(mean_shape_of_sample(field.points, simplices, stride))
-
-
-def to_come(before: float, gained: float) -> float:
-    """What is to be gained yet, if gains go on to fall by the same factor; by half, if only one is known."""
-    if gained <= 0.0:
-        return 0.0
-    if before == math.inf:
-        return gained
-    return gained * gained / (before - gained) if gained < before else math.inf
 
 
 def for_target(target: Target, share: float, *, rings: int, floor: float | None = None) -> Auto:

@@ -167,8 +167,8 @@ class WholeMesh(Smoother):
     """One sweep moves all nodes. Not for the level STAR, whose floors such moves do not know.
 
     doublings: of the power of q, tried in turn until something is taken. With a power, for the worst cells, that is
-    what gains in the least 1/q at least TRADE times what it costs in the mean. settled: see SETTLED. best: what makes the
-    mesh the best so far, instead.
+    what gains in the least 1/q at least TRADE times what it costs in the mean. settled: see SETTLED. best: what makes
+    the mesh the best so far, instead.
     """
 
     doublings: Sequence[int]

@@ -118,9 +118,10 @@ def _at_walls(
 def _edges_on(
     triangles: NDArray[np.int32], points: Floats, rim: Flags, cells: Floats, a: int, b: int, some: Flags
 ) -> tuple[NDArray[np.intp], Floats, Flags, NDArray[np.int32], NDArray[np.int32], Floats]:
-    """Of the edges ab with both ends on the rim: the row, the length, whether the cell is stretched along, the ends.
+    """Of the edges ab of some simplices with both ends on the rim: the row, the length, whether the cell is stretched
+    along, the ends; and how far from the middle the third corner lies along the edge, in lengths: 0.5 over an end.
 
-    some: (S,) of which simplices. Last, how far from the middle of the edge the third corner lies along it, in lengths: 0.5 over an end.
+    some: (S,) bool.
     """
     one, two = triangles[:, a], triangles[:, b]
     row = np.flatnonzero(rim[one] & rim[two] & some)
