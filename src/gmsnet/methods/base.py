@@ -63,6 +63,12 @@ class Field:
         assert not isinstance(self.topology, Shell)
         return self.topology
 
+    def written(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (N, 2) as the file will keep them, where they are others than those of the field."""
+        if not self.precision.single:
+            return points
+        return np.where(points == self.points, points, points.astype(np.float32).astype(np.float64))
+
     def guard(self, executor: Executor) -> Guard:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
         if isinstance(self.topology, MixedVolume):

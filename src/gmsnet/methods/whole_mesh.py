@@ -31,6 +31,7 @@ from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.methods.conjugate import minimise
 from gmsnet.methods.multigrid import Multigrid
+from gmsnet.methods.sliders import Sliders
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
 
@@ -50,7 +51,8 @@ class Problem:
     """Σq over corner simplices as a function of the places of some nodes.
 
     cells: (S, 3) counter-clockwise. table: (S, 3) weights, None where all are 1. moved: (n,) the nodes that move.
-    number: (N,) their rows, −1 for others. matrix: the Laplacian. nothing: (N,) zeros. doublings: with some,
+    number: (N,) their rows, −1 for others. matrix: the Laplacian. nothing: (N,) zeros. sliders: the nodes that slide.
+    doublings: with some,
     Σ(q/top)^p, p = 2^doublings, instead, top the largest q at first.
     """
 
@@ -62,13 +64,14 @@ class Problem:
     nothing: Floats
     doublings: int = 0
     top: float = 1.0
+    sliders: Sliders | None = None
 
     @classmethod
-    def of(cls, field: Field, doublings: int = 0) -> Problem:
-        """Of the free nodes that do not slide and have no cell that is not certified positive."""
+    def of(cls, field: Field, doublings: int = 0, *, slide: bool = False) -> Problem:
+        """Of the free nodes that have no cell that is not certified positive; slide: those that slide, too."""
         topology, precision = field.planar, field.precision
         simplices, free = topology.changeable, topology.near_free.copy()
-        if field.constraint is not None:
+        if field.constraint is not None and not slide:
             free[field.constraint.row >= 0] = False
         bad, every = np.empty(len(simplices.rows), dtype=bool), np.ones(len(simplices.rows), dtype=bool)
         if find_bad(field.points, field.points, simplices, every, precision.unit, precision.grain, bad):
@@ -88,10 +91,16 @@ class Problem:
         if doublings and len(cells):
             least, _ = powers.shapes(field.points, cells, table)
             top = 1.0 / least
-        return cls(cells, table, moved, number, matrix, np.zeros(len(free)), doublings, top)
+        sliders = Sliders.of(field, free) if slide else None
+        return cls(cells, table, moved, number, matrix, np.zeros(len(free)), doublings, top, sliders)
 
-    def inverse(self, points: Floats, *, even: bool = False) -> Multigrid:
-        """Of the Laplacian for the points as they are."""
+    def inverse(self, points: Floats) -> Callable[[Floats], Floats]:
+        """Of the Laplacian for the points as they are; of nodes that slide, along their curves."""
+        cycle, sliders = self.cycle(points), self.sliders
+        return cycle if sliders is None else lambda rest: sliders.along(cycle(rest), self.number[sliders.nodes])
+
+    def cycle(self, points: Floats, *, even: bool = False) -> Multigrid:
+        """Of the Laplacian for the points as they are; even: of the mesh alone."""
         table = self.table
         if self.doublings and not even:
             _, table = self._weighted(points)
@@ -101,12 +110,14 @@ class Problem:
     def value(self, points: Floats, gradient: Floats) -> float:
         """Σq, and its gradient (N, 2); more than any mesh has where a cell is inverted."""
         if self.doublings:
-            power, weights = self._weighted(points)
-            if power < math.inf:
+            total, weights = self._weighted(points)
+            if total < math.inf:
                 energy(points, self.cells, weights, self.nothing, 0.0, gradient)
-            return power
-        total: float = energy(points, self.cells, self.table, self.nothing, 0.0, gradient)
-        return total
+        else:
+            total = energy(points, self.cells, self.table, self.nothing, 0.0, gradient)
+        if self.sliders is not None:
+            self.sliders.along(gradient, self.sliders.nodes)
+        return float(total)
 
     def _weighted(self, points: Floats) -> tuple[float, Floats]:
         """See ``powers.weighted``."""
@@ -116,7 +127,7 @@ class Problem:
 
     def harmonic(self, points: Floats) -> Iterator[Floats]:
         """Each node that moves at the weighted mean of its neighbours, more and more exactly."""
-        inverse = self.inverse(points, even=True)
+        inverse = self.cycle(points, even=True)
         rest, x = np.empty((len(self.moved), 2)), np.zeros((len(self.moved), 2))
         graph.pull_of_neighbours(points, self.cells, self.table, self.number, rest)
         first = multigrid.product(rest, rest)
@@ -198,16 +209,29 @@ class WholeMesh(Smoother):
             if self.best and not test():
                 field.points[:] = before
                 continue
-            tally[MOVED] = (found != before).any(axis=1).sum()
+            self._slide(field, executor, doublings)
+            tally[MOVED] = (field.points != before).any(axis=1).sum()
             break
         return tally
+
+    def _slide(self, field: Field, executor: Executor, doublings: int) -> None:
+        """The same once more with the nodes that slide."""
+        if field.constraint is None:
+            return
+        problem = Problem.of(field, doublings, slide=True)
+        if problem.sliders is None:
+            return
+        found = self._allowed(minimise(problem, field.points, CLOSE), field, executor)
+        if found is not None and problem.is_better(found, field.points):
+            field.points[:] = found
+            field.floor.forget()
+        problem.sliders.back(field.points)
 
     def _allowed(self, points: Floats, field: Field, executor: Executor) -> Floats | None:
         """The points as they can be taken, perhaps after cycles on the worst cells; None if they cannot be."""
         floor = max(field.guard(executor).floor, 0.0)
         for repair in range(REPAIRS + 1):
-            if field.precision.single:
-                points = points.astype(np.float32).astype(np.float64)
+            points = field.written(points)
             below = steps.count_below(
                 points, field.points, field.topology.changeable, floor, field.precision.unit, field.precision.grain
             )
