@@ -82,6 +82,8 @@ def _set_aside(state: State, level: int, executor: Executor) -> Volume | None:
         locate3(state.constraint, points)
     cells, rest, alike = topology.changeable, None, ALIKE if state.rest else APART
     aside = np.isinf(ratios_of(points, cells, executor))
+    if aside.any():  # with inverted cells in the mesh, sweeps keep nothing of the others
+        alike = 0.0
     for _ in range(ROUNDS):
         ratios = ratios_of(points, cells, executor)
         ratios[aside] = 0.0
