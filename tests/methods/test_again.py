@@ -22,7 +22,12 @@ from gmsnet.topology.volume import Volume
 
 def field_of(mesh):
     volume = Volume.of(mesh)
-    return Field(taken(space_points(mesh), volume.memory), volume, Precision.of(single=False, exponent=mesh.exponent), LEVELS.index("valid"))
+    return Field(
+        taken(space_points(mesh), volume.memory),
+        volume,
+        Precision.of(single=False, exponent=mesh.exponent),
+        LEVELS.index("valid"),
+    )
 
 
 def visits(field, guard, kind):

@@ -38,7 +38,7 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     totals = totals_at_end(state, options, executor)
     if totals is None:
         return state
-    topology, level = state.topology, LEVELS.index(options.guard)
+    topology, level = state.rest or state.topology, LEVELS.index(options.guard)
     assert isinstance(topology, Volume)
     field = Field(state.points.copy(), topology, state.precision, level, constraint=state.constraint)
     if isinstance(state.constraint, Surface):
@@ -60,25 +60,36 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
 
 
 def totals_at_end(state: State, options: SmoothOptions, executor: Executor, *, mixed: bool = False) -> Totals | None:
-    """Those of a volume of tetrahedra, all valid, on which ``auto`` has ended of itself, without a target; or None.
+    """Those of a volume of tetrahedra, all valid, on which ``auto`` has ended of itself, without a target; or None. Of
+    the rest, where cells are set aside.
 
     mixed: of one of other cells, too.
     """
-    topology, auto = state.topology, isinstance(state.smoother, Auto)
-    ended = state.stop_reason == NO_PROGRESS and _sweeps(state) < options.max_sweeps
-    if not (isinstance(topology, Volume) and auto and ended) or options.target:
+    topology = state.rest or state.topology
+    if not ended_of_itself(state, options) or isinstance(topology, MixedVolume) != mixed:
         return None
-    if isinstance(topology, MixedVolume) != mixed:
-        return None
-    totals = state.totals or totals_of(state.points, topology.scored, executor)
+    totals = None if state.rest else state.totals
+    totals = totals or totals_of(state.points, topology.scored, executor)
     return None if totals is None or totals.uncertain else totals
 
 
-def with_sweep(state: State, options: SmoothOptions, points: Floats, totals: Totals, phase: str, tally: Tally) -> State:
-    """The state after a sweep to these points, recorded and told."""
+def ended_of_itself(state: State, options: SmoothOptions) -> bool:
+    """Has ``auto`` ended on a volume because there was nothing to gain, without a target?"""
+    ended = state.stop_reason == NO_PROGRESS and _sweeps(state) < options.max_sweeps
+    return isinstance(state.topology, Volume) and isinstance(state.smoother, Auto) and ended and not options.target
+
+
+def with_sweep(
+    state: State, options: SmoothOptions, points: Floats, totals: Totals | None, phase: str, tally: Tally,
+    sweeps: int = 1,
+) -> State:  # fmt: skip
+    """The state after sweeps to these points, recorded and told. totals: theirs, if they are known of all cells."""
+    if totals is None or state.rest:
+        totals = totals_of(points, state.topology.scored)
+        assert totals is not None
     moved, truncated, dropped = tally.tolist()
     sweep = Sweep(
-        _sweeps(state) + 1, phase, moved, truncated, dropped, totals.inverted, totals.qhat, totals.shape_min,
+        _sweeps(state) + sweeps, phase, moved, truncated, dropped, totals.inverted, totals.qhat, totals.shape_min,
         totals.shape_mean,
     )  # fmt: skip
     state = replace(state, points=points, totals=totals, history=(*state.history, sweep))
