@@ -163,10 +163,11 @@ def smoothed_towards(name, start, mesh, size, *, slide=False):
     seconds = time.process_time() - began
     before, after = result.conformity
     passes = after.near_one >= NEAR and not result.after.inverted
-    shape, inverted = result.after.shape.min(), f"{result.before.inverted:,} → {result.after.inverted}"
+    shape = result.after.shape.min()
+    inverted = f"{result.before.inverted:,} → {result.after.inverted}"
     print(
-        f"  {name:30} {start:12} {len(mesh.points):6,} nodes: edges near h {before.near_one:.3f} → {after.near_one:.3f},"
-        f" near their mean {after.near_mean:.3f}, least quality {before.least:.3f} → {after.least:.3f}, "
+        f"  {name:30} {start:12} {len(mesh.points):6,} nodes: edges near h "
+        f"{before.near_one:.3f} → {after.near_one:.3f}, near their mean {after.near_mean:.3f}, least quality {before.least:.3f} → {after.least:.3f}, "
         f"least 1/q {shape:.3f}, inverted {inverted}, {seconds:.2f} s",
         flush=True,
     )

@@ -58,6 +58,7 @@ from gmsnet.topology.topology import Topology
 SLOW = 0.02  # in the mean of 1/q: so much to come, by the last two gains, is more than sweeps should be left to bring
 POOR = 0.5  # a mean of 1/q below this is not left to sweeps alone
 FAIR = 0.8  # nor is one below this where they end
+STILL_POOR = 0.85  # a mean of 1/q where a small mesh ends: its worst cells are among many like them
 AHEAD = 50  # times the last gain are at most expected to come
 # Turns of all nodes for the worst cells, at most; and in the least 1/q, what the last one must have gained for another.
 TURNS, TURN_GAIN = 3, 0.01
@@ -204,7 +205,8 @@ class Auto(Smoother):
         small, moved = self.phases is SMALL_PLAN, self.whole > 0
         if self.creep is None or self.least >= (GOOD_MOVED if small and moved else GOOD):
             return False
-        return (small and moved) or ((small or moved) and self.least > mean_shape(field) - NEAR_MEAN)
+        mean = mean_shape(field)
+        return (small and (moved or mean < STILL_POOR)) or ((small or moved) and self.least > mean - NEAR_MEAN)
 
     def _is_slow(self, field: Field, ahead: float, lasts: bool) -> bool:
         """Is the mesh deformed as a whole? ahead: what is to come in the mean of 1/q. lasts: gains do not fall fast."""
