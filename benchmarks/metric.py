@@ -167,7 +167,8 @@ def smoothed_towards(name, start, mesh, size, *, slide=False):
     inverted = f"{result.before.inverted:,} → {result.after.inverted}"
     print(
         f"  {name:30} {start:12} {len(mesh.points):6,} nodes: edges near h "
-        f"{before.near_one:.3f} → {after.near_one:.3f}, near their mean {after.near_mean:.3f}, least quality {before.least:.3f} → {after.least:.3f}, "
+        f"{before.near_one:.3f} → {after.near_one:.3f}, near their mean {after.near_mean:.3f}, "
+        f"least quality {before.least:.3f} → {after.least:.3f}, "
         f"least 1/q {shape:.3f}, inverted {inverted}, {seconds:.2f} s",
         flush=True,
     )
