@@ -14,11 +14,11 @@ from gmsnet.errors import FormatError, InputError
 from gmsnet.io import vtp, vtu
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
+from gmsnet.io.merge import Part, merged
 from gmsnet.io.packed import split_name
 from gmsnet.io.splice import Share, Untouched
 from gmsnet.io.vtk_ghosts import with_vertices
 from gmsnet.io.vtk_links import BLOCKS, Link, kind_of
-from gmsnet.io.vtk_merge import Part, merged
 from gmsnet.io.vtu_reader import Reader
 from gmsnet.mesh.mesh import Mesh
 
