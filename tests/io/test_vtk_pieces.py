@@ -423,5 +423,5 @@ def test_errors_of_nested_blocks(tmp_path: Path) -> None:
             gmsnet.read(tmp_path / "a.vtm")
     inner.write_text(BLOCKS.format(blocks='<DataSet index="0" file="parts/air.vtu"/>'))
     (tmp_path / "solid/s.pvtu").write_text(index(["s_0.vtm"]))
-    with pytest.raises(FormatError, match=r"a\.vtm: solid/s\.pvtu: line 7: Piece: .* is neither \.vtu nor \.vtp"):
+    with pytest.raises(FormatError, match=r"a\.vtm: solid/s\.pvtu: line 6: Piece: .* is neither \.vtu nor \.vtp"):
         gmsnet.read(tmp_path / "a.vtm")

@@ -26,11 +26,11 @@ class GMSNet2(torch.nn.Module):
     def __init__(self, hidden: int, activation: str) -> None:
         super().__init__()
         self.activation = activation
-        self.encode = torch.nn.Linear(5, hidden)
-        self.pool = torch.nn.Linear(2 * hidden, hidden)
-        self.triangle = torch.nn.Linear(hidden, hidden)
-        self.context = torch.nn.Linear(hidden, hidden, bias=False)
-        self.decode = torch.nn.Linear(hidden, 3)
+        self.encode: torch.nn.Linear = torch.nn.Linear(5, hidden)
+        self.pool: torch.nn.Linear = torch.nn.Linear(2 * hidden, hidden)
+        self.triangle: torch.nn.Linear = torch.nn.Linear(hidden, hidden)
+        self.context: torch.nn.Linear = torch.nn.Linear(hidden, hidden, bias=False)
+        self.decode: torch.nn.Linear = torch.nn.Linear(hidden, 3)
         torch.nn.init.zeros_(self.decode.weight)
         torch.nn.init.zeros_(self.decode.bias)
 
