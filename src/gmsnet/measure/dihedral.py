@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.tetra_measures import COLUMNS, HIGH, LOW, cubed_ratios, per_tetrahedron
+from gmsnet.kernels.topology.connectivity import touching
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 
@@ -83,6 +84,14 @@ def ratios_of(points: Floats, cells: Tetrahedra, executor: Executor = serial) ->
     return out
 
 
+def renew(ratios: Floats, points: Floats, cells: Tetrahedra, nodes: Rows, executor: Executor = serial) -> None:
+    """Measures those of ``ratios_of`` anew that have one of these nodes, which alone have moved."""
+    moved = np.zeros(len(points), dtype=bool)
+    moved[nodes] = True
+    rows = touching(cells.rows, moved)
+    ratios[rows] = ratios_of(points, cells.take(rows), executor)
+
+
 def largest(values: Floats, count: int) -> Rows:
     """Where so many of the largest values stand, or all, if they are fewer; in no order."""
     if count >= len(values):
@@ -107,14 +116,24 @@ def below(points: Floats, cells: Tetrahedra, measure: float, wide: float, execut
     return Ranked(rows[chosen][order], found[chosen][order])
 
 
-def worst(points: Floats, cells: Tetrahedra, count: int, wide: float, executor: Executor = serial) -> Ranked:
-    """So many cells of the least measure, all if they are fewer; of valid meshes."""
-    ratios = ratios_of(points, cells, executor)
+def worst(
+    points: Floats,
+    cells: Tetrahedra,
+    count: int,
+    wide: float,
+    executor: Executor = serial,
+    ratios: Floats | None = None,
+) -> Ranked:
+    """So many cells of the least measure, all if they are fewer; of valid meshes. ratios: theirs, as far as known."""
+    ratios = ratios_of(points, cells, executor) if ratios is None else ratios
     rows = largest(ratios, MORE * count)
     found = measures_of(columns_of(points, cells, rows), wide)
     if len(rows) < len(ratios):
         limit = most_shape_below(float(np.partition(found, count - 1)[count - 1]), wide)
         rows = np.flatnonzero(~(ratios < 432.0 / limit**3)).astype(np.int32)
         found = measures_of(columns_of(points, cells, rows), wide)
+    if len(rows) > count:
+        few = found <= np.partition(found, count - 1)[count - 1]
+        rows, found = rows[few], found[few]
     order = np.argsort(found, kind="stable")[:count]
     return Ranked(rows[order], found[order])

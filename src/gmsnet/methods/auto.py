@@ -40,7 +40,18 @@ from gmsnet.methods.base import ALL_CELLS, Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.below_in_space import BelowInSpace
 from gmsnet.methods.creep import Creep
-from gmsnet.methods.phases import MIXED_PLAN, NEWTON, SMALL_PLAN, SURFACE_PLAN, VOLUME_PLAN, WORST, Phase, plan_for
+from gmsnet.methods.phases import (
+    LARGE_VOLUME,
+    LARGE_VOLUME_PLAN,
+    MIXED_PLAN,
+    NEWTON,
+    SMALL_PLAN,
+    SURFACE_PLAN,
+    VOLUME_PLAN,
+    WORST,
+    Phase,
+    plan_for,
+)
 from gmsnet.methods.whole_mesh import CLOSEST, SETTLED, WholeMesh
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
@@ -55,12 +66,13 @@ AHEAD = 50  # times the last gain are at most expected to come
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
-LARGE_VOLUME, LARGE_GAIN = 50_000, 0.008  # free nodes of meshes in space of which a pass must gain more
+LARGE_GAIN = 0.008  # of meshes in space of more than LARGE_VOLUME free nodes
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
 GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
 EXACT = 20_000  # free nodes: up to so many, all nodes of such a mesh go to the minimum of Σq, which is near
-IN_SPACE = (VOLUME_PLAN, MIXED_PLAN, SURFACE_PLAN)
+VOLUMES = (VOLUME_PLAN, LARGE_VOLUME_PLAN)  # where one round is enough before another turn of the worst cells
+IN_SPACE = (*VOLUMES, MIXED_PLAN, SURFACE_PLAN)
 NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
 
 
@@ -198,7 +210,7 @@ class Auto(Smoother):
         self.rounds += 1
         self.made = 0
         goes_on = False
-        if self.rounds < phase.rounds:
+        if self.rounds < (1 if self.again >= 0 and self.phases in VOLUMES else phase.rounds):
             mean, ahead, lasts = mean_shape(field), 0.0, True
             if phase.first and self.rounds == 1:
                 goes_on = True

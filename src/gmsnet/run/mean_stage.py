@@ -41,7 +41,7 @@ def improve_mean(state: State, options: SmoothOptions, executor: Executor) -> St
     totals = totals_at_end(state, options, executor)
     if totals is None or level == STAR:
         return state
-    topology = state.topology
+    topology = state.rest or state.topology
     assert isinstance(topology, Volume)
     least = float(worst(state.points, topology.scored, 1, WIDE, executor).measure[0])
     for share in SHARES if len(topology.free) <= LARGE else SHARES[-1:]:
@@ -65,7 +65,8 @@ def _of_mixed(state: State, options: SmoothOptions, executor: Executor) -> State
 
     Where a valid mesh has lost more than LOSS of its mean, some of what the least has gained is given for it.
     """
-    totals, topology = totals_at_end(state, options, executor, mixed=True), state.topology
+    totals = totals_at_end(state, options, executor, mixed=True)
+    topology = state.rest or state.topology
     if totals is None:
         return state
     assert isinstance(topology, Volume)

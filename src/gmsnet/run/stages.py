@@ -12,6 +12,7 @@ from gmsnet.run.mean_stage import improve_mean
 from gmsnet.run.metric_stage import take_metric
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import write_back
+from gmsnet.run.rest_stage import improve_rest
 from gmsnet.run.second_order import make_room, smooth_corners, untangle_second_order
 from gmsnet.run.state import State
 from gmsnet.run.sweep_stage import sweep
@@ -31,8 +32,8 @@ class Stage(Protocol):
 
 
 STAGES: tuple[Stage, ...] = (
-    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_dihedrals, improve_mean,
-    improve_near_walls, untangle_second_order, smooth_corners, make_room,
+    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_rest, improve_dihedrals,
+    improve_mean, improve_near_walls, untangle_second_order, smooth_corners, make_room,
 )  # fmt: skip
 
 
