@@ -7,7 +7,7 @@ features.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from gmsnet.learn.data import Stars
 from gmsnet.weights import shapes
 
 LEAST, CLIP, TINY = 1e-5, 40.0, 1e-30  # as in kernels.methods.gmsnet2
-ACTIVATIONS = {"silu": torch.nn.functional.silu, "relu": torch.relu}
+ACTIVATIONS: dict[str, Callable[..., torch.Tensor]] = {"silu": torch.nn.functional.silu, "relu": torch.relu}
 
 
 class GMSNet2(torch.nn.Module):
