@@ -132,6 +132,12 @@ def test_errors() -> None:
 
     refused(cgns, changed(FILES["zones"], flat), "some zones have two axes of coordinates, others three")
 
+    def bare(file: h5py.File) -> None:
+        for name in ("left/tri", "right/tri", "right/quad"):
+            del file[f"Base/{name}"]
+
+    refused(cgns, changed(FILES["zones"], bare), "no zone has cells")
+
     def none(file: h5py.File) -> None:
         del file["Base/left"], file["Base/right"]
 

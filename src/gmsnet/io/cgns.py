@@ -50,6 +50,8 @@ def _one(parts: list[Parsed]) -> Parsed:
     """All zones as one mesh."""
     if len({part.points.shape[1] for part in parts}) > 1:
         raise FormatError("some zones have two axes of coordinates, others three: give all the same")
+    if not any(part.cells for part in parts):
+        raise FormatError("no zone has cells: there is nothing to smooth")
     whole = merged([Part(part) for part in parts])
     slots = shared([Share(part.slots, node) for part, node in zip(parts, whole.nodes, strict=True)])
     sets = {name: np.unique(node[nodes]) for part, node in zip(parts, whole.nodes, strict=True)
