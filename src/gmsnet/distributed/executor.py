@@ -24,6 +24,11 @@ class Ranks:
     """
 
     sequential = False
+    comm: Any
+    halo: Halo
+    numbers: NDArray[np.int64]
+    inner: Executor
+    count: int
 
     def __init__(self, comm: Any, halo: Halo, numbers: NDArray[np.int64], inner: Executor = serial) -> None:
         self.comm, self.halo, self.numbers, self.inner = comm, halo, numbers, inner
