@@ -16,7 +16,7 @@ def curved(request):
 
 @pytest.mark.parametrize("method", ["angle", "cvt", "cpt", "nn", "gmsnet", "gmsnet2", "sized"])
 def test_methods_for_other_cells(curved, method):
-    with pytest.raises(gmsnet.InputError, match="choose .*laplacian"):
+    with pytest.raises(gmsnet.InputError, match=r"choose .*laplacian"):
         gmsnet.smooth(curved, method)
 
 
