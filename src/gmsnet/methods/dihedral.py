@@ -71,15 +71,16 @@ class Dihedral(Smoother):
         else:
             guard = MeshGuard(*field.precision, self.floor, field.constraint)
         for cycle in self.cycles:
-            count = min(max(FEWEST, math.ceil(cycle.share * len(cells.rows))), len(cells.rows))
+            every = executor.counted(np.ones(len(cells.rows), dtype=bool))
+            count = min(max(FEWEST, math.ceil(cycle.share * every)), every)
             ranked = worst(field.points, cells, count, self.wide, executor)
-            self.least = min(self.least, float(ranked.measure[0]))
+            self.least = min(self.least, ranked.least)
             chosen = ranked.rows[ranked.measure < self.goal]
-            if not len(chosen):
+            if not ranked.least < self.goal:
                 break
             nodes = np.unique(cells.rows[chosen])
             stars = topology.stars_of(nodes[topology.near_free[nodes]].astype(np.int64))
-            enough = min(float(ranked.measure[-1]), self.goal)
+            enough = min(ranked.most, self.goal)
             aim = Aim3(DIHEDRAL, cycle.doublings, self.wide, math.radians(enough), max(guard.floor, 0.0))
 
             def visit(blocks: SpaceBlocks, first: int, last: int, counts: Tally, aim: Aim3 = aim) -> None:

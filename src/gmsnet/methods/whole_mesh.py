@@ -33,6 +33,7 @@ from gmsnet.methods.conjugate import minimise
 from gmsnet.methods.multigrid import Multigrid
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -181,23 +182,37 @@ class WholeMesh(Smoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         self.converged = True
-        tally = np.zeros(3, dtype=np.int64)
+        moved = 0
         for doublings in self.doublings:
-            problem = Problem.of(field, doublings)
-            if not len(problem.moved):
-                break
-            start, settled = problem.start(field.points), CLOSE if doublings else self.settled
-            found = self._allowed(minimise(problem, start, settled), field, executor)
-            if found is not None and problem.is_better(found, field.points):
-                tally[MOVED] = (found != field.points).any(axis=1).sum()
-                field.points[:] = found
+            floor = max(field.guard(executor).floor, 0.0)
+            whole = executor.gathered(field, None)  # on one process
+            of_one = (
+                -1 if whole is None else self._moved(whole, doublings, floor, executor if whole is field else serial)
+            )
+            moved = executor.returned(field, whole, of_one)
+            if moved > 0:
                 field.floor.forget()
+            if moved:
                 break
+        tally = np.zeros(3, dtype=np.int64)
+        tally[MOVED] = max(moved, 0)
         return tally
 
-    def _allowed(self, points: Floats, field: Field, executor: Executor) -> Floats | None:
+    def _moved(self, field: Field, doublings: int, floor: float, executor: Executor) -> int:
+        """How many nodes are elsewhere now; 0 if the places were not worth taking, −1 if no node can move."""
+        problem = Problem.of(field, doublings)
+        if not len(problem.moved):
+            return -1
+        start, settled = problem.start(field.points), CLOSE if doublings else self.settled
+        found = self._allowed(minimise(problem, start, settled), floor, field, executor)
+        if found is None or not problem.is_better(found, field.points):
+            return 0
+        moved = int((found != field.points).any(axis=1).sum())
+        field.points[:] = found
+        return moved
+
+    def _allowed(self, points: Floats, floor: float, field: Field, executor: Executor) -> Floats | None:
         """The points as they can be taken, perhaps after cycles on the worst cells; None if they cannot be."""
-        floor = max(field.guard(executor).floor, 0.0)
         for repair in range(REPAIRS + 1):
             if field.precision.single:
                 points = points.astype(np.float32).astype(np.float64)

@@ -15,7 +15,7 @@ from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.kernels.topology.connectivity import touching
-from gmsnet.measure.dihedral import largest, ratios_of
+from gmsnet.measure.dihedral import ratios_of
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 # The share of all cells, k of p = 3·2^k, and how many sweeps.
 CYCLES = ((0.004, 2, 4), (0.002, 4, 8), (0.001, 5, 12))
-FEWEST, WATCHED = 12, 64  # cells
+FEWEST = 12  # cells
 
 
 class WorstInSpace(Smoother):
@@ -42,9 +42,11 @@ class WorstInSpace(Smoother):
         guard, cells = field.guard(executor), topology.changeable
         ratios = ratios_of(field.points, cells, executor)
         tangled = _set_aside(ratios, cells, topology.near_free)
-        before = after = float(ratios.max(initial=K3))
+        before = after = _most(ratios, executor)
+        every = executor.counted(np.ones(len(ratios), dtype=bool))
         for share, number, sweeps in CYCLES:
-            nodes = np.unique(cells.rows[largest(ratios, max(FEWEST, math.ceil(share * len(ratios))))])
+            many = max(FEWEST, math.ceil(share * every))
+            nodes = np.unique(cells.rows[executor.lowest_rows(-ratios, many)])
             nodes = nodes[topology.near_free[nodes]]
             stars = topology.stars_of(nodes.astype(np.int64))
             power = Power3.of(number, min(after / K3, 1e30))
@@ -59,19 +61,24 @@ class WorstInSpace(Smoother):
                 _set_aside(ratios, cells, topology.near_free)
             else:
                 _renew(ratios, field.points, cells, nodes, executor)
-            after = float(ratios.max(initial=K3))
+            after = _most(ratios, executor)
         least = (K3 / after) ** (1.0 / 3.0)
         self.least, self.gained = least, least - (K3 / before) ** (1.0 / 3.0)
-        few = largest(ratios, WATCHED)
-        field.floor.watch(few, 1.0 / np.maximum(ratios[few], 1.0))
+        field.floor.watch(np.arange(len(ratios), dtype=np.int32), -ratios, executor)
         return tally
+
+
+def _most(ratios: Floats, executor: Executor) -> float:
+    """The largest of all, or of a regular tetrahedron."""
+    return -executor.minimum(-float(ratios.max(initial=K3)))
 
 
 def _renew(ratios: Floats, points: Floats, cells: Tetrahedra, nodes: NDArray[np.int32], executor: Executor) -> None:
     """Those of the simplices at these nodes, which alone have moved."""
-    moved = np.zeros(len(points), dtype=bool)
-    moved[nodes] = True
-    rows = touching(cells.rows, moved)
+    moved = np.zeros(len(points))
+    moved[nodes] = 1.0
+    executor.exchange(moved)
+    rows = touching(cells.rows, moved > 0.0)
     ratios[rows] = ratios_of(points, cells.take(rows), executor)
 
 

@@ -46,7 +46,7 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     tally = smoother.sweep(field, executor, lambda: False)
     after = totals_of(field.points, topology.scored, executor)
     assert after is not None
-    least = float(worst(field.points, topology.scored, 1, WIDE, executor).measure[0])
+    least = worst(field.points, topology.changeable, 1, WIDE, executor).least
     gained = merit(after, least) - merit(totals, smoother.least)
     if gained < GAIN or after.uncertain:
         return state
