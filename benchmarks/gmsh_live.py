@@ -35,6 +35,7 @@ def volume(nodes: float) -> float:
     maker = gmsh.model.occ
     maker.cut([(3, maker.addBox(0, 0, 0, 1, 1, 1))], [(3, maker.addSphere(0.5, 0.5, 0.5, 0.25))])
     maker.synchronize()
+    gmsh.option.setNumber("Mesh.RecombineAll", 0)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     gmsh.model.mesh.generate(3)
     return size

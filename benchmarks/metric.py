@@ -156,17 +156,19 @@ def starts(mesh, topology):
     yield "anywhere", mesh.with_points(points)
 
 
-def smoothed_towards(name, start, mesh, size):
+def smoothed_towards(name, start, mesh, size, *, slide=False):
     """One line, and its figures."""
     began = time.process_time()
-    result = gmsnet.smooth(mesh, size=size, threads=1)
+    result = gmsnet.smooth(mesh, size=size, threads=1, slide=slide or None)
     seconds = time.process_time() - began
     before, after = result.conformity
     passes = after.near_one >= NEAR and not result.after.inverted
-    shape, inverted = result.after.shape.min(), f"{result.before.inverted:,} → {result.after.inverted}"
+    shape = result.after.shape.min()
+    inverted = f"{result.before.inverted:,} → {result.after.inverted}"
     print(
-        f"  {name:30} {start:9} {len(mesh.points):6,} nodes: edges near h {before.near_one:.3f} → {after.near_one:.3f},"
-        f" near their mean {after.near_mean:.3f}, least quality {before.least:.3f} → {after.least:.3f}, "
+        f"  {name:30} {start:12} {len(mesh.points):6,} nodes: edges near h "
+        f"{before.near_one:.3f} → {after.near_one:.3f}, near their mean {after.near_mean:.3f}, "
+        f"least quality {before.least:.3f} → {after.least:.3f}, "
         f"least 1/q {shape:.3f}, inverted {inverted}, {seconds:.2f} s",
         flush=True,
     )
@@ -192,7 +194,10 @@ def even(options):
         "random": settle(random_mesh(1500, seed=options.seed), 3),
     }
     return [
-        smoothed_towards(name, start, mesh, length) for name, length in SIZES.items() for start, mesh in meshes.items()
+        smoothed_towards(name, start + (", slid" if slide else ""), mesh, length, slide=slide)
+        for name, length in SIZES.items()
+        for start, mesh in meshes.items()
+        for slide in (False, True)
     ]
 
 

@@ -45,6 +45,9 @@ def samples() -> dict[str, Files]:
         "CGNS": {"a.cgns": made.cgns()},
         "CGNS, compressed": {"a.cgns": made.cgns(True)},
         "CGNS, single, mixed cells": {"a.cgns": made.cgns(kind=np.float32, mixed=True)},
+        "CGNS, several zones": {"a.cgns": made.cgns_zones()},
+        "CGNS, several zones, compressed": {"a.cgns": made.cgns_zones(packed=True)},
+        "CGNS, structured zones": {"a.cgns": made.cgns_structured()},
         "MED": {"a.med": made.med()},
         "MED, compressed": {"a.med": made.med(True)},
         "VTKHDF": {"a.vtkhdf": made.vtkhdf()},
@@ -60,6 +63,8 @@ def samples() -> dict[str, Files]:
         "MFEM": {"a.mesh": plain["mfem"].PLAIN},
         "Fluent, plane": {"a.msh": plain["fluent"].PLAIN},
         "Fluent, volume": {"a.msh": plain["fluent"].VOLUME},
+        "Fluent, binary, single": {"a.msh": plain["fluent"].FORMS["volume f4<"]},
+        "Fluent, binary, double": {"a.msh": plain["fluent"].FORMS["volume f8<"]},
     }
     return found
 

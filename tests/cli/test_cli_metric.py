@@ -66,7 +66,6 @@ def test_what_cannot_be_used_is_refused_in_a_line(run, square, lengths, tmp_path
         (["--size", lengths, "--guard", "star"], "the guard 'star' cannot be had with size"),
         (["--size", lengths, "--preserve", "metric"], "size and preserve='metric' contradict each other"),
         (["--size", lengths, "--target-angle", "20"], "a target and size contradict each other"),
-        (["--preserve", "metric", "--slide", "all"], "nodes cannot slide"),
     ):
         done = run("smooth", square, out, *arguments)
         assert done.code == 2

@@ -215,6 +215,7 @@ def seeds() -> Iterator[tuple[str, bytes]]:
     yield "openfoam", NEXT.join((*test_openfoam.in_text(test_openfoam.VOLUMES).values(), *zones))
     yield "fluent", test_fluent.PLAIN
     yield "fluent", test_fluent.VOLUME
+    yield from (("fluent", data) for data in test_fluent.FORMS.values())
     yield "mfem", test_mfem.PLAIN
     yield "netgen", test_netgen.PLAIN
     yield "vtp", test_vtp.PLAIN
@@ -236,6 +237,8 @@ def seeds() -> Iterator[tuple[str, bytes]]:
         yield "vtkhdf", binary_meshes.vtkhdf(packed)
         yield "exodus", binary_meshes.exodus4(packed)
         yield "exodus", binary_meshes.exodus3(1 + packed, whole=packed)
+    yield from (("cgns", make(packed)) for make in (binary_meshes.cgns_zones, binary_meshes.cgns_structured)
+                for packed in (False, True))  # fmt: skip
     yield "cgns", binary_meshes.cgns(kind=np.float32, mixed=True)
     yield from _written()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -82,6 +83,60 @@ VOLUME = b"""(2 3)
 """
 
 
+def in_binary(data: bytes, kind: str = "f8", order: str = "<") -> bytes:
+    """The same file with its nodes, cells and faces as binary sections."""
+
+    def section(found: re.Match[bytes]) -> bytes:
+        key, head, words = int(found[1]), found[2].split(), found[3].split()
+        if key == 10:
+            numbers = np.array([float(word) for word in words], f"{order}{kind}")
+        else:
+            numbers = np.array([int(word, 16) for word in words], f"{order}i4")
+        key += 2000 if kind == "f4" else 3000
+        body = b"(%d (%s)(%s)" % (key, b" ".join(head), numbers.tobytes())
+        return body + b"\nEnd of Binary Section   %d)" % key
+
+    machine = {"<": b"(4 (60 0 0 1 2 4 4 4 8 4 4))\n", ">": b"(4 (0 60 0 1 2 4 4 4 8 4 4))\n"}[order]
+    found = re.sub(rb"\((10|12|13) \(([1-9a-f][^()]*)\)\(([^()]+)\)\)", section, data)
+    return found.replace(b"(10 (0 ", machine + b"(10 (0 ", 1)
+
+
+FORMS = {
+    f"{name} {kind}{order}": in_binary(data, kind, order)
+    for name, data in (("plane", PLAIN), ("volume", VOLUME))
+    for kind in ("f4", "f8")
+    for order in "<>"
+}
+
+
+@pytest.mark.parametrize("key", FORMS)
+def test_binary_sections(key: str) -> None:
+    data, text = FORMS[key], read(fluent, PLAIN if key.startswith("plane") else VOLUME)
+    assert re.search(rb"End of Binary Section +[23]013\)", data)
+    parsed = read(fluent, data)
+    assert parsed.points.tolist() == text.points.tolist()
+    assert parsed.single == ("f4" in key)
+    assert [(b.kind, b.nodes.tolist(), b.regions.tolist()) for b in parsed.cells] == [
+        (b.kind, b.nodes.tolist(), b.regions.tolist()) for b in text.cells
+    ]
+    assert dict(parsed.region_names) == dict(text.region_names)
+    assert len(check_splice(fluent, data)) == len(data)
+
+
+def test_zones_of_nodes_in_any_order() -> None:
+    """Of two binary zones the second stands first; other binary sections are passed over."""
+    head, _, rest = PLAIN.partition(b"(10 (1 1 6 1 2)(")
+    listed, _, rest = rest.partition(b"))")
+    lines = listed.split(b"\n")[1:]
+    zones = b"(10 (8 5 6 1 2)(%s))\n(10 (7 1 4 1 2)(%s))" % (b"\n".join(lines[4:]), b"\n".join(lines[:4]))
+    data = in_binary(head + zones + rest)
+    data += b"(3500 (1 2)(\x00)(\n((End of Binary Section   3500)\n"
+    parsed = read(fluent, data)
+    assert parsed.points.tolist() == read(fluent, PLAIN).points.tolist()
+    assert "sections of the number 3500" in parsed.unread
+    check_splice(fluent, data)
+
+
 def test_a_plain_file() -> None:
     parsed = read(fluent, PLAIN)
     assert sorted(map(sorted, cells_of(parsed, "triangle"))) == [[0, 1, 2], [0, 2, 3]]
@@ -109,7 +164,19 @@ def test_volumes() -> None:
 
 
 def test_errors() -> None:
-    refused(fluent, PLAIN.replace(b"(10 (1", b"(3010 (1"), "line 6: binary sections are not read")
+    refused(fluent, PLAIN.replace(b"(10 (1", b"(3010 (1"), "line 6: the binary section 3010 is not closed")
+    binary = FORMS["plane f8<"]
+    refused(fluent, binary.replace(b"(3010 (1 1 6", b"(3010 (1 1 5"), "line 7: 10 numbers do not fill the binary")
+    refused(fluent, binary.replace(b"(3010 (1 1 6", b"(3010 (1 1 ffffffffffffff"), "numbers do not fill the binary")
+    refused(
+        fluent, binary.replace(b"(3010 (1 1 6 1 2", b"(3010 (1 1 4 1 3"), "12 coordinates do not fit the nodes 1 to 4"
+    )
+    refused(fluent, binary.replace(np.float64(2).tobytes(), np.float64(np.nan).tobytes()), "not a finite number")
+    mixed = FORMS["volume f8<"]
+    start = mixed.find(b"(3013 (5") + len(b"(3013 (5 7 a 3 0)(")
+    refused(fluent, mixed[:start] + b"\x7f" + mixed[start + 1 :], "face 0 .* has a wrong number of nodes")
+    added = PLAIN.replace(b"(45 (3", b"(10 (9 7 7 1 2)(9 9))(45 (3")
+    refused(fluent, in_binary(PLAIN) + added[added.find(b"(10 (9") : added.find(b"(45")], "write them in one form")
     refused(fluent, PLAIN.replace(b"5 6 3 0\n", b"5 7 3 0\n"), "a face names a node that is none of 1 to 6")
     refused(fluent, PLAIN.replace(b"5 6 3 0\n", b""), "23|do not make 6 faces")
     refused(fluent, PLAIN.replace(b"5 6 3 0\n", b"5 2 3 0\n"), "the faces of cell 3 do not run around it")
@@ -122,15 +189,20 @@ def test_damage(data: bytes) -> None:
     read_or_refuse(fluent, {".msh": data})
 
 
+@given(data=damaged(FORMS["volume f4<"]))
+def test_damage_of_binary_sections(data: bytes) -> None:
+    read_or_refuse(fluent, {".msh": data})
+
+
 @given(data=damaged(VOLUME))
 def test_damage_of_volumes(data: bytes) -> None:
     read_or_refuse(fluent, {".msh": data})
 
 
 def test_the_contents_tell_it_from_gmsh(tmp_path: Path) -> None:
-    for name in ("a.msh", "a.cas"):
+    for name, data in (("a.msh", VOLUME), ("a.cas", VOLUME), ("b.msh", FORMS["volume f8<"])):
         path = tmp_path / name
-        path.write_bytes(VOLUME)
+        path.write_bytes(data)
         mesh = gmsnet.read(path)
         new = mesh.points + 0.25
         assert gmsnet.write(mesh.with_points(new), path) == []
@@ -138,8 +210,9 @@ def test_the_contents_tell_it_from_gmsh(tmp_path: Path) -> None:
         assert gmsnet.read(path).points.tolist() == new.tolist()
 
 
+@pytest.mark.parametrize("kind", ["", "f4", "f8"])
 @pytest.mark.parametrize("name", ["PLAIN", "VOLUME"])
-def test_vtk_reads_the_same(name: str, tmp_path: Path) -> None:
+def test_vtk_reads_the_same(name: str, kind: str, tmp_path: Path) -> None:
     """The same cells from the same faces, and the points that were written. It wants a name for every zone."""
     geometry = pytest.importorskip("vtkmodules.vtkIOGeometry")
     from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -150,7 +223,7 @@ def test_vtk_reads_the_same(name: str, tmp_path: Path) -> None:
     for zone in range(2, 6):
         data += b"" if b"(45 (%d " % zone in data else b"(45 (%d fluid zone%d)())\n" % (zone, zone)
     path, out = tmp_path / "a.cas", tmp_path / "b.cas"
-    path.write_bytes(data)
+    path.write_bytes(in_binary(data, kind) if kind else data)
     mesh = gmsnet.read(path)
     new = mesh.points * 1.5
     gmsnet.write(mesh.with_points(new), out)

@@ -373,3 +373,55 @@ def test_blocks_of_pyvista(tmp_path: Path) -> None:
     back = pyvista.read(tmp_path / "b.vtm")
     assert rows(back["inside"].points) == rows(result.mesh.points)
     assert set(rows(back["wall"].points)) <= set(rows(back["inside"].points))
+
+
+def nested_blocks(folder: Path) -> None:
+    """a.vtm names a block of pieces and a block of blocks, each in a folder of its own."""
+    left, right = SQUARES.values()
+    for name in ("solid", "fluid/parts"):
+        (folder / name).mkdir(parents=True)
+    (folder / "solid/s.pvtu").write_text(index(["s_0.vtu"]))
+    (folder / "solid/s_0.vtu").write_bytes(_vtu(left))
+    (folder / "fluid/f.vtm").write_text(BLOCKS.format(blocks='<DataSet index="0" file="parts/air.vtu"/>'))
+    (folder / "fluid/parts/air.vtu").write_bytes(_vtu(right))
+    named = (
+        '<DataSet name="steel" file="solid/s.pvtu"/><Block name="all"><DataSet name="air" file="fluid/f.vtm"/></Block>'
+    )
+    (folder / "a.vtm").write_text(BLOCKS.format(blocks=named))
+
+
+def test_blocks_that_name_pieces_and_blocks(tmp_path: Path) -> None:
+    nested_blocks(tmp_path)
+    mesh = gmsnet.read(tmp_path / "a.vtm")
+    assert len(mesh.points) == 6
+    assert dict(mesh.region_names) == {(2, 1): "steel", (2, 2): "air"}
+    before = {path.relative_to(tmp_path): path.read_bytes() for path in tmp_path.rglob("*.*")}
+    gmsnet.write(mesh, tmp_path / "a.vtm")
+    assert {path.relative_to(tmp_path): path.read_bytes() for path in tmp_path.rglob("*.*")} == before
+    new = mesh.points * 2.0
+    gmsnet.write(mesh.with_points(new), tmp_path / "b.vtm")
+    assert sorted(str(path.relative_to(tmp_path)) for path in (tmp_path / "b").rglob("*.*")) == [
+        "b/fluid/f.vtm", "b/fluid/parts/air.vtu", "b/solid/s.pvtu", "b/solid/s_0.vtu",
+    ]  # fmt: skip
+    assert gmsnet.read(tmp_path / "b.vtm").points.tolist() == new.tolist()
+    assert {path: (tmp_path / path).read_bytes() for path in before} == before
+    gmsnet.write(mesh.with_points(new), tmp_path / "a.vtm")
+    assert gmsnet.read(tmp_path / "a.vtm").points.tolist() == new.tolist()
+    assert (tmp_path / "solid/s.pvtu").read_bytes() == before[Path("solid/s.pvtu")]
+
+
+def test_errors_of_nested_blocks(tmp_path: Path) -> None:
+    nested_blocks(tmp_path)
+    inner = tmp_path / "fluid/f.vtm"
+    for path, message in (
+        ("../solid/s_0.vtu", r"a\.vtm: fluid/f\.vtm: line 4: DataSet: .* must lie in the folder of this file or below"),
+        ("f.vtm", r"a\.vtm: fluid/f\.vtm: 'fluid/f\.vtm' is named twice, or names itself"),
+        ("none.vtu", r"a\.vtm: the file that it names cannot be read: .*none\.vtu: there is no such file"),
+    ):
+        inner.write_text(BLOCKS.format(blocks=f'<DataSet index="0" file="{path}"/>'))
+        with pytest.raises(InputError, match=message):
+            gmsnet.read(tmp_path / "a.vtm")
+    inner.write_text(BLOCKS.format(blocks='<DataSet index="0" file="parts/air.vtu"/>'))
+    (tmp_path / "solid/s.pvtu").write_text(index(["s_0.vtm"]))
+    with pytest.raises(FormatError, match=r"a\.vtm: solid/s\.pvtu: line 6: Piece: .* is neither \.vtu nor \.vtp"):
+        gmsnet.read(tmp_path / "a.vtm")

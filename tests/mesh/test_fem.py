@@ -117,8 +117,12 @@ def test_dolfinx_stand_in() -> None:
         to_mesh(dolfinx_mesh(TRIANGLES, "triangle", size=2))
     with pytest.raises(InputError, match="only those of degree 1"):
         to_mesh(dolfinx_mesh(np.zeros((1, 6), int), "triangle"))
-    with pytest.raises(InputError, match="'prism' are not known"):
-        to_mesh(dolfinx_mesh(TRIANGLES, "prism"))
+    base = cube[[0, 1, 2, 3, 4]]
+    pyramids, _ = to_mesh(dolfinx_mesh(np.arange(5)[None], "pyramid", base))
+    assert pyramids.points[pyramids.cells[0].nodes[0]].tolist() == base[[0, 1, 3, 2, 4]].tolist()
+    assert to_mesh(dolfinx_mesh(np.arange(6)[None], "prism", cube[[0, 1, 2, 4, 5, 6]]))[0].cells[0].kind == "wedge"
+    with pytest.raises(InputError, match="'interval' are not known"):
+        to_mesh(dolfinx_mesh(TRIANGLES, "interval"))
 
 
 def plex(size: int = 1, cells: np.ndarray = TRIANGLES) -> Any:
@@ -141,3 +145,35 @@ def test_plex_stand_in() -> None:
         to_mesh(plex(2))
     with pytest.raises(InputError, match="has 5 vertices"):
         to_mesh(plex(cells=np.array([[0, 1, 2, 3, 4]])))
+
+
+@pytest.mark.parametrize(
+    "name", ["MeshTri1", "MeshQuad1", "MeshTet1", "MeshHex1", "MeshWedge1", "MeshTri2", "MeshQuad2", "MeshTet2"]
+)
+def test_all_meshes_of_scikit_fem(name: str) -> None:
+    """Cells are valid as they come, middles lie on their edges, and only points that are free move."""
+    skfem = pytest.importorskip("skfem")
+    made = getattr(skfem, name)
+    grid = made() if name == "MeshWedge1" else made().refined(1 if name == "MeshQuad2" else 2)  # wedges: two of them
+    mesh, restore = to_mesh(grid)
+    assert gmsnet.quality(mesh).inverted == 0
+    (block,) = mesh.cells
+    for edge in block.cell.edges:
+        ends, middle = mesh.points[block.nodes[:, edge[:2]]], block.nodes[:, edge[2:]]
+        if middle.shape[1]:
+            assert np.abs(mesh.points[middle[:, 0]] - ends.mean(axis=1)).max() < 1e-12
+    thrown = mesh.points.copy()
+    inner = np.setdiff1d(np.arange(len(thrown)), np.flatnonzero(np.isin(thrown, (0.0, 1.0)).any(axis=1)))
+    thrown[inner] += np.random.default_rng(0).uniform(-0.02, 0.02, (len(inner), thrown.shape[1]))
+    result = gmsnet.smooth(restore(thrown))
+    assert type(result.mesh) is type(grid)
+    assert np.array_equal(result.mesh.t, grid.t)
+    assert result.after.inverted == 0
+    assert np.array_equal(result.mesh.doflocs.T, result.points)
+    assert result.moved.any() == (len(inner) > 0)
+
+
+def test_other_meshes_of_scikit_fem_are_refused() -> None:
+    skfem = pytest.importorskip("skfem")
+    with pytest.raises(InputError, match=r"knows .*MeshWedge1, .* not MeshHex2"):
+        to_mesh(skfem.MeshHex2())

@@ -174,3 +174,30 @@ def test_nothing_is_lost_on_meshes_from_hell(options, level, seed, nodes):
         assert result.conformity.after.least >= result.conformity.before.least
     if mesh.single:
         assert (np.float64(np.float32(result.points)) == result.points).all()
+
+
+def test_boundary_nodes_slide_towards_sizes():
+    """Corners stay, sides keep their bits, and cells come nearer to their sizes than with the boundary held."""
+    mesh = structured_mesh(24)
+    held, slid = (gmsnet.smooth(mesh, size=length, slide=slide) for slide in (None, True))
+    assert not slid.after.inverted
+    assert slid.conformity[1].least > held.conformity[1].least + 0.05
+    assert slid.conformity[1].mean > held.conformity[1].mean + 0.05
+    for axis in range(2):
+        for side in (0.0, 1.0):
+            on = mesh.points[:, axis] == side
+            assert (slid.points[on, axis] == side).all()
+            order = np.argsort(mesh.points[on, 1 - axis])
+            assert (np.diff(slid.points[on, 1 - axis][order]) > 0.0).all()
+
+
+def test_they_slide_on_arcs_too():
+    mesh = random_mesh(600, "circle", seed=4)
+    middle = mesh.points.mean(axis=0)
+    boundary = np.setdiff1d(np.arange(len(mesh.points)), Topology.of(mesh).free)
+    slid = gmsnet.smooth(mesh, preserve="metric", slide=True)
+    radius, before = (np.hypot(*(points[boundary] - middle).T) for points in (slid.points, mesh.points))
+    assert slid.moved[boundary].any()
+    assert radius.max() / before.max() - 1.0 < 1e-6
+    assert 1.0 - radius.min() / before.min() < 1e-6
+    conforms(slid, 0.0, 0.5)

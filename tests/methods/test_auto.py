@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.methods.auto import WHOLE, Auto, to_come
+from gmsnet.generate import random_quad_mesh, sheared_mesh
+from gmsnet.methods.auto import WHOLE, WHOLE_WORST, Auto
+from gmsnet.methods.gains import to_come
 from gmsnet.methods.phases import LARGE_PLAN, SMALL, SMALL_PLAN
 from gmsnet.paper.cases import CASES
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run, Start
+from gmsnet.run.stop import NO_PROGRESS
 from gmsnet.topology.topology import Topology
 
 
@@ -82,6 +85,26 @@ def test_a_slow_change_of_the_whole_mesh_takes_all_nodes_at_once():
     assert "worst first" in stages
     assert result.after.shape.mean() > gmsnet.quality(mesh).shape.mean() - 0.005
     assert result.after.shape.min() > gmsnet.quality(mesh).shape.min() - 0.01
+
+
+@pytest.mark.parametrize(("make", "factor"), [(gmsnet.random_mesh, 2.2), (random_quad_mesh, 3.1)])
+def test_a_call_on_a_stretched_mesh_ends_before_its_sweeps_do_and_leaves_little_to_another(make, factor):
+    mesh = make(1500, seed=7)
+    one = gmsnet.smooth(mesh.with_points(mesh.points * (factor, 1.0)))
+    two = gmsnet.smooth(one.mesh)
+    assert one.stop_reason == NO_PROGRESS
+    assert WHOLE_WORST in told(one.history)
+    assert two.after.shape.min() < one.after.shape.min() + 0.05
+
+
+def test_powers_are_tried_on_all_nodes_before_single_cells_raise_the_floor():
+    """The worst cell is at a corner of the square and cannot change, so that others count in the angles alone."""
+    mesh = sheared_mesh(45, 56, amplitude=0.887, waves=1.24)
+    result = gmsnet.smooth(mesh)
+    stages = told(result.history)
+    assert stages.index(WHOLE_WORST) < stages.index("worst first")
+    assert max(result.history, key=lambda sweep: sweep.qhat).stage == WHOLE_WORST
+    assert result.after.qhat > 0.06
 
 
 @pytest.mark.parametrize("seed", range(3))

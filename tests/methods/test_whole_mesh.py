@@ -239,3 +239,20 @@ def test_worst_cells_of_small_meshes_have_a_turn_even_where_they_are_good():
     assert any(sweep.stage == WHOLE_WORST for sweep in result.history)
     assert result.after.shape.min() > 0.8
     assert result.after.qhat > 0.37
+
+
+@pytest.mark.parametrize("cells", ["triangle", "quad"])
+def test_boundary_nodes_slide_with_all_others(cells):
+    """A grid pressed to one side with its boundary, far more rows than sweeps can even out, is even again."""
+    mesh = sheared_mesh(100, amplitude=0.0, cells=cells)
+    points = mesh.points.copy()
+    points[:, 0] **= 2
+    result = gmsnet.smooth(mesh.with_points(points), slide=True, preserve="none")
+    assert not result.after.inverted
+    assert result.after.shape.mean() > gmsnet.quality(mesh).shape.mean() - 0.001
+    for axis in range(2):
+        for side in (0.0, 1.0):
+            on = points[:, axis] == side
+            assert (result.points[on, axis] == side).all()
+    corners = [0, 100, 101 * 100, 101 * 101 - 1]
+    assert (result.points[corners] == points[corners]).all()

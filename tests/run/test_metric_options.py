@@ -26,7 +26,6 @@ def unit(points):
         ({"target_angle": 20}, "a target and .* contradict each other"),
         ({"guard": "star"}, "the guard 'star' cannot be had with"),
         ({"best_by": "aspect"}, "leave out best_by"),
-        ({"slide": True}, "nodes cannot slide with"),
     ],
 )
 def test_what_contradicts_a_metric_is_refused(given, more, message):

@@ -246,3 +246,13 @@ def test_single_cells_that_are_inside_out_are_told_by_their_neighbours(kind):
     assert found.inverted == 0
     assert found.summary()["read_inside_out"] == {kind: 1}
     assert gmsnet.smooth(one).after.inverted == 0
+
+
+def test_slide_beside_lines_of_curved_volumes() -> None:
+    """There are no straight facets to slide on, though lines of a marker stand at the boundary."""
+    _, mesh = twins("tetra10")
+    lines = CellBlock("line3", mesh.cells[0].nodes[:, [0, 1, 4]], np.full(len(mesh.cells[0].nodes), 7))
+    marked = Mesh(mesh.points, (*mesh.cells, lines))
+    result = gmsnet.smooth(marked, slide=True)
+    assert "slide: no node of the boundary can move along it" in result.notes
+    assert result.after.inverted == 0

@@ -139,3 +139,16 @@ def test_what_cannot_be_asked_of_surfaces_is_told():
     ):
         with pytest.raises(InputError, match=message):
             gmsnet.smooth(mesh, **options)
+
+
+def test_cells_of_second_order_are_held_and_named():
+    mesh = ball()
+    (block,) = [block for block in mesh.cells if block.dimension == 2]
+    ends = np.stack([block.nodes, np.roll(block.nodes, -1, axis=1)], axis=2)
+    edges, number = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    middles = mesh.points[edges].mean(axis=1)
+    nodes = np.column_stack([block.nodes, len(mesh.points) + number.reshape(block.nodes.shape)])
+    points = np.concatenate([mesh.points, middles])
+    result = gmsnet.smooth((points, [("triangle6", nodes)]))
+    assert not result.moved.any()
+    assert f"on a surface they are held: {len(nodes):,} triangle6 cells" in " ".join(result.notes)

@@ -25,44 +25,103 @@ def _file(fill: Callable[[h5py.File], None], **options: Any) -> bytes:
     return stream.getvalue()
 
 
+def _node(parent: h5py.Group, name: str, label: str, data: Any = None, **more: Any) -> h5py.Group:
+    """A node of CGNS."""
+    made = parent.create_group(name)
+    kinds = {"i1": "C1", "i4": "I4", "f4": "R4", "f8": "R8"}
+    kind = "MT" if data is None else kinds[np.asarray(data).dtype.str[1:]]
+    for key, text, size in (("name", name, 33), ("label", label, 33), ("type", kind, 3)):
+        made.attrs[key] = np.array(text.encode(), f"S{size}")
+    if data is not None:
+        made.create_dataset(" data", data=data, **more)
+    return made
+
+
+def _letters(text: str) -> np.ndarray:
+    return np.frombuffer(text.encode(), np.int8)
+
+
+def _zone(base: h5py.Group, name: str, points: np.ndarray, kind: str, sizes: Any, **how: Any) -> h5py.Group:
+    """A zone with its coordinates, (…, axes) as the file lists them."""
+    zone = _node(base, name, "Zone_t", np.array(sizes, np.int32))
+    _node(zone, "ZoneType", "ZoneType_t", _letters(kind))
+    grid = _node(zone, "GridCoordinates", "GridCoordinates_t")
+    for axis in range(points.shape[-1]):
+        _node(grid, f"Coordinate{'XYZ'[axis]}", "DataArray_t", np.ascontiguousarray(points[..., axis]), **how)
+    return zone
+
+
+def _elements(zone: h5py.Group, sections: Any) -> None:
+    """sections: name, type, cells or a list of types and nodes, and how many there are."""
+    at = 1
+    for name, code, cells, count in sections:
+        made = _node(zone, name, "Elements_t", np.array([code, 0], np.int32))
+        _node(made, "ElementRange", "IndexRange_t", np.array([at, at + count - 1], np.int32))
+        _node(made, "ElementConnectivity", "DataArray_t", (np.ravel(cells) + 1).astype(np.int32))
+        at += count
+
+
 def cgns(packed: bool = False, kind: type = np.float64, mixed: bool = False) -> bytes:
     """One zone with a section of each type, or with one of them all."""
-    how = GZIP if packed else {}
-
-    def node(parent: h5py.Group, name: str, label: str, data: Any = None, **more: Any) -> h5py.Group:
-        made = parent.create_group(name)
-        made.attrs["name"], made.attrs["label"] = np.bytes_(name), np.bytes_(label)
-        made.attrs["type"] = np.bytes_("MT")
-        if data is not None:
-            made.create_dataset(" data", data=data, **more)
-        return made
-
-    def letters(text: str) -> np.ndarray:
-        return np.frombuffer(text.encode(), np.int8)
 
     def fill(file: h5py.File) -> None:
-        base = node(file, "Base", "CGNSBase_t", np.array([2, 2], np.int32))
-        zone = node(base, "blk-1", "Zone_t", np.array([[8], [7], [0]], np.int32))
-        node(zone, "ZoneType", "ZoneType_t", letters("Unstructured"))
-        grid = node(zone, "GridCoordinates", "GridCoordinates_t")
-        for axis in range(2):
-            node(grid, f"Coordinate{'XY'[axis]}", "DataArray_t", POINTS[:, axis].astype(kind), **how)
-        sections = [("tri", 5, TRIANGLES), ("quad", 7, QUADS), ("walls", 3, LINES)]
+        base = _node(file, "Base", "CGNSBase_t", np.array([2, 2], np.int32))
+        how = GZIP if packed else {}
+        zone = _zone(base, "blk-1", POINTS.astype(kind), "Unstructured", [[8], [7], [0]], **how)
+        sections: list[Any] = [("tri", 5, TRIANGLES, 6), ("quad", 7, QUADS, 1), ("walls", 3, LINES, 2)]
         if mixed:
-            rows = [[code, *(row + 1)] for _, code, cells in sections[:2] for row in cells.tolist() for row in
-                    [np.array(row)]]  # fmt: skip
-            sections = [("all", 20, np.concatenate(rows) - 1), sections[2]]
-        at = 1
-        for name, code, cells in sections:
-            count = 7 if code == 20 else len(cells)
-            made = node(zone, name, "Elements_t", np.array([code, 0], np.int32))
-            node(made, "ElementRange", "IndexRange_t", np.array([at, at + count - 1], np.int32))
-            node(made, "ElementConnectivity", "DataArray_t", (np.ravel(cells) + 1).astype(np.int32))
-            at += count
-        conditions = node(zone, "ZoneBC", "ZoneBC_t")
-        held = node(conditions, "held", "BC_t", letters("BCWall"))
-        node(held, "PointList", "IndexArray_t", np.array([[7]], np.int32))
-        node(zone, "FlowSolution", "FlowSolution_t")
+            rows = [np.array([code - 1, *row]) for _, code, cells, _ in sections[:2] for row in cells.tolist()]
+            sections = [("all", 20, np.concatenate(rows), 7), sections[2]]
+        _elements(zone, sections)
+        held = _node(_node(zone, "ZoneBC", "ZoneBC_t"), "held", "BC_t", _letters("BCWall"))
+        _node(held, "PointList", "IndexArray_t", np.array([[7]], np.int32))
+        _node(zone, "FlowSolution", "FlowSolution_t")
+
+    return _file(fill)
+
+
+def cgns_zones(packed: bool = False, mixed: bool = False) -> bytes:
+    """The same mesh in two zones: the triangles of the left, and all other cells, whose points are in another order.
+
+    mixed: one zone is compressed, the other is not.
+    """
+    left = np.array([0, 1, 4, 5, 6])
+    right = np.array([7, 4, 3, 2, 1])
+
+    def fill(file: h5py.File) -> None:
+        base = _node(file, "Base", "CGNSBase_t", np.array([2, 2], np.int32))
+        how = GZIP if packed else {}
+        zone = _zone(base, "right", POINTS[right], "Unstructured", [[5], [3], [0]], **how)
+        own = np.argsort(right)
+        place = {int(right[k]): int(k) for k in own}
+        local = np.vectorize(place.__getitem__)
+        _elements(zone, [("tri", 5, local(TRIANGLES[4:]), 2), ("quad", 7, local(QUADS), 1)])
+        _node(zone, "ZoneGridConnectivity", "ZoneGridConnectivity_t")
+        zone = _zone(base, "left", POINTS[left], "Unstructured", [[5], [4], [0]], **({} if mixed else how))
+        _elements(zone, [("tri", 5, np.searchsorted(left, TRIANGLES[:4]), 4)])
+        held = _node(_node(zone, "ZoneBC", "ZoneBC_t"), "held", "BC_t", _letters("BCWall"))
+        _node(held, "PointList", "IndexArray_t", np.array([[5]], np.int32))
+
+    return _file(fill)
+
+
+def grid(size: int, left_handed: bool = False) -> np.ndarray:
+    """(size, size, size, 3) points of a grid as CGNS lists them: along i first, thrown a little inside."""
+    places = np.stack(np.meshgrid(*[np.arange(size) / (size - 1)] * 3, indexing="ij"), axis=-1)[..., ::-1].copy()
+    inside = places[1:-1, 1:-1, 1:-1]
+    inside += np.random.default_rng(0).uniform(-0.1, 0.1, inside.shape)
+    return places[..., [1, 0, 2]] if left_handed else places
+
+
+def cgns_structured(packed: bool = False, left_handed: bool = False) -> bytes:
+    """Two blocks of a grid side by side."""
+    places = grid(4, left_handed)
+
+    def fill(file: h5py.File) -> None:
+        base = _node(file, "Base", "CGNSBase_t", np.array([3, 3], np.int32))
+        for k, name in enumerate(("inflow", "outflow")):
+            sizes = [[4] * 3, [3] * 3, [0] * 3]
+            _zone(base, name, places + np.array([0, 0, k]), "Structured", sizes, **(GZIP if packed else {}))
 
     return _file(fill)
 

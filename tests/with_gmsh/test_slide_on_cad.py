@@ -198,3 +198,43 @@ def test_nearest_places_are_nearest(gmsh, kernel):
     nearest = np.array([np.linalg.norm(table - point, axis=1).min() for point in points])
     found = np.linalg.norm(at - points, axis=1)
     assert (found <= nearest + 1e-12).all()
+
+
+@pytest.mark.parametrize("quads", [False, True])
+@pytest.mark.parametrize("how", ["hold", "slide"])
+def test_nodes_of_a_surface_in_space_are_on_the_cad(gmsh, how, quads):
+    """A cylinder: its sides have a radius, its rims besides a height."""
+    gmsh.model.add("cylinder")
+    gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 2, 1)
+    gmsh.model.occ.synchronize()
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 0.3)
+    gmsh.option.setNumber("Mesh.RecombineAll", int(quads))
+    gmsh.model.mesh.generate(2)
+    random = np.random.default_rng(0)
+    for _, surface in gmsh.model.getEntities(2):
+        tags, at, _ = gmsh.model.mesh.getNodes(2, surface)
+        for tag, place in zip(tags, at.reshape(-1, 3), strict=True):
+            step = random.uniform(-0.08, 0.08, 2)
+            if gmsh.model.getType(2, surface) == "Plane":
+                place[:2] += step
+            else:
+                angle = np.arctan2(place[1], place[0]) + step[0]
+                place[:] = np.cos(angle), np.sin(angle), place[2] + step[1]
+            gmsh.model.mesh.setNode(tag, place, [])
+    before = gmsnet.gmsh.smooth(max_sweeps=0).before.shape.min()
+    result = gmsnet.gmsh.smooth(on_geometry=how)
+    assert snapping.KEPT not in result.notes
+    assert result.after.shape.min() > before
+    assert result.after.inverted == 0
+    for dimension, tag in gmsh.model.getEntities():
+        nodes, at, _ = gmsh.model.mesh.getNodes(dimension, tag)
+        at = at.reshape(-1, 3)
+        moved = np.isin(nodes, result.mesh.point_data["gmsh:node"][result.moved])
+        if dimension == 2:
+            assert moved.any()
+        elif how == "hold" or dimension == 0:
+            assert not moved.any()
+        if gmsh.model.getType(dimension, tag) in ("Cylinder", "Circle"):
+            assert np.abs(np.hypot(at[:, 0], at[:, 1]) - 1.0).max() < 1e-12
+        if gmsh.model.getType(dimension, tag) in ("Plane", "Circle"):
+            assert np.isin(at[:, 2], (0.0, 2.0)).all()

@@ -28,7 +28,7 @@ MANY_OBJECTS = (
 )
 INTERRUPTED, BROKEN_PIPE = 130, 141  # as the shells have them
 
-app = typer.Typer(
+app: typer.Typer = typer.Typer(
     name="gmsnet",
     help="Better elements for any mesh file: moves nodes, changes nothing else and never inverts a cell.",
     epilog="Exit codes: 0 done, 1 a target is missed, cells stay inverted or a boundary is not in place, "

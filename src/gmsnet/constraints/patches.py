@@ -130,7 +130,8 @@ def _outline(facets: Facets, keys: Longs, f: Longs, g: Longs, line_keys: Longs, 
     sides = np.sort(np.column_stack([facets.label[f], facets.label[g]]), axis=1)
     marks = np.full(len(keys), NOTHING, dtype=np.int64)
     place = np.searchsorted(keys, line_keys)
-    on_edge = np.flatnonzero((place < len(keys)) & (keys[np.minimum(place, max(len(keys) - 1, 0))] == line_keys))
+    on_edge = np.flatnonzero(place < len(keys))  # none where there are no sharp edges
+    on_edge = on_edge[keys[place[on_edge]] == line_keys[on_edge]]
     marks[place[on_edge]] = facets.line_marks[on_edge]
     table, label = np.unique(np.column_stack([sides, marks]), axis=0, return_inverse=True)
     names = tuple(tuple(dict.fromkeys(facets.names[a] + facets.names[b])) for a, b, _ in table.tolist())

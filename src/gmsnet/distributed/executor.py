@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.by_rank import by_rank
+from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.loan import Loan, gathered_field
 from gmsnet.distributed.numbering import NO_NUMBERS, Numbers
@@ -16,6 +19,8 @@ from gmsnet.distributed.part import Part
 from gmsnet.methods.base import Field
 from gmsnet.parallel.executor import Executor, Figure, Figures, Result
 from gmsnet.parallel.threads import serial
+from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -24,10 +29,20 @@ class Ranks:
     """See Executor. numbers: of the cells of a part that are in ``changeable``. inner: carries out its work."""
 
     sequential = False
+    part: Part
+    comm: Any
+    halo: Halo
+    rows: Numbers
+    numbers: NDArray[np.int64]
+    inner: Executor
+    count: int
+    known: WeakKeyDictionary[Topology | Volume, Ranks]  # of what was restricted
+    loan: Loan | None
 
     def __init__(self, part: Part, numbers: Numbers = NO_NUMBERS, inner: Executor = serial) -> None:
         self.part, self.comm, self.halo, self.rows, self.inner = part, part.comm, part.halo, numbers, inner
         self.numbers = numbers.blocks
+        self.known = WeakKeyDictionary()
         self.count = int(self.comm.allreduce(int(self.numbers.max(initial=-1)) + 1, mpi().MAX))
 
     def map(self, work: Callable[[int, int], Result], first: int, last: int) -> list[Result]:
@@ -124,8 +139,21 @@ class Ranks:
 
     def gathered(self, field: Field, rows: NDArray[np.int32] | None) -> Field | None:
         """See Executor."""
-        self.loan: Loan | None = gathered_field(self.part, field, rows)
+        self.loan = gathered_field(self.part, field, rows)
         return self.loan.field
+
+    def restricted(self, topology: Topology | Volume, active: NDArray[np.bool_]) -> Topology | Volume:
+        """See Executor."""
+        active = active & topology.near_free
+        inner, numbers = self.part.ready(
+            replace(topology, near_free=active, free=np.sort(topology.memory[np.flatnonzero(active)]))
+        )
+        self.known[inner] = Ranks(self.part, numbers, self.inner)
+        return inner
+
+    def of(self, topology: Topology | Volume) -> Executor:
+        """See Executor."""
+        return self.known.get(topology, self)
 
     def lent(self, values: Floats) -> Floats:
         """See Executor."""

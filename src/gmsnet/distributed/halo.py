@@ -21,6 +21,16 @@ class Messages:
     request is set up once (MPI 4); where the library is older, each exchange names its buffers anew.
     """
 
+    graph: Any
+    columns: int
+    out: Places
+    into: Places
+    sent: Floats
+    got: Floats
+    messages: int
+    bytes: int
+    buffers: tuple[list[Any], list[Any]]
+
     def __init__(self, graph: Any, give: Sequence[Places], take: Sequence[Places], columns: int) -> None:
         self.graph, self.columns = graph, columns
         self.out, self.into = (np.concatenate([*each, np.empty(0, dtype=np.int64)]) for each in (give, take))
@@ -56,6 +66,14 @@ class Halo:
     places of the nodes that the neighbour moves and this rank has. Both in the order of the global ids.
     messages, bytes: sent so far, of the exchanges after colours.
     """
+
+    neighbours: list[int]
+    give: list[Places]
+    take: list[Places]
+    graph: Any
+    whole: Messages
+    messages: int
+    bytes: int
 
     def __init__(self, comm: Any, own: dict[int, Places], others: dict[int, Places]) -> None:
         self.neighbours = sorted({*own, *others})

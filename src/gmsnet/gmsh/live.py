@@ -44,6 +44,16 @@ class Live:
     parts: list[Part]
     dimension: int
 
+    @property
+    def planar(self) -> bool:
+        """Whether the cells to smooth are those of a mesh in a plane along two axes."""
+        return self.dimension == 2 and self.mesh.plane is not None
+
+    @property
+    def curved(self) -> bool:
+        """Whether the cells to smooth are those of a surface in space, inside of which nodes leave the CAD."""
+        return self.dimension == 2 and self.mesh.plane is None
+
     def below(self, dimension: int) -> NDArray[np.bool_]:
         """(N,) the nodes that lie on shapes of lower dimension: points, and curves, and surfaces."""
         return np.concatenate(

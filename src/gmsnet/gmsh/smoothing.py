@@ -50,15 +50,15 @@ def smooth(
         cad = Cad(gmsh, live) if on_geometry == SLIDE and "geometry" not in options else None
         if on_geometry == SLIDE:
             options = {"slide": True, **options}
-        if cad is not None and cad.curves and live.dimension == 2:  # else the mesh itself tells where they slide
+        if cad is not None and cad.curves and live.planar:  # else the mesh itself tells where they slide
             options["geometry"] = cad
         held = _held(gmsh, live, fixed, on_geometry)
         with Progress(options.get("max_sweeps", 100), bar=progress_bar) as progress:
             options["callback"] = progress.before(options.get("callback"))
             result = smooth_mesh(live.mesh, method, fixed=held, **options)
-        if cad is not None:
+        if cad is not None or live.curved:
             target = Target(*(options.get(f"target_{of}") for of in ("quality", "angle", "dihedral")))
-            result = snapping.on_geometry(gmsh, live, cad.curves, result, target)
+            result = snapping.on_geometry(gmsh, live, cad.curves if cad is not None else {}, result, target)
         set_points(gmsh, live, result.points, result.moved)
     return result
 

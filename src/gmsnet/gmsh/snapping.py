@@ -41,12 +41,12 @@ def on_geometry(
 
 def _snapped(gmsh: Any, live: Live, curves: Mapping[int, CadCurve], result: SmoothResult) -> Floats:
     points = result.points.copy()
-    axes = list(live.mesh.plane if live.dimension == 2 and live.mesh.plane else (0, 1, 2))
+    axes = list(live.mesh.plane if live.planar and live.mesh.plane else (0, 1, 2))
     for part in live.parts:
         rows = part.first + np.flatnonzero(result.moved[part.first : part.last])
         if len(rows) and part.dimension == 1 and part.tag in curves:
             points[rows[:, None], axes] = curves[part.tag].project(points[rows])[0][:, axes]
-        elif len(rows) and live.dimension == 3 and _is_curved(gmsh, part):
+        elif len(rows) and not live.planar and _is_curved(gmsh, part):
             places, _ = gmsh.model.getClosestPoint(2, part.tag, points[rows].ravel())
             points[rows] = np.asarray(places).reshape(-1, 3)
     return points

@@ -23,7 +23,7 @@ from gmsnet.io.formats import (
     format_of_suffix,
     sniff,
 )  # fmt: skip
-from gmsnet.io.linked import links_of
+from gmsnet.io.linked import links_of, nested
 from gmsnet.io.packed import MAGIC, is_packed, split_name, unpacked
 from gmsnet.io.paths import beside, name_of
 from gmsnet.io.splice import FileSource
@@ -102,17 +102,34 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
 
 
 def _linked(entry: Entry, name: str, shown: str, data: Data, stream: bool) -> dict[str, tuple[str, Data, Stamp | None]]:
-    """The files that a file names, by their keys."""
+    """The files that a file names, by their keys, and those that they name in turn."""
+    opened, folder = dict[str, tuple[str, Data, Stamp | None]](), os.path.dirname(name)
+    ways, naming = {os.path.normpath(name)}, [("", shown, data)]
+    while naming:
+        key, title, data = naming.pop()
+        for path, file in _named(entry, title, data, os.path.dirname(key)).items():
+            if stream:
+                raise InputError(f"{shown}: {entry.title} that names another file cannot be read from a stream")
+            place = os.path.join(folder, file)
+            if os.path.normpath(place) in ways:
+                raise FormatError(f"{title}: {file[:80]!r} is named twice, or names itself")
+            ways.add(os.path.normpath(place))
+            try:
+                opened[path] = _loaded(place)
+            except InputError as error:
+                raise type(error)(f"{shown}: the file that it names cannot be read: {error}") from None
+            if nested(entry, file):
+                naming.append((path, f"{shown}: {path}", opened[path][1]))
+    return opened
+
+
+def _named(entry: Entry, title: str, data: Data, folder: str) -> dict[str, str]:
+    """Key → path of the files that a file names, both from the folder of the first file. folder: of the file itself."""
     try:
-        named = links_of(entry, data)
+        found = links_of(entry, data)
     except FormatError as error:
-        raise FormatError(f"{shown}: {error}") from None
-    if named and stream:
-        raise InputError(f"{shown}: {entry.title} that names another file cannot be read from a stream")
-    try:
-        return {key: _loaded(os.path.join(os.path.dirname(name), path)) for key, path in named.items()}
-    except InputError as error:
-        raise type(error)(f"{shown}: the file that it names cannot be read: {error}") from None
+        raise FormatError(f"{title}: {error}") from None
+    return {os.path.join(folder, key): os.path.join(folder, path) for key, path in found.items()} if folder else found
 
 
 def _is_stream(name: str) -> bool:

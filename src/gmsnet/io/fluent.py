@@ -1,4 +1,4 @@
-"""Fluent meshes as text (``.msh``, ``.cas``). Only the coordinates are written again.
+"""Fluent meshes, as text or with binary sections (``.msh``, ``.cas``). Only the coordinates are written again.
 
 A file lists faces, each with the cell on either side; cells are put together from them. Zones of cells are regions,
 zones of faces on the boundary are markers. Source: the mesh file format in the manual of ANSYS Fluent, appendix.
@@ -18,9 +18,9 @@ from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.fluent_sections import CELLS, FACES, NAMES, NODES, Section, face_lists, sections
 from gmsnet.io.foam_cells import Faces, Sides, volumes
-from gmsnet.io.places import ranges
-from gmsnet.io.splice import TextSlots
-from gmsnet.io.text import Text
+from gmsnet.io.places import Lattice, Places, ranges
+from gmsnet.io.splice import BinarySlots, Points, TextSlots
+from gmsnet.io.text import Text, fail
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -39,7 +39,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
     dimension = next((k.head[0] for k in found if k.key == 2 and k.head), 3)
     if dimension not in (2, 3):
         raise FormatError(f"the mesh has {dimension} dimensions instead of 2 or 3")
-    points, slots = _points(Text(data, ends=b")"), [k for k in found if k.key in NODES and k.body], dimension)
+    points, slots = _points(data, [k for k in found if k.key in NODES and k.body], dimension)
     zones, sizes, nodes, sides = _faces(data, [k for k in found if k.key in FACES and k.body], len(points))
     count = int(sides.max(initial=0))
     if not count or count > len(sizes):
@@ -65,30 +65,59 @@ def read(files: Mapping[str, Data]) -> Parsed:
     names |= {(dimension, zone): titles[zone] for zone in distinct(regions) if zone in titles}
     known = {0, 1, 2, *NODES, *FACES, *CELLS, *NAMES}
     unread = [f"sections of the number {key}" for key in sorted({k.key for k in found} - known)]
-    return Parsed(points, blocks, slots, names, unread=["the faces and their order", *unread])
+    single = isinstance(slots, BinarySlots) and slots.dtype.endswith("4")
+    return Parsed(points, blocks, slots, names, single=single, unread=["the faces and their order", *unread])
 
 
-def _points(text: Text, found: list[Section], dimension: int) -> tuple[NDArray[np.float64], TextSlots]:
+def _points(data: Data, found: list[Section], dimension: int) -> tuple[Points, TextSlots | BinarySlots]:
     """The coordinates of all zones of nodes, by their numbers."""
-    parts: list[tuple[int, NDArray[np.int64]]] = []
-    for section in found:
-        first, last = section.head[1:3] if len(section.head) > 2 else (1, 0)
-        assert section.body is not None
-        starts, _ = text.until(section.body[1]).tokens(section.body[0])
-        if first < 1 or len(starts) != (last - first + 1) * dimension:
-            text.fail(section.start, f"{len(starts)} coordinates do not fit the nodes {first} to {last}")
-        parts.append((first, starts.reshape(-1, dimension)))
-    parts.sort(key=lambda part: part[0])
     at = 1
-    for first, part in parts:
+    for first, count in sorted((section.first, section.members) for section in found):
         if first != at:
             raise FormatError(f"the node {at} is missing, or given twice: nodes go on with {first}")
-        at += len(part)
-    if not parts:
+        at += count
+    kinds = {section.dtype for section in found}
+    if len(kinds) > 1:
+        raise FormatError("some nodes are text or of another precision than others: write them in one form")
+    if not found:
         raise FormatError("the file has no nodes (section 10)")
-    starts = np.ascontiguousarray(np.concatenate([part for _, part in parts]))
+    return (_binary if any(kinds) else _texts)(data, found, dimension)
+
+
+def _texts(data: Data, found: list[Section], dimension: int) -> tuple[Points, TextSlots]:
+    text, parts = Text(data, ends=b")"), list[Ints]()
+    for section in sorted(found, key=lambda section: section.first):
+        assert section.body is not None
+        starts, _ = text.until(section.body[1]).tokens(section.body[0])
+        _fits(data, section, len(starts), dimension)
+        parts.append(starts.reshape(-1, dimension))
+    starts = np.ascontiguousarray(np.concatenate(parts))
     points, ends = text.spans(starts)
     return points, TextSlots(starts, ends)
+
+
+def _binary(data: Data, found: list[Section], dimension: int) -> tuple[Points, BinarySlots]:
+    dtype, lattices, nodes = found[0].dtype, list[Lattice](), list[Ints]()
+    size = np.dtype(dtype).itemsize
+    points = np.empty((sum(section.members for section in found), dimension))
+    for section in found:
+        assert section.body is not None
+        _fits(data, section, (section.body[1] - section.body[0]) // size, dimension)
+        lattice = Lattice(section.body[0], section.members, dimension * size, range(0, dimension * size, size))
+        rows = np.arange(section.first - 1, section.first - 1 + section.members)
+        for axis, column in enumerate(lattice.columns):
+            points[rows, axis] = lattice.column(data, column, dtype)
+        if not np.isfinite(points[rows]).all():
+            fail(data, section.start, "a coordinate is not a finite number")
+        lattices.append(lattice)
+        nodes.append(rows)
+    return points, BinarySlots(Places(*lattices), dtype, np.concatenate(nodes))
+
+
+def _fits(data: Data, section: Section, count: int, dimension: int) -> None:
+    if count != section.members * dimension or not count:
+        last = section.first + section.members - 1
+        fail(data, section.start, f"{count} coordinates do not fit the nodes {section.first} to {last}")
 
 
 def _faces(data: Data, found: list[Section], count: int) -> tuple[Ints, Ints, Ints, Ints]:

@@ -11,25 +11,25 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
+from gmsnet.io.fluent_binary import MIXED, POLYGONS, Binary, binary, is_binary
 from gmsnet.io.places import ranges
 from gmsnet.io.text import fail
 
 Ints = NDArray[np.int64]
 
 NODES, CELLS, FACES, NAMES = (10,), (12,), (13,), (39, 45)
-BINARY = (2010, 2012, 2013, 3010, 3012, 3013)
+MACHINE, LITTLE = 4, b"60"  # the section of the machine that wrote, and its first number for bytes of that order
 MOST_DEEP, MOST_SECTIONS = 50, 100_000
 
 _OPEN = re.compile(rb"\s*\(\s*(\d{1,5})(?=[\s()\"])")
 _NEXT = re.compile(rb"[()\"]")
 _HEX = re.compile(rb"[0-9A-Fa-f]{1,15}")
-MIXED, POLYGONS = 0, 5  # kinds of faces that say how many nodes each has
 
 
 class Section(NamedTuple):
     """head: the numbers of its first list (of zone, first and last member, …); body: the bytes of its second.
 
-    start: its first byte. title: the name of a zone.
+    start: its first byte. title: the name of a zone. dtype: of the numbers of a binary body, "" for text.
     """
 
     key: int
@@ -37,16 +37,27 @@ class Section(NamedTuple):
     head: tuple[int, ...]
     body: tuple[int, int] | None
     title: str
+    dtype: str = ""
 
     @property
     def zone(self) -> int:
         """The number of the zone."""
         return self.head[0] if self.head else 0
 
+    @property
+    def first(self) -> int:
+        """The number of its first member; 0 where the head does not say."""
+        return self.head[1] if len(self.head) > 2 else 0
+
+    @property
+    def members(self) -> int:
+        """How many members there are by the head."""
+        return max(0, self.head[2] - self.head[1] + 1) if len(self.head) > 2 else 0
+
 
 def sections(data: Data) -> Iterator[Section]:
-    """All sections in the order of the file. Raises FormatError where brackets do not match, or one is binary."""
-    at = 0
+    """All sections in the order of the file. Raises FormatError where brackets do not match."""
+    at, dimension, order = 0, 3, "<"
     for _ in range(MOST_SECTIONS):
         found = _OPEN.match(data, at)
         if found is None:
@@ -54,11 +65,18 @@ def sections(data: Data) -> Iterator[Section]:
                 fail(data, at, "a section was expected, as in (10 (1 1 4 1)( … )): is the file damaged?")
             return
         key, start = int(found[1]), data.find(b"(", found.start())
-        if key in BINARY:
-            fail(data, found.start(1), "binary sections are not read: write the file as text (ASCII) from Fluent")
-        lists, stop = _lists(data, found.end())
-        at = stop
-        yield _section(data, key, start, found.end(), lists, stop)
+        if is_binary(key):
+            there = binary(data, key, found.end(), dimension, order)
+            at = there.stop
+            yield _in_binary(key, start, there)
+            continue
+        lists, at = _lists(data, found.end())
+        section = _section(data, key, start, found.end(), lists, at)
+        if key == 2 and section.head:
+            dimension = section.head[0]
+        if key == MACHINE and lists:
+            order = "<" if bytes(data[slice(*lists[0])]).split()[:1] == [LITTLE] else ">"
+        yield section
     fail(data, at, f"there are more than {MOST_SECTIONS} sections")
 
 
@@ -86,6 +104,13 @@ def _lists(data: Data, at: int) -> tuple[list[tuple[int, int]], int]:
     return fail(data, begin, "the section is not closed: is the file cut off?")
 
 
+def _in_binary(key: int, start: int, there: Binary) -> Section:
+    """A binary section under the number that it would have as text, where it holds nodes, cells or faces."""
+    key = key % 1000 if there.dtype else key
+    declared = not there.head or there.head[0] == 0
+    return Section(key, start, there.head, None if declared else there.body, "", there.dtype)
+
+
 def _section(data: Data, key: int, start: int, begin: int, lists: list[tuple[int, int]], stop: int) -> Section:
     if key == 2:
         words = bytes(data[begin : stop - 1]).split()
@@ -105,8 +130,10 @@ def _section(data: Data, key: int, start: int, begin: int, lists: list[tuple[int
 
 
 def numbers(data: Data, section: Section) -> Ints:
-    """The hexadecimal numbers of a section."""
+    """The whole numbers of a section, as text hexadecimal."""
     assert section.body is not None
+    if section.dtype:
+        return np.frombuffer(bytes(data[slice(*section.body)]), section.dtype).astype(np.int64)
     words = bytes(data[slice(*section.body)]).split()
     try:
         return np.array([int(word, 16) for word in words], dtype=np.int64)

@@ -157,7 +157,9 @@ STRANGERS = {
 }
 IN_HDF5 = ("exodus", "cgns", "med", "vtkhdf")
 HEAD = 4096  # bytes that are looked at
-MAY_BE_BINARY = ("gmsh", "vtk", "vtu", "vtp", "stl", "ply", "ugrid", "openfoam", "exodus", "cgns", "med", "vtkhdf")
+MAY_BE_BINARY = (
+    "gmsh", "vtk", "vtu", "vtp", "stl", "ply", "ugrid", "openfoam", "exodus", "cgns", "med", "vtkhdf", "fluent"
+)  # fmt: skip
 
 
 def known() -> str:

@@ -11,7 +11,8 @@ from typing import Protocol, cast
 from gmsnet.errors import InputError
 from gmsnet.io.atomic import reason
 from gmsnet.io.contents import Data
-from gmsnet.io.formats import Entry
+from gmsnet.io.formats import BY_SUFFIX, FORMATS, Entry
+from gmsnet.io.packed import split_name
 from gmsnet.io.pieces import Pieces
 from gmsnet.io.stamps import Stamps
 
@@ -37,6 +38,12 @@ def links_of(entry: Entry, data: Data) -> dict[str, str]:
     return _module(entry).links(data) if entry.linked else {}
 
 
+def nested(entry: Entry, path: str) -> bool:
+    """Whether a file that is named may name others in turn, as this format's do. Their paths are kept as they are."""
+    other = FORMATS.get(BY_SUFFIX.get(split_name(path)[1].lower(), ""))
+    return other is not None and other.linked == entry.linked != ""
+
+
 def _module(entry: Entry) -> Links:
     return cast(Links, import_module(f"gmsnet.io.{entry.linked}"))
 
@@ -51,7 +58,9 @@ def placed(
     main = entry.suffixes[0]
     data = bytes(files[main])
     module, in_place = _module(entry), os.path.abspath(name) in stamps.known
-    names = module.placed(name, module.links(data), in_place)
+    named = module.links(data)
+    below = {key: key for key in files if key != main and key not in named}  # named by those that are named
+    names = module.placed(name, {**named, **below}, in_place)
     paths = {key: os.path.join(os.path.dirname(name), path) for key, path in names.items()}
     for path in paths.values():
         if os.path.abspath(path) in stamps.known and not in_place:

@@ -7,7 +7,7 @@ chunks) the array is written again by the library, and all other arrays keep the
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -18,19 +18,23 @@ from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
 from gmsnet.io.hdf5 import Node, shown, with_values
 from gmsnet.io.pieces import Piece
-from gmsnet.io.splice import EncodedSlots, Points, Slots
+from gmsnet.io.splice import EncodedSlots, Points, Share, Slots
 
 _ROWS = 1 << 16  # that are written at once
 
 
 @dataclass(frozen=True)
 class Column:
-    """One coordinate of all nodes: node k at the byte start + k · stride, a number of the type ``dtype``."""
+    """One coordinate of all nodes: node k at the byte start + k · stride, a number of the type ``dtype``.
+
+    node: the node of each row, where row k is not node k.
+    """
 
     start: int
     stride: int
     dtype: str
     axis: int
+    node: NDArray[np.int64] | None = None
 
     def of(self, data: Data | bytearray, rows: int, first: int = 0) -> NDArray[Any]:
         """(rows,) the numbers, in the memory of ``data``, whose first byte is byte ``first`` of the file."""
@@ -46,22 +50,25 @@ class ColumnSlots:
     def replace(self, data: Data, old: Points, new: Points) -> Iterator[Piece]:
         """See Slots."""
         at, differ = 0, old != new
-        for group in self._groups(len(new)):
-            for k in range(0, len(new), _ROWS):
-                rows = min(_ROWS, len(new) - k)
+        for group in self._groups():
+            node = group[0].node
+            count = len(new) if node is None else len(node)
+            for k in range(0, count, _ROWS):
+                rows = min(_ROWS, count - k)
+                some = slice(k, k + rows) if node is None else node[k : k + rows]
                 starts = [column.start + k * column.stride for column in group]
                 stop = max(starts) + (rows - 1) * group[0].stride + np.dtype(group[0].dtype).itemsize
                 yield memoryview(data)[at : min(starts)]
                 block = bytearray(memoryview(data)[min(starts) : stop])
                 for start, column in zip(starts, group, strict=True):
                     here = Column(start, column.stride, column.dtype, column.axis).of(block, rows, min(starts))
-                    moved = differ[k : k + rows, column.axis]
-                    here[moved] = new[k : k + rows, column.axis][moved]
+                    moved = differ[some, column.axis]
+                    here[moved] = new[some, column.axis][moved]
                 yield memoryview(block)
                 at = stop
         yield memoryview(data)[at:]
 
-    def _groups(self, rows: int) -> list[list[Column]]:
+    def _groups(self) -> list[list[Column]]:
         """Columns that lie side by side, in the order of the file; those one after another are groups of one."""
         groups: list[list[Column]] = []
         for column in sorted(self.columns, key=lambda column: column.start):
@@ -69,7 +76,32 @@ class ColumnSlots:
                 groups[-1].append(column)
             else:
                 groups.append([column])
-        return groups if rows else []
+        return groups
+
+
+@dataclass(frozen=True)
+class SharedSlots:
+    """The parts of a mesh that stand in one file, some of them encoded (see Slots)."""
+
+    shares: Sequence[Share]
+
+    def replace(self, data: Data, old: Points, new: Points) -> Iterator[Piece]:
+        """See Slots: one part after another."""
+        for share in self.shares:
+            data = b"".join(share.replace(data, old, new))
+        yield memoryview(data)
+
+
+def shared(shares: Sequence[Share]) -> Slots:
+    """The slots of all parts of a mesh in one file. Raises FormatError where two have the same numbers."""
+    columns = list[Column]()
+    for share in shares:
+        if not isinstance(share.slots, ColumnSlots):
+            return SharedSlots(tuple(shares))
+        columns += [replace(column, node=share.node) for column in share.slots.columns]
+    if len({column.start for column in columns}) < len(columns):
+        raise FormatError("two parts of the mesh share an array of coordinates: give each its own")
+    return ColumnSlots(columns)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from gmsnet.io.xml_tree import Element, blame, parse, span_of
 NAMED = {"PUnstructuredGrid": ("Piece", "Source"), "PPolyData": ("Piece", "Source"),
          "vtkMultiBlockDataSet": ("DataSet", "file")}  # fmt: skip
 BLOCKS = "vtkMultiBlockDataSet"
-READ = (".vtu", ".vtp")
+READ, INDEXES = (".vtu", ".vtp"), (".pvtu", ".pvtp", ".vtm")  # with cells; that name others, as a block may
 LONGEST = 250  # characters of a path
 Numbered = tuple[Element, tuple[int, ...], str]
 
@@ -54,7 +54,7 @@ def kind_of(data: Data) -> tuple[str, list[Link]]:
         if not inside or os.path.normpath(path) in seen:
             how = "is named twice" if inside else "must lie in the folder of this file or below"
             blame(data, link.element, f"{path[:80]!r} {how}")
-        if split_name(path)[1].lower() not in READ:
+        if split_name(path)[1].lower() not in (READ if kind != BLOCKS else READ + INDEXES):
             blame(data, link.element, f"{path[:80]!r} is neither .vtu nor .vtp: only such pieces are smoothed")
         seen.add(os.path.normpath(path))
     if not found:
@@ -72,6 +72,25 @@ def _numbered(element: Element, tag: str, group: tuple[int, ...] = (), name: str
             yield child, own, called
         elif child.tag in (*NAMED, "Block", "Piece"):
             yield from _numbered(child, tag, own, called)
+
+
+def leaves(files: Mapping[str, Data], found: list[Link], folder: str = "") -> Iterator[Link]:
+    """The files with cells that are named, by files that are named, too; paths from the folder of the first file.
+
+    Pieces of a file of pieces are one block.
+    """
+    for link in found:
+        path = os.path.join(folder, link.path)
+        if split_name(path)[1].lower() in READ:
+            yield link._replace(path=path)
+            continue
+        try:
+            kind, below = kind_of(files[path])
+        except FormatError as error:
+            raise FormatError(f"{path}: {error}") from None
+        for each in leaves(files, below, os.path.dirname(path)):
+            group = (*link.group, *each.group) if kind == BLOCKS else link.group
+            yield each._replace(group=group, name=each.name or link.name)
 
 
 def links(data: Data) -> dict[str, str]:

@@ -14,11 +14,11 @@ from gmsnet.errors import FormatError, InputError
 from gmsnet.io import vtp, vtu
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
+from gmsnet.io.merge import Part, merged
 from gmsnet.io.packed import split_name
 from gmsnet.io.splice import Share, Untouched
 from gmsnet.io.vtk_ghosts import with_vertices
-from gmsnet.io.vtk_links import BLOCKS, Link, kind_of
-from gmsnet.io.vtk_merge import Part, merged
+from gmsnet.io.vtk_links import BLOCKS, Link, kind_of, leaves
 from gmsnet.io.vtu_reader import Reader
 from gmsnet.mesh.mesh import Mesh
 
@@ -35,9 +35,10 @@ class PieceFormat:
 
     def read(self, files: Mapping[str, Data]) -> Parsed:
         """See Format; the other files are there under the names that the first gives them."""
-        kind, links = kind_of(files[self.suffixes[0]])
+        kind, named = kind_of(files[self.suffixes[0]])
         if kind != self.kind:
             raise FormatError(f"a VTKFile of type {kind} is not {self.name}: rename the file")
+        links = list(leaves(files, named))
         parts = [part for link in links if (part := _part(link, files)) is not None]
         if not parts:
             raise FormatError("no piece has cells: there is nothing to smooth")

@@ -8,6 +8,7 @@ N = Σ(n + 1) nodes in all.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,11 @@ class GMSNet(torch.nn.Module):
 
     Each star is a wheel: the free node is joined to its neighbours, and these to each other around the ring.
     """
+
+    linear: torch.nn.Linear
+    norm: Any
+    gcn: Any
+    mlp: torch.nn.ModuleList
 
     def __init__(self, hidden: int) -> None:
         super().__init__()

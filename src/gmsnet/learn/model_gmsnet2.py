@@ -7,7 +7,7 @@ features.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from gmsnet.learn.data import Stars
 from gmsnet.weights import shapes
 
 LEAST, CLIP, TINY = 1e-5, 40.0, 1e-30  # as in kernels.methods.gmsnet2
-ACTIVATIONS = {"silu": torch.nn.functional.silu, "relu": torch.relu}
+ACTIVATIONS: dict[str, Callable[..., torch.Tensor]] = {"silu": torch.nn.functional.silu, "relu": torch.relu}
 
 
 class GMSNet2(torch.nn.Module):
@@ -26,11 +26,11 @@ class GMSNet2(torch.nn.Module):
     def __init__(self, hidden: int, activation: str) -> None:
         super().__init__()
         self.activation = activation
-        self.encode = torch.nn.Linear(5, hidden)
-        self.pool = torch.nn.Linear(2 * hidden, hidden)
-        self.triangle = torch.nn.Linear(hidden, hidden)
-        self.context = torch.nn.Linear(hidden, hidden, bias=False)
-        self.decode = torch.nn.Linear(hidden, 3)
+        self.encode: torch.nn.Linear = torch.nn.Linear(5, hidden)
+        self.pool: torch.nn.Linear = torch.nn.Linear(2 * hidden, hidden)
+        self.triangle: torch.nn.Linear = torch.nn.Linear(hidden, hidden)
+        self.context: torch.nn.Linear = torch.nn.Linear(hidden, hidden, bias=False)
+        self.decode: torch.nn.Linear = torch.nn.Linear(hidden, 3)
         torch.nn.init.zeros_(self.decode.weight)
         torch.nn.init.zeros_(self.decode.bias)
 

@@ -19,6 +19,8 @@ from gmsnet.weights.shapes import NN_HIDDEN
 class RingNetwork(torch.nn.Module):
     """The network of one degree: 2n → h₁ → h₂ → 2 with sigmoids."""
 
+    layers: torch.nn.ModuleList
+
     def __init__(self, degree: int) -> None:
         super().__init__()
         widths = (2 * degree, *NN_HIDDEN[degree], 2)

@@ -59,7 +59,7 @@ class GMSNetTrainee(Trainee):
         self.options = options
         self.net = GMSNet(options.hidden)
         self.nets: Mapping[str, torch.nn.Module] = {"gmsnet": self.net}
-        self.loss = LOSSES[options.loss]
+        self.loss: Loss = LOSSES[options.loss]
         first, second, _ = data.SPLIT
         self.sizes = [len(part) for part in parts[:first]]
         self.training = Batch.of_stars(data.joined(parts[:first]))

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.tetra_measures import COLUMNS, HIGH, LOW, cubed_ratios, per_tetrahedron
+from gmsnet.kernels.topology.connectivity import touching
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 
@@ -90,6 +91,15 @@ def ratios_of(points: Floats, cells: Tetrahedra, executor: Executor = serial) ->
     return out
 
 
+def renew(ratios: Floats, points: Floats, cells: Tetrahedra, nodes: Rows, executor: Executor = serial) -> None:
+    """Measures those of ``ratios_of`` anew that have one of these nodes, which alone have moved."""
+    moved = np.zeros(len(points))
+    moved[nodes] = 1.0
+    executor.exchange(moved)
+    rows = touching(cells.rows, moved > 0.0)
+    ratios[rows] = ratios_of(points, cells.take(rows), executor)
+
+
 def below(points: Floats, cells: Tetrahedra, measure: float, wide: float, executor: Executor = serial) -> Ranked:
     """The cells whose measure is less than this, or that are inverted."""
     ratios = ratios_of(points, cells, executor)
@@ -100,12 +110,19 @@ def below(points: Floats, cells: Tetrahedra, measure: float, wide: float, execut
     return Ranked.of(rows[chosen][order], found[chosen][order], executor)
 
 
-def worst(points: Floats, cells: Tetrahedra, count: int, wide: float, executor: Executor = serial) -> Ranked:
-    """So many cells of the least measure, all if they are fewer; of valid meshes.
+def worst(
+    points: Floats,
+    cells: Tetrahedra,
+    count: int,
+    wide: float,
+    executor: Executor = serial,
+    ratios: Floats | None = None,
+) -> Ranked:
+    """So many cells of the least measure, all if they are fewer; of valid meshes. ratios: theirs, as far as known.
 
     cells: those that can change (``Volume.changeable``), of which processes may have some each.
     """
-    ratios = ratios_of(points, cells, executor)
+    ratios = ratios_of(points, cells, executor) if ratios is None else ratios
     rows = executor.lowest_rows(-ratios, MORE * count)
     found = measures_of(columns_of(points, cells, rows), wide)
     if MORE * count < executor.counted(np.ones(len(ratios), dtype=bool)):

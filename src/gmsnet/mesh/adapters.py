@@ -46,8 +46,8 @@ def to_mesh(thing: Any) -> tuple[Mesh, Restore]:
 
     thing: a Mesh; ``(points, cells)`` arrays or a mapping ``{"points": …, "cells": …, "regions": …, "markers": …}``
     (see ``mesh_from_arrays``); a ``Mesh`` of meshio or meshlane; an ``UnstructuredGrid`` or ``PolyData`` of PyVista; a
-    ``MeshTri``, ``MeshQuad`` or ``MeshTet`` of scikit-fem; a ``Triangulation`` of Matplotlib; a ``Delaunay`` of SciPy;
-    a ``Mesh`` of sfepy, Netgen or dolfinx; a ``DMPlex`` of PETSc; a ``Mesh2d`` of MeshKernel.
+    ``MeshTri``, ``MeshQuad``, ``MeshTet`` or ``MeshHex`` of scikit-fem; a ``Triangulation`` of Matplotlib; a
+    ``Delaunay`` of SciPy; a ``Mesh`` of sfepy, Netgen or dolfinx; a ``DMPlex`` of PETSc; a ``Mesh2d`` of MeshKernel.
     Points in single precision give a Mesh with ``single`` set.
 
     restore(points): points (N×dim, float64) → the type that came in, with these coordinates and all else equal. The
@@ -248,7 +248,7 @@ def _refill(copied: Callable[[], Any], points: Any) -> Restore:
 def _even(kind: str, data: Any) -> Iterator[tuple[str, NDArray[np.int64]]]:
     """A block of meshio, cut where the number of nodes changes (its polygons may be lists of different lengths)."""
     if kind.startswith("polyhedron"):
-        raise InputError("the mesh has polyhedra: of volumes, gmsnet smooths tetrahedra alone")
+        raise InputError("the mesh has polyhedra: of volumes, tetrahedra, pyramids, wedges and hexahedra are smoothed")
     if isinstance(data, np.ndarray):
         yield face(kind, indices(data, f"{kind} cells"))
         return

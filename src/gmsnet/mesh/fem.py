@@ -22,6 +22,7 @@ DOLFINX: dict[str, tuple[str, tuple[int, ...]]] = {
     "triangle": ("triangle", (0, 1, 2)), "quadrilateral": ("quad", (0, 1, 3, 2)),
     "tetrahedron": ("tetra", (0, 1, 2, 3)),
     "hexahedron": ("hexahedron", (0, 1, 3, 2, 4, 5, 7, 6)),
+    "prism": ("wedge", (0, 1, 2, 3, 4, 5)), "pyramid": ("pyramid", (0, 1, 3, 2, 4)),
 }  # fmt: skip
 SFEPY = {"1_2": "line", "2_3": "triangle", "2_4": "quad", "3_4": "tetra", "3_8": "hexahedron", "3_6": "wedge"}
 VOLUMES = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron"}

@@ -252,6 +252,11 @@ def unmoved(mesh: Mesh) -> str:
     return _counted(block for block in mesh.cells if block.dimension in (3, None) and not has_form(block.kind))
 
 
+def unmoved_faces(mesh: Mesh) -> str:
+    """How many cells of a surface in space are of second order, whose nodes are held, in words. "" if none are."""
+    return _counted(block for block in mesh.cells if measured(mesh, block) and block.cell.order > 1)
+
+
 def measured(mesh: Mesh, block: CellBlock) -> bool:
     """Is the quality of these cells known: are they triangles, or quads in a plane? Second-order ones by their
     corners. Where there are volumes: is their Jacobian determinant known in Bernstein form?"""

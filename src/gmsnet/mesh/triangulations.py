@@ -7,17 +7,23 @@ from typing import Any
 
 import numpy as np
 
+from gmsnet.cells.table import CELLS
 from gmsnet.errors import InputError
 from gmsnet.mesh.array_forms import Restore, from_pair, in_precision_of, mesh_from_arrays
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import combined
 
-SKFEM = {"MeshTri1": "triangle", "MeshQuad1": "quad", "MeshTet1": "tetra"}  # those of order one
+# Classes → the kind of cell, and where its nodes are listed the place of each of a Mesh's (None: as in a Mesh).
+SKFEM: dict[str, tuple[str, tuple[int, ...] | None]] = {
+    "MeshTri1": ("triangle", None), "MeshQuad1": ("quad", None), "MeshTet1": ("tetra", None),
+    "MeshHex1": ("hexahedron", (0, 3, 6, 2, 1, 5, 7, 4)), "MeshWedge1": ("wedge", None),
+    "MeshTri2": ("triangle6", None), "MeshQuad2": ("quad9", None), "MeshTet2": ("tetra10", None),
+}  # fmt: skip
 SIMPLEX = {2: "triangle", 3: "tetra"}
 
 
 def from_skfem(thing: Any) -> tuple[Mesh, Restore]:
-    """Of a ``MeshTri``, ``MeshQuad`` or ``MeshTet``: p (2 or 3, N), t (3 or 4, M). Out goes the same class.
+    """Of a mesh of one of the classes ``SKFEM``. Out goes the same class.
 
     Cells belong to one region where the same subdomains hold them. The facets of named boundaries become markers, of
     volumes sets of nodes.
@@ -25,15 +31,18 @@ def from_skfem(thing: Any) -> tuple[Mesh, Restore]:
     """
     name = next(base.__name__ for base in type(thing).__mro__ if base.__module__.partition(".")[0] == "skfem")
     if name not in SKFEM:
-        raise InputError(f"gmsnet knows MeshTri, MeshQuad and MeshTet (of order one) of scikit-fem, not {name}")
-    points, cells = np.asarray(thing.p).T, np.asarray(thing.t).T
+        raise InputError(f"of scikit-fem, gmsnet knows {', '.join(SKFEM)}, not {name}")
+    kind, order = SKFEM[name]
+    points = np.asarray(thing.doflocs).T
+    cells = np.asarray(thing.dofs.element_dofs if name.endswith("2") else thing.t).T
+    cells = cells if order is None else cells[:, list(order)]
     subdomains = (thing.subdomains or {}).values()
     regions = combined([np.isin(np.arange(len(cells)), ids) for ids in subdomains], len(cells))
     facets = np.asarray(thing.facets).T if thing.boundaries else np.zeros((0, 2), dtype=np.int64)
     markers = {name: facets[np.asarray(ids)] for name, ids in (thing.boundaries or {}).items()}
-    if SKFEM[name] == "tetra":
+    if CELLS[kind].dimension == 3:
         markers = {name: np.unique(nodes) for name, nodes in markers.items()}
-    mesh, back = mesh_from_arrays(points, {SKFEM[name]: cells}, regions, markers), in_precision_of(points)
+    mesh, back = mesh_from_arrays(points, {kind: cells}, regions, markers), in_precision_of(points)
     return mesh, lambda new: dataclasses.replace(thing, doflocs=np.ascontiguousarray(back(new).T))
 
 

@@ -29,6 +29,7 @@ from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.methods.conjugate import minimise
 from gmsnet.methods.multigrid import Multigrid
+from gmsnet.methods.sliders import Sliders
 from gmsnet.metric.conformity import cell_qualities, oriented
 from gmsnet.metric.field import Metric
 from gmsnet.metric.tensors import tensors_of
@@ -53,6 +54,7 @@ class Problem:
     """ΣE, or Σ(E/top)^p, p = 2^doublings, as a function of the places of some nodes. See ``conjugate.Sum``.
 
     table: (S, 3) weights of edges, None where all are 1. number: (N,) the rows of the nodes that move, −1 of others.
+    sliders: those of them that slide.
     background: the metric between nodes; start: (N,) where each node was in it. logs, slopes: of the metric at the
     nodes. floor: of 1/E, 0 for none. least: the least 1/E of these simplices at first; no point below it is accepted.
     """
@@ -69,6 +71,7 @@ class Problem:
     floor: float = 0.0
     doublings: int = 0
     top: float = 1.0
+    sliders: Sliders | None = None
 
     @classmethod
     def of(cls, field: Field, metric: Metric, free: NDArray[np.bool_]) -> Problem:
@@ -91,6 +94,7 @@ class Problem:
         problem = cls(cells, table, moved, number, matrix, background, metric.first.copy(), logs, slopes)
         places.evaluate(background, field.points, problem.start, logs, slopes)
         slopes[~free] = 0.0
+        problem.sliders = Sliders.of(field, free)
         return problem
 
     def look(self, points: Floats) -> None:
@@ -109,7 +113,10 @@ class Problem:
 
     def value(self, points: Floats, gradient: Floats) -> float:
         """See ``conjugate.Sum``."""
-        return self._value(points, gradient)[0]
+        total = self._value(points, gradient)[0]
+        if self.sliders is not None:
+            self.sliders.along(gradient, self.sliders.nodes)
+        return total
 
     def _value(self, points: Floats, gradient: Floats) -> tuple[float, Floats]:
         share = np.empty(len(self.cells))
@@ -140,8 +147,10 @@ class Problem:
             x, y = residual.T
             inner = cycle(np.column_stack([a * x + b * y, b * x + c * y]))
             x, y = inner.T
-            return np.column_stack([a * x + b * y, b * x + c * y])
+            found = np.column_stack([a * x + b * y, b * x + c * y])
+            return found if sliders is None else sliders.along(found, self.number[sliders.nodes])
 
+        sliders = self.sliders
         return apply
 
 
@@ -154,6 +163,7 @@ class Adapt(Smoother):
 
     rounds: int
     passes: int
+    slide: bool
     gained: float
     step: Callable[[Field], int]
     converged: bool
@@ -163,7 +173,7 @@ class Adapt(Smoother):
 
     def __init__(self, metric: Metric) -> None:
         self.metric = metric
-        self.rounds, self.passes, self.gained = 0, 0, 0.0
+        self.rounds, self.passes, self.gained, self.slide = 0, 0, 0.0, False
         self.step = self._even
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
@@ -180,18 +190,29 @@ class Adapt(Smoother):
         self.rounds += 1
         gained = self._standing(field.points, field)[1] - before[1]
         if not moved or gained < ROUND_GAIN * before[1] or self.rounds == ROUNDS:
-            self.step = self._worst
+            if field.constraint is None or self.slide:
+                self.step = self._worst
+            self.slide, self.rounds = True, 0
         return moved
+
+    def _free(self, field: Field) -> NDArray[np.bool_]:
+        """The nodes (N,) that may move now: those that slide not before the others have settled."""
+        constraint = field.constraint
+        return (
+            field.planar.near_free
+            if constraint is None or self.slide
+            else field.planar.near_free & (constraint.row < 0)
+        )
 
     def _worst(self, field: Field) -> int:
         """A round of a power of E, for the worst cells: taken for what they gain, if the others do not lose more."""
         self.phase = WORST_PHASE
         before = self._standing(field.points, field)
-        moved, problem = 0, Problem.of(field, self.metric, field.planar.near_free)
+        moved, problem = 0, Problem.of(field, self.metric, self._free(field))
         least = problem.least(field.points)
         if len(problem.moved) and least > 0.0:
             problem.doublings, problem.top = DOUBLINGS, 1.0 / least
-            found = self._written(minimise(problem, field.points, SETTLED), field)
+            found = field.written(minimise(problem, field.points, SETTLED))
             after = self._standing(found, field)
             if self._certified(found, field) and TRADE * (before[1] - after[1]) < after[0] - before[0]:
                 moved, self.gained = self._take(found, field), after[0] - before[0]
@@ -210,13 +231,13 @@ class Adapt(Smoother):
 
     def _round(self, field: Field, before: tuple[float, float], floor: float) -> int:
         """Minimises ΣE with a barrier at a share ``floor`` of the least 1/E; how many nodes move."""
-        free = field.planar.near_free
+        free = self._free(field)
         for _ in range(REPAIRS):
             problem = Problem.of(field, self.metric, free)
             if not len(problem.moved):
                 return 0
             problem.floor = floor * max(0.0, problem.least(field.points))
-            found = self._written(minimise(problem, field.points, SETTLED), field)
+            found = field.written(minimise(problem, field.points, SETTLED))
             if not self._certified(found, field):
                 return 0
             if field.level == VALID or self._standing(found, field)[0] >= before[0]:
@@ -232,10 +253,6 @@ class Adapt(Smoother):
         """The least and the mean 1/E of the cells that are compared."""
         values = cell_qualities(points, field.planar.scored, self.metric.at(points))
         return float(values.min(initial=1.0)), float(values.mean()) if len(values) else 1.0
-
-    def _written(self, points: Floats, field: Field) -> Floats:
-        """The points as the file will keep them."""
-        return points.astype(np.float32).astype(np.float64) if field.precision.single else points
 
     def _certified(self, points: Floats, field: Field) -> bool:
         """Does the guard allow all nodes to go there at once?"""

@@ -12,7 +12,8 @@ with every cell kept above a floor.
 
 Where nodes creep, many neighbours together one way (methods/creep.py), or much more is to come than the next rounds
 will bring, the mesh is deformed as a whole: then all nodes move at once (methods/whole_mesh.py), and the phase goes on.
-In the end, where the worst cells are many alike, all nodes move at once for these, and all phases have another turn.
+Then small meshes try powers of q at once, while no single cell is above the others. In the end, where the worst cells
+are many alike, all nodes move at once for these, and all phases have another turn, as long as that gains.
 
 A phase goes on as long as more than its ``gain`` in the mean of 1/q (of a sample of the cells) is to come, if gains go
 on as the last two did. What each phase is worth is measured by ``benchmarks/auto.py``; see docs/auto.md.
@@ -28,40 +29,50 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import LANES
-from gmsnet.kernels.methods import ranking
-from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.simplex.shell_measures import mean_shape_of_shell
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import STAR
 from gmsnet.measure.target import Target
-from gmsnet.measure.totals import totals_of
 from gmsnet.methods.base import ALL_CELLS, Field, Method, Smoother, Tally
 from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
 from gmsnet.methods.below_in_space import BelowInSpace
 from gmsnet.methods.creep import Creep
-from gmsnet.methods.phases import MIXED_PLAN, NEWTON, SMALL_PLAN, SURFACE_PLAN, VOLUME_PLAN, WORST, Phase, plan_for
+from gmsnet.methods.gains import mean_shape, to_come
+from gmsnet.methods.phases import (
+    LARGE_VOLUME,
+    LARGE_VOLUME_PLAN,
+    MIXED_PLAN,
+    NEWTON,
+    SMALL_PLAN,
+    SURFACE_PLAN,
+    VOLUME_PLAN,
+    WORST,
+    Phase,
+    plan_for,
+)
 from gmsnet.methods.whole_mesh import CLOSEST, SETTLED, WholeMesh
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
-from gmsnet.parallel.threads import serial
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 
-SAMPLE = 32  # blocks of cells
 SLOW = 0.02  # in the mean of 1/q: so much to come, by the last two gains, is more than sweeps should be left to bring
 POOR = 0.5  # a mean of 1/q below this is not left to sweeps alone
 FAIR = 0.8  # nor is one below this where they end
+STILL_POOR = 0.85  # a mean of 1/q where a small mesh ends: its worst cells are among many like them
 AHEAD = 50  # times the last gain are at most expected to come
+# Turns of all nodes for the worst cells, at most; and in the least 1/q, what the last one must have gained for another.
+TURNS, TURN_GAIN = 3, 0.01
+COARSER = 10.0  # times what a phase must gain to go on, once these have been moved
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
-LARGE_VOLUME, LARGE_GAIN = 50_000, 0.008  # free nodes of meshes in space of which a pass must gain more
+LARGE_GAIN = 0.008  # of meshes in space of more than LARGE_VOLUME free nodes
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
-WHOLE_WORST, POWERS = "whole mesh, worst cells", (3, 2)  # q⁸, q⁴
+WHOLE_WORST, POWERS, EARLY = "whole mesh, worst cells", (3, 2), (2, 3)  # q⁸, q⁴
 GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
 EXACT = 20_000  # free nodes: up to so many, all nodes of such a mesh go to the minimum of Σq, which is near
-IN_SPACE = (VOLUME_PLAN, MIXED_PLAN, SURFACE_PLAN)
+VOLUMES = (VOLUME_PLAN, LARGE_VOLUME_PLAN)  # where one round is enough before another turn of the worst cells
+IN_SPACE = (*VOLUMES, MIXED_PLAN, SURFACE_PLAN)
 NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
 
 
@@ -72,8 +83,9 @@ class Auto(Smoother):
     at: int
     whole: int
     slow: bool
-    last: bool
+    turns: int
     ideal: bool
+    early: bool
     pass_gain: float
     passes: int
     least: float
@@ -96,7 +108,8 @@ class Auto(Smoother):
         self.at = -1
         self.creep: Creep | None = None
         self.whole = 0  # how often all nodes have moved at once
-        self.slow = self.last = self.ideal = False
+        self.slow = self.ideal = self.early = False
+        self.turns, self.least_before = 0, -math.inf  # how often all nodes had their turn for the worst cells
         self.pass_gain = PASS_GAIN
         self.passes, self.least = 0, -math.inf  # passes over the worst cells, and the least 1/q after the last one
         self.again = -1  # the phase to go back to in the end, if there is one
@@ -106,8 +119,9 @@ class Auto(Smoother):
             phase, self.again = self.again, -1
         self.at, self.made, self.rounds, self.gained = phase, 0, 0, math.inf
         if phase == len(self.phases):
-            self.converged = self.last or not (self.ideal or self._is_even(field, executor))
-            self.last = True
+            gained = self.turns == 0 or self.least >= self.least_before + TURN_GAIN
+            self.converged = self.turns == TURNS or not gained or not (self.ideal or self._is_even(field, executor))
+            self.turns, self.least_before = self.turns + 1, self.least
             return
         self.smoother = self.phases[phase].create()
         if self.phases[phase].rounds > 1 and not self.phases[phase].first:  # what those gain at first does not count
@@ -127,6 +141,8 @@ class Auto(Smoother):
         if self.at == len(self.phases):
             return (self._move_all if self.ideal else self._move_all_for_worst)(field, executor, test)
         phase = self.phases[self.at]
+        if self.early:
+            return self._move_all_early(field, executor, test)
         if self.slow:
             return self._move_all(field, executor, test)
         watched = self.creep if phase.rounds > 1 and self.made + 1 == self._wanted else None
@@ -159,6 +175,15 @@ class Auto(Smoother):
             self.whole = MOST_WHOLE
         return tally
 
+    def _move_all_early(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
+        """All nodes at once on powers of q while the floor is low: where all cells are alike, q̂ may gain by that."""
+        self.early, self.looks, self.phase = False, True, WHOLE_WORST
+        tally = np.zeros(3, dtype=np.int64)
+        for power in EARLY:
+            tally += WholeMesh((power,), best=True).sweep(field, executor, test)
+        self._enter(self.at + 1, field, executor)
+        return tally
+
     def _move_all_for_worst(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """All nodes at once, for the worst cells; then all phases have another turn for the mean."""
         self.looks, self.phase = True, WHOLE_WORST
@@ -183,7 +208,8 @@ class Auto(Smoother):
         small, moved = self.phases is SMALL_PLAN, self.whole > 0
         if self.creep is None or self.least >= (GOOD_MOVED if small and moved else GOOD):
             return False
-        return (small and moved) or ((small or moved) and self.least > mean_shape(field, executor) - NEAR_MEAN)
+        mean = mean_shape(field, executor)
+        return (small and (moved or mean < STILL_POOR)) or ((small or moved) and self.least > mean - NEAR_MEAN)
 
     def _is_slow(self, field: Field, executor: Executor, ahead: float, lasts: bool) -> bool:
         """Is the mesh deformed as a whole? ahead: what is to come in the mean of 1/q. lasts: gains do not fall fast."""
@@ -202,7 +228,7 @@ class Auto(Smoother):
         self.rounds += 1
         self.made = 0
         goes_on = False
-        if self.rounds < phase.rounds:
+        if self.rounds < (1 if self.again >= 0 and self.phases in VOLUMES else phase.rounds):
             mean, ahead, lasts = mean_shape(field, executor), 0.0, True
             if phase.first and self.rounds == 1:
                 goes_on = True
@@ -210,7 +236,8 @@ class Auto(Smoother):
                 before, self.gained = self.gained, mean - self.mean
                 lasts = not phase.lasting or self.gained >= phase.lasting * before
                 ahead = to_come(before, self.gained)
-                goes_on = ahead > phase.gain and self.gained > phase.least
+                enough = phase.gain * (COARSER if self.turns or self.whole else 1.0)
+                goes_on = ahead > enough and self.gained > phase.least
                 ahead = min(ahead, AHEAD * self.gained) if before < math.inf else 0.0
             self.mean = mean
             self.slow = self._is_slow(field, executor, ahead, lasts) or (not goes_on and self._is_caught())
@@ -223,33 +250,11 @@ class Auto(Smoother):
             is_ideal = isinstance(self.smoother, WorstFirst) and self.smoother.least >= self.smoother.enough
             few = self.creep is not None and not self.whole and self.free <= EXACT
             self.ideal = is_ideal and few
+            moved = self.at == 0 and self.whole > 0 and self.phases is SMALL_PLAN
+            self.early = moved and field.planar.near_shapes is None
+            if self.early:
+                return
             self._enter(len(self.phases) if target_reached or is_ideal else self.at + 1, field, executor)
-
-
-def mean_shape(field: Field, executor: Executor = serial) -> float:
-    """The mean of 1/q over some of the cells, evenly taken."""
-    simplices = field.topology.changeable
-    stride = max(1, executor.counted(np.ones(len(simplices.rows), dtype=bool)) // (SAMPLE * LANES))
-    if isinstance(simplices, Tetrahedra):
-        taken = simplices.take(executor.every(stride, len(simplices.rows)))
-        totals = totals_of(field.points, taken, executor)
-        return math.nan if totals is None else totals.shape_mean
-    if isinstance(field.topology, Shell):
-        return float(mean_shape_of_shell(field.points, simplices, stride))
-    some = executor.every(stride, len(simplices.rows), LANES)
-    shape = np.empty(len(some))
-    ranking.shapes_of(field.points, simplices, some, shape)
-    shape = executor.in_order(executor.row_numbers(some), shape)
-    return float(np.cumsum(shape)[-1] / len(shape)) if len(shape) else math.nan  # added up in their order
-
-
-def to_come(before: float, gained: float) -> float:
-    """What is to be gained yet, if gains go on to fall by the same factor; by half, if only one is known."""
-    if gained <= 0.0:
-        return 0.0
-    if before == math.inf:
-        return gained
-    return gained * gained / (before - gained) if gained < before else math.inf
 
 
 def for_target(target: Target, share: float, *, rings: int, floor: float | None = None) -> Auto:

@@ -79,7 +79,7 @@ class Banded(StarSmoother):
     def __init__(self, start: NDArray[np.float64], kept: Kept) -> None:
         self.start, self.kept = start, kept
         self.topology: Topology | None = None
-        self.bands = bands.Bands(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0))
+        self.bands: bands.Bands = bands.Bands(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0))
         self.at, self.inverse = -1, 1.0
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:

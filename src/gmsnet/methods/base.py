@@ -63,6 +63,12 @@ class Field:
         assert not isinstance(self.topology, Shell)
         return self.topology
 
+    def written(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (N, 2) as the file will keep them, where they are others than those of the field."""
+        if not self.precision.single:
+            return points
+        return np.where(points == self.points, points, points.astype(np.float32).astype(np.float64))
+
     def guard(self, executor: Executor) -> Guard:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
         if isinstance(self.topology, MixedVolume):
@@ -86,9 +92,10 @@ class Smoother(ABC):
     """A method ready for one run.
 
     settled: it has its own rule when to stop, and that has come true. reached: so has the target that it was made for.
-    looks: the mesh is worth measuring after the last sweep. stops_when_idle: a sweep that moved nothing is the last.
-    shared_out: each rank can do the same with a part of the mesh (gmsnet.distributed), else one does all. phase: what
-    of the method the last sweep was, "" for methods of one phase.
+    looks: the mesh is worth measuring after the last sweep. stops_when_idle: a sweep that moved nothing is the last,
+    and the run ends after many without a gain; else ``converged`` alone tells. shared_out: each rank can do the same
+    with a part of the mesh (gmsnet.distributed), else one does all. phase: what of the method the last sweep was, ""
+    for methods of one phase.
     """
 
     converged = False

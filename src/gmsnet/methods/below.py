@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,8 @@ class Below(Smoother):
 
     least: float
     everywhere: bool
+    target: Target
+    plan: NDArray[Any]
     limits: tuple[float, float]
     converged: bool
     target_reached: bool

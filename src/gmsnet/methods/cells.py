@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NoReturn
 
+from gmsnet.cells.jacobian import has_form
+from gmsnet.cells.table import CELLS
 from gmsnet.errors import InputError
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import METHODS, method_named
@@ -28,9 +30,18 @@ def check_cells(mesh: Mesh, name: str, choice: str | None = None) -> None:
             f"{name}{f' ({choice})' if method.surfaces else ''} is not for surfaces in space: choose {others}"
         )
     for kind in ("tetra", "hexahedron", "wedge", "pyramid") if mesh.has_volumes else ("quad",):
-        count = sum(len(block.nodes) for block in mesh.cells if block.kind == kind)
+        count = sum(len(block.nodes) for block in mesh.cells if _alike(block.kind, kind))
         if count and not method.moves(kind, choice):
             _refuse(method, choice, kind, count)
+
+
+def _alike(kind: str, straight: str) -> bool:
+    """Is this that kind, or, of volumes, that of the second order whose corners move as its corners do?"""
+    if kind not in CELLS:
+        return False
+    own, other = CELLS[kind], CELLS[straight]
+    curved = own.dimension == other.dimension == 3 and own.corners == other.corners and has_form(kind)
+    return kind == straight or curved
 
 
 def _refuse(method: Method, choice: str, kind: str, count: int) -> NoReturn:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.whole import multigrid, steps
+from gmsnet.methods.sliders import Sliders
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +26,7 @@ ARMIJO, HALVINGS, INSIDE = 1e-4, 25, 0.9
 class Sum(Protocol):
     """A sum over simplices as a function of the places of some nodes.
 
-    cells: (S, 3) counter-clockwise. moved: (n,) the nodes that move.
+    cells: (S, 3) counter-clockwise. moved: (n,) the nodes that move. sliders: those of them that slide.
     """
 
     @property
@@ -33,6 +34,9 @@ class Sum(Protocol):
 
     @property
     def moved(self) -> NDArray[np.intp]: ...  # noqa: D102
+
+    @property
+    def sliders(self) -> Sliders | None: ...  # noqa: D102
 
     def value(self, points: Floats, gradient: Floats) -> float:
         """The sum at points (N, 2), and its gradient (N, 2); more than any mesh has where a cell is inverted."""
@@ -46,7 +50,7 @@ def minimise(problem: Sum, points: Floats, settled: float) -> Floats:
 
     settled: a smaller share of the sum, gained in an iteration, is little.
     """
-    gradient = np.empty_like(points)
+    gradient, sliders = np.empty_like(points), problem.sliders
     value = problem.value(points, gradient)
     slopes = gradient[problem.moved]
     inverse, age, small, length = problem.inverse(points), 0, 0, 1.0
@@ -63,15 +67,20 @@ def minimise(problem: Sum, points: Floats, settled: float) -> Floats:
         shifts[problem.moved] = along
         length = min(length, INSIDE * steps.largest_step(points, problem.cells, shifts))
         for _ in range(HALVINGS):
-            there = points + length * shifts
+            there, promised = points + length * shifts, ARMIJO * length * slope
+            if sliders is not None:
+                there = sliders.placed(there)  # which may cut the shifts of some short
+                promised = ARMIJO * multigrid.product(slopes, there[problem.moved] - points[problem.moved])
             after = problem.value(there, gradient)
-            if after <= value + ARMIJO * length * slope:
+            if after <= value + min(promised, 0.0):
                 break
             length *= 0.5
         else:
             break
         small = small + 1 if value - after < settled * value else 0
         points, value = there, after
+        if sliders is not None:
+            sliders.taken()
         if small == PATIENCE:
             break
         before, slopes = slopes, gradient[problem.moved]

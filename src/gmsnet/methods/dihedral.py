@@ -20,8 +20,9 @@ from gmsnet.kernels.methods.descent3 import sweep3
 from gmsnet.kernels.simplex.objectives3 import DIHEDRAL, Aim3
 from gmsnet.kernels.star.guard import STAR, Guard, MeshGuard
 from gmsnet.kernels.star.space import SpaceBlocks
-from gmsnet.measure.dihedral import WIDE, worst
-from gmsnet.methods.base import Field, Smoother, Tally, over_stars
+from gmsnet.measure.dihedral import WIDE, ratios_of, renew, worst
+from gmsnet.methods.again import over_changing
+from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume
 
@@ -44,7 +45,7 @@ class Dihedral(Smoother):
     """One sweep is all cycles.
 
     floor: of D/S^(3/2) in the place of the guard's, but at the level of stars. goal: a measure in degrees of which no
-    more is asked. wide: the weight of what angles lack to 180°. least: the least measure when a cycle began.
+    more is asked. wide: the weight of what angles lack to 180°. before, after: the least measure.
     """
 
     cycles: Sequence[Cycle]
@@ -53,7 +54,8 @@ class Dihedral(Smoother):
     wide: float
 
     phase = "dihedral angles"
-    least: float = math.inf
+    before: float = math.inf
+    after: float = math.inf
 
     def __init__(
         self, cycles: Sequence[Cycle] = CYCLES, floor: float | None = None, goal: float = math.inf, wide: float = WIDE
@@ -70,25 +72,25 @@ class Dihedral(Smoother):
             guard = field.guard(executor)
         else:
             guard = MeshGuard(*field.precision, self.floor, field.constraint)
-        for cycle in self.cycles:
+        ratios = ratios_of(field.points, cells, executor)
+        for number, cycle in enumerate(self.cycles):
             every = executor.counted(np.ones(len(cells.rows), dtype=bool))
             count = min(max(FEWEST, math.ceil(cycle.share * every)), every)
-            ranked = worst(field.points, cells, count, self.wide, executor)
-            self.least = min(self.least, ranked.least)
+            ranked = worst(field.points, cells, count, self.wide, executor, ratios)
+            self.after = ranked.least
+            self.before = self.before if number else self.after
             chosen = ranked.rows[ranked.measure < self.goal]
             if not ranked.least < self.goal:
-                break
+                return tally
             nodes = np.unique(cells.rows[chosen])
-            stars = topology.stars_of(nodes[topology.near_free[nodes]].astype(np.int64))
+            nodes = nodes[topology.near_free[nodes]]
             enough = min(ranked.most, self.goal)
             aim = Aim3(DIHEDRAL, cycle.doublings, self.wide, math.radians(enough), max(guard.floor, 0.0))
 
             def visit(blocks: SpaceBlocks, first: int, last: int, counts: Tally, aim: Aim3 = aim) -> None:
                 sweep3(field.points, blocks, first, last, guard, aim, 1, NO_SIZES, counts)
 
-            for _ in range(cycle.sweeps):
-                found = over_stars(visit, stars, field.points, executor)
-                tally += found
-                if not found.any():
-                    break
+            tally += over_changing(visit, nodes, cycle.sweeps, field, executor)
+            renew(ratios, field.points, cells, nodes, executor)
+        self.after = worst(field.points, cells, 1, self.wide, executor, ratios).least
         return tally

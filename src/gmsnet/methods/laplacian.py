@@ -30,7 +30,7 @@ from gmsnet.kernels.star.shell import ShellStars
 from gmsnet.kernels.star.space import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, CELLS, Method, StarSmoother, Tally
 
-VARIANTS = {  # None: the plain form, which has a kernel of its own
+VARIANTS: dict[str, int | None] = {  # None: the plain form, which has a kernel of its own
     "smart": kernels.SMART,
     "plain": None,
     "inverse-length": kernels.INVERSE_LENGTH,
@@ -45,7 +45,7 @@ class Laplacian(StarSmoother):
     """One variant."""
 
     def __init__(self, variant: str) -> None:
-        self.variant = VARIANTS[variant]
+        self.variant: int | None = VARIANTS[variant]
 
     def visit(
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally

@@ -1,4 +1,4 @@
-"""The mean η of a volume last: Newton steps on Σq^(3/8) over stars whose cells are all good, and stay so.
+"""The mean η of a volume last: Newton steps on Σq^(3/16) over stars whose cells are all good, and stay so.
 
 The sum of a low power is led by the many cells, that of q^(3/2) by the bad ones. No cell may fall below a floor, so
 that no star with a cell below it moves: what the worst cells and the smallest angles have reached is kept.
@@ -16,7 +16,7 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.volume import Volume
 
-POWER = Power3.of(-3, trials=3)  # p = 3/8; stars with a cell below the floor refuse all
+POWER = Power3.of(-4, trials=3)  # p = 3/16; stars with a cell below the floor refuse all
 RELAXATION = 1.3  # ω, as of the barrier
 
 

@@ -16,7 +16,7 @@ from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
-SMALL = 5000  # free nodes
+SMALL, LARGE_VOLUME = 5000, 50_000  # free nodes
 ALWAYS = 10**9  # sweeps
 RELAXATION = 1.6  # of the Newton steps
 IDEAL = 0.99  # a least 1/q at which the worst cells have no turn, nor what follows
@@ -61,7 +61,7 @@ NEWTON = Phase("Newton on q", lambda: newton(means=1), 2, first=3, rounds=40, ga
 WORST = Phase("worst first", lambda: worst_first(3), 1)
 MEAN = Phase("Newton on q, worst kept", newton, 1, rounds=10, gain=0.002)
 SHORT = WORST._replace(create=lambda: worst_first(0))
-LONG = Phase("Newton on q, to its end", lambda: newton(1.85, means=1), 4, first=4, rounds=20, gain=0.00005)
+LONG = Phase("Newton on q, to its end", lambda: newton(1.85, means=1), 4, first=4, rounds=8, gain=0.00005)
 ABOVE = Phase("MetricLoss, above 1/q = 0.4", lambda: Newton("metric", floor=0.4), 1, rounds=8, gain=0.0003)
 POLISH = Phase("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1, rounds=8, gain=0.0003)
 
@@ -79,8 +79,9 @@ SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 VOLUME_PLAN = (
     Phase("Newton on q", lambda: Barrier("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False),
     Phase("worst first", WorstFirst, 1, looks=False),
-    Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0005),
+    Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0002),
 )
+LARGE_VOLUME_PLAN = (*VOLUME_PLAN[:-1], VOLUME_PLAN[-1]._replace(gain=0.0005))
 # Of surfaces; what high powers take from the mean comes back last.
 SURFACE_PLAN = (
     NEWTON._replace(looks=False),
@@ -90,13 +91,15 @@ SURFACE_PLAN = (
 
 
 # Of other volumes, grids among which have an ideal mesh.
-MIXED_PLAN = (*VOLUME_PLAN, Phase("Newton on q, in float64", ToTheEnd, 1))
+MIXED_PLAN = (*LARGE_VOLUME_PLAN, Phase("Newton on q, in float64", ToTheEnd, 1))
 
 
 def plan_for(topology: Topology | Volume, free: int) -> Sequence[Phase]:
     """The phases for a mesh of so many free nodes and these cells."""
     if isinstance(topology, Volume):
-        return MIXED_PLAN if isinstance(topology, MixedVolume) else VOLUME_PLAN
+        if isinstance(topology, MixedVolume):
+            return MIXED_PLAN
+        return VOLUME_PLAN if free <= LARGE_VOLUME else LARGE_VOLUME_PLAN
     if isinstance(topology, Shell):
         return SURFACE_PLAN
     if free <= SMALL:

@@ -33,7 +33,7 @@ class Sized(StarSmoother):
     def __init__(self, weight: float = WEIGHT) -> None:
         self.weight = weight
         self.topology: Topology | None = None
-        self.wanted = kernels.Wanted(np.empty(0, dtype=np.int64), np.empty(0))
+        self.wanted: kernels.Wanted = kernels.Wanted(np.empty(0, dtype=np.int64), np.empty(0))
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""

@@ -31,6 +31,7 @@ from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.methods.conjugate import minimise
 from gmsnet.methods.multigrid import Multigrid
+from gmsnet.methods.sliders import Sliders
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
@@ -51,7 +52,8 @@ class Problem:
     """Σq over corner simplices as a function of the places of some nodes.
 
     cells: (S, 3) counter-clockwise. table: (S, 3) weights, None where all are 1. moved: (n,) the nodes that move.
-    number: (N,) their rows, −1 for others. matrix: the Laplacian. nothing: (N,) zeros. doublings: with some,
+    number: (N,) their rows, −1 for others. matrix: the Laplacian. nothing: (N,) zeros. sliders: the nodes that slide.
+    doublings: with some,
     Σ(q/top)^p, p = 2^doublings, instead, top the largest q at first.
     """
 
@@ -63,13 +65,14 @@ class Problem:
     nothing: Floats
     doublings: int = 0
     top: float = 1.0
+    sliders: Sliders | None = None
 
     @classmethod
-    def of(cls, field: Field, doublings: int = 0) -> Problem:
-        """Of the free nodes that do not slide and have no cell that is not certified positive."""
+    def of(cls, field: Field, doublings: int = 0, *, slide: bool = False) -> Problem:
+        """Of the free nodes that have no cell that is not certified positive; slide: those that slide, too."""
         topology, precision = field.planar, field.precision
         simplices, free = topology.changeable, topology.near_free.copy()
-        if field.constraint is not None:
+        if field.constraint is not None and not slide:
             free[field.constraint.row >= 0] = False
         bad, every = np.empty(len(simplices.rows), dtype=bool), np.ones(len(simplices.rows), dtype=bool)
         if find_bad(field.points, field.points, simplices, every, precision.unit, precision.grain, bad):
@@ -89,10 +92,16 @@ class Problem:
         if doublings and len(cells):
             least, _ = powers.shapes(field.points, cells, table)
             top = 1.0 / least
-        return cls(cells, table, moved, number, matrix, np.zeros(len(free)), doublings, top)
+        sliders = Sliders.of(field, free) if slide else None
+        return cls(cells, table, moved, number, matrix, np.zeros(len(free)), doublings, top, sliders)
 
-    def inverse(self, points: Floats, *, even: bool = False) -> Multigrid:
-        """Of the Laplacian for the points as they are."""
+    def inverse(self, points: Floats) -> Callable[[Floats], Floats]:
+        """Of the Laplacian for the points as they are; of nodes that slide, along their curves."""
+        cycle, sliders = self.cycle(points), self.sliders
+        return cycle if sliders is None else lambda rest: sliders.along(cycle(rest), self.number[sliders.nodes])
+
+    def cycle(self, points: Floats, *, even: bool = False) -> Multigrid:
+        """Of the Laplacian for the points as they are; even: of the mesh alone."""
         table = self.table
         if self.doublings and not even:
             _, table = self._weighted(points)
@@ -102,12 +111,14 @@ class Problem:
     def value(self, points: Floats, gradient: Floats) -> float:
         """Σq, and its gradient (N, 2); more than any mesh has where a cell is inverted."""
         if self.doublings:
-            power, weights = self._weighted(points)
-            if power < math.inf:
+            total, weights = self._weighted(points)
+            if total < math.inf:
                 energy(points, self.cells, weights, self.nothing, 0.0, gradient)
-            return power
-        total: float = energy(points, self.cells, self.table, self.nothing, 0.0, gradient)
-        return total
+        else:
+            total = energy(points, self.cells, self.table, self.nothing, 0.0, gradient)
+        if self.sliders is not None:
+            self.sliders.along(gradient, self.sliders.nodes)
+        return float(total)
 
     def _weighted(self, points: Floats) -> tuple[float, Floats]:
         """See ``powers.weighted``."""
@@ -117,7 +128,7 @@ class Problem:
 
     def harmonic(self, points: Floats) -> Iterator[Floats]:
         """Each node that moves at the weighted mean of its neighbours, more and more exactly."""
-        inverse = self.inverse(points, even=True)
+        inverse = self.cycle(points, even=True)
         rest, x = np.empty((len(self.moved), 2)), np.zeros((len(self.moved), 2))
         graph.pull_of_neighbours(points, self.cells, self.table, self.number, rest)
         first = multigrid.product(rest, rest)
@@ -168,54 +179,74 @@ class WholeMesh(Smoother):
     """One sweep moves all nodes. Not for the level STAR, whose floors such moves do not know.
 
     doublings: of the power of q, tried in turn until something is taken. With a power, for the worst cells, that is
-    what gains in the least 1/q at least TRADE times what it costs in the mean. settled: see SETTLED.
+    what gains in the least 1/q at least TRADE times what it costs in the mean. settled: see SETTLED. best: what makes
+    the mesh the best so far, instead.
     """
 
     doublings: Sequence[int]
     settled: float
+    best: bool
 
     stops_when_idle = False
 
-    def __init__(self, doublings: Sequence[int] = (0,), settled: float = SETTLED) -> None:
-        self.doublings, self.settled = doublings, settled
+    def __init__(self, doublings: Sequence[int] = (0,), settled: float = SETTLED, *, best: bool = False) -> None:
+        self.doublings, self.settled, self.best = doublings, settled, best
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         self.converged = True
-        moved = 0
-        for doublings in self.doublings:
-            floor = max(field.guard(executor).floor, 0.0)
-            whole = executor.gathered(field, None)  # on one process
-            of_one = (
-                -1 if whole is None else self._moved(whole, doublings, floor, executor if whole is field else serial)
-            )
-            moved = executor.returned(field, whole, of_one)
-            if moved > 0:
-                field.floor.forget()
-            if moved:
-                break
         tally = np.zeros(3, dtype=np.int64)
-        tally[MOVED] = max(moved, 0)
+        for doublings in self.doublings:
+            before, floor = field.points.copy(), max(field.guard(executor).floor, 0.0)
+            whole = executor.gathered(field, None)  # on one process
+            inner = executor if whole is field else serial
+            can, taken = executor.returned(
+                field, whole, (False, False) if whole is None else self._taken(whole, doublings, floor, inner)
+            )
+            if not can:
+                break
+            if not taken:
+                continue
+            field.floor.forget()
+            if self.best and not test():
+                field.points[:] = before
+                continue
+            self._slide(field, executor, doublings)
+            moved = (field.points != before).any(axis=1) & field.topology.near_free
+            tally[MOVED] = executor.total(np.array(np.count_nonzero(moved)))
+            break
         return tally
 
-    def _moved(self, field: Field, doublings: int, floor: float, executor: Executor) -> int:
-        """How many nodes are elsewhere now; 0 if the places were not worth taking, −1 if no node can move."""
+    def _taken(self, field: Field, doublings: int, floor: float, executor: Executor) -> tuple[bool, bool]:
+        """Whether nodes can move, and whether they are where they were found to be better."""
         problem = Problem.of(field, doublings)
         if not len(problem.moved):
-            return -1
+            return False, False
         start, settled = problem.start(field.points), CLOSE if doublings else self.settled
         found = self._allowed(minimise(problem, start, settled), floor, field, executor)
-        if found is None or not problem.is_better(found, field.points):
-            return 0
-        moved = int((found != field.points).any(axis=1).sum())
+        if found is None or not (self.best or problem.is_better(found, field.points)):
+            return True, False
         field.points[:] = found
-        return moved
+        return True, True
+
+    def _slide(self, field: Field, executor: Executor, doublings: int) -> None:
+        """The same once more with the nodes that slide."""
+        if field.constraint is None:
+            return
+        problem = Problem.of(field, doublings, slide=True)
+        if problem.sliders is None:
+            return
+        floor = max(field.guard(executor).floor, 0.0)
+        found = self._allowed(minimise(problem, field.points, CLOSE), floor, field, executor)
+        if found is not None and problem.is_better(found, field.points):
+            field.points[:] = found
+            field.floor.forget()
+        problem.sliders.back(field.points)
 
     def _allowed(self, points: Floats, floor: float, field: Field, executor: Executor) -> Floats | None:
         """The points as they can be taken, perhaps after cycles on the worst cells; None if they cannot be."""
         for repair in range(REPAIRS + 1):
-            if field.precision.single:
-                points = points.astype(np.float32).astype(np.float64)
+            points = field.written(points)
             below = steps.count_below(
                 points, field.points, field.topology.changeable, floor, field.precision.unit, field.precision.grain
             )

@@ -14,17 +14,16 @@ from numpy.typing import NDArray
 from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.space import SpaceBlocks
-from gmsnet.kernels.topology.connectivity import touching
-from gmsnet.measure.dihedral import ratios_of
+from gmsnet.measure.dihedral import ratios_of, renew
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
-# The share of all cells, k of p = 3·2^k, and how many sweeps.
+# The share of all cells, k of p = 3·2^k, and how many sweeps. Of small meshes MORE times as many, up to FEWEST.
 CYCLES = ((0.004, 2, 4), (0.002, 4, 8), (0.001, 5, 12))
-FEWEST = 12  # cells
+MORE, FEWEST, LEAST = 2.0, 225_000.0, 12  # FEWEST: times the share
 
 
 class WorstInSpace(Smoother):
@@ -45,8 +44,7 @@ class WorstInSpace(Smoother):
         before = after = _most(ratios, executor)
         every = executor.counted(np.ones(len(ratios), dtype=bool))
         for share, number, sweeps in CYCLES:
-            many = max(FEWEST, math.ceil(share * every))
-            nodes = np.unique(cells.rows[executor.lowest_rows(-ratios, many)])
+            nodes = np.unique(cells.rows[executor.lowest_rows(-ratios, how_many(share, every))])
             nodes = nodes[topology.near_free[nodes]]
             stars = topology.stars_of(nodes.astype(np.int64))
             power = Power3.of(number, min(after / K3, 1e30))
@@ -60,7 +58,7 @@ class WorstInSpace(Smoother):
                 ratios = ratios_of(field.points, cells, executor)
                 _set_aside(ratios, cells, topology.near_free)
             else:
-                _renew(ratios, field.points, cells, nodes, executor)
+                renew(ratios, field.points, cells, nodes, executor)
             after = _most(ratios, executor)
         least = (K3 / after) ** (1.0 / 3.0)
         self.least, self.gained = least, least - (K3 / before) ** (1.0 / 3.0)
@@ -73,13 +71,9 @@ def _most(ratios: Floats, executor: Executor) -> float:
     return -executor.minimum(-float(ratios.max(initial=K3)))
 
 
-def _renew(ratios: Floats, points: Floats, cells: Tetrahedra, nodes: NDArray[np.int32], executor: Executor) -> None:
-    """Those of the simplices at these nodes, which alone have moved."""
-    moved = np.zeros(len(points))
-    moved[nodes] = 1.0
-    executor.exchange(moved)
-    rows = touching(cells.rows, moved > 0.0)
-    ratios[rows] = ratios_of(points, cells.take(rows), executor)
+def how_many(share: float, cells: int) -> int:
+    """The cells of a cycle."""
+    return max(LEAST, math.ceil(share * max(cells, min(MORE * cells, FEWEST))))
 
 
 def _set_aside(ratios: Floats, cells: Tetrahedra, free: NDArray[np.bool_]) -> bool:

@@ -20,7 +20,7 @@ PROPERTIES, TRAINING, QUALITY, THIRD, DRAWING = (
     "drawing",
 )
 
-NEEDS = {
+NEEDS: dict[str, tuple[str, ...]] = {
     "table1": (TIMED_PLAIN, TIMED, PROPERTIES),
     "table2": (TIMED_PLAIN, TIMED, QUALITY),
     "table3": (TRAINING, THIRD),

@@ -74,6 +74,13 @@ class MetricLoss:
     something linear, with coefficients that are the ring's alone, so that they are formed once for all steps.
     """
 
+    turn: torch.Tensor
+    doubled: torch.Tensor
+    both: torch.Tensor
+    squares: torch.Tensor
+    scaled_turn: torch.Tensor
+    scaled_doubled: torch.Tensor
+
     def __init__(self, ring: torch.Tensor) -> None:
         after, before = ring, ring.roll(1, dims=0)
         self.turn = torch.stack([before[:, 1] - after[:, 1], after[:, 0] - before[:, 0]], dim=1)  # ∇D, (n, 2)

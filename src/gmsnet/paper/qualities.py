@@ -16,7 +16,7 @@ from gmsnet.paper.store import Result, Store
 from gmsnet.paper.units import Context, Unit
 
 # Each column of the table, in 1/q_V as the paper forms it and in 1/q, and where QualityReport.summary() has it.
-PLACES = {
+PLACES: dict[str, tuple[str, ...]] = {
     "min_angle_min": ("min_angle", "min"),
     "min_angle_mean": ("min_angle", "mean"),
     "max_angle_max": ("max_angle", "max"),

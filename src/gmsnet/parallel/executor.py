@@ -93,6 +93,14 @@ class Executor(Protocol):
         """
         ...
 
+    def restricted(self, topology: Any, active: NDArray[np.bool_]) -> Any:
+        """A topology in which the active nodes (N,) by places in memory alone are free, of those that are free here."""
+        ...
+
+    def of(self, topology: Any) -> Executor:
+        """The executor for what was ``restricted``, and for others this one."""
+        ...
+
     def lent(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (N,) at nodes, in memory order, for what was gathered last: in its order, where it is."""
         ...

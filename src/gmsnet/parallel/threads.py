@@ -86,6 +86,10 @@ class Process:
         """See Executor."""
         return field
 
+    def restricted(self, topology: Any, active: NDArray[np.bool_]) -> Any:
+        """See Executor."""
+        return topology.restricted(active)
+
     def lent(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """See Executor."""
         return values
@@ -115,6 +119,10 @@ class Serial(Process):
     def map(self, work: Callable[[int, int], Result], first: int, last: int) -> list[Result]:
         """See Executor."""
         return [work(first, last)]
+
+    def of(self, topology: Any) -> Executor:
+        """See Executor."""
+        return self
 
     def for_blocks(self, blocks: int) -> Executor:
         """See Executor."""
@@ -159,6 +167,10 @@ class Threads(Process):
             self.close()  # and those that were begun have ended before the caller looks at what they did
             raise
         return found
+
+    def of(self, topology: Any) -> Executor:
+        """See Executor."""
+        return self
 
     def for_blocks(self, blocks: int) -> Executor:
         """See Executor."""

@@ -7,7 +7,7 @@ edge on a wall and are stretched along it: they must be many, thin, and
 
 - much thinner than most of the piece, which has grown from row to row by much, or by less where most of the piece or
   of its edges on walls, and some of the piece, lie so, or
-- thinner, and most of the piece lies along the wall that is nearest, or
+- thinner, and most of the piece lies along the wall that is nearest, with nodes over nodes as rows have them, or
 - as even along the wall as rows of one height are made, where most of the piece lies along the wall, and the piece is
   not the mesh.
 
@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex import stretch
+from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL
 from gmsnet.kernels.topology.components import pieces
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.layers import Layers
@@ -43,6 +44,7 @@ HIGHER = math.log(1.3)  # how many times as high as those cells the piece's are,
 OF_PIECE, OF_EDGES = 0.66, 0.7  # of the cells, of the edges on walls: a share that lies along them where it is thin
 SOME = 0.4  # of the cells, where it is the share of the edges that tells: around a flattened hole 0.2 to 0.3 lie so
 MOSTLY = 0.72  # of the cells of a layer are stretched along the wall nearest to them
+OVER = 0.35  # of an edge there, from its middle to where the third corner lies along it: in rows, over an end of it
 PART, EVEN = 0.6, math.log(1.05)  # of a piece without growth: share of the mesh, change from cell to cell
 UNEVEN = math.log(1.6)  # more from cell to cell is no row, but the slivers of a hull
 
@@ -57,7 +59,10 @@ def split(mesh: Mesh, topology: Topology, survey: Survey, layers: Layers) -> tup
     rim = np.zeros(len(topology.memory), dtype=bool)
     rim[topology.memory] = survey.rim > 0
     part = triangles[chosen]
-    kept = _at_walls(part, orientation[chosen], planar_points(mesh), rim, len(chosen), quads=of_cell is not None)
+    equal = np.ones(len(part), dtype=bool)
+    if of_cell is not None and topology.near_shapes is not None:
+        equal = topology.near_shapes[chosen] == EQUILATERAL
+    kept = _at_walls(part, orientation[chosen], planar_points(mesh), rim, len(chosen), equal)
     whole = np.zeros(len(chosen), dtype=bool)
     whole[np.flatnonzero(chosen)[kept]] = True
     first = np.ones(len(chosen), dtype=bool) if of_cell is None else np.append(True, np.diff(of_cell) != 0)
@@ -71,21 +76,22 @@ def split(mesh: Mesh, topology: Topology, survey: Survey, layers: Layers) -> tup
 
 
 def _at_walls(
-    triangles: NDArray[np.int32], orientation: NDArray[np.int8], points: Floats, rim: Flags, of_all: int, *, quads: bool
+    triangles: NDArray[np.int32], orientation: NDArray[np.int8], points: Floats, rim: Flags, of_all: int, equal: Flags
 ) -> Flags:
     """Which simplices (S, 3), all of them stretched alike with their neighbours, belong to layers of a wall.
 
-    points: (N, 2). rim: (N,) which nodes are on boundaries or interfaces. of_all: how many the mesh has. quads: they
-    may be corners of quads.
+    points: (N, 2). rim: (N,) which nodes are on boundaries or interfaces. of_all: how many the mesh has. equal: (S,)
+    which are triangles, the others are corners of quads, 0 the corner itself.
     """
     cells = np.empty((len(triangles), stretch.COLUMNS))
     stretch.per_cell(points, triangles, orientation, math.inf, cells)
     inside = np.zeros(len(points), dtype=bool)
     inside[triangles] = True
     piece = pieces(triangles, inside)[triangles[:, 0]]
-    edges = ((0, 1), (0, 2)) if quads else ((0, 1), (0, 2), (1, 2))  # of a quad, those of its corner
-    found = [_edges_on(triangles, points, rim, cells, a, b) for a, b in edges]
-    row, length, aligned, one, two = (np.concatenate(each) for each in zip(*found, strict=True))
+    every = np.ones(len(triangles), dtype=bool)
+    edges = ((0, 1, every), (0, 2, every), (1, 2, equal))  # of a quad, those of its corner
+    found = [_edges_on(triangles, points, rim, cells, *each) for each in edges]
+    row, length, aligned, one, two, off = (np.concatenate(each) for each in zip(*found, strict=True))
     height = np.log(np.maximum(np.abs(cells[row, stretch.AREA]), stretch.TINY) / length)
     across = 0.5 * (np.log(np.maximum(np.abs(cells[:, stretch.AREA]), stretch.TINY)) - cells[:, stretch.LENGTH])
     kept = np.zeros(len(triangles), dtype=bool)
@@ -102,23 +108,29 @@ def _at_walls(
         even = change <= EVEN and np.count_nonzero(own) <= PART * of_all
         most = lie >= OF_PIECE or (lie >= SOME and np.count_nonzero(along) >= OF_EDGES * np.count_nonzero(here))
         clear = thin >= CLEARLY_THIN and higher and grown >= (CLEARLY_GROWN if most else GROWN_BY_MUCH)
-        orderly = clear or (thin >= THIN and lie >= MOSTLY and ((higher and grown >= GROWN) or even))
+        rows = np.median(off[along]) >= OVER
+        orderly = clear or (thin >= THIN and lie >= MOSTLY and ((higher and grown >= GROWN and rows) or even))
         if orderly and change <= UNEVEN:
             kept |= own
     return kept
 
 
 def _edges_on(
-    triangles: NDArray[np.int32], points: Floats, rim: Flags, cells: Floats, a: int, b: int
-) -> tuple[NDArray[np.intp], Floats, Flags, NDArray[np.int32], NDArray[np.int32]]:
-    """Of the edges ab with both ends on the rim: the row, the length, whether the cell is stretched along, the ends."""
+    triangles: NDArray[np.int32], points: Floats, rim: Flags, cells: Floats, a: int, b: int, some: Flags
+) -> tuple[NDArray[np.intp], Floats, Flags, NDArray[np.int32], NDArray[np.int32], Floats]:
+    """Of the edges ab of some simplices with both ends on the rim: the row, the length, whether the cell is stretched
+    along, the ends; and how far from the middle the third corner lies along the edge, in lengths: 0.5 over an end.
+
+    some: (S,) bool.
+    """
     one, two = triangles[:, a], triangles[:, b]
-    row = np.flatnonzero(rim[one] & rim[two])
+    row = np.flatnonzero(rim[one] & rim[two] & some)
     one, two = one[row], two[row]
     way = points[two] - points[one]
     length = np.hypot(way[:, 0], way[:, 1])
-    aligned = _aligned(cells[row], way)
-    return row, np.maximum(length, stretch.TINY), aligned, one, two
+    aligned, length = _aligned(cells[row], way), np.maximum(length, stretch.TINY)
+    share = ((points[triangles[row, 3 - a - b]] - points[one]) * way).sum(axis=1) / length**2
+    return row, length, aligned, one, two, np.abs(share - 0.5)
 
 
 def _change(height: Floats, one: NDArray[np.int32], two: NDArray[np.int32]) -> float:

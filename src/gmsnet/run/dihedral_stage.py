@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from gmsnet.kernels.methods.barrier3 import K3
 from gmsnet.kernels.star.guard import LEVELS, VALID
 from gmsnet.kernels.star.surface import Surface, locate3
-from gmsnet.measure.dihedral import REGULAR, WIDE, Floats, worst
+from gmsnet.measure.dihedral import REGULAR, Floats
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.methods.auto import Auto
 from gmsnet.methods.base import Field, Tally
 from gmsnet.methods.dihedral import Dihedral
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS
@@ -22,57 +25,73 @@ from gmsnet.run.sweep import Sweep
 from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.volume import Volume
 
-SPENT = 0.06  # by so much may the largest q = 1/η grow
-GAIN = 0.005  # in the merit: with less the mesh stays as it was
+# By so much may the largest q = 1/η grow, at first, and once more if the least η was at least ROOM.
+SPENT, ROOM = (0.015, 0.06), 0.5
+GAIN = 0.005  # in the merit, each time: with less the mesh stays as it was
 
 
 def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Makes the smallest dihedral angles larger where ``auto`` has ended of itself; a mesh with inverted cells stays.
 
-    No q = 1/η becomes more than the largest one and SPENT, nor, but at the level ``valid``, than the largest of the
-    input. The result is taken where the merit gains GAIN.
+    No q = 1/η becomes more than the largest one and what is SPENT, nor, but at the level ``valid``, than the largest of
+    the input. The result is taken where the merit gains GAIN.
     """
     totals = totals_at_end(state, options, executor)
     if totals is None:
         return state
-    topology = state.topology
+    topology, level = state.rest or state.topology, LEVELS.index(options.guard)
     assert isinstance(topology, Volume)
-    level = LEVELS.index(options.guard)
-    floor = floor_for_angles(state, level, 1.0 / (1.0 / totals.shape_min + SPENT), executor)
+    outer, executor = executor, executor.of(topology)
     field = Field(state.points.copy(), topology, state.precision, level, constraint=state.constraint)
     if isinstance(state.constraint, Surface):
         locate3(state.constraint, field.points)
-    smoother = Dihedral(floor=floor)
-    tally = smoother.sweep(field, executor, lambda: False)
-    after = totals_of(field.points, topology.scored, executor)
-    assert after is not None
-    least = worst(field.points, topology.changeable, 1, WIDE, executor).least
-    gained = merit(after, least) - merit(totals, smoother.least)
-    if gained < GAIN or after.uncertain:
+    best, taken, smoother = state.points, totals, Dihedral()
+    tally: Tally = np.zeros(3, dtype=np.int64)
+    for spent in SPENT if totals.shape_min >= ROOM else SPENT[:1]:
+        smoother.floor = floor_for_angles(state, level, 1.0 / (1.0 / totals.shape_min + spent), outer)
+        found = smoother.sweep(field, executor, lambda: False)
+        after = totals_of(field.points, topology.scored, executor)
+        assert after is not None
+        gained = merit(after, smoother.after) - merit(taken, smoother.before)
+        if gained < GAIN or after.uncertain:
+            break
+        best, taken, tally = field.points.copy(), after, tally + found
+    if taken is totals:
         return state
-    return with_sweep(state, options, field.points, after, smoother.phase, tally)
+    return with_sweep(state, options, best, taken, smoother.phase, tally, executor=outer)
 
 
 def totals_at_end(state: State, options: SmoothOptions, executor: Executor, *, mixed: bool = False) -> Totals | None:
-    """Those of a volume of tetrahedra, all valid, on which ``auto`` has ended of itself, without a target; or None.
+    """Those of a volume of tetrahedra, all valid, on which ``auto`` has ended of itself, without a target; or None. Of
+    the rest, where cells are set aside.
 
     mixed: of one of other cells, too.
     """
-    topology, auto = state.topology, isinstance(state.smoother, Auto)
-    ended = state.stop_reason == NO_PROGRESS and _sweeps(state) < options.max_sweeps
-    if not (isinstance(topology, Volume) and auto and ended) or options.target:
+    topology = state.rest or state.topology
+    if not ended_of_itself(state, options) or isinstance(topology, MixedVolume) != mixed:
         return None
-    if isinstance(topology, MixedVolume) != mixed:
-        return None
-    totals = state.totals or totals_of(state.points, topology.scored, executor)
+    totals = None if state.rest else state.totals
+    totals = totals or totals_of(state.points, topology.scored, executor)
     return None if totals is None or totals.uncertain else totals
 
 
-def with_sweep(state: State, options: SmoothOptions, points: Floats, totals: Totals, phase: str, tally: Tally) -> State:
-    """The state after a sweep to these points, recorded and told."""
+def ended_of_itself(state: State, options: SmoothOptions) -> bool:
+    """Has ``auto`` ended on a volume because there was nothing to gain, without a target?"""
+    ended = state.stop_reason == NO_PROGRESS and _sweeps(state) < options.max_sweeps
+    return isinstance(state.topology, Volume) and isinstance(state.smoother, Auto) and ended and not options.target
+
+
+def with_sweep(
+    state: State, options: SmoothOptions, points: Floats, totals: Totals | None, phase: str, tally: Tally,
+    sweeps: int = 1, executor: Executor = serial,
+) -> State:  # fmt: skip
+    """The state after sweeps to these points, recorded and told. totals: theirs, if they are known of all cells."""
+    if totals is None or state.rest:
+        totals = totals_of(points, state.topology.scored, executor)
+        assert totals is not None
     moved, truncated, dropped = tally.tolist()
     sweep = Sweep(
-        _sweeps(state) + 1, phase, moved, truncated, dropped, totals.inverted, totals.qhat, totals.shape_min,
+        _sweeps(state) + sweeps, phase, moved, truncated, dropped, totals.inverted, totals.qhat, totals.shape_min,
         totals.shape_mean,
     )  # fmt: skip
     state = replace(state, points=points, totals=totals, history=(*state.history, sweep))

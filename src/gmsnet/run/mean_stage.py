@@ -41,8 +41,9 @@ def improve_mean(state: State, options: SmoothOptions, executor: Executor) -> St
     totals = totals_at_end(state, options, executor)
     if totals is None or level == STAR:
         return state
-    topology = state.topology
+    topology = state.rest or state.topology
     assert isinstance(topology, Volume)
+    outer, executor = executor, executor.of(topology)
     least = worst(state.points, topology.changeable, 1, WIDE, executor).least
     for share in SHARES if executor.total(np.array(len(topology.free))) <= LARGE else SHARES[-1:]:
         shape = max(share * min(most_shape_below(least, WIDE), 1.0), totals.shape_min * (1.0 + ROUNDING))
@@ -57,7 +58,7 @@ def improve_mean(state: State, options: SmoothOptions, executor: Executor) -> St
     assert after is not None
     if after.shape_mean < totals.shape_mean + GAIN or after.shape_min < totals.shape_min - 1e-12 or after.uncertain:
         return state
-    return with_sweep(state, options, field.points, after, smoother.phase, tally)
+    return with_sweep(state, options, field.points, after, smoother.phase, tally, executor=outer)
 
 
 def _of_mixed(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -65,7 +66,8 @@ def _of_mixed(state: State, options: SmoothOptions, executor: Executor) -> State
 
     Where a valid mesh has lost more than LOSS of its mean, some of what the least has gained is given for it.
     """
-    totals, topology = totals_at_end(state, options, executor, mixed=True), state.topology
+    totals = totals_at_end(state, options, executor, mixed=True)
+    topology = state.rest or state.topology
     if totals is None:
         return state
     assert isinstance(topology, Volume)

@@ -30,5 +30,3 @@ def check_adapting(options: SmoothOptions) -> None:
         raise InputError(f"the guard 'star' cannot be had with {what}, which moves all nodes at once: use 'worst'")
     if options.best_by != SHAPE:
         raise InputError(f"with {what} meshes are compared in the metric: leave out best_by")
-    if options.slides:
-        raise InputError(f"nodes cannot slide with {what} so far: leave out slide")

@@ -45,7 +45,8 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
         again=state.second_order is not None and state.second_order.solid,
     )  # fmt: skip
     if state.metric is not None:
-        near = near_points(state.mesh.with_points(final.points), state.topology)
+        plane = list(state.mesh.plane or (0, 1))  # in the units of the input, though its extent may be another now
+        near = np.ldexp(final.points[:, plane][state.topology.memory], -state.mesh.exponent)
         state = replace(state, conformity=(*state.conformity, Conformity.of(near, state.planar, state.metric)))
     nothing = np.empty((0, 2))
     return replace(state, start=nothing, points=nothing, shapes=np.empty(0, dtype=np.float32), final=final)

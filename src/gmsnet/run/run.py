@@ -174,9 +174,9 @@ class Run:
         return Score.of(totals, self.options.best_by, self.missing(points) if self.missing else NONE)
 
     def _stalled(self) -> bool:
-        """Has nothing been gained for PATIENCE looks?"""
+        """Has nothing been gained for PATIENCE looks? Not asked of methods that know themselves when they are done."""
         own = self.history[self.first :]
-        if len(own) <= PATIENCE:
+        if len(own) <= PATIENCE or not self.smoother.stops_when_idle:
             return False
         if self.fewest[-1] < self.fewest[-1 - PATIENCE]:
             return False

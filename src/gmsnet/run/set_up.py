@@ -200,6 +200,14 @@ def check_target(mesh: Mesh, target: Target) -> None:
         raise InputError(
             "target_dihedral is of meshes of tetrahedra alone, and this one has other volumes: give target_quality"
         )
+    curved = sorted(
+        {block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes) and block.cell.order > 1}
+    )
+    if curved and target:
+        raise InputError(
+            f"a target is of volumes of the first order so far, and this mesh has {', '.join(curved)} cells: leave the "
+            "target out"
+        )
     if not mesh.has_volumes and target.dihedral is not None:
         raise InputError("target_dihedral is of tetrahedra, and this mesh has none: give target_angle")
 

@@ -13,7 +13,7 @@ from gmsnet.constraints.shell import FEATURE, patches_of_surface, sides_of
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.constraints.smooth_patches import normals_of
 from gmsnet.measure.report import measure
-from gmsnet.mesh.mesh import Mesh, unmeasured
+from gmsnet.mesh.mesh import Mesh, unmeasured, unmoved_faces
 from gmsnet.methods import Smoother
 from gmsnet.parallel.executor import Executor
 from gmsnet.preserve.protection import Protection
@@ -51,7 +51,9 @@ def first_of_surface(
         options.hausdorff,
     )
     others = unmeasured(given)
-    remarks = (f"not measured, and their nodes are held: {others}",) if others else ()
+    remarks: tuple[str, ...] = (f"not measured, and their nodes are held: {others}",) if others else ()
+    if curved := unmoved_faces(given):
+        remarks += (f"cells of second order move in a plane and in volumes, on a surface they are held: {curved}",)
     given = given.without_cells()
     before = measure(given, shell, start, executor.for_blocks(0))
     nothing = np.empty(0, dtype=np.float32)

@@ -12,6 +12,7 @@ from gmsnet.run.mean_stage import improve_mean
 from gmsnet.run.metric_stage import take_metric
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import write_back
+from gmsnet.run.rest_stage import improve_rest
 from gmsnet.run.second_order import make_room, smooth_corners, untangle_second_order
 from gmsnet.run.state import State
 from gmsnet.run.sweep_stage import sweep
@@ -31,12 +32,12 @@ class Stage(Protocol):
 
 
 STAGES: tuple[Stage, ...] = (
-    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_dihedrals, improve_mean,
-    improve_near_walls, untangle_second_order, smooth_corners, make_room,
+    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_rest, improve_dihedrals,
+    improve_mean, improve_near_walls, untangle_second_order, smooth_corners, make_room,
 )  # fmt: skip
 
 
-SWEEPS: tuple[Stage, ...] = (sweep, improve_dihedrals, improve_mean)  # of a valid mesh, without walls and curves
+SWEEPS: tuple[Stage, ...] = (sweep, improve_rest, improve_dihedrals, improve_mean)  # of a valid mesh, without walls
 
 
 def carry_out_all(state: State, options: SmoothOptions, executor: Executor, stages: Sequence[Stage] = SWEEPS) -> State:

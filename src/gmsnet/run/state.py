@@ -127,7 +127,8 @@ class State:
     metric that is given at nodes. metric: what cells are to become, once it is known; conformity: of the input to it,
     and of the result. interruption: what ends the smoothing before its end. final:
     once the mesh is written back to the order of the input; start, points and shapes are then empty, lest the result
-    needs more memory than the stages. motion: of a boundary that moves (``deform_stage``).
+    needs more memory than the stages. motion: of a boundary that moves (``deform_stage``). rest: of a volume, with the
+    nodes of cells held behind which others could become better (``rest_stage``).
     """
 
     mesh: Mesh
@@ -155,6 +156,7 @@ class State:
     nodal: Floats | None = None
     metric: Metric | None = None
     conformity: tuple[Conformity, ...] = ()
+    rest: Volume | None = None
 
     @property
     def topology(self) -> Topology | Volume:

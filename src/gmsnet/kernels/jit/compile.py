@@ -15,17 +15,17 @@ from collections.abc import Callable
 from functools import cached_property, update_wrapper
 from typing import Any
 
-if folder := os.environ.get("GMSNET_CACHE"):
-    os.environ.setdefault("NUMBA_CACHE_DIR", folder)  # Numba reads it when it is imported
+if os.environ.get("GMSNET_CACHE"):
+    os.environ.setdefault("NUMBA_CACHE_DIR", os.environ["GMSNET_CACHE"])  # Numba reads it when it is imported
 
 from gmsnet.kernels.jit.usable import UnusableNumbaError
 
 try:
     import numba
-except ValueError as error:  # it reads its settings as it is imported
+except ValueError as _error:  # it reads its settings as it is imported
     raise UnusableNumbaError(
-        f"Numba cannot start: {error} Look at the variables of the environment that begin with NUMBA_"
-    ) from error
+        f"Numba cannot start: {_error} Look at the variables of the environment that begin with NUMBA_"
+    ) from _error
 if getattr(numba.config, "DISABLE_JIT", 0):
     raise UnusableNumbaError(
         "Numba is told not to compile, without which kernels would take hours: unset NUMBA_DISABLE_JIT"
@@ -87,6 +87,9 @@ class Part:
     A part must not print, nor raise an error with computed values in it: that needs Python. Where kernels are on disk,
     no part is needed: so Numba is told of one when it compiles a kernel that calls it.
     """
+
+    py_func: Callable[..., Any]
+    options: dict[str, Any]
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         self.py_func, self.options = function, options

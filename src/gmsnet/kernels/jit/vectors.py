@@ -18,6 +18,14 @@ from numba.core import cgutils
 from gmsnet.kernels.jit.compile import Part
 
 WIDTH = 16  # lanes
+REAL: Any
+DOUBLE: Any
+NUMBER: Any
+INDEX: Any
+BYTE: Any
+REALS: Any
+NUMBERS: Any
+DOUBLES: Any
 REAL, DOUBLE, NUMBER, INDEX, BYTE = ir.FloatType(), ir.DoubleType(), ir.IntType(32), ir.IntType(64), ir.IntType(8)
 REALS, NUMBERS, DOUBLES = (ir.VectorType(kind, WIDTH) for kind in (REAL, NUMBER, DOUBLE))
 
@@ -34,6 +42,9 @@ def constant(value: float, kind: Any = REALS) -> ir.Constant:
 
 class Vector:
     """WIDTH floats in a register, or float64 in two."""
+
+    builder: Any
+    value: Any
 
     def __init__(self, builder: Any, value: Any) -> None:
         self.builder, self.value = builder, value
@@ -167,6 +178,8 @@ def _joined(builder: Any, parts: Sequence[Any]) -> Any:
 
 class Sum:
     """A vector that is added to in a loop; LLVM keeps it in a register."""
+
+    place: Any
 
     def __init__(self, builder: Any, first: float) -> None:
         self.place = cgutils.alloca_once(builder, REALS)

@@ -20,7 +20,7 @@ class Compilation(event.Listener):
     """
 
     def __init__(self, on_first: Callable[[], None] | None = None) -> None:
-        self.seconds = 0.0
+        self.seconds: float = 0.0
         self._on_first, self._depth, self._began = on_first, 0, 0.0
 
     def __enter__(self) -> Compilation:

@@ -11,8 +11,8 @@ from numba.extending import intrinsic
 
 from gmsnet.kernels.jit.compile import inlined
 
-HALF = ir.IntType(32)
-WHOLE = ir.IntType(64)
+HALF: Any = ir.IntType(32)
+WHOLE: Any = ir.IntType(64)
 THIRD_OF_BIAS = 715094163  # (1023 − 1023/3 − 0.033)·2²⁰: the exponent's bias after a division by three
 
 

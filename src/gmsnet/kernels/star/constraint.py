@@ -252,6 +252,19 @@ def locate(constraint, points):
 
 
 @kernel
+def slide_all(constraint, nodes, points, parameters, tangents):
+    """Puts all of these nodes (K,) of points (N, 2) onto their curves, as ``snap`` does, each as if it moved alone.
+
+    Writes their parameters (K,) there and unit tangents (K, 2); nothing is stored in the constraint.
+    """
+    for i in range(len(nodes)):
+        node = nodes[i]
+        points[node, 0], points[node, 1], parameters[i] = snap(constraint, node, points[node, 0], points[node, 1])
+        k, t = piece_at(constraint, constraint.curve[constraint.row[node]], parameters[i])
+        tangents[i, 0], tangents[i, 1] = piece_tangent(constraint.piece, k, t)
+
+
+@kernel
 def project(piece, points, closed, parameters, places):
     """The place nearest to each point (K, 2) on a curve of some pieces (P, 6): parameters (K,) and places (K, 2)."""
     for i in range(len(points)):

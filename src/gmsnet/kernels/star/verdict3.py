@@ -16,6 +16,8 @@ from gmsnet.kernels.jit.vectors import BYTE, DOUBLES, INDEX, WIDTH, Vector, as_w
 from gmsnet.kernels.star.guard3 import WIDER, error_bound3
 from gmsnet.kernels.star.space import AFTER, LEAST, MARGIN, VALUE
 
+BITS: Any
+BYTES: Any
 BITS, BYTES = ir.IntType(WIDTH), ir.VectorType(BYTE, WIDTH)
 
 

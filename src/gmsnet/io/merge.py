@@ -72,7 +72,7 @@ def _joined(parts: Sequence[Part]) -> tuple[Ints, NDArray[np.bool_]]:
     for part, start in zip(parts, starts.tolist(), strict=False):
         for block in part.parsed.cells:
             used[block.nodes.ravel() + start] = True
-    keys = [points[:, 2], points[:, 1], points[:, 0]]
+    keys = list(points.T[::-1])
     if all(part.ids is not None for part in parts):
         keys.append(np.concatenate([part.ids for part in parts if part.ids is not None]))
     rows = np.flatnonzero(used)

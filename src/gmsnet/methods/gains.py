@@ -1,0 +1,45 @@
+"""How good cells are in the mean, and what of that is yet to come if gains go on as they did."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods import ranking
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
+from gmsnet.kernels.simplex.shell_measures import mean_shape_of_shell
+from gmsnet.measure.totals import totals_of
+from gmsnet.methods.base import Field
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
+from gmsnet.topology.shell import Shell
+
+SAMPLE = 32  # blocks of cells
+
+
+def mean_shape(field: Field, executor: Executor = serial) -> float:
+    """The mean of 1/q over some of the cells, evenly taken."""
+    simplices = field.topology.changeable
+    stride = max(1, executor.counted(np.ones(len(simplices.rows), dtype=bool)) // (SAMPLE * LANES))
+    if isinstance(simplices, Tetrahedra):
+        taken = simplices.take(executor.every(stride, len(simplices.rows)))
+        totals = totals_of(field.points, taken, executor)
+        return math.nan if totals is None else totals.shape_mean
+    if isinstance(field.topology, Shell):
+        return float(mean_shape_of_shell(field.points, simplices, stride))
+    some = executor.every(stride, len(simplices.rows), LANES)
+    shape = np.empty(len(some))
+    ranking.shapes_of(field.points, simplices, some, shape)
+    shape = executor.in_order(executor.row_numbers(some), shape)
+    return float(np.cumsum(shape)[-1] / len(shape)) if len(shape) else math.nan  # added up in their order
+
+
+def to_come(before: float, gained: float) -> float:
+    """What is to be gained yet, if gains go on to fall by the same factor; by half, if only one is known."""
+    if gained <= 0.0:
+        return 0.0
+    if before == math.inf:
+        return gained
+    return gained * gained / (before - gained) if gained < before else math.inf
