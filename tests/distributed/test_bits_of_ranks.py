@@ -15,10 +15,8 @@ from gmsnet.mesh.mesh import Mesh
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
-from support.comm import together
+from support.ranks import parts_at_random, same
 
-from gmsnet.distributed.piece import pieces_of
-from gmsnet.distributed.smoothing import smoothed
 from gmsnet.run.options import SmoothOptions
 
 MESHES = {
@@ -28,52 +26,6 @@ MESHES = {
     "tetrahedra": gmsnet.generate.random_volume(250, seed=2),
 }
 SWEEPS = 6
-
-
-def parts_at_random(mesh, ranks, rng, how):
-    """Which rank has which cell: at random, in runs, or but for one all on the last one."""
-    found = []
-    for block in mesh.cells:
-        count = len(block.nodes)
-        if how == "interleaved":
-            part = rng.integers(0, ranks, count)
-        elif how == "strips":
-            part = np.arange(count) * ranks // max(count, 1)
-        else:
-            part = np.full(count, ranks - 1)
-            part[:1] = 0
-        found.append(part.astype(np.int32))
-    return found
-
-
-def spread(mesh, options, parts, ranks, fixed=None):
-    """The points (N, dim) after a run over ranks, and what the first rank tells."""
-    fixed = np.zeros(len(mesh.points), dtype=bool) if fixed is None else fixed
-    pieces = pieces_of(mesh, fixed, parts, ranks)
-    results = together(ranks, lambda comm: smoothed(pieces[comm.rank], options, comm))
-    points = np.full_like(mesh.points, np.nan)
-    for piece, result in zip(pieces, results, strict=True):
-        seen = points[piece.ids]
-        assert (np.isnan(seen) | (seen == result.points)).all(), "ranks agree on the nodes that they share"
-        points[piece.ids] = result.points
-    for result in results:
-        assert (result.before, result.after, result.sweeps) == (results[0].before, results[0].after, results[0].sweeps)
-    return points, results
-
-
-def same(mesh, options, parts, ranks, fixed=None):
-    serial = gmsnet.smooth(
-        mesh, options.method, guard=options.guard, max_sweeps=options.max_sweeps, preserve=options.preserve,
-        variant=options.variant, objective=options.objective, threads=1, fixed=fixed,
-    )  # fmt: skip
-    points, results = spread(mesh, options, parts, ranks, fixed)
-    assert points.tobytes() == serial.points.tobytes()
-    told = results[0]
-    assert told.after == serial.after.totals
-    assert told.stop_reason == serial.stop_reason
-    assert [sweep.moved for sweep in told.history] == [sweep.moved for sweep in serial.history]
-    assert told.held == {reason: len(ids) for reason, ids in serial.held.items()}
-    return told
 
 
 @pytest.mark.parametrize("guard", ["valid", "worst", "star"])
@@ -129,7 +81,7 @@ def test_a_large_floor_watches_the_same_blocks_of_cells():
     same(mesh, options, parts_at_random(mesh, 3, rng, "interleaved"), 3)
 
 
-@pytest.mark.parametrize("method", ["auto", "getme", "worst-first"])
+@pytest.mark.parametrize("method", ["getme"])
 def test_what_is_not_shared_out_is_done_by_the_first_rank(method):
     mesh, rng = MESHES["triangles"], np.random.default_rng(4)
     options = SmoothOptions(method=method, max_sweeps=5, threads=1)

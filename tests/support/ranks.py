@@ -1,43 +1,56 @@
-"""Executors of several processes, with threads in their place: each has a part of the work, and sees no other's."""
+"""Meshes that are cut up, smoothed by ranks in threads, and compared with the serial run."""
 
 from __future__ import annotations
 
-import threading
-
 import numpy as np
 
-from gmsnet.parallel.threads import Serial
+import gmsnet
+from gmsnet.distributed.piece import pieces_of
+from gmsnet.distributed.smoothing import smoothed
+from support.comm import together
 
 
-class Rank(Serial):
-    """One of several. What it is asked for it forms of what all of them give, in an order of its own."""
-
-    sequential = False
-
-    def __init__(self, number, board, meeting):
-        self.number, self.board, self.meeting = number, board, meeting
-        self.colours = []
-
-    def exchanged(self, value):
-        self.board[self.number] = value
-        self.meeting.wait()
-        values = self.board[self.number :] + self.board[: self.number]
-        self.meeting.wait()
-        return values
-
-    def total(self, figures):
-        return sum(self.exchanged(figures))
-
-    def minimum(self, value):
-        values = self.exchanged(value)
-        return min(values) if isinstance(value, float) else np.minimum.reduce(values)
-
-    def after_colour(self, colour, points):
-        self.colours.append(colour)
-        self.meeting.wait()
+def parts_at_random(mesh, ranks, rng, how):
+    """Which rank has which cell: at random, in runs, or but for one all on the last one."""
+    found = []
+    for block in mesh.cells:
+        count = len(block.nodes)
+        if how == "interleaved":
+            part = rng.integers(0, ranks, count)
+        elif how == "strips":
+            part = np.arange(count) * ranks // max(count, 1)
+        else:
+            part = np.full(count, ranks - 1)
+            part[:1] = 0
+        found.append(part.astype(np.int32))
+    return found
 
 
-def ranks_of(count):
-    """So many, which wait for each other."""
-    board, meeting = [None] * count, threading.Barrier(count, timeout=60)
-    return [Rank(number, board, meeting) for number in range(count)]
+def spread(mesh, options, parts, ranks, fixed=None):
+    """The points (N, dim) after a run over ranks, and what the first rank tells."""
+    fixed = np.zeros(len(mesh.points), dtype=bool) if fixed is None else fixed
+    pieces = pieces_of(mesh, fixed, parts, ranks)
+    results = together(ranks, lambda comm: smoothed(pieces[comm.rank], options, comm))
+    points = np.full_like(mesh.points, np.nan)
+    for piece, result in zip(pieces, results, strict=True):
+        seen = points[piece.ids]
+        assert (np.isnan(seen) | (seen == result.points)).all(), "ranks agree on the nodes that they share"
+        points[piece.ids] = result.points
+    for result in results:
+        assert (result.before, result.after, result.sweeps) == (results[0].before, results[0].after, results[0].sweeps)
+    return points, results
+
+
+def same(mesh, options, parts, ranks, fixed=None):
+    serial = gmsnet.smooth(
+        mesh, options.method, guard=options.guard, max_sweeps=options.max_sweeps, preserve=options.preserve,
+        variant=options.variant, objective=options.objective, threads=1, fixed=fixed,
+    )  # fmt: skip
+    points, results = spread(mesh, options, parts, ranks, fixed)
+    assert points.tobytes() == serial.points.tobytes()
+    told = results[0]
+    assert told.after == serial.after.totals
+    assert told.stop_reason == serial.stop_reason
+    assert [sweep.moved for sweep in told.history] == [sweep.moved for sweep in serial.history]
+    assert told.held == {reason: len(ids) for reason, ids in serial.held.items()}
+    return told

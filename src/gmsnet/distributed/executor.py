@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,28 +13,37 @@ from numpy.typing import NDArray
 from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.library import mpi
+from gmsnet.distributed.loan import Loan, gathered_field
+from gmsnet.distributed.numbering import NO_NUMBERS, Numbers
+from gmsnet.distributed.part import Part
+from gmsnet.methods.base import Field
 from gmsnet.parallel.executor import Executor, Figure, Figures, Result
 from gmsnet.parallel.threads import serial
+from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
 
 class Ranks:
-    """See Executor. numbers: of each block of cells of this rank, its number among those of the whole mesh.
-
-    inner: carries out the work of this rank.
-    """
+    """See Executor. numbers: of the cells of a part that are in ``changeable``. inner: carries out its work."""
 
     sequential = False
+    part: Part
     comm: Any
     halo: Halo
+    rows: Numbers
     numbers: NDArray[np.int64]
     inner: Executor
     count: int
+    known: WeakKeyDictionary[Topology | Volume, Ranks]  # of what was restricted
+    loan: Loan | None
 
-    def __init__(self, comm: Any, halo: Halo, numbers: NDArray[np.int64], inner: Executor = serial) -> None:
-        self.comm, self.halo, self.numbers, self.inner = comm, halo, numbers, inner
-        self.count = int(comm.allreduce(int(numbers.max(initial=-1)) + 1, mpi().MAX))
+    def __init__(self, part: Part, numbers: Numbers = NO_NUMBERS, inner: Executor = serial) -> None:
+        self.part, self.comm, self.halo, self.rows, self.inner = part, part.comm, part.halo, numbers, inner
+        self.numbers = numbers.blocks
+        self.known = WeakKeyDictionary()
+        self.count = int(self.comm.allreduce(int(self.numbers.max(initial=-1)) + 1, mpi().MAX))
 
     def map(self, work: Callable[[int, int], Result], first: int, last: int) -> list[Result]:
         """See Executor."""
@@ -68,20 +79,99 @@ class Ranks:
 
     def _lowest(self, values: Floats, many: int) -> NDArray[np.bool_]:
         """Which of the values of all ranks are the lowest ones; of equal ones, those that come first in their order."""
-        bits = (values + 0.0).view(np.int64)  # 0.0 and -0.0 are one
-        keys = np.where(bits < 0, bits ^ np.int64(2**63 - 1), bits)  # whole numbers in the order of the floats
+        keys = _keys(values)
+        bound = self._bound(keys, many)
+        chosen, equal = keys < bound, np.flatnonzero(keys == bound)
+        room = many - self.comm.allreduce(int(np.count_nonzero(chosen)))
+        before = self.comm.exscan(len(equal)) or 0
+        chosen[equal[: max(room - before, 0)]] = True
+        return np.asarray(chosen)
+
+    def _bound(self, keys: NDArray[np.int64], many: int) -> int:
+        """The least bound that so many of the keys of all ranks do not exceed."""
         low, high = -(2**63), 2**63 - 1
-        while low < high:  # the least bound that so many values do not exceed
+        while low < high:
             middle = (low + high) // 2
             if self.comm.allreduce(int(np.count_nonzero(keys <= middle))) >= many:
                 high = middle
             else:
                 low = middle + 1
-        chosen, equal = keys < low, np.flatnonzero(keys == low)
-        room = many - self.comm.allreduce(int(np.count_nonzero(chosen)))
-        before = self.comm.exscan(len(equal)) or 0
-        chosen[equal[: max(room - before, 0)]] = True
-        return np.asarray(chosen)
+        return low
+
+    def lowest_rows(self, values: Floats, many: int, rows: NDArray[np.int32] | None = None) -> NDArray[np.int32]:
+        """See Executor. A rank finds all that it has, those of others among them."""
+        counted, numbers = (each if rows is None else each[rows] for each in (self.rows.counted, self.rows.rows))
+        if many >= self.comm.allreduce(int(np.count_nonzero(counted))):
+            return np.arange(len(values), dtype=np.int32)
+        keys = _keys(values)
+        bound = self._bound(keys[counted], many)
+        less, equal = keys < bound, keys == bound
+        room = many - self.comm.allreduce(int(np.count_nonzero(less & counted)))
+        last = self._bound(numbers[equal & counted], room)
+        return np.flatnonzero(less | (equal & (numbers <= last))).astype(np.int32)
+
+    def counted(self, flags: NDArray[np.bool_]) -> int:
+        """See Executor."""
+        return int(self.comm.allreduce(int(np.count_nonzero(flags & self.rows.counted))))
+
+    def cell_count(self, simplices: Any) -> int:
+        """See Executor."""
+        return int(self.comm.allreduce(self.rows.cells))
+
+    def every(self, stride: int, length: int, size: int = 1) -> NDArray[np.int32]:
+        """See Executor."""
+        return np.flatnonzero(self.rows.counted & (self.rows.rows // size % stride == 0)).astype(np.int32)
+
+    def row_numbers(self, rows: NDArray[np.int32]) -> NDArray[np.int64]:
+        """See Executor."""
+        return self.rows.rows[rows]
+
+    def free_numbers(self, near_free: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """See Executor."""
+        return self.part.numbered(near_free)
+
+    def in_order(self, numbers: NDArray[np.int64], values: Floats) -> Floats:
+        """See Executor."""
+        came = self.comm.allgather((numbers, values))
+        order = np.argsort(np.concatenate([each for each, _ in came]))
+        found: Floats = np.concatenate([each for _, each in came])[order]
+        return found
+
+    def gathered(self, field: Field, rows: NDArray[np.int32] | None) -> Field | None:
+        """See Executor."""
+        self.loan = gathered_field(self.part, field, rows)
+        return self.loan.field
+
+    def restricted(self, topology: Topology | Volume, active: NDArray[np.bool_]) -> Topology | Volume:
+        """See Executor."""
+        active = active & topology.near_free
+        inner, numbers = self.part.ready(
+            replace(topology, near_free=active, free=np.sort(topology.memory[np.flatnonzero(active)]))
+        )
+        self.known[inner] = Ranks(self.part, numbers, self.inner)
+        return inner
+
+    def of(self, topology: Topology | Volume) -> Executor:
+        """See Executor."""
+        return self.known.get(topology, self)
+
+    def lent(self, values: Floats) -> Floats:
+        """See Executor."""
+        assert self.loan is not None
+        return self.loan.at_nodes(self.part, values)
+
+    def returned(self, field: Field, part: Field | None, result: Result) -> Result:
+        """See Executor."""
+        assert self.loan is not None
+        self.loan.give_back(self.part, field.points)
+        self.loan = None
+        found: Result = self.comm.bcast(result)
+        return found
+
+    def blocks_with(self, rows: NDArray[np.int32], size: int) -> NDArray[np.int32]:
+        """See Executor."""
+        found = np.unique(np.concatenate(self.comm.allgather(np.unique(self.numbers[rows // size]))))
+        return np.flatnonzero(np.isin(self.numbers, found)).astype(np.int32)
 
     def minimum(self, value: Figure) -> Figure:
         """See Executor."""
@@ -102,3 +192,9 @@ class Ranks:
         found = np.empty_like(given)
         self.comm.Allreduce(given, found, operation)
         return float(found[0]) if isinstance(value, float) else found.reshape(np.shape(value))
+
+
+def _keys(values: Floats) -> NDArray[np.int64]:
+    """Whole numbers in the order of the values."""
+    bits = (values + 0.0).view(np.int64)  # 0.0 and -0.0 are one
+    return np.where(bits < 0, bits ^ np.int64(2**63 - 1), bits)

@@ -7,7 +7,7 @@ sorted over all ranks for that, by their places on the curve.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,24 @@ from gmsnet.distributed.by_rank import by_rank
 
 Ids = NDArray[np.int64]
 
+NO_ROWS = np.empty(0, dtype=np.int64)
 SAMPLES = 64  # of each rank's nodes, by which the curve is shared out
+
+
+class Numbers(NamedTuple):
+    """What the rows of ``changeable`` of a rank are in the whole mesh.
+
+    blocks: of each block of rows, its number. rows: (S,) of each row, its number. counted: (S,) bool, which rows this
+    rank answers for; each is one rank's. cells: how many cells these belong to.
+    """
+
+    blocks: NDArray[np.int64] = NO_ROWS
+    rows: NDArray[np.int64] = NO_ROWS
+    counted: NDArray[np.bool_] = NO_ROWS > 0
+    cells: int = 0
+
+
+NO_NUMBERS = Numbers()
 
 
 def before(comm: Any, codes: Ids, ids: Ids, counts: Ids) -> Ids:

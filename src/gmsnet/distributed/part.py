@@ -17,7 +17,7 @@ from gmsnet.distributed.frame import framed
 from gmsnet.distributed.ghosts import Surrounded, owners_beside
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.library import mpi
-from gmsnet.distributed.numbering import before
+from gmsnet.distributed.numbering import Numbers, before
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
@@ -27,7 +27,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.mixed_volume import volume_of, wound_of
 from gmsnet.topology.ordering import planar_points, space_points, taken
-from gmsnet.topology.stars import Colouring, Ints, Stars
+from gmsnet.topology.stars import Colouring, Ints
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -54,7 +54,7 @@ class Part:
 
     mesh: its cells, and those around. topology: with the nodes free that it moves. points: in memory order. codes: (n,)
     places on the curve, in memory order. moves: (n,) by places in memory, the nodes that this rank has to move or hold.
-    own_rows: of ``topology.simplices``, those of its own cells: each cell is one rank's. colours: how many there are.
+    own_rows: of ``topology.simplices``, those of its own cells: each cell is one rank's.
     """
 
     comm: Any
@@ -66,7 +66,6 @@ class Part:
     codes: Ids
     moves: Flags
     own_rows: Ints
-    colours: int
 
     @classmethod
     def of(cls, around: Surrounded, comm: Any, single: bool) -> Part:
@@ -79,44 +78,47 @@ class Part:
         topology = volume_of(wound_of(mesh, held)) if mesh.has_volumes else Topology.of(mesh, held)
         near = taken(planar_points(mesh) if mesh.plane else space_points(mesh), topology.memory)
         halo = around.halo(comm, topology.places)
-        topology, colours = _coloured(comm, topology, halo)
+        topology = _coloured(comm, topology, halo)
         codes = np.empty(len(near), dtype=np.int64)
         morton_codes(near, mesh.box, codes)
         own = np.concatenate([*around.own, np.empty(0, dtype=bool)])
         rows = np.arange(len(topology.simplices.rows), dtype=np.int32)
         own_rows = rows[own[topology.cells_of(rows.astype(np.intp))]]
-        return cls(comm, around, mesh, topology, near, halo, codes, moves[topology.memory], own_rows, colours)
+        return cls(comm, around, mesh, topology, near, halo, codes, moves[topology.memory], own_rows)
 
     @property
     def simplices(self) -> Simplices | Tetrahedra:
         """Those of its own cells."""
         return self.topology.simplices.take(self.own_rows)
 
-    def ready(self, topology: Topology | Volume) -> tuple[Topology | Volume, Ids]:
-        """The connectivity as a run wants it, and the numbers that its blocks of cells have in the whole mesh.
+    def numbered(self, chosen: Flags) -> Ids:
+        """The places of some nodes that this rank moves, among all that ranks choose, in memory order.
 
-        topology: this one, or with more nodes held. Its stars have as many colours as those of all ranks.
+        chosen: (n,) by places in memory.
+        """
+        own = np.flatnonzero(self.moves)
+        ids = self.around.nodes.ids[self.topology.memory]
+        found = before(self.comm, self.codes[own], ids[own], chosen[own].astype(np.int64))
+        return found[chosen[own]]
+
+    def ready(self, topology: Topology | Volume) -> tuple[Topology | Volume, Numbers]:
+        """The connectivity as a run wants it, and the numbers that its cells have in the whole mesh.
+
+        topology: this one, or with more nodes held.
         ``changeable`` stands in the blocks of the whole mesh, as far as their cells have a node that this rank moves;
         the rest of a block are repetitions. ``scored`` are those of its own cells.
         """
         free = self.halo.spread(topology.near_free)
-        stars, first = topology.stars, np.zeros(self.colours + 1, dtype=np.int32)
-        first[: len(stars.first)] = stars.first
-        first[len(stars.first) :] = stars.first[-1]
         rows, numbers = self._blocks(topology, free)
         scored = self.own_rows
         if isinstance(topology, Volume) or topology.near_shapes is not None:
             scored = scored[_of_whole_cells(topology.simplices, _with_a_free_node(topology.simplices, free))[scored]]
         found = replace(topology)
-        found.__dict__.update(
-            stars=Stars(stars.blocks, first),
-            changeable=topology.simplices.take(rows),
-            scored=topology.simplices.take(scored),
-        )
+        found.__dict__.update(changeable=topology.simplices.take(rows), scored=topology.simplices.take(scored))
         return found, numbers
 
-    def _blocks(self, topology: Topology | Volume, free: Flags) -> tuple[Ints, Ids]:
-        """The rows of ``changeable``, and the numbers of their blocks of LANES.
+    def _blocks(self, topology: Topology | Volume, free: Flags) -> tuple[Ints, Numbers]:
+        """The rows of ``changeable``, and their numbers.
 
         free: (n,) by places in memory, the nodes that any rank moves.
         """
@@ -135,11 +137,13 @@ class Part:
         starts = np.flatnonzero(np.diff(lowest, prepend=-1) != 0)  # cells stand by their first node
         within -= np.repeat(within[starts], np.diff(np.append(starts, len(lowest)))) if len(starts) else 0
         place = first[lowest] + within
-        known = self.moves[lowest]
+        known = answers = self.moves[lowest]
         place, known = self._told(topology, chosen[begin] if len(chosen) else chosen, place, known)
         row_place = np.repeat(place, size) + _counted(size)
         row_known = np.repeat(known, size)
-        return _aligned(chosen[row_known], row_place[row_known])
+        rows, blocks, at, first_of = _aligned(row_place[row_known])
+        counted = np.repeat(answers, size)[row_known][rows] & first_of
+        return chosen[row_known][rows], Numbers(blocks, at, counted, int(np.count_nonzero(answers)))
 
     def _told(self, topology: Topology | Volume, rows: Ints, place: Ids, known: Flags) -> tuple[Ids, Flags]:
         """The places of cells, one row each, whose first node another rank moves: it tells those who move another."""
@@ -169,8 +173,8 @@ class Part:
         return place, known
 
 
-def _coloured(comm: Any, topology: Topology | Volume, halo: Halo) -> tuple[Topology | Volume, int]:
-    """The same with the colours of the whole mesh, and how many there are."""
+def _coloured(comm: Any, topology: Topology | Volume, halo: Halo) -> Topology | Volume:
+    """The same with the colours of the whole mesh, as many as there are of them."""
     places, free = topology.colouring.places, halo.spread(topology.near_free)
     colours = np.full(len(free), -1, dtype=np.int32)
     start, ring = topology.colouring.start, topology.colouring.ring
@@ -182,7 +186,7 @@ def _coloured(comm: Any, topology: Topology | Volume, halo: Halo) -> tuple[Topol
     count = int(comm.allreduce(int(colours.max(initial=-1)) + 1, mpi().MAX))
     axes = 2 if isinstance(topology, Topology) else 3
     halo.coloured(colours, count, axes)
-    return replace(topology, colouring=Known(places, start, ring, colours)), count
+    return replace(topology, colouring=Known(places, start, ring, colours, fewest=count))
 
 
 def _with_a_free_node(simplices: Simplices | Tetrahedra, free: Flags) -> Flags:
@@ -220,10 +224,13 @@ def _counted(size: Ids) -> Ids:
     return np.arange(size.sum()) - np.repeat(np.cumsum(size) - size, size)
 
 
-def _aligned(rows: Ints, place: Ids) -> tuple[Ints, Ids]:
-    """Rows at some places in blocks of LANES, where the last of a block stands for those that are not there."""
+def _aligned(place: Ids) -> tuple[NDArray[np.intp], Ids, Ids, Flags]:
+    """Rows at some places in blocks of LANES, where the last of a block stands for those that are not there.
+
+    Returns which row stands where, the numbers of the blocks, the place of each, and which are no repetitions.
+    """
     order = np.argsort(place)
-    rows, block = rows[order], place[order] // LANES
-    numbers, begin, size = np.unique(block, return_index=True, return_counts=True)
+    numbers, begin, size = np.unique(place[order] // LANES, return_index=True, return_counts=True)
     lane = np.minimum(np.arange(LANES), size[:, None] - 1)
-    return rows[begin[:, None] + lane].reshape(-1).astype(np.int32), numbers
+    rows = order[(begin[:, None] + lane).reshape(-1)]
+    return rows, numbers, place[rows], (lane == np.arange(LANES)).reshape(-1)

@@ -19,6 +19,7 @@ from gmsnet.distributed.on_first import Intent, intent_of, smoothed_on_first
 from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.result import RankResult
+from gmsnet.distributed.stages import swept
 from gmsnet.kernels.topology.connectivity import NON_ORIENTABLE, ZERO_AREA
 from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.signs import exact_signs
@@ -28,7 +29,6 @@ from gmsnet.methods import Smoother
 from gmsnet.preserve.protection import LAYER
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import factors_of, rank_by
-from gmsnet.run.run import Run, Start, precision_of
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.held import REASONS
 from gmsnet.topology.mixed_volume import MixedVolume
@@ -55,7 +55,7 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
         return smoothed_on_first(piece, options, comm, why, began, known)
     part = Part.of(around, comm, piece.single)
     try:
-        before = totals_of(part.points, part.simplices, Ranks(comm, part.halo, np.empty(0, dtype=np.int64)))
+        before = totals_of(part.points, part.simplices, Ranks(part))
         why, intent = _not_plain(part, before), Intent(None, False, [])
         if not why and options.preserved != "none" and may_be_meant(part):
             intent = intent_of(piece, options, comm, known)
@@ -117,19 +117,18 @@ def _shared(
         layers[at] = intent.layers
         topology = topology.holding(part.halo.spread(layers[topology.memory])[topology.places] > 0.0, LAYER)
     topology, numbers = part.ready(topology)
-    executor = Ranks(part.comm, part.halo, numbers)
+    executor = Ranks(part, numbers)
     options = replace(options, callback=_answered(part.comm, options.callback))
-    run = Run(Start(topology, part.points, precision_of(part.mesh)), smoother, options, executor)
-    stop_reason = run.to_the_end()
-    points, moved, after = _written(part, run.best, options, before, executor)
+    state = swept(part, topology, smoother, options, executor)
+    points, moved, after = _written(part, state.points, options, before, executor)
     return RankResult(
         points=points[at],
         moved=moved[at],
         before=before,
         after=after,
-        sweeps=run.history[-1].index if run.history else 0,
-        stop_reason=stop_reason,
-        history=run.history,
+        sweeps=state.history[-1].index if state.history else 0,
+        stop_reason=state.stop_reason,
+        history=[*state.history],
         notes=intent.notes,
         held=_held(part, topology),
         nodes=int(part.comm.allreduce(int(part.moves.sum()))),
@@ -138,7 +137,7 @@ def _shared(
         seconds=time.perf_counter() - began,
         messages=part.halo.messages,
         bytes=part.halo.bytes,
-        interrupted=run.interruption is not None,
+        interrupted=state.interruption is not None,
     )
 
 

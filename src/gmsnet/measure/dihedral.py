@@ -31,16 +31,23 @@ REGULAR = math.degrees(math.acos(1.0 / 3.0))  # the dihedral angles of a regular
 # The weight of what an angle lacks to 180°: 45° and 120°, as cells at the faces of a lattice have, count alike. With
 # 0.64, by which those of a regular tetrahedron do, lattices keep 42°.
 WIDE = 0.75
-STRIDE = 32  # one value in so many tells about how large the largest are
 MORE = 4  # times as many cells of the least η are looked at first
 SHARE = 1.0 + 1e-6  # times an η: for its rounding
 
 
 class Ranked(NamedTuple):
-    """Some cells of the least measure. rows: which. measure: (K,) degrees, ascending."""
+    """Some cells of the least measure. rows: which. measure: (K,) degrees, ascending. least, most: of all processes."""
 
     rows: Rows
     measure: Floats
+    least: float
+    most: float
+
+    @classmethod
+    def of(cls, rows: Rows, measure: Floats, executor: Executor) -> Ranked:
+        """With the extremes over all processes."""
+        least = executor.minimum(float(measure.min(initial=math.inf)))
+        return cls(rows, measure, least, -executor.minimum(float((-measure).min(initial=math.inf))))
 
 
 def most_shape_with(angle: float) -> float:
@@ -86,24 +93,11 @@ def ratios_of(points: Floats, cells: Tetrahedra, executor: Executor = serial) ->
 
 def renew(ratios: Floats, points: Floats, cells: Tetrahedra, nodes: Rows, executor: Executor = serial) -> None:
     """Measures those of ``ratios_of`` anew that have one of these nodes, which alone have moved."""
-    moved = np.zeros(len(points), dtype=bool)
-    moved[nodes] = True
-    rows = touching(cells.rows, moved)
+    moved = np.zeros(len(points))
+    moved[nodes] = 1.0
+    executor.exchange(moved)
+    rows = touching(cells.rows, moved > 0.0)
     ratios[rows] = ratios_of(points, cells.take(rows), executor)
-
-
-def largest(values: Floats, count: int) -> Rows:
-    """Where so many of the largest values stand, or all, if they are fewer; in no order."""
-    if count >= len(values):
-        return np.arange(len(values), dtype=np.int32)
-    some = values[::STRIDE]
-    few = min(2 * count // STRIDE + STRIDE, len(some) - 1)
-    likely = np.flatnonzero(values >= np.partition(some, -few - 1)[-few - 1])
-    if len(likely) < count:
-        likely = np.arange(len(values))
-    rest = len(likely) - count
-    chosen: Rows = likely[np.argpartition(values[likely], rest)[rest:]].astype(np.int32)
-    return chosen
 
 
 def below(points: Floats, cells: Tetrahedra, measure: float, wide: float, executor: Executor = serial) -> Ranked:
@@ -113,7 +107,7 @@ def below(points: Floats, cells: Tetrahedra, measure: float, wide: float, execut
     found = measures_of(columns_of(points, cells, rows), wide)
     chosen = (found < measure) | np.isinf(ratios[rows])
     order = np.argsort(found[chosen], kind="stable")
-    return Ranked(rows[chosen][order], found[chosen][order])
+    return Ranked.of(rows[chosen][order], found[chosen][order], executor)
 
 
 def worst(
@@ -124,16 +118,22 @@ def worst(
     executor: Executor = serial,
     ratios: Floats | None = None,
 ) -> Ranked:
-    """So many cells of the least measure, all if they are fewer; of valid meshes. ratios: theirs, as far as known."""
+    """So many cells of the least measure, all if they are fewer; of valid meshes. ratios: theirs, as far as known.
+
+    cells: those that can change (``Volume.changeable``), of which processes may have some each.
+    """
     ratios = ratios_of(points, cells, executor) if ratios is None else ratios
-    rows = largest(ratios, MORE * count)
+    rows = executor.lowest_rows(-ratios, MORE * count)
     found = measures_of(columns_of(points, cells, rows), wide)
-    if len(rows) < len(ratios):
-        limit = most_shape_below(float(np.partition(found, count - 1)[count - 1]), wide)
+    if MORE * count < executor.counted(np.ones(len(ratios), dtype=bool)):
+        limit = most_shape_below(Ranked.of(*_lowest(found, count, rows, executor), executor).most, wide)
         rows = np.flatnonzero(~(ratios < 432.0 / limit**3)).astype(np.int32)
         found = measures_of(columns_of(points, cells, rows), wide)
-    if len(rows) > count:
-        few = found <= np.partition(found, count - 1)[count - 1]
-        rows, found = rows[few], found[few]
-    order = np.argsort(found, kind="stable")[:count]
-    return Ranked(rows[order], found[order])
+    return Ranked.of(*_lowest(found, count, rows, executor), executor)
+
+
+def _lowest(measure: Floats, count: int, rows: Rows, executor: Executor) -> tuple[Rows, Floats]:
+    """So many of some rows of the least measure, and that."""
+    chosen = executor.lowest_rows(measure, count, rows)
+    chosen = chosen[np.argsort(measure[chosen], kind="stable")]
+    return rows[chosen], measure[chosen]

@@ -34,18 +34,22 @@ def over_changing(
         tally += found
         if sweep + 1 == sweeps or not found.any():
             break
-        changed = _at_or_beside(active[(points[active] != before).any(axis=1)], topology)
+        moved = np.zeros(len(points))
+        moved[active[(points[active] != before).any(axis=1)]] = 1.0
+        executor.exchange(moved)
+        changed = _at_or_beside(all_of_them, moved > 0.0, topology)
         again = all_of_them[changed[all_of_them]]
-        if len(again) < FEW * len(active) or np.count_nonzero(changed[active]) < len(again):
+        counts = np.array([len(again), len(active), np.count_nonzero(changed[active])])
+        many, now, still = executor.total(counts).tolist()
+        if many < FEW * now or still < many:
             active, stars = again, topology.stars_of(again)
     return tally
 
 
-def _at_or_beside(nodes: NDArray[np.int64], topology: Volume) -> NDArray[np.bool_]:
-    """(N,) which nodes are these, or share a cell with one of them."""
-    start, chosen = topology.near_start, np.zeros(len(topology.near_free), dtype=bool)
+def _at_or_beside(nodes: NDArray[np.int64], moved: NDArray[np.bool_], topology: Volume) -> NDArray[np.bool_]:
+    """(N,) which of some nodes have moved, or share a cell with one that has. moved: (N,)."""
+    start, chosen = topology.near_start, moved.copy()
     count = np.diff(start)[nodes]
     places = np.repeat(start[nodes] - (np.cumsum(count) - count), count) + np.arange(count.sum())
-    chosen[topology.near_ring[places]] = True
-    chosen[nodes] = True
+    chosen[np.repeat(nodes, count)[moved[topology.near_ring[places]]]] = True
     return chosen

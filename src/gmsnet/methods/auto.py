@@ -94,12 +94,14 @@ class Auto(Smoother):
     rounds: int
     gained: float
     converged: bool
+    free: int
     smoother: Smoother
     mean: float
     phase: str
     looks: bool
 
     stops_when_idle = False
+    shared_out = True
 
     def __init__(self, phases: Sequence[Phase] = ()) -> None:
         self.phases = phases
@@ -112,29 +114,30 @@ class Auto(Smoother):
         self.passes, self.least = 0, -math.inf  # passes over the worst cells, and the least 1/q after the last one
         self.again = -1  # the phase to go back to in the end, if there is one
 
-    def _enter(self, phase: int, field: Field) -> None:
+    def _enter(self, phase: int, field: Field, executor: Executor) -> None:
         if phase == len(self.phases) and self.again >= 0:
             phase, self.again = self.again, -1
         self.at, self.made, self.rounds, self.gained = phase, 0, 0, math.inf
         if phase == len(self.phases):
             gained = self.turns == 0 or self.least >= self.least_before + TURN_GAIN
-            self.converged = self.turns == TURNS or not gained or not (self.ideal or self._is_even(field))
+            self.converged = self.turns == TURNS or not gained or not (self.ideal or self._is_even(field, executor))
             self.turns, self.least_before = self.turns + 1, self.least
             return
         self.smoother = self.phases[phase].create()
         if self.phases[phase].rounds > 1 and not self.phases[phase].first:  # what those gain at first does not count
-            self.mean = mean_shape(field)
+            self.mean = mean_shape(field, executor)
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if self.at < 0:
+            self.free = int(executor.total(np.array(len(field.topology.free))))
             planar = isinstance(field.topology, Topology) and not isinstance(field.topology, Shell)
             if not self.phases and field.level != STAR and planar:
-                self.creep = Creep.of(field)
-            self.phases = self.phases or plan_for(field.topology)
-            if self.phases in IN_SPACE and len(field.topology.free) > LARGE_VOLUME:
+                self.creep = Creep.of(field, executor)
+            self.phases = self.phases or plan_for(field.topology, self.free)
+            if self.phases in IN_SPACE and self.free > LARGE_VOLUME:
                 self.pass_gain = LARGE_GAIN
-            self._enter(0, field)
+            self._enter(0, field, executor)
         if self.at == len(self.phases):
             return (self._move_all if self.ideal else self._move_all_for_worst)(field, executor, test)
         phase = self.phases[self.at]
@@ -150,7 +153,7 @@ class Auto(Smoother):
         self.made += 1
         self.looks = False
         if self.made == self._wanted or self.smoother.converged or not tally[MOVED]:
-            self._end_round(field)
+            self._end_round(field, executor)
         return tally
 
     @property
@@ -167,7 +170,7 @@ class Auto(Smoother):
         tally = WholeMesh(settled=CLOSEST if self.ideal else SETTLED).sweep(field, executor, test)
         if tally[MOVED]:
             self.rounds, self.made, self.gained = 0, 0, math.inf
-            self.mean = mean_shape(field)
+            self.mean = mean_shape(field, executor)
         else:
             self.whole = MOST_WHOLE
         return tally
@@ -178,7 +181,7 @@ class Auto(Smoother):
         tally = np.zeros(3, dtype=np.int64)
         for power in EARLY:
             tally += WholeMesh((power,), best=True).sweep(field, executor, test)
-        self._enter(self.at + 1, field)
+        self._enter(self.at + 1, field, executor)
         return tally
 
     def _move_all_for_worst(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
@@ -186,7 +189,7 @@ class Auto(Smoother):
         self.looks, self.phase = True, WHOLE_WORST
         tally = WholeMesh(POWERS).sweep(field, executor, test)
         if tally[MOVED]:
-            self._enter(0, field)
+            self._enter(0, field, executor)
         else:
             self.converged = True
         return tally
@@ -200,33 +203,33 @@ class Auto(Smoother):
         self.again = self.at if gains and self.passes < PASSES else -1
         self.least = smoother.least
 
-    def _is_even(self, field: Field) -> bool:
+    def _is_even(self, field: Field, executor: Executor) -> bool:
         """Is the worst cell one of many like it, which one star at a time cannot better?"""
         small, moved = self.phases is SMALL_PLAN, self.whole > 0
         if self.creep is None or self.least >= (GOOD_MOVED if small and moved else GOOD):
             return False
-        mean = mean_shape(field)
+        mean = mean_shape(field, executor)
         return (small and (moved or mean < STILL_POOR)) or ((small or moved) and self.least > mean - NEAR_MEAN)
 
-    def _is_slow(self, field: Field, ahead: float, lasts: bool) -> bool:
+    def _is_slow(self, field: Field, executor: Executor, ahead: float, lasts: bool) -> bool:
         """Is the mesh deformed as a whole? ahead: what is to come in the mean of 1/q. lasts: gains do not fall fast."""
         if self.creep is None or self.whole >= MOST_WHOLE:
             return False
-        creeps = self.creep.is_one(field.points)
+        creeps = self.creep.is_one(field.points, executor)
         return (lasts and (ahead > SLOW or creeps)) or (self.mean < POOR and not self.whole)
 
     def _is_caught(self) -> bool:
         """Have sweeps ended where the mesh may be folded? Moves of single nodes do not unfold it."""
         return self.creep is not None and not self.whole and self.mean < FAIR
 
-    def _end_round(self, field: Field) -> None:
+    def _end_round(self, field: Field, executor: Executor) -> None:
         """Makes the phase once more where that pays, else goes on to the next one, or settles."""
         phase = self.phases[self.at]
         self.rounds += 1
         self.made = 0
         goes_on = False
         if self.rounds < (1 if self.again >= 0 and self.phases in VOLUMES else phase.rounds):
-            mean, ahead, lasts = mean_shape(field), 0.0, True
+            mean, ahead, lasts = mean_shape(field, executor), 0.0, True
             if phase.first and self.rounds == 1:
                 goes_on = True
             else:
@@ -237,7 +240,7 @@ class Auto(Smoother):
                 goes_on = ahead > enough and self.gained > phase.least
                 ahead = min(ahead, AHEAD * self.gained) if before < math.inf else 0.0
             self.mean = mean
-            self.slow = self._is_slow(field, ahead, lasts) or (not goes_on and self._is_caught())
+            self.slow = self._is_slow(field, executor, ahead, lasts) or (not goes_on and self._is_caught())
             goes_on = goes_on or self.slow
         target_reached = self.smoother.target_reached
         self.looks = self.rounds % phase.often == 0 if goes_on else phase.looks or target_reached
@@ -245,13 +248,13 @@ class Auto(Smoother):
             self._look_at_worst(self.smoother)
         if not goes_on:
             is_ideal = isinstance(self.smoother, WorstFirst) and self.smoother.least >= self.smoother.enough
-            few = self.creep is not None and not self.whole and len(field.topology.free) <= EXACT
+            few = self.creep is not None and not self.whole and self.free <= EXACT
             self.ideal = is_ideal and few
             moved = self.at == 0 and self.whole > 0 and self.phases is SMALL_PLAN
             self.early = moved and field.planar.near_shapes is None
             if self.early:
                 return
-            self._enter(len(self.phases) if target_reached or is_ideal else self.at + 1, field)
+            self._enter(len(self.phases) if target_reached or is_ideal else self.at + 1, field, executor)
 
 
 def for_target(target: Target, share: float, *, rings: int, floor: float | None = None) -> Auto:

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.methods.base import Field
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 
 WINDOW, WINDOWS = 64, 64  # nodes; windows at most, evenly taken
 FEWEST = 4  # windows: smaller meshes are done by sweeps
@@ -23,35 +25,47 @@ WORTHWHILE = 0.01
 
 
 class Creep:
-    """Some nodes, and where they were before a sweep. nodes: (n, WINDOW) places in memory. free: how many move."""
+    """Some nodes, and where they were before a sweep.
+
+    nodes: (K,) places in memory of those that are here. numbers: (K,) theirs among those that are free. free: how many
+    move.
+    """
 
     nodes: NDArray[np.intp]
+    numbers: NDArray[np.int64]
     free: int
 
-    def __init__(self, nodes: NDArray[np.intp], free: int) -> None:
-        self.nodes, self.free = nodes, free
+    def __init__(self, nodes: NDArray[np.intp], numbers: NDArray[np.int64], free: int) -> None:
+        self.nodes, self.numbers, self.free = nodes, numbers, free
         self.before: NDArray[np.float64] | None = None
 
     @classmethod
-    def of(cls, field: Field) -> Creep | None:
+    def of(cls, field: Field, executor: Executor = serial) -> Creep | None:
         """Of a mesh; None for small ones."""
-        free = np.flatnonzero(field.topology.near_free)
-        count = len(free) // WINDOW
+        free, numbers = np.flatnonzero(field.topology.near_free), executor.free_numbers(field.topology.near_free)
+        every = int(executor.total(np.array(len(free))))
+        count = every // WINDOW
         if count < FEWEST:
             return None
-        windows = free[: count * WINDOW].reshape(count, WINDOW)
-        return cls(windows[np.unique(np.linspace(0, count - 1, min(count, WINDOWS)).astype(int))], len(free))
+        windows = np.unique(np.linspace(0, count - 1, min(count, WINDOWS)).astype(int))
+        chosen = (WINDOW * windows[:, None] + np.arange(WINDOW)).ravel()
+        at = np.searchsorted(numbers, chosen)
+        here = at[at < len(numbers)][numbers[at[at < len(numbers)]] == chosen[at < len(numbers)]]
+        return cls(free[here], numbers[here], every)
 
     def start(self, points: NDArray[np.float64]) -> None:
         """A sweep begins."""
         self.before = points.take(self.nodes, axis=0)
 
-    def is_one(self, points: NDArray[np.float64]) -> bool:
+    def is_one(self, points: NDArray[np.float64], executor: Executor = serial) -> bool:
         """Did the nodes creep in the sweep that began last? No, if none has begun since this was asked."""
         if self.before is None:
             return False
-        now = points.take(self.nodes, axis=0)
-        shifts = now - self.before
+        now, before = (
+            executor.in_order(self.numbers, each).reshape(-1, WINDOW, points.shape[1])
+            for each in (points.take(self.nodes, axis=0), self.before)
+        )
+        shifts = now - before
         self.before = None
         square = float((shifts * shifts).sum())
         if not square > 0.0:

@@ -74,16 +74,17 @@ class Dihedral(Smoother):
             guard = MeshGuard(*field.precision, self.floor, field.constraint)
         ratios = ratios_of(field.points, cells, executor)
         for number, cycle in enumerate(self.cycles):
-            count = min(max(FEWEST, math.ceil(cycle.share * len(cells.rows))), len(cells.rows))
+            every = executor.counted(np.ones(len(cells.rows), dtype=bool))
+            count = min(max(FEWEST, math.ceil(cycle.share * every)), every)
             ranked = worst(field.points, cells, count, self.wide, executor, ratios)
-            self.after = float(ranked.measure[0])
+            self.after = ranked.least
             self.before = self.before if number else self.after
             chosen = ranked.rows[ranked.measure < self.goal]
-            if not len(chosen):
+            if not ranked.least < self.goal:
                 return tally
             nodes = np.unique(cells.rows[chosen])
             nodes = nodes[topology.near_free[nodes]]
-            enough = min(float(ranked.measure[-1]), self.goal)
+            enough = min(ranked.most, self.goal)
             aim = Aim3(DIHEDRAL, cycle.doublings, self.wide, math.radians(enough), max(guard.floor, 0.0))
 
             def visit(blocks: SpaceBlocks, first: int, last: int, counts: Tally, aim: Aim3 = aim) -> None:
@@ -91,5 +92,5 @@ class Dihedral(Smoother):
 
             tally += over_changing(visit, nodes, cycle.sweeps, field, executor)
             renew(ratios, field.points, cells, nodes, executor)
-        self.after = float(worst(field.points, cells, 1, self.wide, executor, ratios).measure[0])
+        self.after = worst(field.points, cells, 1, self.wide, executor, ratios).least
         return tally

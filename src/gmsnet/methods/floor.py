@@ -16,6 +16,7 @@ from gmsnet.kernels.star.guard import Precision, ratio_upper_bounds
 from gmsnet.kernels.star.guard3 import ratio_upper_bounds3
 from gmsnet.kernels.star.shell import ShellSimplices, ratio_upper_bounds_of_shell
 from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -42,14 +43,14 @@ class Floor:
         self.enough = self.LOOKS  # with that many looks the blocks may be chosen anew
         self.looks = self.unhindered = 0  # looks, and sweeps in which no star was held back, since these were chosen
 
-    def watch(self, cells: NDArray[np.int32], shape: NDArray[np.floating[Any]]) -> None:
+    def watch(self, cells: NDArray[np.int32], shape: NDArray[np.floating[Any]], executor: Executor = serial) -> None:
         """From now on looks at the blocks of the worst of these cells (rows of ``Topology.changeable``), by their 1/q.
 
         The worst of all must be among them.
         """
-        few = min(self.WATCHED, len(cells)) - 1
+        few = executor.lowest_rows(shape.astype(np.float64), self.WATCHED, cells)
         self.enough = self.LOOKS
-        self._watch(np.unique(cells[np.argpartition(shape, few)[: few + 1]] // LANES))
+        self._watch(executor.blocks_with(cells[few], LANES))
 
     def forget(self) -> None:
         """All nodes may be elsewhere: which blocks hold the worst is not known."""

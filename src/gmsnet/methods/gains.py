@@ -7,26 +7,33 @@ import math
 import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods import ranking
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.simplex.measures import mean_shape_of_sample
 from gmsnet.kernels.simplex.shell_measures import mean_shape_of_shell
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods.base import Field
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 from gmsnet.topology.shell import Shell
 
 SAMPLE = 32  # blocks of cells
 
 
-def mean_shape(field: Field) -> float:
+def mean_shape(field: Field, executor: Executor = serial) -> float:
     """The mean of 1/q over some of the cells, evenly taken."""
     simplices = field.topology.changeable
-    stride = max(1, len(simplices.rows) // (SAMPLE * LANES))
+    stride = max(1, executor.counted(np.ones(len(simplices.rows), dtype=bool)) // (SAMPLE * LANES))
     if isinstance(simplices, Tetrahedra):
-        totals = totals_of(field.points, simplices.take(np.arange(0, len(simplices.rows), stride, dtype=np.int32)))
+        taken = simplices.take(executor.every(stride, len(simplices.rows)))
+        totals = totals_of(field.points, taken, executor)
         return math.nan if totals is None else totals.shape_mean
     if isinstance(field.topology, Shell):
         return float(mean_shape_of_shell(field.points, simplices, stride))
-    return float(mean_shape_of_sample(field.points, simplices, stride))
+    some = executor.every(stride, len(simplices.rows), LANES)
+    shape = np.empty(len(some))
+    ranking.shapes_of(field.points, simplices, some, shape)
+    shape = executor.in_order(executor.row_numbers(some), shape)
+    return float(np.cumsum(shape)[-1] / len(shape)) if len(shape) else math.nan  # added up in their order
 
 
 def to_come(before: float, gained: float) -> float:

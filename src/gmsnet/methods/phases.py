@@ -94,14 +94,14 @@ SURFACE_PLAN = (
 MIXED_PLAN = (*LARGE_VOLUME_PLAN, Phase("Newton on q, in float64", ToTheEnd, 1))
 
 
-def plan_for(topology: Topology | Volume) -> Sequence[Phase]:
-    """The phases for a mesh of this size and these cells."""
+def plan_for(topology: Topology | Volume, free: int) -> Sequence[Phase]:
+    """The phases for a mesh of so many free nodes and these cells."""
     if isinstance(topology, Volume):
         if isinstance(topology, MixedVolume):
             return MIXED_PLAN
-        return VOLUME_PLAN if len(topology.free) <= LARGE_VOLUME else LARGE_VOLUME_PLAN
+        return VOLUME_PLAN if free <= LARGE_VOLUME else LARGE_VOLUME_PLAN
     if isinstance(topology, Shell):
         return SURFACE_PLAN
-    if len(topology.free) <= SMALL:
+    if free <= SMALL:
         return SMALL_PLAN
     return LARGE_PLAN if topology.near_shapes is None else QUADS_PLAN

@@ -34,6 +34,7 @@ from gmsnet.methods.multigrid import Multigrid
 from gmsnet.methods.sliders import Sliders
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -196,23 +197,37 @@ class WholeMesh(Smoother):
         self.converged = True
         tally = np.zeros(3, dtype=np.int64)
         for doublings in self.doublings:
-            problem = Problem.of(field, doublings)
-            if not len(problem.moved):
+            before, floor = field.points.copy(), max(field.guard(executor).floor, 0.0)
+            whole = executor.gathered(field, None)  # on one process
+            inner = executor if whole is field else serial
+            can, taken = executor.returned(
+                field, whole, (False, False) if whole is None else self._taken(whole, doublings, floor, inner)
+            )
+            if not can:
                 break
-            start, settled = problem.start(field.points), CLOSE if doublings else self.settled
-            found = self._allowed(minimise(problem, start, settled), field, executor)
-            if found is None or not (self.best or problem.is_better(found, field.points)):
+            if not taken:
                 continue
-            before = field.points.copy()
-            field.points[:] = found
             field.floor.forget()
             if self.best and not test():
                 field.points[:] = before
                 continue
             self._slide(field, executor, doublings)
-            tally[MOVED] = (field.points != before).any(axis=1).sum()
+            moved = (field.points != before).any(axis=1) & field.topology.near_free
+            tally[MOVED] = executor.total(np.array(np.count_nonzero(moved)))
             break
         return tally
+
+    def _taken(self, field: Field, doublings: int, floor: float, executor: Executor) -> tuple[bool, bool]:
+        """Whether nodes can move, and whether they are where they were found to be better."""
+        problem = Problem.of(field, doublings)
+        if not len(problem.moved):
+            return False, False
+        start, settled = problem.start(field.points), CLOSE if doublings else self.settled
+        found = self._allowed(minimise(problem, start, settled), floor, field, executor)
+        if found is None or not (self.best or problem.is_better(found, field.points)):
+            return True, False
+        field.points[:] = found
+        return True, True
 
     def _slide(self, field: Field, executor: Executor, doublings: int) -> None:
         """The same once more with the nodes that slide."""
@@ -221,15 +236,15 @@ class WholeMesh(Smoother):
         problem = Problem.of(field, doublings, slide=True)
         if problem.sliders is None:
             return
-        found = self._allowed(minimise(problem, field.points, CLOSE), field, executor)
+        floor = max(field.guard(executor).floor, 0.0)
+        found = self._allowed(minimise(problem, field.points, CLOSE), floor, field, executor)
         if found is not None and problem.is_better(found, field.points):
             field.points[:] = found
             field.floor.forget()
         problem.sliders.back(field.points)
 
-    def _allowed(self, points: Floats, field: Field, executor: Executor) -> Floats | None:
+    def _allowed(self, points: Floats, floor: float, field: Field, executor: Executor) -> Floats | None:
         """The points as they can be taken, perhaps after cycles on the worst cells; None if they cannot be."""
-        floor = max(field.guard(executor).floor, 0.0)
         for repair in range(REPAIRS + 1):
             points = field.written(points)
             below = steps.count_below(

@@ -22,11 +22,13 @@ from gmsnet.kernels.methods import ranking
 from gmsnet.kernels.methods import worst_first_cycles as kernels
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.simplex.shell_measures import shell_shapes
+from gmsnet.kernels.star.guard import Guard, StarGuard
 from gmsnet.kernels.star.shell import ShellSimplices
 from gmsnet.methods.base import ALL_CELLS, Field, Method, MethodOptions, Smoother, Tally
 from gmsnet.methods.worst_in_space import WorstInSpace
 from gmsnet.methods.worst_on_surface import cycles_on_surface
 from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.volume import Volume
 
@@ -53,6 +55,7 @@ CYCLES = (
     Cycle(0.0003, 7, 12),
 )
 LAST = (Cycle(0.0003, 7, 16), Cycle(0.0003, 8, 16))
+HALVINGS = 24  # of the interval in which a limit is looked for: single precision has no more
 GAIN = 1e-4  # in the minimum 1/q: less is none
 
 
@@ -70,8 +73,11 @@ class WorstFirst(Smoother):
     enough: float
     converged: bool
     next: int
+    limit: np.float32
+    gathered: NDArray[np.int32]
 
     least = gained = -math.inf
+    shared_out = True
 
     def __init__(self, cycles: tuple[Cycle, ...] = CYCLES, at_once: int = 1, enough: float = math.inf) -> None:
         self.cycles, self.at_once, self.enough = cycles, at_once, enough
@@ -86,25 +92,45 @@ class WorstFirst(Smoother):
             return self._in_space(field, executor, test)
         simplices = topology.changeable
         if self.cells is None or self.next >= len(self.cycles):
-            self.cells, self.least = candidates(field, executor)
+            self.cells, self.least, self.limit = candidates(field, executor)
         if self.least >= self.enough:
             self.converged = True
             return tally
         goes_on = self.next >= len(self.cycles)
         chosen = LAST if goes_on else self.cycles[self.next : self.next + self.at_once]
-        count = simplices.cell_count
+        count = executor.cell_count(simplices)
         plan = [(max(FEWEST, math.ceil(cycle.share * count)), cycle.power, cycle.sweeps) for cycle in chosen]
+        guard = field.guard(executor)
         if isinstance(topology, Shell):
-            before, late, after = cycles_on_surface(field, topology, self.cells, field.guard(executor), plan, tally)
+            before, late, after = cycles_on_surface(field, topology, self.cells, guard, plan, tally)
         else:
-            before, late, after = kernels.cycles(
-                field.points, simplices, self.cells, topology.near_free, topology.memory, topology.links,
-                field.guard(executor), np.array(plan), tally,
-            )  # fmt: skip
+            part = executor.gathered(field, self.cells)  # on one process
+            if isinstance(guard, StarGuard):
+                guard = guard._replace(floors=executor.lent(guard.floors))
+            found = (0.0, 0.0, 0.0, tally) if part is None else self._cycles(part, field, guard, plan)
+            before, late, after, tally = executor.returned(field, part, found)
         self.next += len(chosen)
         self.converged = goes_on and after < before + GAIN
         self.least, self.gained = after, after - late
         return tally
+
+    def _cycles(
+        self, part: Field, field: Field, guard: Guard, plan: list[tuple[int, int, int]]
+    ) -> tuple[float, float, float, Tally]:  # fmt: skip
+        """What ``cycles`` returns, and the tally. part: the field, or the cells around the candidates of all processes.
+
+        The candidates of these are the same cells, for they are all that were up to a limit.
+        """
+        topology, tally, cells = part.planar, np.zeros(3, dtype=np.int64), self.cells
+        if part is not field:
+            if self.next == 0 or self.next >= len(self.cycles):
+                self.gathered = up_to(self.limit, shapes_in(part, serial))
+            cells = self.gathered
+        figures = kernels.cycles(
+            part.points, topology.changeable, cells, topology.near_free, topology.memory, topology.links, guard,
+            np.array(plan), tally,
+        )  # fmt: skip
+        return *figures, tally
 
     def _in_space(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         inner = WorstInSpace()
@@ -113,12 +139,22 @@ class WorstFirst(Smoother):
         return tally
 
 
-def candidates(field: Field, executor: Executor) -> tuple[NDArray[np.int32], float]:
-    """The worst cells, by their place among those that can change: at least the share CANDIDATES of them; and the
-    minimum 1/q.
+def candidates(field: Field, executor: Executor) -> tuple[NDArray[np.int32], float, np.float32]:
+    """The worst cells, by their place among those that can change: at least the share CANDIDATES of them; the minimum
+    1/q; and the 1/q up to which all are candidates.
 
     The floor of the guard is told of the worst of these.
     """
+    shape = shapes_in(field, executor)
+    wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * executor.cell_count(field.topology.changeable)))
+    limit = limit_of(shape, wanted, executor)
+    cells = up_to(limit, shape)
+    field.floor.watch(cells, shape[cells], executor)
+    return cells, executor.minimum(float(shape[cells].min(initial=math.inf))), limit
+
+
+def shapes_in(field: Field, executor: Executor) -> NDArray[np.float32]:
+    """1/q of each corner simplex that can change."""
     simplices = field.topology.changeable
     assert isinstance(simplices, Simplices | ShellSimplices)
     shape = np.empty(len(simplices.rows), dtype=np.float32)
@@ -128,10 +164,31 @@ def candidates(field: Field, executor: Executor) -> tuple[NDArray[np.int32], flo
         shapes(field.points, simplices, first, last, shape)
 
     executor.map(look, 0, -(-len(shape) // LANES))
-    wanted = max(FEWEST_CANDIDATES, math.ceil(CANDIDATES * simplices.cell_count))
-    cells: NDArray[np.int32] = ranking.worst(shape, wanted)
-    field.floor.watch(cells, shape[cells])
-    return cells, float(shape[cells].min(initial=math.inf))
+    return shape
+
+
+def limit_of(shape: NDArray[np.float32], wanted: int, executor: Executor = serial) -> np.float32:
+    """The 1/q up to which there are as many as are wanted or a quarter more, or any number if many are equal.
+
+    shape: (S,) between −1 and 1. The limit is found by halving.
+    """
+    low, high = -1.0, 1.0 + 1e-6
+    count = executor.counted(np.ones(len(shape), dtype=bool))
+    for _ in range(HALVINGS):
+        if count <= wanted + wanted // 4:
+            break
+        middle = 0.5 * (low + high)
+        fewer = executor.counted(shape <= np.float32(middle))
+        if fewer < wanted:
+            low = middle
+        else:
+            high, count = middle, fewer
+    return np.float32(high)
+
+
+def up_to(limit: np.float32, shape: NDArray[np.float32]) -> NDArray[np.int32]:
+    """Where all those stand that are at most the limit."""
+    return np.flatnonzero(shape <= limit).astype(np.int32)
 
 
 def create(options: MethodOptions) -> WorstFirst:

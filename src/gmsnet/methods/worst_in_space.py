@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.space import SpaceBlocks
-from gmsnet.measure.dihedral import largest, ratios_of, renew
+from gmsnet.measure.dihedral import ratios_of, renew
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 # The share of all cells, k of p = 3·2^k, and how many sweeps. Of small meshes MORE times as many, up to FEWEST.
 CYCLES = ((0.004, 2, 4), (0.002, 4, 8), (0.001, 5, 12))
-MORE, FEWEST, LEAST, WATCHED = 2.0, 225_000.0, 12, 64  # FEWEST: times the share
+MORE, FEWEST, LEAST = 2.0, 225_000.0, 12  # FEWEST: times the share
 
 
 class WorstInSpace(Smoother):
@@ -41,9 +41,10 @@ class WorstInSpace(Smoother):
         guard, cells = field.guard(executor), topology.changeable
         ratios = ratios_of(field.points, cells, executor)
         tangled = _set_aside(ratios, cells, topology.near_free)
-        before = after = float(ratios.max(initial=K3))
+        before = after = _most(ratios, executor)
+        every = executor.counted(np.ones(len(ratios), dtype=bool))
         for share, number, sweeps in CYCLES:
-            nodes = np.unique(cells.rows[largest(ratios, how_many(share, len(ratios)))])
+            nodes = np.unique(cells.rows[executor.lowest_rows(-ratios, how_many(share, every))])
             nodes = nodes[topology.near_free[nodes]]
             stars = topology.stars_of(nodes.astype(np.int64))
             power = Power3.of(number, min(after / K3, 1e30))
@@ -58,12 +59,16 @@ class WorstInSpace(Smoother):
                 _set_aside(ratios, cells, topology.near_free)
             else:
                 renew(ratios, field.points, cells, nodes, executor)
-            after = float(ratios.max(initial=K3))
+            after = _most(ratios, executor)
         least = (K3 / after) ** (1.0 / 3.0)
         self.least, self.gained = least, least - (K3 / before) ** (1.0 / 3.0)
-        few = largest(ratios, WATCHED)
-        field.floor.watch(few, 1.0 / np.maximum(ratios[few], 1.0))
+        field.floor.watch(np.arange(len(ratios), dtype=np.int32), -ratios, executor)
         return tally
+
+
+def _most(ratios: Floats, executor: Executor) -> float:
+    """The largest of all, or of a regular tetrahedron."""
+    return -executor.minimum(-float(ratios.max(initial=K3)))
 
 
 def how_many(share: float, cells: int) -> int:

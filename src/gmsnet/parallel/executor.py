@@ -51,6 +51,68 @@ class Executor(Protocol):
         """
         ...
 
+    def lowest_rows(
+        self, values: NDArray[np.float64], many: int, rows: NDArray[np.int32] | None = None
+    ) -> NDArray[np.int32]:
+        """Which of the corner simplices that can change have the lowest values: so many, or all if they are fewer.
+
+        values: one for each row of ``changeable``, or of some ``rows``. Of equal ones those that come first in the
+        whole mesh. Returns indices into ``values``, ascending.
+        """
+        ...
+
+    def counted(self, flags: NDArray[np.bool_]) -> int:
+        """How many rows of ``changeable`` are flagged, each once. flags: (S,)."""
+        ...
+
+    def cell_count(self, simplices: Any) -> int:
+        """How many cells the rows of ``changeable`` belong to. simplices: these rows."""
+        ...
+
+    def every(self, stride: int, length: int, size: int = 1) -> NDArray[np.int32]:
+        """Of so many rows of ``changeable`` those in every stride-th block of ``size`` of the whole mesh, each once."""
+        ...
+
+    def row_numbers(self, rows: NDArray[np.int32]) -> NDArray[np.int64]:
+        """The places in the whole mesh of rows of ``changeable``."""
+        ...
+
+    def free_numbers(self, near_free: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """The places, among the free nodes of the whole mesh, of those that are free here, in memory order."""
+        ...
+
+    def in_order(self, numbers: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values (K, …) of all processes in the order of their numbers, which are ascending here."""
+        ...
+
+    def gathered(self, field: Any, rows: NDArray[np.int32] | None) -> Any:
+        """What is smoothed, with all cells at the free nodes of some rows of ``changeable``, of all processes.
+
+        Those nodes alone are free. rows: None for the whole mesh. Returns a Field on one process, None on the others. A
+        single process has ``field`` itself, where more nodes may be free.
+        """
+        ...
+
+    def restricted(self, topology: Any, active: NDArray[np.bool_]) -> Any:
+        """A topology in which the active nodes (N,) by places in memory alone are free, of those that are free here."""
+        ...
+
+    def of(self, topology: Any) -> Executor:
+        """The executor for what was ``restricted``, and for others this one."""
+        ...
+
+    def lent(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values (N,) at nodes, in memory order, for what was gathered last: in its order, where it is."""
+        ...
+
+    def returned(self, field: Any, part: Any, result: Result) -> Result:
+        """The points of what was gathered go back into ``field``; returns the result of the process that had it."""
+        ...
+
+    def blocks_with(self, rows: NDArray[np.int32], size: int) -> NDArray[np.int32]:
+        """The blocks of ``changeable``, of so many rows, that have some of these rows, of any process."""
+        ...
+
     def minimum(self, value: Figure) -> Figure:
         """The least of what all processes give; of an array, for each of its places."""
         ...

@@ -17,6 +17,7 @@ from gmsnet.methods.base import Field, Tally
 from gmsnet.methods.dihedral import Dihedral
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS
@@ -40,13 +41,14 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
         return state
     topology, level = state.rest or state.topology, LEVELS.index(options.guard)
     assert isinstance(topology, Volume)
+    outer, executor = executor, executor.of(topology)
     field = Field(state.points.copy(), topology, state.precision, level, constraint=state.constraint)
     if isinstance(state.constraint, Surface):
         locate3(state.constraint, field.points)
     best, taken, smoother = state.points, totals, Dihedral()
     tally: Tally = np.zeros(3, dtype=np.int64)
     for spent in SPENT if totals.shape_min >= ROOM else SPENT[:1]:
-        smoother.floor = floor_for_angles(state, level, 1.0 / (1.0 / totals.shape_min + spent), executor)
+        smoother.floor = floor_for_angles(state, level, 1.0 / (1.0 / totals.shape_min + spent), outer)
         found = smoother.sweep(field, executor, lambda: False)
         after = totals_of(field.points, topology.scored, executor)
         assert after is not None
@@ -56,7 +58,7 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
         best, taken, tally = field.points.copy(), after, tally + found
     if taken is totals:
         return state
-    return with_sweep(state, options, best, taken, smoother.phase, tally)
+    return with_sweep(state, options, best, taken, smoother.phase, tally, executor=outer)
 
 
 def totals_at_end(state: State, options: SmoothOptions, executor: Executor, *, mixed: bool = False) -> Totals | None:
@@ -81,11 +83,11 @@ def ended_of_itself(state: State, options: SmoothOptions) -> bool:
 
 def with_sweep(
     state: State, options: SmoothOptions, points: Floats, totals: Totals | None, phase: str, tally: Tally,
-    sweeps: int = 1,
+    sweeps: int = 1, executor: Executor = serial,
 ) -> State:  # fmt: skip
     """The state after sweeps to these points, recorded and told. totals: theirs, if they are known of all cells."""
     if totals is None or state.rest:
-        totals = totals_of(points, state.topology.scored)
+        totals = totals_of(points, state.topology.scored, executor)
         assert totals is not None
     moved, truncated, dropped = tally.tolist()
     sweep = Sweep(

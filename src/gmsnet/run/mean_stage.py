@@ -43,21 +43,22 @@ def improve_mean(state: State, options: SmoothOptions, executor: Executor) -> St
         return state
     topology = state.rest or state.topology
     assert isinstance(topology, Volume)
-    least = float(worst(state.points, topology.scored, 1, WIDE, executor).measure[0])
-    for share in SHARES if len(topology.free) <= LARGE else SHARES[-1:]:
+    outer, executor = executor, executor.of(topology)
+    least = worst(state.points, topology.changeable, 1, WIDE, executor).least
+    for share in SHARES if executor.total(np.array(len(topology.free))) <= LARGE else SHARES[-1:]:
         shape = max(share * min(most_shape_below(least, WIDE), 1.0), totals.shape_min * (1.0 + ROUNDING))
         field = Field(state.points.copy(), topology, state.precision, level, constraint=state.constraint)
         if isinstance(state.constraint, Surface):
             locate3(state.constraint, field.points)
         smoother = MeanInSpace(floor_of(shape))
         tally = smoother.sweep(field, executor, lambda: False)
-        if share == SHARES[-1] or not len(below(field.points, topology.scored, least, WIDE, executor).rows):
+        if share == SHARES[-1] or below(field.points, topology.changeable, least, WIDE, executor).least == math.inf:
             break
     after = totals_of(field.points, topology.scored, executor)
     assert after is not None
     if after.shape_mean < totals.shape_mean + GAIN or after.shape_min < totals.shape_min - 1e-12 or after.uncertain:
         return state
-    return with_sweep(state, options, field.points, after, smoother.phase, tally)
+    return with_sweep(state, options, field.points, after, smoother.phase, tally, executor=outer)
 
 
 def _of_mixed(state: State, options: SmoothOptions, executor: Executor) -> State:

@@ -54,6 +54,7 @@ def _once(state: State, options: SmoothOptions, executor: Executor) -> State:
     rest = _set_aside(state, LEVELS.index(options.guard), executor)
     if rest is None:
         return state
+    outer, executor = executor, executor.of(rest)
     before = _totals(state.points, rest, executor)
     start = Start(rest, state.points, state.precision, None, state.history, state.constraint, state.curved)
     run = Run(start, Auto(), replace(options, callback=None), executor)
@@ -65,7 +66,7 @@ def _once(state: State, options: SmoothOptions, executor: Executor) -> State:
     own = run.history[len(state.history) :]
     tally = np.array([[sweep.moved, sweep.truncated, sweep.dropped] for sweep in own]).sum(axis=0)
     sweeps = own[-1].index - state.history[-1].index  # there are some, or nothing would have been gained
-    state = with_sweep(replace(state, rest=rest), options, run.best, None, PHASE, tally, sweeps)
+    state = with_sweep(replace(state, rest=rest), options, run.best, None, PHASE, tally, sweeps, executor=outer)
     return state.ended(reason) if reason == MAX_SWEEPS else state
 
 
@@ -80,34 +81,39 @@ def _set_aside(state: State, level: int, executor: Executor) -> Volume | None:
     assert isinstance(topology, Volume)
     if isinstance(state.constraint, Surface):
         locate3(state.constraint, points)
+    outer = executor.of(topology)
     cells, rest, alike = topology.changeable, None, ALIKE if state.rest else APART
-    aside = np.isinf(ratios_of(points, cells, executor))
-    if aside.any():  # with inverted cells in the mesh, sweeps keep nothing of the others
+    aside = np.isinf(ratios_of(points, cells, outer))
+    if outer.counted(aside):  # with inverted cells in the mesh, sweeps keep nothing of the others
         alike = 0.0
     for _ in range(ROUNDS):
-        ratios = ratios_of(points, cells, executor)
+        ratios = ratios_of(points, cells, outer)
         ratios[aside] = 0.0
-        limit = _limit(ratios, alike**3)
+        limit = _limit(ratios, alike**3, outer)
         if limit == math.inf:
             break
         alike = ALIKE
         aside |= ratios > limit
-        active = topology.near_free.copy()
-        active[cells.rows[aside]] = False
-        if not active.any():
+        free = topology.near_free.copy()
+        free[cells.rows[aside]] = False
+        if not executor.total(np.array(np.count_nonzero(free))):
             return None
+        everywhere = free.astype(np.float64)
+        executor.exchange(everywhere)
+        active = everywhere > 0.0
         aside |= ~active[cells.rows].any(axis=1)  # cells without a node that may move have no say any more
-        rest = topology.restricted(active)
+        rest = executor.restricted(topology, active)
         field = Field(points, rest, state.precision, level, constraint=state.constraint)
-        WorstInSpace().sweep(field, executor, lambda: False)
+        WorstInSpace().sweep(field, executor.of(rest), lambda: False)
     return rest
 
 
-def _limit(ratios: Floats, alike: float) -> float:
+def _limit(ratios: Floats, alike: float, executor: Executor) -> float:
     """1/η³ above which cells are set aside; infinity, where the worst are many alike. alike: a factor of it."""
-    count = min(max(FEWEST, math.ceil(SHARE * len(ratios))), len(ratios))
-    many = float(np.partition(ratios, len(ratios) - count)[len(ratios) - count])
-    most = float(ratios.max(initial=0.0))
+    every = executor.counted(np.ones(len(ratios), dtype=bool))
+    count = min(max(FEWEST, math.ceil(SHARE * every)), every)
+    many = executor.minimum(float(ratios[executor.lowest_rows(-ratios, count)].min(initial=math.inf)))
+    most = -executor.minimum(-float(ratios.max(initial=0.0)))
     return math.inf if most <= alike * many else max(most / STEP**3, ALIKE**3 * many)
 
 

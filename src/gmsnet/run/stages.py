@@ -37,8 +37,11 @@ STAGES: tuple[Stage, ...] = (
 )  # fmt: skip
 
 
-def carry_out(state: State, options: SmoothOptions, executor: Executor, stages: Sequence[Stage] = STAGES) -> State:
-    """The state after all stages, or after the one that was interrupted, written back."""
+SWEEPS: tuple[Stage, ...] = (sweep, improve_rest, improve_dihedrals, improve_mean)  # of a valid mesh, without walls
+
+
+def carry_out_all(state: State, options: SmoothOptions, executor: Executor, stages: Sequence[Stage] = SWEEPS) -> State:
+    """The state after all stages, or after the one that was interrupted."""
     for stage in stages:
         try:
             with interruptible():
@@ -47,6 +50,12 @@ def carry_out(state: State, options: SmoothOptions, executor: Executor, stages: 
             state = state.interrupted(interruption)
         if state.interruption is not None:
             break
+    return state
+
+
+def carry_out(state: State, options: SmoothOptions, executor: Executor, stages: Sequence[Stage] = STAGES) -> State:
+    """The state after all stages, or after the one that was interrupted, written back."""
+    state = carry_out_all(state, options, executor, stages)
     last = interruptible()(write_back)
     try:
         return last(state, options, executor)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -40,12 +40,14 @@ class Stars:
 class Colouring:
     """Greedy colours of the nodes at some places in memory, in this order; made when they are first asked for.
 
-    start, ring: CSR by places in memory, the ring with WIDTH more (kernels.topology.connectivity).
+    start, ring: CSR by places in memory, the ring with WIDTH more (kernels.topology.connectivity). fewest: stars have
+    at least so many colours, though some have no nodes.
     """
 
     places: Ints
     start: Offsets
     ring: Ints
+    fewest: int = field(default=0, kw_only=True)
 
     @cached_property
     def colours(self) -> Ints:

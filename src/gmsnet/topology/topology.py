@@ -183,7 +183,7 @@ class Topology(Connectivity):
             kind, pattern = numbers.take(free), self.patterns
             sizes = np.diff(pattern.row)
             most = int(max(sizes.max(initial=0), np.diff(pattern.first).max(initial=0)))
-        colours, kinds = int(self.near_colours.max(initial=-1)) + 1, len(sizes)
+        colours, kinds = max(int(self.near_colours.max(initial=-1)) + 1, self.colouring.fewest), len(sizes)
         kind = self.near_colours.take(free) * kinds + kind
         number = -(-np.bincount(kind, minlength=colours * kinds).reshape(colours, kinds) // LANES)
         first, to = np.zeros((2, colours + 1), dtype=np.int64)

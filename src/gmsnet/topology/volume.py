@@ -158,7 +158,7 @@ class Volume(Connectivity):
         cells = np.diff(self.start)[nodes]
         colour = self.near_colours[nodes]
         order = nodes[np.lexsort((nodes, cells, colour))].astype(np.int32)
-        colours = int(colour.max(initial=-1)) + 1
+        colours = max(int(colour.max(initial=-1)) + 1, self.colouring.fewest)
         sizes = np.bincount(colour, minlength=colours)
         blocks = -(-sizes // LANES3)
         of_colour = np.concatenate([[0], np.cumsum(blocks)])

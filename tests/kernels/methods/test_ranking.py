@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import gmsnet
@@ -26,22 +25,6 @@ def test_shapes_are_those_of_the_report():
     cells = np.array([5, 0, count - 1], dtype=np.int32)
     ranking.shapes_of(points, simplices, cells, some)
     np.testing.assert_allclose(some, report.shape[cells], rtol=1e-12)
-
-
-@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 2000), wanted=st.integers(1, 500))
-@settings(max_examples=100)
-def test_the_worst_are_all_up_to_a_limit(seed, count, wanted):
-    rng = np.random.default_rng(seed)
-    shape = rng.uniform(-1, 1, count).astype(np.float32) ** rng.choice([1, 3])
-    cells = ranking.worst(shape, wanted)
-    assert min(wanted, count) <= len(cells) <= max(wanted + wanted // 4, 1)
-    limit = shape[cells].max()
-    np.testing.assert_array_equal(cells, np.flatnonzero(shape <= limit))
-
-
-@pytest.mark.parametrize("value", [-1.0, 0.0, 0.5, 1.0])
-def test_equal_ones_are_taken_together(value):
-    assert len(ranking.worst(np.full(100, value, dtype=np.float32), 3)) == 100
 
 
 def test_free_nodes_once_each():

@@ -1,4 +1,4 @@
-"""Which cells are the worst, and which free nodes they have.
+"""How good some cells are, and which free nodes they have.
 
 Selection is exact, and does not depend on the order of the cells: all those up to a limit are taken, equal ones too.
 """
@@ -12,7 +12,6 @@ from gmsnet.kernels.simplex.mean_ratio2 import put_weights, shape_of, weights_at
 
 PLACE = 8  # bits of an id by which it is sorted at a time
 DIGITS = 1 << PLACE
-HALVINGS = 24  # of the interval in which a limit is looked for: single precision has no more
 
 
 @kernel
@@ -52,42 +51,6 @@ def shapes_of(points, simplices, cells, shape):
         x, y = points[a, 0], points[a, 1]
         px, py, qx, qy = points[b, 0] - x, points[b, 1] - y, points[c, 0] - x, points[c, 1] - y
         shape[k] = orientation[t] * shape_of(px, py, qx, qy, weights_at_first(simplices.shapes, t, True))
-
-
-@part
-def count_up_to(shape, limit):
-    """How many of the values are at most the limit."""
-    count = 0
-    for t in range(len(shape)):
-        count += shape[t] <= limit
-    return count
-
-
-@kernel
-def worst(shape, wanted):
-    """Indices (int32) of the worst cells, as many as are wanted or a quarter more, or any number if many are equal.
-
-    shape: (T,) between −1 and 1. They are all those up to a limit, which is found by halving.
-    """
-    low, high = -1.0, 1.0 + 1e-6
-    count = len(shape)
-    for _ in range(HALVINGS):
-        if count <= wanted + wanted // 4:
-            break
-        middle = 0.5 * (low + high)
-        fewer = count_up_to(shape, shape.dtype.type(middle))
-        if fewer < wanted:
-            low = middle
-        else:
-            high, count = middle, fewer
-    limit = shape.dtype.type(high)
-    cells = np.empty(count, dtype=np.int32)
-    found = 0
-    for t in range(len(shape)):
-        if shape[t] <= limit:
-            cells[found] = t
-            found += 1
-    return cells
 
 
 @part

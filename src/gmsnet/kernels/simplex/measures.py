@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
-from gmsnet.kernels.simplex.mean_ratio2 import TINY, TWO_SQRT3, put_weights, shape_of, weights_at_first, weights_in
+from gmsnet.kernels.simplex.mean_ratio2 import TINY, TWO_SQRT3
 from gmsnet.kernels.simplex.predicates import SHEWCHUK, UNDERFLOW
 
 TAN_PI_8 = math.tan(math.pi / 8.0)
@@ -220,25 +220,3 @@ def per_surface_cell(points, triangles, columns):
             px * px + py * py + pz * pz, qx * qx + qy * qy + qz * qz, rx * rx + ry * ry + rz * rz,
         )  # fmt: skip
         columns[LOW, t], columns[HIGH, t], columns[SHAPE, t], columns[ASPECT, t] = low, high, shape, aspect
-
-
-@kernel
-def mean_shape_of_sample(points, simplices, stride):
-    """The mean 1/q over every stride-th block of LANES corner simplices."""
-    rows, orientation = simplices.rows, simplices.orientation
-    work, shape, weight = np.empty(ROOM), np.empty(LANES), np.empty(3 * LANES)
-    total_shape, count = 0.0, 0
-    for start in range(0, len(rows), stride * LANES):
-        filled = min(LANES, len(rows) - start)
-        gather(points, rows, orientation, start, filled, work)
-        for lane in range(filled):
-            put_weights(weights_at_first(simplices.shapes, start + lane, True), weight, lane)
-        for lane in range(filled):
-            px, py = work[lane], work[LANES + lane]
-            qx, qy = work[2 * LANES + lane], work[3 * LANES + lane]
-            weights = weights_in(simplices.shapes, weight, lane)
-            shape[lane] = work[SIGN + lane] * shape_of(px, py, qx, qy, weights)
-        for lane in range(filled):
-            total_shape += shape[lane]
-        count += filled
-    return total_shape / count

@@ -1,0 +1,126 @@
+"""What the first rank smooths for all: cells of all ranks around some nodes, or all cells, and where the nodes go then.
+
+What follows one another, as the visits to the worst cells do, goes by global ids. So it comes to the same wherever the
+cells are, if the stars are whole.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.distributed.part import Part
+from gmsnet.distributed.piece import Ids
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.methods.base import Field
+from gmsnet.topology.topology import Topology
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+class Parcel(NamedTuple):
+    """Nodes and cells of one rank. ids: (n,). places: (n, dim) in the input, by which they are ordered. points: (n, 2)
+    as they are. moves: (n,) bool, which are free. cells: for each block, nodes by their ids and the numbers of cells.
+    """
+
+    ids: Ids
+    places: Floats
+    points: Floats
+    moves: Flags
+    cells: list[tuple[Ids, Ids]]
+
+
+class Loan(NamedTuple):
+    """ids: (n,) those that this rank has sent. field: what was gathered, on the first rank; all: the ids of its nodes.
+
+    sent: on the first rank, the ids of each rank.
+    """
+
+    ids: Ids
+    field: Field | None = None
+    all: Ids | None = None
+    sent: list[Ids] | None = None
+
+    def at_nodes(self, part: Part, values: Floats) -> Floats:
+        """Values (n,) of a rank, in memory order, in that of the gathered field; none but on the first rank."""
+        came = part.comm.gather(values[self._places(part)])
+        found = np.empty(0 if self.all is None else len(self.all))
+        if came is None or self.field is None or self.all is None or self.sent is None:
+            return found
+        for ids, some in zip(self.sent, came, strict=True):
+            found[np.searchsorted(self.all, ids)] = some
+        in_memory: Floats = found[self.field.topology.memory]
+        return in_memory
+
+    def _places(self, part: Part) -> NDArray[np.int32]:
+        """In memory, of the nodes that were sent."""
+        return part.topology.places[np.searchsorted(part.around.nodes.ids, self.ids)]
+
+    def give_back(self, part: Part, points: Floats) -> None:
+        """The points of the gathered field go to the ranks. points: (n, 2) of a rank, in memory order."""
+        parcels: list[Floats] | None = None
+        if self.field is not None and self.all is not None and self.sent is not None:
+            found = np.empty_like(self.field.points)
+            found[self.field.topology.memory] = self.field.points
+            parcels = [found[np.searchsorted(self.all, ids)] for ids in self.sent]
+        points[self._places(part)] = part.comm.scatter(parcels)
+        for axis in range(points.shape[1]):  # to those, too, that have sent no cell of a node
+            points[:, axis] = part.halo.spread(points[:, axis])
+
+
+def gathered_field(part: Part, field: Field, rows: NDArray[np.int32] | None) -> Loan:
+    """See Executor.gathered. All ranks call it; the mesh is in a plane."""
+    parcel = _parcel(part, field, rows)
+    came = part.comm.gather(parcel)
+    if came is None:
+        return Loan(parcel.ids)
+    ids, first = np.unique(np.concatenate([each.ids for each in came]), return_index=True)
+    places, points = (np.concatenate([each[k] for each in came])[first] for k in (1, 2))
+    moves = np.zeros(len(ids), dtype=bool)
+    for each in came:
+        moves[np.searchsorted(ids, each.ids[each.moves])] = True
+    blocks = []
+    for kind, cells in zip(_faces(part), zip(*(each.cells for each in came), strict=True), strict=True):
+        nodes, numbers = (np.concatenate(each) for each in zip(*cells, strict=True))
+        _, once = np.unique(numbers, return_index=True)
+        nodes = np.searchsorted(ids, nodes[once])
+        blocks.append(CellBlock(kind[1], nodes, np.zeros(len(nodes), dtype=np.int64)))
+    whole = part.mesh
+    assert whole.box is not None
+    mesh = Mesh(places, tuple(blocks), single=whole.single).as_part(
+        whole.plane, (whole.has_volumes, whole.has_quads), whole.exponent, whole.box
+    )
+    topology = Topology.of(mesh, ~moves)
+    points = points[topology.memory]
+    return Loan(parcel.ids, Field(points, topology, field.precision, field.level), ids, [each.ids for each in came])
+
+
+def _faces(part: Part) -> list[tuple[int, str]]:
+    """Which blocks have cells that move, and their kinds."""
+    kinds = enumerate(block.kind for block in part.around.blocks)
+    return [(k, kind) for k, kind in kinds if kind in ("triangle", "quad")]
+
+
+def _parcel(part: Part, field: Field, rows: NDArray[np.int32] | None) -> Parcel:
+    """What this rank brings: all cells at the nodes that it moves; without rows, its own."""
+    topology, ids = field.topology, part.around.nodes.ids
+    free, active = topology.near_free, topology.near_free
+    if rows is not None:
+        active = np.zeros(len(free), dtype=bool)
+        active[topology.changeable.rows[rows]] = True
+        active &= free
+    moves = np.zeros(len(ids), dtype=bool)
+    moves[topology.memory] = active
+    used, cells = moves.copy(), []
+    for k, _ in _faces(part):
+        block, nodes = part.around.blocks[k], part.mesh.cells[k].nodes
+        chosen = part.around.own[k] if rows is None else moves[nodes].any(axis=1)
+        used[nodes[chosen]] = True
+        cells.append((block.nodes[chosen], block.numbers[chosen]))
+    by_id = np.empty_like(field.points)
+    by_id[topology.memory] = field.points
+    return Parcel(ids[used], part.mesh.points[used], by_id[used], moves[used], cells)
