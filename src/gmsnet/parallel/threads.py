@@ -67,8 +67,9 @@ class Process:
 
     def every(self, stride: int, length: int, size: int = 1) -> NDArray[np.int32]:
         """See Executor."""
-        rows = np.arange(length, dtype=np.int32)
-        return rows[::stride] if size == 1 else rows[rows // size % stride == 0]
+        first = np.arange(0, length, stride * size, dtype=np.int32)
+        rows = (first[:, None] + np.arange(size, dtype=np.int32)).ravel()
+        return rows[rows < length].astype(np.int32)
 
     def row_numbers(self, rows: NDArray[np.int32]) -> NDArray[np.int64]:
         """See Executor."""
