@@ -17,6 +17,7 @@ from support.ranks import parts_at_random, same
 from gmsnet.generate import sheared_mesh
 from gmsnet.methods.auto import WHOLE
 from gmsnet.run.options import SmoothOptions
+from gmsnet.run.rest_stage import PHASE
 
 TETRAHEDRA = gmsnet.generate.random_volume(400, seed=2)
 PLANAR = {
@@ -36,6 +37,17 @@ def test_tetrahedra_have_all_stages(guard):
     if guard != "star":
         assert "dihedral angles" in [sweep.stage for sweep in told.history]
     assert told.messages > 0
+
+
+@pytest.mark.parametrize(("ranks", "how"), [(2, "strips"), (3, "interleaved")])
+def test_the_rest_behind_cells_that_cannot_become_better(ranks, how):
+    mesh = gmsnet.generate.random_volume(1200, seed=4)
+    worst = np.argsort(gmsnet.quality(mesh).shape)[:12]
+    fixed = np.zeros(len(mesh.points), dtype=bool)
+    fixed[mesh.cells[0].nodes[worst]] = True
+    told = same(mesh, AUTO, parts_at_random(mesh, ranks, np.random.default_rng(5), how), ranks, fixed)
+    assert told.gathered == ""
+    assert PHASE in [sweep.stage for sweep in told.history]
 
 
 @given(
