@@ -149,8 +149,17 @@ def _fits(source: FileSource, mesh: Mesh) -> bool:
     cells the other way round."""
     if source.fits(mesh) or source.format != "cgns" or len(mesh.cells) != len(source.cells):
         return source.fits(mesh)
-    same = [np.array_equal(np.sort(a.nodes), np.sort(b.nodes)) for a, b in zip(mesh.cells, source.cells, strict=True)]
+    same = [_turned_alike(a.nodes, b.nodes) for a, b in zip(mesh.cells, source.cells, strict=True)]
     return all(same) and source.fits(Mesh(mesh.points, source.cells, mesh.region_names, node_sets=mesh.node_sets))
+
+
+def _turned_alike(cells: np.ndarray, others: np.ndarray) -> bool:
+    """Whether the nodes of all cells (T, k) are those of the others in one and the same order."""
+    if cells.shape != others.shape or not len(cells):
+        return cells.shape == others.shape
+    places = {node: place for place, node in enumerate(cells[0].tolist())}
+    order = [places.get(node, -1) for node in others[0].tolist()]
+    return -1 not in order and len(set(order)) == len(order) and np.array_equal(cells[:, order], others)
 
 
 def _spliced(source: FileSource, points: np.ndarray) -> dict[str, bytes]:
