@@ -1,18 +1,15 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import naive
-from support.ranks import ranks_of
 
 import gmsnet
 from gmsnet import CellBlock, Mesh
-from gmsnet.generate.recombine import random_quad_mesh
 from gmsnet.measure.report import measure
 from gmsnet.measure.signs import exact_signs
 from gmsnet.measure.summary import percentile
@@ -154,21 +151,6 @@ def test_how_the_work_is_shared_out_does_not_change_a_bit_of_the_totals():
     whole = totals_of(*given)
     for ends in ([1], [17, 40], [40, 41, 42, 90]):
         assert totals_of(*given, Parts(ends)) == whole
-
-
-@pytest.mark.parametrize("ends", [[0], [1000], [100, 101, 4000]])
-@pytest.mark.parametrize("kind", ["triangles", "quads"])
-def test_processes_that_have_a_part_of_the_cells_each_form_the_totals_of_all(ends, kind):
-    """To the bit, though none of them sees more than its own cells, and one may have none."""
-    mesh = gmsnet.random_mesh(3000, seed=7) if kind == "triangles" else random_quad_mesh(2000, seed=1)
-    topology = Topology.of(mesh)
-    points, whole = near_points(mesh, topology), topology.simplices
-    rows = np.arange(len(whole.rows)) if whole.cells is None else whole.cells
-    parts = [whole.take(np.flatnonzero(some)) for some in np.digitize(rows, ends) == np.arange(len(ends) + 1)[:, None]]
-    ranks = ranks_of(len(parts))
-    with ThreadPoolExecutor(len(parts)) as pool:
-        found = list(pool.map(lambda part, rank: totals_of(points, part, rank), parts, ranks))
-    assert [repr(each) for each in found] == [repr(totals_of(points, whole))] * len(parts)  # nan is nan
 
 
 def test_what_is_changed_later_does_not_change_a_report():
