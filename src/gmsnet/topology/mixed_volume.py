@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.space import LANES3, Mixture, SpaceBlocks
 from gmsnet.kernels.topology import connectivity
-from gmsnet.kernels.topology import solids as kernels
+from gmsnet.kernels.topology import solid_stars as kernels
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.held import AT_BOUNDARY, reasons_in_space, released, sorted_out
 from gmsnet.topology.polygons import Ints
