@@ -26,7 +26,7 @@ from gmsnet.kernels.star.guard import (
 from gmsnet.kernels.star.guard3 import star_floors3
 from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
 from gmsnet.kernels.star.shell_simplices import star_floors_of_shell
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor

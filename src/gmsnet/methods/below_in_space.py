@@ -19,7 +19,7 @@ from gmsnet.kernels.methods import descent3
 from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
 from gmsnet.kernels.simplex.objectives3 import DIHEDRAL, Aim3
 from gmsnet.kernels.star.guard import STAR, Guard
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.measure.target import Target
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.methods.below import MANY, SMALL

@@ -33,7 +33,7 @@ from gmsnet.kernels.methods.getme import Queue
 from gmsnet.kernels.methods.getme_elements import Elements, Transformation
 from gmsnet.kernels.simplex.mean_ratio2 import SQUARE, Simplices
 from gmsnet.kernels.star.block import MOVED, Blocks
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import CELLS, TETRAHEDRA, Field, Method, MethodOptions, Smoother, Tally, by_colour, over_stars
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology

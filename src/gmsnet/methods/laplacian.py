@@ -27,7 +27,7 @@ from gmsnet.kernels.methods.laplacian3 import sweep3
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
 from gmsnet.kernels.star.shell import ShellStars
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, CELLS, Method, StarSmoother, Tally
 
 VARIANTS: dict[str, int | None] = {  # None: the plain form, which has a kernel of its own

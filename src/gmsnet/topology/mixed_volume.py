@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.star.space import LANES3, Mixture, SpaceBlocks
+from gmsnet.kernels.star.space_blocks import LANES3, Mixture, SpaceBlocks
 from gmsnet.kernels.topology import connectivity
 from gmsnet.kernels.topology import solid_stars as kernels
 from gmsnet.mesh.mesh import Mesh
