@@ -37,8 +37,7 @@ from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
 CELLS = ("triangle", "quad")  # the kinds of cells whose nodes may move
-TETRAHEDRA = (*CELLS, "tetra")
-ALL_CELLS = (*TETRAHEDRA, "hexahedron", "wedge", "pyramid")
+ALL_CELLS = (*CELLS, "tetra", "hexahedron", "wedge", "pyramid")
 TRIANGLES = ("triangle",)
 Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.star.stars)
 
