@@ -1,5 +1,7 @@
 """What every method that moves hexahedra, wedges and pyramids keeps, at every level, in exact arithmetic."""
 
+import os
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -53,7 +55,7 @@ def shapes_of(mesh, points, sense):
 
 @pytest.mark.parametrize("level", LEVELS)
 @given(mesh=some_meshes, choice=st.sampled_from(CHOICES), sweeps=st.integers(1, 5))
-@settings(max_examples=100)
+@settings(max_examples=int(os.environ.get("GMSNET_GUARD_EXAMPLES", 100)))
 def test_what_a_level_promises_is_kept_in_exact_arithmetic(level, mesh, choice, sweeps):
     sense = int(gmsnet.quality(mesh).cells.blocks[0].orientation[0])
     before = signs(mesh, mesh.points, sense)
