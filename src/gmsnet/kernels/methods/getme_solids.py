@@ -136,7 +136,10 @@ def fetch_cell(points, nodes, count, i, corners):
 @part
 def is_new(seen, count, cell):
     """Is a cell none of the first ``count`` ones?"""
-    return not (seen[:count] == cell).any()
+    new = True
+    for k in range(count):
+        new &= seen[k] != cell
+    return new
 
 
 @kernel
