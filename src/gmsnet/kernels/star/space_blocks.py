@@ -23,8 +23,8 @@ class Mixture(NamedTuple):
     [block][row][lane], the cell of each. edges: (B·LANES3,) how many nodes of the ring, from the first on, an edge
     joins to the free one. solids: all cells. at: (N + 1,), those at each node that are not valid just where their
     corner simplices are positive begin there in ``around``. Their numbers are 8t + the
-    corner. slack: (T,) of each cell (kernels.simplex.slack3) and gone: (8T,) how far each corner has gone of it, for
-    points that the guard alone has moved since both were set to 0.
+    corner; place: (8T,) where a number stands there, or −1. slack: (T,) of each cell (kernels.simplex.slack3). gone:
+    how far each corner in ``around`` has gone of it, if the guard alone has moved points since both were set to 0.
     """
 
     role: NDArray[np.uint8]
@@ -38,6 +38,7 @@ class Mixture(NamedTuple):
     around: NDArray[np.int32]
     slack: NDArray[np.float64]
     gone: NDArray[np.float64]
+    place: NDArray[np.int32]
 
 
 class SpaceBlocks(NamedTuple):

@@ -77,7 +77,7 @@ def stars_of_solids(nodes, kind, tables, roles, start, cell, corner, ring_start,
     roles: (K, 4) by the kind and by which vertex of the simplex the node is. local, role, owner have room for eight a
     corner. Returns how many there are.
     """
-    place = np.zeros(len(core), dtype=np.int64)
+    place, after = np.zeros(len(core), dtype=np.int64), np.empty(roles.max() + 2, dtype=np.int64)
     end = 0
     for v in range(len(core)):
         own[v] = end
@@ -85,29 +85,34 @@ def stars_of_solids(nodes, kind, tables, roles, start, cell, corner, ring_start,
             continue
         for j in range(core[v]):
             place[ring[ring_start[v] + j]] = j
+        after[:] = 0
+        for at in range(start[v], start[v + 1]):
+            t = kind[cell[at]]
+            for vertex in tables.at_corner[t, corner[at]]:
+                if vertex == NONE:
+                    break
+                after[roles[t, vertex & 3] + 1] += 1
+        after[0] = end
+        for number in range(1, len(after)):
+            after[number] += after[number - 1]
+        end = after[-1]
         for at in range(start[v], start[v + 1]):
             t = cell[at]
-            for s in range(8):
-                simplex = tables.simplices[kind[t], s]
-                if simplex[0] == NONE:
+            for vertex in tables.at_corner[kind[t], corner[at]]:
+                if vertex == NONE:
                     break
-                for k in range(4):
-                    if simplex[k] == corner[at]:
-                        put_simplex(nodes, t, simplex, k, roles[kind[t], k], place, own[v], end, local, role, owner)
-                        end += 1
+                put_simplex(nodes, t, kind[t], tables, vertex, roles, place, after, local, role, owner)
     own[len(core)] = end
     return end
 
 
 @inlined
-def put_simplex(nodes, t, simplex, k, number, place, first, end, local, role, owner):
-    """Puts a simplex behind those from first to end of its role or a lesser one."""
-    i = end
-    while i > first and role[i - 1] > number:
-        role[i], owner[i] = role[i - 1], owner[i - 1]
-        local[i, 0], local[i, 1], local[i, 2] = local[i - 1, 0], local[i - 1, 1], local[i - 1, 2]
-        i -= 1
-    role[i], owner[i] = number, t
+def put_simplex(nodes, t, kind, tables, vertex, roles, place, after, local, role, owner):
+    """Puts a simplex of cell t behind those of its role. after: where the next one of each goes."""
+    simplex, k = tables.simplices[kind, vertex >> 2], vertex & 3
+    number = roles[kind, k]
+    i = after[number]
+    role[i], owner[i], after[number] = number, t, i + 1
     for j in range(3):
         local[i, j] = place[nodes[t, simplex[OPPOSITE[k, j]]]]
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
+from gmsnet.kernels.simplex.mean_ratio3 import determinant
 from gmsnet.kernels.topology.facets import ALONE, NON_MANIFOLD
 
 FACETS = 6
@@ -22,13 +23,15 @@ class Tables(NamedTuple):
     """By the kind of a cell, NONE where there is nothing.
 
     facets: (K, 6, 4) corners, counter-clockwise as seen from outside. around: (3, K, 8, 4) the corners that an edge
-    joins to each; the others of its corner simplices; those of none. simplices: (K, 8, 4). inexact: (K,) whether
-    positive corner simplices do not tell that a cell is valid. facets_at: (K, 8) how many at each corner.
+    joins to each; the others of its corner simplices; those of none. simplices: (K, 8, 4). at_corner:
+    (K, 8, 8) 4s + k for each simplex s that has the corner as its vertex k. inexact: (K,) whether positive corner
+    simplices do not tell that a cell is valid. facets_at: (K, 8) how many at each corner.
     """
 
     facets: NDArray[np.int32]
     around: NDArray[np.int32]
     simplices: NDArray[np.int32]
+    at_corner: NDArray[np.int32]
     inexact: NDArray[np.bool_]
     facets_at: NDArray[np.int32]
 
@@ -152,6 +155,38 @@ def wind_solids(nodes, kind, tables, twin, piece, orientation):
                     consistent[parts] = False
         parts += 1
     return consistent[:parts]
+
+
+@kernel
+def list_simplices(nodes, kind, tables, rows, owner):
+    """Writes the corner simplices of all cells, cell by cell: rows (S, 4) and owner (S,), the cell."""
+    end = 0
+    for t in range(len(kind)):
+        for simplex in tables.simplices[kind[t]]:
+            if simplex[0] == NONE:
+                break
+            for k in range(4):
+                rows[end, k] = nodes[t, simplex[k]]
+            owner[end] = t
+            end += 1
+
+
+@kernel
+def corner_volumes(points, nodes, kind, tables, mean, size):
+    """Writes the mean of the determinants of the corner simplices of each cell, (T,), and that of their magnitudes."""
+    for t in range(len(kind)):
+        total, magnitude, count = 0.0, 0.0, 0
+        for simplex in tables.simplices[kind[t]]:
+            if simplex[0] == NONE:
+                break
+            d, a, b, c = nodes[t, simplex[0]], nodes[t, simplex[1]], nodes[t, simplex[2]], nodes[t, simplex[3]]
+            x, y, z = points[d, 0], points[d, 1], points[d, 2]
+            double = determinant(
+                points[a, 0] - x, points[a, 1] - y, points[a, 2] - z, points[b, 0] - x, points[b, 1] - y,
+                points[b, 2] - z, points[c, 0] - x, points[c, 1] - y, points[c, 2] - z,
+            )  # fmt: skip
+            total, magnitude, count = total + double, magnitude + abs(double), count + 1
+        mean[t], size[t] = total / count, magnitude / count
 
 
 @kernel
