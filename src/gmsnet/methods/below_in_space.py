@@ -66,7 +66,7 @@ class BelowInSpace(Smoother):
         rows, _ = self.target.tetrahedra_missing(field.points, cells)
         self.target_reached = not len(rows)
         many = MANY if self.target.dihedral is None else MANY_ANGLES
-        if self.target_reached or len(rows) > max(many * len(cells.rows), SMALL):
+        if self.target_reached or len(rows) > max(many * cells.cell_count, SMALL):
             return tally
         guard, everywhere = field.guard(executor), self.everywhere
         if self.target.dihedral is not None and field.level != STAR:
