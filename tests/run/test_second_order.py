@@ -169,6 +169,21 @@ def test_a_target_ends_the_run_when_it_is_met():
     assert result.after.shape.min() >= 0.5
 
 
+@pytest.mark.parametrize("kind", ["triangle6", "quad9", "mixed"])
+@pytest.mark.parametrize("share", [0.97, 1.1])
+def test_for_a_target_all_patches_are_tried(kind, share):
+    """That nothing of the first order is there to move is no reason to stop."""
+    _, mesh = twins(kind)
+    full = gmsnet.smooth(mesh).after.shape
+    target = min(share * float(full.min()), 0.99)
+    result = gmsnet.smooth(mesh, target_quality=target)
+    assert_sound(mesh, result)
+    assert result.sweeps > 0
+    left = int((result.after.shape < target).sum())
+    assert left <= (full < target).sum() < (result.before.shape < target).sum()
+    assert (result.stop_reason == stop.TARGET_REACHED) == (left == 0)
+
+
 @pytest.mark.parametrize("sweeps", [1, 3])
 def test_ctrl_c_leaves_the_best_mesh_with_its_middles(sweeps):
     _, mesh = twins("triangle6")

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gmsnet
-from gmsnet.generate import disturb
+from gmsnet.generate import disturb, random_quad_mesh
 from gmsnet.kernels.topology.patch import around
 from gmsnet.measure.report import measure
 from gmsnet.measure.target import Target
@@ -204,6 +204,16 @@ def test_what_a_full_run_meets_a_target_run_meets_on_small_meshes_too(seed):
     result = gmsnet.smooth(mesh, target_quality=target)
     assert result.stop_reason == stop.TARGET_REACHED
     assert result.after.shape.min() >= target
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("share", [1.05, 1.2, 1.4])
+def test_where_many_cannot_reach_it_no_more_miss_it_than_after_a_full_run(seed, share):
+    mesh = gmsnet.random_mesh(1500, seed=seed) if seed % 2 else random_quad_mesh(1500, seed=seed, cells="mixed")
+    full = gmsnet.smooth(mesh).after.shape
+    target = share * float(full.min())
+    result = gmsnet.smooth(mesh, target_quality=target)
+    assert (result.after.shape < target).sum() <= (full < target).sum() < (result.before.shape < target).sum()
 
 
 def test_a_cell_in_one_place_meets_no_angle():

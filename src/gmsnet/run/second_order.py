@@ -147,7 +147,7 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     curved = Curved(cells.mesh, room) if isinstance(cells, PlanarCells) else None
     ready = replace(
         state, points=cells.points, totals=None, protection=corners, released=False, sliding=None,
-        smoother=options.smoother(), curved=curved,
+        smoother=options.smoother(), curved=curved, stop_reason="",
     )  # fmt: skip
     done = sweep(ready, options, executor)
     if done.stop_reason == NOTHING_TO_MOVE:

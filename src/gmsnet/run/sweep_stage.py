@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods.auto import Auto
 from gmsnet.parallel.executor import Executor
 from gmsnet.run.dihedral_stage import improve_dihedrals
+from gmsnet.run.mean_stage import improve_mean
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run
 from gmsnet.run.score import Score
@@ -27,32 +29,62 @@ def sweep(state: State, options: SmoothOptions, executor: Executor) -> State:
 
 
 def _to_target(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """Patches around the cells that miss the target; before or after them all of a volume where these are many."""
-    if _miss_it(state, options, executor, MANY if options.target.dihedral is None else MANY_ANGLES, FEW):
-        return reach_target(_at_large(state, options, executor), options, executor)
-    first = reach_target(state, options, executor)
-    if first.stop_reason != NO_PROGRESS or not _miss_it(state, options, executor, SOME, FEWER):
-        return first
-    start = _at_large(replace(first, stop_reason=""), options, executor)
-    second = reach_target(start, options, executor)
-    if _score(second, options, executor).closer_to_target(_score(first, options, executor)):
-        return second
-    return first if second.interruption is None else first.interrupted(second.interruption)
+    """Patches around the cells that miss the target; before or after them all cells, where these are many."""
+    large = (MANY if options.target.dihedral is None else MANY_ANGLES, FEW)
+    if isinstance(state.topology, Volume) and _miss_it(state, options, executor, *large):
+        first = _at_large(state, options, executor)
+        if first.stop_reason != NO_PROGRESS or _closer(first, state, options, executor):
+            return first
+        second = reach_target(state, options, executor)
+    else:
+        first = reach_target(state, options, executor)
+        if first.stop_reason != NO_PROGRESS or not _miss_it(state, options, executor, SOME, FEWER):
+            return first
+        second = _at_large(_going_on(first), options, executor)
+    return _closer_one(second, first, options, executor)
+
+
+def _closer_one(state: State, other: State, options: SmoothOptions, executor: Executor) -> State:
+    """The one that is closer to the target, the other one if neither is; interrupted if the first one is."""
+    if _closer(state, other, options, executor):
+        return state
+    return other if state.interruption is None else other.interrupted(state.interruption)
+
+
+def _closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
+    """Is a state closer to the target than another one?"""
+    return _score(state, options, executor).closer_to_target(_score(other, options, executor))
 
 
 def _miss_it(state: State, options: SmoothOptions, executor: Executor, share: float, few: int) -> bool:
-    """Do more than so many cells of a volume that ``auto`` smooths miss the target?"""
+    """Do more than so many of the cells that ``auto`` smooths miss the target?"""
     topology = state.topology
-    if not (isinstance(topology, Volume) and isinstance(state.smoother, Auto) and len(topology.changeable.rows)):
+    if not isinstance(state.smoother, Auto) or not len(topology.free):
         return False
-    missing = len(options.target.tetrahedra_missing(state.points, topology.changeable)[0])
-    return missing > max(share * executor.cell_count(topology.changeable), few)
+    cells, target = topology.changeable, options.target
+    if isinstance(cells, Tetrahedra):
+        rows, _ = target.tetrahedra_missing(state.points, cells)
+    else:
+        rows = target.corners_missing(state.points, cells)
+    return len(rows) > max(share * executor.cell_count(cells), few)
 
 
 def _at_large(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """The state after sweeps over all free nodes, without a target."""
+    """Sweeps over all free nodes, without a target, then patches; with the stage of the mean between, where that is
+    closer to the target."""
     plain = replace(options, target_quality=None, target_dihedral=None)
-    state = improve_dihedrals(_sweep_all(state, plain, executor), plain, executor)
+    all_of_it = improve_dihedrals(_sweep_all(state, plain, executor), plain, executor)
+    found = reach_target(_going_on(all_of_it), options, executor)
+    if found.stop_reason != NO_PROGRESS or not isinstance(state.topology, Volume):
+        return found
+    raised = improve_mean(all_of_it, plain, executor)
+    if raised is all_of_it or not _closer(raised, found, options, executor):
+        return found if raised.interruption is None else found.interrupted(raised.interruption)
+    return _closer_one(reach_target(_going_on(raised), options, executor), raised, options, executor)
+
+
+def _going_on(state: State) -> State:
+    """The state, if it ended for want of progress, as one that has not ended."""
     return replace(state, stop_reason="") if state.stop_reason == NO_PROGRESS else state
 
 
