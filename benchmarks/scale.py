@@ -40,7 +40,7 @@ import gmsnet
 from gmsnet.generate.volumes import random_volume
 from gmsnet.kernels.jit.compile import LANES, kernel
 from gmsnet.kernels.star.guard import Precision
-from gmsnet.kernels.star.space import LANES3, SpaceBlocks
+from gmsnet.kernels.star.space_blocks import LANES3, SpaceBlocks
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.methods import Field, smoother
 from gmsnet.parallel.threads import workers

@@ -154,9 +154,13 @@ def _fits(source: FileSource, mesh: Mesh) -> bool:
 
 
 def _turned_alike(cells: np.ndarray, others: np.ndarray) -> bool:
-    """Whether the nodes of all cells (T, k) are those of the others in one and the same order."""
-    if cells.shape != others.shape or not len(cells):
-        return cells.shape == others.shape
+    """Whether the nodes of all cells (T, k) are those of the others, or are so in one and the same other order."""
+    if cells.shape != others.shape:
+        return False
+    turned = (cells != others).any(axis=1)  # the zones that are
+    cells, others = cells[turned], others[turned]
+    if not len(cells):
+        return True
     places = {node: place for place, node in enumerate(cells[0].tolist())}
     order = [places.get(node, -1) for node in others[0].tolist()]
     return -1 not in order and len(set(order)) == len(order) and np.array_equal(cells[:, order], others)

@@ -13,6 +13,8 @@ import pytest
 from support.optional import library
 
 import gmsnet
+from gmsnet.cells.dual import ideal_corners
+from gmsnet.cells.table import CELLS
 from gmsnet.errors import InputError
 from gmsnet.mesh.adapters import to_mesh
 
@@ -145,6 +147,43 @@ def test_plex_stand_in() -> None:
         to_mesh(plex(2))
     with pytest.raises(InputError, match="has 5 vertices"):
         to_mesh(plex(cells=np.array([[0, 1, 2, 3, 4]])))
+
+
+def solid_plex(kind: str, tensor: bool) -> Any:
+    """An ideal cell in the order of PETSc, whose first facet is seen from outside."""
+    ideal = ideal_corners(CELLS[kind])
+    swap = {"tetra": (0, 1), "hexahedron": (1, 3), "wedge": (1, 2), "pyramid": (1, 3)}[kind]  # as DMPlexInvertCell
+    cone = list(range(len(ideal)))
+    if not tensor:
+        cone[swap[0]], cone[swap[1]] = cone[swap[1]], cone[swap[0]]
+    number = {"tetra": 6, "hexahedron": 10 if tensor else 7, "wedge": 9 if tensor else 8, "pyramid": 11}[kind]
+    return stand_in(
+        "petsc4py.PETSc", "DMPlex", comm=SimpleNamespace(size=1),
+        getCoordinateDim=lambda self: 3, getDimension=lambda self: 3,
+        getCoordinatesLocal=lambda self: SimpleNamespace(array=ideal.ravel()),
+        getDepthStratum=lambda self, depth: (1, 1 + len(ideal)), getHeightStratum=lambda self, height: (0, 1),
+        getTransitiveClosure=lambda self, cell: (np.array([0, 50, 51, *(1 + np.array(cone))]), None),
+        getCellType=lambda self, cell: number,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "tensor"),
+    [
+        ("tetra", False),
+        ("hexahedron", False),
+        ("hexahedron", True),
+        ("wedge", False),
+        ("wedge", True),
+        ("pyramid", False),
+    ],
+)
+def test_volumes_of_plex_are_turned_to_the_order_of_meshio(kind: str, tensor: bool) -> None:
+    mesh, _ = to_mesh(solid_plex(kind, tensor))
+    (block,) = mesh.cells
+    assert block.kind == kind
+    assert block.nodes.tolist() == [list(range(len(mesh.points)))]
+    assert gmsnet.quality(mesh).shape.min() == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,12 @@ from support import volumes
 
 import gmsnet
 from gmsnet.errors import InputError
+from gmsnet.generate import disturb, o_grid_section, random_volume, swept_volume
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.measure.target import SURE, Target
 from gmsnet.parallel import threads as workers
 from gmsnet.run import stop
+from gmsnet.topology.mixed_volume import volume_of, wound_of
 from gmsnet.topology.volume import Volume
 
 MESHES = os.environ.get("GMSNET_MESHES")
@@ -186,3 +188,26 @@ def test_a_real_mesh_whose_smallest_angle_is_held():
     beyond = gmsnet.smooth(mesh, target_dihedral=28.6)
     assert beyond.stop_reason == stop.NO_PROGRESS
     assert (beyond.after.min_dihedral < 28.6).sum() == 1  # a cell whose nodes are all held
+
+
+@pytest.mark.parametrize("share", [1.02, 1.2, 1.5])
+@pytest.mark.parametrize("thrown", [0.1, 0.3])
+def test_where_not_all_can_reach_it_no_more_miss_it_than_after_a_full_run(share, thrown):
+    """Hexahedra have eight corner simplices each: cells are counted, not these."""
+    grid = swept_volume(o_grid_section(7, 4, radius=0.5), 10, 3.0, twist=15.0)
+    mesh = disturb(grid, volume_of(wound_of(grid)).free, thrown, seed=1, keep_valid=False)
+    full = gmsnet.smooth(mesh)
+    target = share * float(full.after.shape.min())
+    result = gmsnet.smooth(mesh, target_quality=target)
+    assert result.after.inverted == 0
+    left, left_by_full = (int((each.after.shape < target).sum()) for each in (result, full))
+    assert left <= 1.02 * left_by_full
+    if left > 0.98 * left_by_full:
+        assert result.after.shape.min() > 0.98 * full.after.shape.min()
+
+
+def test_the_last_cells_may_need_all_others():
+    mesh = random_volume(2000, seed=5)
+    result = gmsnet.smooth(mesh, target_quality=0.3)
+    assert (gmsnet.smooth(mesh).after.shape < 0.3).any()
+    assert result.stop_reason == stop.TARGET_REACHED

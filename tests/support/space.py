@@ -7,7 +7,8 @@ from fractions import Fraction
 import numba
 import numpy as np
 
-from gmsnet.kernels.star.space import LANES3, derive, judge
+from gmsnet.kernels.star.space import derive, judge
+from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.kernels.star.stars3 import certify3, fetch3, workspace3_for
 from gmsnet.topology.ordering import space_points
 from gmsnet.topology.volume import Volume

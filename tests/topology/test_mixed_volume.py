@@ -6,7 +6,7 @@ from support import blocks
 
 from gmsnet.cells.table import CELLS
 from gmsnet.kernels.simplex.mean_ratio3 import REGULAR, WEIGHTS3
-from gmsnet.kernels.star.space import LANES3
+from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.solids import KINDS

@@ -12,7 +12,7 @@ from support import volumes
 from support.space import simplices_of
 
 from gmsnet.errors import InputError
-from gmsnet.kernels.star.space import LANES3
+from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.parallel import memory as available_memory
 from gmsnet.topology.volume import MOST, Volume
 

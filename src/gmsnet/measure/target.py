@@ -13,7 +13,7 @@ from gmsnet.kernels.methods.below_on_surface import missed_on_surface
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.tetra_measures import LOW, SHAPE
-from gmsnet.kernels.star.shell import ShellSimplices
+from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.measure.cells import MeasuredCells
 from gmsnet.measure.dihedral import SHARE, columns_of, most_shape_below, ratios_of
 from gmsnet.measure.report import QualityReport

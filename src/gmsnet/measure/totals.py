@@ -17,7 +17,7 @@ from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.shell_measures import summarise_shell, summarise_shell_cells
 from gmsnet.kernels.simplex.solid_measures import summarise_solids
 from gmsnet.kernels.simplex.tetra_measures import summarise_tetrahedra
-from gmsnet.kernels.star.shell import ShellSimplices
+from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 

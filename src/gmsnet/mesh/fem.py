@@ -26,6 +26,10 @@ DOLFINX: dict[str, tuple[str, tuple[int, ...]]] = {
 }  # fmt: skip
 SFEPY = {"1_2": "line", "2_3": "triangle", "2_4": "quad", "3_4": "tetra", "3_8": "hexahedron", "3_6": "wedge"}
 VOLUMES = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron"}
+# PETSc's cells have their first facet seen from outside: where a Mesh's nodes stand in theirs (DMPlexReorderCell). Its
+# tensor products of a triangle or a quad with a segment have them as a Mesh has.
+PLEX = {4: (1, 0, 2, 3), 5: (0, 3, 2, 1, 4), 6: (0, 2, 1, 3, 4, 5), 8: (0, 3, 2, 1, 4, 5, 6, 7)}
+PLEX_TENSORS = (9, 10)  # numbers of DM_POLYTOPE
 
 
 def from_dolfinx(thing: Any) -> tuple[Mesh, Restore]:
@@ -58,10 +62,10 @@ def from_dolfinx(thing: Any) -> tuple[Mesh, Restore]:
 
 
 def from_plex(thing: Any) -> tuple[Mesh, Restore]:
-    """Of a ``petsc4py.PETSc.DMPlex`` on one process, of triangles, quads or tetrahedra. Out goes (points, cells), the
-    points in the order of its local coordinates.
+    """Of a ``petsc4py.PETSc.DMPlex`` on one process. Out goes (points, cells), the points in the order of its local
+    coordinates, the nodes of cells in meshio's.
 
-    Raises InputError for a mesh on several processes and for other cells.
+    Raises InputError for a mesh on several processes, one of higher degree, and for polyhedra.
     """
     if thing.comm.size > 1:
         raise InputError("a DMPlex on several processes: nodes that they share would go to different places: "
@@ -74,7 +78,7 @@ def from_plex(thing: Any) -> tuple[Mesh, Restore]:
             f"a DMPlex of {end - first} vertices with {len(points)} points: only those of degree 1 are known"
         )
     of_cells = 2 if int(thing.getDimension()) == 2 else 3
-    kinds = {3: "triangle", 4: "quad"} if of_cells == 2 else {4: "tetra"}
+    kinds = {3: "triangle", 4: "quad"} if of_cells == 2 else VOLUMES
     cells: dict[str, list[list[int]]] = {}
     for cell in range(*thing.getHeightStratum(0)):
         closure = np.asarray(thing.getTransitiveClosure(cell)[0])
@@ -83,6 +87,8 @@ def from_plex(thing: Any) -> tuple[Mesh, Restore]:
             raise InputError(
                 f"cell {cell} of the DMPlex has {len(nodes)} vertices: known are {', '.join(kinds.values())}"
             )
+        if of_cells == 3 and int(thing.getCellType(cell)) not in PLEX_TENSORS:
+            nodes = [nodes[place] for place in PLEX[len(nodes)]]
         cells.setdefault(kinds[len(nodes)], []).append(nodes)
     blocks = [(kind, np.array(rows)) for kind, rows in cells.items()]
     return mesh_from_arrays(points, blocks), lambda new: (new.copy(), blocks)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import Field, Tally, over_stars
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume

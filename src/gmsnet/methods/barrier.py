@@ -28,7 +28,7 @@ from gmsnet.kernels.methods.shell_lanes import sweep_lanes
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
 from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, Field, Method, StarSmoother, Tally
 from gmsnet.parallel.executor import Executor
 

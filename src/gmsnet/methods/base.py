@@ -24,8 +24,9 @@ from gmsnet.kernels.star.guard import (
     star_floors,
 )
 from gmsnet.kernels.star.guard3 import star_floors3
-from gmsnet.kernels.star.shell import ShellBlocks, ShellStars, star_floors_of_shell
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
+from gmsnet.kernels.star.shell_simplices import star_floors_of_shell
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
@@ -36,8 +37,7 @@ from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
 CELLS = ("triangle", "quad")  # the kinds of cells whose nodes may move
-TETRAHEDRA = (*CELLS, "tetra")
-ALL_CELLS = (*TETRAHEDRA, "hexahedron", "wedge", "pyramid")
+ALL_CELLS = (*CELLS, "tetra", "hexahedron", "wedge", "pyramid")
 TRIANGLES = ("triangle",)
 Tally = NDArray[np.int64]  # (3,) counts of moved, truncated and dropped shifts (kernels.star.stars)
 

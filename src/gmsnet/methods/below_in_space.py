@@ -19,7 +19,7 @@ from gmsnet.kernels.methods import descent3
 from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
 from gmsnet.kernels.simplex.objectives3 import DIHEDRAL, Aim3
 from gmsnet.kernels.star.guard import STAR, Guard
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.measure.target import Target
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.methods.below import MANY, SMALL
@@ -66,7 +66,7 @@ class BelowInSpace(Smoother):
         rows, _ = self.target.tetrahedra_missing(field.points, cells)
         self.target_reached = not len(rows)
         many = MANY if self.target.dihedral is None else MANY_ANGLES
-        if self.target_reached or len(rows) > max(many * len(cells.rows), SMALL):
+        if self.target_reached or len(rows) > max(many * cells.cell_count, SMALL):
             return tally
         guard, everywhere = field.guard(executor), self.everywhere
         if self.target.dihedral is not None and field.level != STAR:

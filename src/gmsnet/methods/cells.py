@@ -49,8 +49,6 @@ def _refuse(method: Method, choice: str, kind: str, count: int) -> NoReturn:
     name = method.name
     one, many = NAMES[kind]
     moves = "moves triangles alone" if method.cells == TRIANGLES or kind == "quad" else "moves cells in a plane alone"
-    if method.moves("tetra", choice):
-        moves = "moves cells in a plane and tetrahedra alone"
     cells = f"1 {one}" if count == 1 else f"{count:,} {many}"
     others = ", ".join(each.name for each in METHODS.values() if each.moves(kind) and each is not method)
     what = "objective" if choice in method.objectives else "variant"

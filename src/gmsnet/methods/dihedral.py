@@ -19,7 +19,7 @@ import numpy as np
 from gmsnet.kernels.methods.descent3 import sweep3
 from gmsnet.kernels.simplex.objectives3 import DIHEDRAL, Aim3
 from gmsnet.kernels.star.guard import STAR, Guard, MeshGuard
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.measure.dihedral import WIDE, ratios_of, renew, worst
 from gmsnet.methods.again import over_changing
 from gmsnet.methods.base import Field, Smoother, Tally

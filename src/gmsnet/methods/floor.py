@@ -14,7 +14,7 @@ from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.block import DROPPED, TRUNCATED
 from gmsnet.kernels.star.guard import Precision, ratio_upper_bounds
 from gmsnet.kernels.star.guard3 import ratio_upper_bounds3
-from gmsnet.kernels.star.shell import ShellSimplices, ratio_upper_bounds_of_shell
+from gmsnet.kernels.star.shell_simplices import ShellSimplices, ratio_upper_bounds_of_shell
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 from gmsnet.topology.topology import Topology

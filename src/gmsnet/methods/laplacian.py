@@ -21,13 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.methods import laplacian as kernels
-from gmsnet.kernels.methods import laplacian_plain, shell
+from gmsnet.kernels.methods import laplacian_plain, shell_laplacian
 from gmsnet.kernels.methods.barrier3 import Power3
 from gmsnet.kernels.methods.laplacian3 import sweep3
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import Guard
 from gmsnet.kernels.star.shell import ShellStars
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, CELLS, Method, StarSmoother, Tally
 
 VARIANTS: dict[str, int | None] = {  # None: the plain form, which has a kernel of its own
@@ -66,7 +66,7 @@ class Laplacian(StarSmoother):
         self, points: NDArray[np.float64], stars: ShellStars, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """See StarSmoother."""
-        shell.average(points, stars, first, last, guard, self.variant is not None, tally)
+        shell_laplacian.average(points, stars, first, last, guard, self.variant is not None, tally)
 
 
 METHOD = Method(

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from gmsnet.kernels.methods.barrier3 import Power3, sweep3
 from gmsnet.kernels.star.guard import MeshGuard
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.mixed_volume import MixedVolume

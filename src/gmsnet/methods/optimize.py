@@ -23,7 +23,7 @@ from gmsnet.kernels.simplex import objectives
 from gmsnet.kernels.simplex.objectives3 import Aim3
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import LARGEST, Guard
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, TRIANGLES, Method, MethodOptions, StarSmoother, Tally
 
 

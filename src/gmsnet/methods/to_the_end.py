@@ -10,7 +10,7 @@ import numpy as np
 from gmsnet.kernels.methods.descent3 import sweep3
 from gmsnet.kernels.simplex.objectives3 import Aim3, Q
 from gmsnet.kernels.star.guard import WORST, plain_guard
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.measure.dihedral import ratios_of
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.parallel.executor import Executor

@@ -23,7 +23,7 @@ from gmsnet.kernels.methods import worst_first_cycles as kernels
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.simplex.shell_measures import shell_shapes
 from gmsnet.kernels.star.guard import Guard, StarGuard
-from gmsnet.kernels.star.shell import ShellSimplices
+from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.methods.base import ALL_CELLS, Field, Method, MethodOptions, Smoother, Tally
 from gmsnet.methods.worst_in_space import WorstInSpace
 from gmsnet.methods.worst_on_surface import cycles_on_surface

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.measure.dihedral import ratios_of, renew
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.parallel.executor import Executor

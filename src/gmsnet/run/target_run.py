@@ -79,7 +79,7 @@ def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterato
         if own_plan and rings > 1 and too_large(rings, active, len(corners) / at_first, topology):
             break
         patch = topology.restricted(active)
-        fraction = len(corners) / len(patch.near)
+        fraction = len(corners) / (patch.simplices.cell_count if isinstance(patch, Volume) else len(patch.near))
         planned = for_target(target, fraction, rings=rings, floor=floor) if own_plan else None
         smoother = planned or options.smoother()
         missing = partial(corners_missing, topology=patch, target=target)

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.star.space import LANES3, Mixture, SpaceBlocks
+from gmsnet.kernels.star.space_blocks import LANES3, Mixture, SpaceBlocks
 from gmsnet.kernels.topology import connectivity
-from gmsnet.kernels.topology import solids as kernels
+from gmsnet.kernels.topology import solid_stars as kernels
+from gmsnet.kernels.topology.connectivity import WIDTH
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.held import AT_BOUNDARY, reasons_in_space, released, sorted_out
 from gmsnet.topology.polygons import Ints
@@ -24,6 +25,10 @@ from gmsnet.topology.solids import KINDS, WoundSolids, has_solids, roles, tables
 from gmsnet.topology.stars import Colouring, Stars
 from gmsnet.topology.volume import MOST, Flags, Volume
 from gmsnet.topology.wound import Wound
+
+# Stars stand beside those with as many cells of each kind: a digit of (4, 8), by kind and corner. An apex has its own.
+PLACES = np.repeat(4096.0 ** np.arange(4)[:, None], 8, axis=1)
+PLACES[KINDS.index("pyramid"), 4] = 4096.0**4
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +40,7 @@ class MixedVolume(Volume):
     joined to it by an edge: the first of its ring. role, owner: (M,) of the simplices at nodes (kernels.star.space).
     order: (N,) by which stars stand beside one another. inexact_at, inexact: in CSR form the cells at each node that
     may be invalid though their corner simplices are positive. file_numbers: (T,) the kind of each cell in file order, a
-    number in file_kinds. slack, gone: of each cell near in memory (kernels.star.space), which are lent to
+    number in file_kinds. slack, gone, place: see kernels.star.space_blocks.Mixture; the first two are lent to
     one Field: lent has it.
     """
 
@@ -50,6 +55,7 @@ class MixedVolume(Volume):
     file_numbers: NDArray[np.uint8]
     slack: NDArray[np.float64]
     gone: NDArray[np.float64]
+    place: Ints
     lent: list[object]
     file_kinds = KINDS
 
@@ -66,7 +72,7 @@ class MixedVolume(Volume):
         cell, corner = np.empty((2, int(wound.corners.sum())), dtype=np.int32)
         found = int(kernels.list_solids(nodes, wound.corners, marks, start, cell, corner))
         cell, corner = cell[:found], corner[:found]
-        ring_start, ring = np.empty(count + 1, dtype=np.int64), np.empty(7 * found, dtype=np.int32)
+        ring_start, ring = np.empty(count + 1, dtype=np.int64), np.empty(7 * found + WIDTH, dtype=np.int32)
         edges, core = np.empty((2, count), dtype=np.int32)
         end = kernels.rings_of_solids(
             nodes, kind, tables(), start, cell, corner, ring_start, ring, edges, core, MOST
@@ -85,9 +91,10 @@ class MixedVolume(Volume):
         total = kernels.stars_of_solids(
             nodes, kind, tables(), numbers, start, cell, corner, ring_start, ring, core, own, local, role, owner
         )  # fmt: skip
-        apart = np.where(kind[cell] == 3, np.where(corner == 4, 4, 3), kind[cell])  # an apex is another place
-        order = np.bincount(node, 4096.0**apart, count)
+        order = np.bincount(node, PLACES[kind[cell], corner], count)
         chosen = tables().inexact[kind[cell]]
+        inexact, place = 8 * cell[chosen] + corner[chosen], np.full(8 * len(kind), -1, dtype=np.int32)
+        place[inexact] = np.arange(len(inexact), dtype=np.int32)
         inexact_at = np.concatenate([[0], np.cumsum(np.bincount(node[chosen], minlength=count))])
         of_file = np.empty_like(wound.orientation)
         of_file[wound.origin] = wound.orientation
@@ -95,12 +102,13 @@ class MixedVolume(Volume):
         kinds[wound.origin] = kind
         simplices = wound.simplices
         assert simplices.cells is not None
-        padded = np.append(ring[:end], np.zeros(connectivity.WIDTH, dtype=np.int32))
+        ring = ring[: end + WIDTH]  # of what is left out no page was ever touched
+        ring[end:] = 0
         return cls(
             wound.cell, wound.cells, of_file, simplices.rows, simplices.orientation, wound.origin[simplices.cells], own,
-            local[:total].copy(), ring_start, ring[:end].copy(), Colouring(places, ring_start, padded), slid,
-            simplices, core, edges, role[:total].copy(), owner[:total].copy(), order.astype(np.int64), inexact_at,
-            8 * cell[chosen] + corner[chosen], kinds, np.zeros(len(kind)), np.zeros(8 * len(kind)), [None],
+            local[:total], ring_start, ring[:end], Colouring(places, ring_start, ring), slid,
+            simplices, core, edges, role[:total], owner[:total], order.astype(np.int64), inexact_at,
+            inexact, kinds, np.zeros(len(kind)), np.zeros(len(inexact)), place, [None],
             held=held, free=free, memory=wound.memory, near_free=marks == 0,
         )  # fmt: skip
 
@@ -170,6 +178,7 @@ class MixedVolume(Volume):
             np.empty(total, dtype=np.uint8), np.hstack([weights, sigma, sigma / 3.0]).astype(np.float32), weights,
             np.empty(total, dtype=np.uint16), np.empty(total * LANES3, dtype=np.int32),
             np.empty(count * LANES3, dtype=np.int32), solids, self.inexact_at, self.inexact, self.slack, self.gone,
+            self.place,
         )  # fmt: skip
         made = SpaceBlocks(
             np.empty(count * LANES3, dtype=np.int32), np.empty(ring_begin[-1], dtype=np.int32), ring_begin[:-1],

@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.star import shell as kernels
+from gmsnet.kernels.star import shell_simplices as kernels
 from gmsnet.kernels.star.block import Blocks
-from gmsnet.kernels.star.shell import ShellBlocks, ShellSimplices, ShellStars
+from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
+from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.kernels.topology import connectivity
 from gmsnet.topology.stars import Flags, Ints, Stars
 from gmsnet.topology.topology import Topology

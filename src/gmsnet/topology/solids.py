@@ -33,6 +33,7 @@ MIRRORED = np.array([
     (0, 2, 1, 3, 4, 5, 6, 7), (4, 5, 6, 7, 0, 1, 2, 3), (3, 4, 5, 0, 1, 2, 6, 7), (0, 3, 2, 1, 4, 5, 6, 7),
 ])  # fmt: skip
 CORNERS = np.array([CELLS[name].corners for name in KINDS])
+SIMPLICES = np.array([len(CELLS[name].simplices) for name in KINDS])
 BITS = connectivity.BOUNDARY, connectivity.INTERFACE, connectivity.NON_MANIFOLD, connectivity.MISMATCHED
 BYTES_PER_CELL = 2_000  # that the set-up takes at most, of a hexahedron
 
@@ -41,8 +42,9 @@ BYTES_PER_CELL = 2_000  # that the set-up takes at most, of a hexahedron
 def tables() -> Tables:
     """What kernels know of the kinds."""
     kinds = [CELLS[name] for name in KINDS]
-    facets, simplices = np.full((4, FACETS, 4), NONE), np.full((4, 8, 4), NONE)
-    around = np.full((3, 4, 8, 4), NONE)
+    facets, simplices, around, at_corner = (
+        np.full(shape, NONE, dtype=np.int32) for shape in ((4, FACETS, 4), (4, 8, 4), (3, 4, 8, 4), (4, 8, 8))
+    )
     facets_at = np.zeros((4, 8), dtype=np.int32)
     for number, kind in enumerate(kinds):
         for k, facet in enumerate(kind.facets):
@@ -51,6 +53,8 @@ def tables() -> Tables:
         for k, simplex in enumerate(kind.simplices):
             simplices[number, k] = simplex
         for corner in range(kind.corners or 0):
+            vertices = [4 * s + simplex.index(corner) for s, simplex in enumerate(kind.simplices) if corner in simplex]
+            at_corner[number, corner, : len(vertices)] = vertices
             joined = [j if i == corner else i for i, j in kind.edges if corner in (i, j)]
             together = {node for simplex in kind.simplices if corner in simplex for node in simplex}
             others = sorted(together - {corner, *joined})
@@ -58,9 +62,7 @@ def tables() -> Tables:
             for turn, found in enumerate((joined, others, rest)):
                 around[turn, number, corner, : len(found)] = found
     inexact = np.array([not kind.exact for kind in kinds])
-    return Tables(
-        facets.astype(np.int32), around.astype(np.int32), simplices.astype(np.int32), inexact, facets_at
-    )  # fmt: skip
+    return Tables(facets, around, simplices, at_corner, inexact, facets_at)
 
 
 @cache
@@ -169,15 +171,10 @@ class WoundSolids:
     @cached_property
     def simplices(self) -> Tetrahedra:
         """The corner simplices, cell by cell."""
-        nodes, kind = self.solids.nodes, self.solids.kind
-        count = np.array([len(CELLS[name].simplices) for name in KINDS])[kind]
-        first = np.concatenate([[0], np.cumsum(count)])
-        rows, table = np.empty((int(first[-1]), 4), dtype=np.int32), tables().simplices
-        for number in range(4):
-            chosen = np.flatnonzero(kind == number)
-            for s in range(len(CELLS[KINDS[number]].simplices) if len(chosen) else 0):
-                rows[first[chosen] + s] = nodes[chosen][:, table[number, s]]
-        owner = np.repeat(np.arange(len(kind), dtype=np.int32), count)
+        kind = self.solids.kind
+        count = int(SIMPLICES[kind].sum())
+        rows, owner = np.empty((count, 4), dtype=np.int32), np.empty(count, dtype=np.int32)
+        kernels.list_simplices(self.solids.nodes, kind, tables(), rows, owner)
         return Tetrahedra(rows, np.ones(len(rows), dtype=np.int8), kind[owner], owner, self.solids)
 
 
@@ -233,14 +230,7 @@ def _wound(points: Floats, near: Ints, kind: NDArray[np.uint8], twin: Ints, mark
     piece, orientation = np.full(count, -1, dtype=np.int32), np.ones(count, dtype=np.int8)
     consistent = kernels.wind_solids(near, kind, tables(), twin, piece, orientation)
     volume, extent = np.zeros((2, count))
-    for number in range(4):
-        chosen = np.flatnonzero(kind == number)
-        for simplex in CELLS[KINDS[number]].simplices if len(chosen) else ():
-            d, *ends = (points[near[chosen, v], :3] for v in simplex)
-            a, b, c = (end - d for end in ends)
-            each = np.einsum("ij,ij->i", a, np.cross(b, c)) / len(CELLS[KINDS[number]].simplices)
-            volume[chosen] += each
-            extent[chosen] += np.abs(each)
+    kernels.corner_volumes(points, near, kind, tables(), volume, extent)
     parts = len(consistent)
     signed = np.bincount(piece, orientation * volume, parts)
     orientation[signed[piece] < 0.0] *= -1

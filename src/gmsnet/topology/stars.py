@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.kernels.topology import connectivity
 from gmsnet.topology.polygons import Offsets
 

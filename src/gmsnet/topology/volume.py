@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.star.space import LANES3, SpaceBlocks
+from gmsnet.kernels.star.space_blocks import LANES3, SpaceBlocks
 from gmsnet.kernels.topology import balls, connectivity
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.connectivity import Connectivity

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.methods.barrier3 import Power3
 from gmsnet.kernels.star.guard import Precision
-from gmsnet.kernels.star.space import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.kernels.untangle.space import find_bad, find_bad_inside, soften
 from gmsnet.measure.volumes import exact_signs3
 from gmsnet.parallel.executor import Executor

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import curved, curved_meshes, naive
+from support.curved_kernels import commit_all
 
-from gmsnet.kernels.curved.commit import commit_all, follow
+from gmsnet.kernels.curved.commit import follow
 from gmsnet.kernels.curved.stars import CENTRE, counter_clockwise, dragged
 from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES, NODES
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED

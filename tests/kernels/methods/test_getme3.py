@@ -11,7 +11,7 @@ from support.naive_objectives3 import shape
 
 from gmsnet.kernels.methods import getme3
 from gmsnet.kernels.star.guard import Precision, plain_guard
-from gmsnet.kernels.star.space import LANES3
+from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.topology.ordering import space_points
 from gmsnet.topology.volume import Volume
 

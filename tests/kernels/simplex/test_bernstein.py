@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from support import curved
+from support.curved_kernels import certified_positive, curved_quality, lower_bound
 
 from gmsnet.kernels.simplex import bernstein, jacobian
 from gmsnet.kernels.simplex.bernstein import NAMES
@@ -79,7 +80,7 @@ def test_ten_thousand_cells_are_judged_as_exact_arithmetic_does(kind):
     signs = {1: 0, -1: 0, 0: 0}
     for k in range(CELLS):
         nodes = curved.random_cell(rng, NAMES[kind], (0.02, 0.1, 0.2, 0.4)[k % 4])
-        sign = jacobian.certified_positive(nodes, kind, delta_of(nodes))
+        sign = certified_positive(nodes, kind, delta_of(nodes))
         signs[sign] += 1
         assert sign == curved.exact_sign(nodes, NAMES[kind])
     assert signs[0] == 0
@@ -91,7 +92,7 @@ def test_lower_bounds_are_below_each_value_and_close_to_the_least(kind):
     rng = np.random.default_rng(200 + kind)
     for _ in range(100):
         nodes = curved.random_cell(rng, NAMES[kind], 0.15)
-        bound = jacobian.lower_bound(nodes, kind, delta_of(nodes))
+        bound = lower_bound(nodes, kind, delta_of(nodes))
         polynomial = curved.determinant(nodes, NAMES[kind])
         steps = [Fraction(k, 12) for k in range(13)]
         places = [(x, y) for x in steps for y in steps if kind != bernstein.TRIANGLE6 or x + y <= 1]
@@ -104,7 +105,7 @@ def test_lower_bounds_are_below_each_value_and_close_to_the_least(kind):
 def test_of_a_straight_cell_the_quality_is_one(kind):
     corners = np.array([[0.0, 0.0], [3.0, 1.0], [4.0, 3.0], [1.0, 2.0]])
     nodes = curved.straight_nodes(corners if kind else corners[:3])[: bernstein.NODES[kind]]
-    assert jacobian.curved_quality(nodes, kind, delta_of(nodes)) == pytest.approx(1.0, abs=1e-12)
+    assert curved_quality(nodes, kind, delta_of(nodes)) == pytest.approx(1.0, abs=1e-12)
 
 
 def near_the_limit(rng, kind):
@@ -117,7 +118,7 @@ def near_the_limit(rng, kind):
     low, high = 0.0, 1.0
     for _ in range(52):
         middle = 0.5 * (low + high)
-        sign = jacobian.certified_positive(good + middle * (bad - good), kind, 0.0)
+        sign = certified_positive(good + middle * (bad - good), kind, 0.0)
         low, high = (middle, high) if sign > 0 else (low, middle)
     return good, bad, low
 
@@ -131,7 +132,7 @@ def test_near_the_limit_what_is_certified_is_true(kind, offset):
         good, bad, at = near_the_limit(rng, kind)
         for nudge in (-1e-9, -1e-12, -1e-15, 0.0, 1e-15, 1e-12, 1e-9):
             nodes = good + (at + nudge) * (bad - good) + offset
-            sign = jacobian.certified_positive(nodes, kind, 0.0)
+            sign = certified_positive(nodes, kind, 0.0)
             exact = curved.exact_sign(nodes, NAMES[kind])
             assert sign in (0, exact) or exact == 0
             undecided += sign == 0
@@ -143,7 +144,7 @@ def test_what_is_certified_holds_for_all_coordinates_within_delta(seed, kind, un
     rng = np.random.default_rng(seed)
     nodes = curved.random_cell(rng, NAMES[kind], rng.choice([0.05, 0.3])) * rng.choice([1.0, 1e-3, 1e-5]) + offset
     delta = delta_of(nodes, unit)
-    sign = jacobian.certified_positive(nodes, kind, delta)
+    sign = certified_positive(nodes, kind, delta)
     readings = [nodes + delta * rng.choice([-1.0, 1.0], nodes.shape) * (1 - 1e-9) for _ in range(3)]
     readings += [nodes] + [np.float64(np.float32(nodes))] * (unit == U32)
     for reading in readings:
@@ -153,14 +154,14 @@ def test_what_is_certified_holds_for_all_coordinates_within_delta(seed, kind, un
 def test_values_that_are_no_numbers_are_undecided():
     nodes = curved.straight_nodes(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
     nodes[4, 0] = np.nan
-    assert jacobian.certified_positive(nodes, bernstein.TRIANGLE6, 0.0) == 0
+    assert certified_positive(nodes, bernstein.TRIANGLE6, 0.0) == 0
 
 
 def test_a_collapsed_cell_is_undecided_and_has_no_quality():
     for kind in KINDS:
         nodes = np.zeros((bernstein.NODES[kind], 2))
-        assert jacobian.certified_positive(nodes, kind, 0.0) == 0
-        assert jacobian.curved_quality(nodes, kind, 0.0) == -np.inf
+        assert certified_positive(nodes, kind, 0.0) == 0
+        assert curved_quality(nodes, kind, 0.0) == -np.inf
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -174,6 +175,6 @@ def test_judging_a_table_of_cells_is_judging_each(kind):
     kinds = np.full(30, kind, dtype=np.int8)
     jacobian.judge_cells(nodes.reshape(-1, 2), cells, kinds, U64, 0.0, 0, 30, sign, quality)
     for k in range(30):
-        assert sign[k] == jacobian.certified_positive(nodes[k], kind, delta_of(nodes[k]))
-        assert quality[k] == jacobian.curved_quality(nodes[k], kind, delta_of(nodes[k]))
+        assert sign[k] == certified_positive(nodes[k], kind, delta_of(nodes[k]))
+        assert quality[k] == curved_quality(nodes[k], kind, delta_of(nodes[k]))
         assert (quality[k] > 0) == (sign[k] > 0)

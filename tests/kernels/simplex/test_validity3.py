@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support import solid
+from support import solid, solid_kernels
 
 from gmsnet.cells.jacobian import form_of, has_form
 from gmsnet.cells.table import CELLS
@@ -49,7 +49,7 @@ def test_coefficients_are_those_of_the_polynomial(name):
     assert form.terms == COUNTS[name] == len(solid.indices(name))
     for bend in (0.0, 0.3):
         nodes = np.round(solid.random_cell(rng, name, bend) * 64) / 64  # few bits: what is computed is nearly exact
-        found, bound, _ = validity3.coefficients_of_solid(nodes, form, 1.0, 0.0)
+        found, bound, _ = solid_kernels.coefficients_of_solid(nodes, form, 1.0, 0.0)
         wanted = solid.determinant(nodes, name)
         have = solid.from_bernstein([Fraction(float(c)) for c in found], name)
         scale = max(abs(float(v)) for v in found)
@@ -63,7 +63,7 @@ def test_of_whole_numbers_coefficients_are_exact(name):
     rng, form = np.random.default_rng(2), form_of(name)
     for _ in range(5):
         nodes = rng.integers(-9, 10, (form.nodes, 3)).astype(float)
-        found, _, _ = validity3.coefficients_of_solid(nodes, form, 1.0, 0.0)
+        found, _, _ = solid_kernels.coefficients_of_solid(nodes, form, 1.0, 0.0)
         many = form.floats[form.multinomial : form.multinomial + form.terms]
         whole = [Fraction(round(float(c * m)), int(m)) for c, m in zip(found, many, strict=True)]
         assert {k: v for k, v in solid.from_bernstein(whole, name).items() if v} == {
@@ -75,7 +75,7 @@ def test_of_whole_numbers_coefficients_are_exact(name):
 def test_at_corners_coefficients_are_the_values_there(name):
     rng, form = np.random.default_rng(3), form_of(name)
     nodes = solid.random_cell(rng, name, 0.2)
-    found, bound, _ = validity3.coefficients_of_solid(nodes, form, 1.0, 0.0)
+    found, bound, _ = solid_kernels.coefficients_of_solid(nodes, form, 1.0, 0.0)
     polynomial = solid.determinant(nodes, name)
     corners = form.ints[form.corner : form.corner + form.corners]
     for corner, place in zip(corners, solid.REFERENCE[name], strict=False):
@@ -88,7 +88,7 @@ def test_errors_of_coefficients_are_within_the_bound(name, offset):
     rng, form = np.random.default_rng(4), form_of(name)
     for _ in range(3):
         nodes = solid.random_cell(rng, name, 0.2) * np.array([1.0, 1.0, 1e-3]) + offset
-        found, bound, _ = validity3.coefficients_of_solid(nodes, form, 1.0, 0.0)
+        found, bound, _ = solid_kernels.coefficients_of_solid(nodes, form, 1.0, 0.0)
         polynomial = solid.determinant(nodes, name)
         have = solid.from_bernstein([Fraction(float(c)) for c in found], name)
         for place in solid.samples(name, 2):
@@ -101,7 +101,7 @@ def test_what_is_said_of_random_cells_is_true(name):
     cells, said = 100 if name in LINEAR else 12, {-1: 0, 0: 0, 1: 0}
     for k in range(cells):
         nodes = solid.random_cell(rng, name, (0.1, 0.25, 0.7)[k % 3])
-        sign, place = validity3.judge_solid(nodes, form, 1.0, delta_of(nodes), DEPTH)
+        sign, place = solid_kernels.judge_solid(nodes, form, 1.0, delta_of(nodes), DEPTH)
         said[sign] += 1
         polynomial = solid.determinant(nodes, name)
         if sign == validity3.INVALID:
@@ -118,9 +118,9 @@ def between_corners(name):
     rng = np.random.default_rng(6)
     for _ in range(100_000):
         nodes = solid.random_cell(rng, name, 0.45)
-        found, bound, _ = validity3.coefficients_of_solid(nodes, form_of(name), 1.0, 0.0)
+        found, bound, _ = solid_kernels.coefficients_of_solid(nodes, form_of(name), 1.0, 0.0)
         corners = found[form_of(name).ints[form_of(name).corner :][: form_of(name).corners]]
-        if corners.min() > bound and validity3.judge_solid(nodes, form_of(name), 1.0, 0.0, 18)[0] < 0:
+        if corners.min() > bound and solid_kernels.judge_solid(nodes, form_of(name), 1.0, 0.0, 18)[0] < 0:
             return nodes
     raise AssertionError("none was found")
 
@@ -128,12 +128,12 @@ def between_corners(name):
 @pytest.mark.parametrize("name", ["hexahedron", "wedge", "tetra10"])
 def test_cells_with_positive_corners_and_a_negative_inside_are_found(name):
     nodes = between_corners(name)
-    sign, place = validity3.judge_solid(nodes, form_of(name), 1.0, 0.0, 18)
+    sign, place = solid_kernels.judge_solid(nodes, form_of(name), 1.0, 0.0, 18)
     polynomial = solid.determinant(nodes, name)
     assert sign == validity3.INVALID
     assert solid.value(polynomial, [Fraction(float(v)) for v in place]) < 0
     assert all(solid.value(polynomial, corner) > 0 for corner in solid.REFERENCE[name][: form_of(name).corners])
-    undecided, _ = validity3.judge_solid(nodes, form_of(name), 1.0, 0.0, 0)
+    undecided, _ = solid_kernels.judge_solid(nodes, form_of(name), 1.0, 0.0, 0)
     assert undecided == validity3.UNDECIDED
 
 
@@ -141,7 +141,7 @@ def test_cells_with_positive_corners_and_a_negative_inside_are_found(name):
 def test_the_lower_bound_is_below_every_value_and_near_the_least(name):
     rng, form = np.random.default_rng(7), form_of(name)
     nodes = solid.random_cell(rng, name, 0.15)
-    found, _, lower = validity3.coefficients_of_solid(nodes, form, 1.0, delta_of(nodes))
+    found, _, lower = solid_kernels.coefficients_of_solid(nodes, form, 1.0, delta_of(nodes))
     polynomial = solid.determinant(nodes, name)
     least = min(solid.value(polynomial, place) for place in solid.samples(name, 4))
     assert lower <= least
@@ -155,7 +155,7 @@ def test_what_is_certified_holds_for_all_coordinates_within_delta(seed, name, un
     rng = np.random.default_rng(seed)
     nodes = solid.random_cell(rng, name, rng.choice([0.1, 0.4])) * rng.choice([1.0, 1e-3, 1e-5]) + offset
     delta = delta_of(nodes, unit)
-    sign, _ = validity3.judge_solid(nodes, form_of(name), 1.0, delta, DEPTH)
+    sign, _ = solid_kernels.judge_solid(nodes, form_of(name), 1.0, delta, DEPTH)
     readings = [nodes + delta * rng.choice([-1.0, 1.0], nodes.shape) * (1 - 1e-9) for _ in range(3)]
     readings += [nodes] + [np.float64(np.float32(nodes))] * (unit == U32)
     for reading in readings:
@@ -168,7 +168,7 @@ def test_near_the_limit_what_is_certified_is_true(name):
     for _ in range(6 if name in LINEAR else 2):
         while True:
             good, bad = solid.random_cell(rng, name, 0.0), solid.random_cell(rng, name, 0.6)
-            if validity3.judge_solid(bad, form, 1.0, 0.0, 18)[0] == -1:
+            if solid_kernels.judge_solid(bad, form, 1.0, 0.0, 18)[0] == -1:
                 break
             if name == "tetra":
                 bad = good[[1, 0, 2, 3]]
@@ -176,11 +176,11 @@ def test_near_the_limit_what_is_certified_is_true(name):
         low, high = 0.0, 1.0
         for _ in range(52):
             middle = 0.5 * (low + high)
-            sign, _ = validity3.judge_solid(good + middle * (bad - good), form, 1.0, 0.0, 18)
+            sign, _ = solid_kernels.judge_solid(good + middle * (bad - good), form, 1.0, 0.0, 18)
             low, high = (middle, high) if sign > 0 else (low, middle)
         for nudge in (-1e-9, -1e-14, 0.0, 1e-15, 1e-12, 1e-9):
             nodes = good + (low + nudge) * (bad - good)
-            sign, _ = validity3.judge_solid(nodes, form, 1.0, 0.0, 18)
+            sign, _ = solid_kernels.judge_solid(nodes, form, 1.0, 0.0, 18)
             assert sign in (0, exact(nodes, name)[0])
             undecided += sign == 0
     assert undecided > 0  # else the test has not come near enough
@@ -192,8 +192,8 @@ def test_values_that_are_no_numbers_and_collapsed_cells_are_not_certified(name):
     for bad in (np.nan, np.inf):
         spoilt = nodes.copy()
         spoilt[-1, 1] = bad
-        assert validity3.judge_solid(spoilt, form, 1.0, 0.0, 18)[0] == 0
-    assert validity3.judge_solid(0 * nodes, form, 1.0, 0.0, 18)[0] == 0
+        assert solid_kernels.judge_solid(spoilt, form, 1.0, 0.0, 18)[0] == 0
+    assert solid_kernels.judge_solid(0 * nodes, form, 1.0, 0.0, 18)[0] == 0
     assert exact(0 * nodes, name)[0] == -1
     assert exact(nodes, name)[0] == 1
 
@@ -201,8 +201,8 @@ def test_values_that_are_no_numbers_and_collapsed_cells_are_not_certified(name):
 @pytest.mark.parametrize("name", KINDS)
 def test_a_cell_inside_out_is_valid_with_the_other_orientation(name):
     nodes = solid.reference_nodes(name) * np.array([1.0, 1.0, -1.0])
-    assert validity3.judge_solid(nodes, form_of(name), 1.0, 0.0, 18)[0] == -1
-    assert validity3.judge_solid(nodes, form_of(name), -1.0, 0.0, 18)[0] == 1
+    assert solid_kernels.judge_solid(nodes, form_of(name), 1.0, 0.0, 18)[0] == -1
+    assert solid_kernels.judge_solid(nodes, form_of(name), -1.0, 0.0, 18)[0] == 1
 
 
 @pytest.mark.parametrize("name", LINEAR)
@@ -217,10 +217,10 @@ def test_with_a_node_at_another_place_a_cell_is_as_if_it_were_there(name):
     moved = cells[np.arange(count), which].astype(np.int64)
     places = points[moved, :3] + rng.normal(size=(count, 3)) * 0.3
     out, turn = np.zeros(count, dtype=bool), np.ones(count, dtype=np.int8)
-    validity3.certified_cells(points, cells, form, turn, U64, 0.0, moved, places, out)
+    solid_kernels.certified_cells(points, cells, form, turn, U64, 0.0, moved, places, out)
     nodes[np.arange(count), which] = places
     for c in range(count):
-        assert out[c] == (validity3.judge_solid(nodes[c], form, 1.0, delta_of(nodes[c]), 18)[0] == 1)
+        assert out[c] == (solid_kernels.judge_solid(nodes[c], form, 1.0, delta_of(nodes[c]), 18)[0] == 1)
     assert 0 < out.sum() < count
 
 

@@ -18,7 +18,8 @@ from gmsnet.kernels.simplex import mean_ratio3
 from gmsnet.kernels.simplex.orientation3 import count_signs, determinant_and_bound, signs
 from gmsnet.kernels.star import guard3
 from gmsnet.kernels.star.guard import Precision, plain_guard
-from gmsnet.kernels.star.space import LANES3, MARGIN
+from gmsnet.kernels.star.space import MARGIN
+from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.kernels.star.stars3 import WIDER, allowed3
 
 measured, moved = as_written(mean_ratio3.measured), as_written(mean_ratio3.moved)

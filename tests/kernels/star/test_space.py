@@ -11,7 +11,8 @@ from support.space import as_written, see, simplices_of, stars
 from gmsnet.kernels.methods.barrier3 import K3, Power3
 from gmsnet.kernels.simplex import mean_ratio3
 from gmsnet.kernels.simplex.tetra_measures import cubed_ratios
-from gmsnet.kernels.star.space import AFTER, KEPT, LANES3, LEAST, MARGIN
+from gmsnet.kernels.star.space import AFTER, KEPT, LEAST, MARGIN
+from gmsnet.kernels.star.space_blocks import LANES3
 
 measured, derivatives, moved = map(as_written, (mean_ratio3.measured, mean_ratio3.derivatives, mean_ratio3.moved))
 NUMBERS = range(-1, 6)

@@ -205,14 +205,6 @@ def commit_curved(points, mesh, i, x, y, guard, room, work, tally):
 
 
 @kernel
-def commit_all(points, mesh, nodes, targets, guard, room, tally):
-    """``commit_curved`` for nodes (K,) towards targets (K, 2), one after the other."""
-    work = curved_workspace(mesh)
-    for k in range(len(nodes)):
-        commit_curved(points, mesh, nodes[k], targets[k, 0], targets[k, 1], guard, room, work, tally)
-
-
-@kernel
 def follow(points, mesh, nodes, places, guard, room, tally):
     """``commit_curved`` for those of the nodes (K,) that are not yet where ``places`` (N, 2) says, in their order.
 

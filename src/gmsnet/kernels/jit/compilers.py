@@ -5,12 +5,19 @@ This rests on how Numba works inside, the same from 0.60 to 0.68; see ``KNOWN`` 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+from numba.core import ir, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.typed_passes import NopythonRewrites
+from numba.core.compiler_machinery import AnalysisPass, register_pass
+from numba.core.typed_passes import NativeLowering, NopythonRewrites
 from numba.core.untyped_passes import InlineClosureLikes
+
+# What gives an array that is there already, or a part of one.
+VIEWS = ("getattr", "getitem", "static_getitem", "typed_getitem", "build_tuple", "exhaust_iter", "cast", "getiter",
+         "iternext", "pair_first", "phi")  # fmt: skip
 
 
 class PartLibrary(JITCodeLibrary):
@@ -26,6 +33,57 @@ class PartLibrary(JITCodeLibrary):
 
     def set_env(self, name: str, environment: Any) -> None:
         """See ``codegen``."""
+
+
+@register_pass(mutates_CFG=False, analysis_only=True)
+class NoCounting(AnalysisPass):
+    """Lets parts that only look at arrays of their caller not count who uses them.
+
+    Numba counts each array of each tuple that a function is given, at each call: a fifth of a sweep over hexahedra. Its
+    caller holds them meanwhile. A part that makes arrays, or returns some, counts, and so do kernels.
+    """
+
+    _name = "no_counting"
+
+    def __init__(self) -> None:
+        AnalysisPass.__init__(self)
+
+    def run_pass(self, state: Any) -> bool:
+        """See AnalysisPass."""
+        if makes_arrays(state):
+            return False
+        state.targetctx = state.targetctx.subtarget(enable_nrt=False)
+        vars(state.targetctx).pop("nrt", None)  # what the context with counting has made of it
+        return True
+
+
+def makes_arrays(state: Any) -> bool:
+    """May there be arrays in a function that are not its caller's?"""
+
+    def holds(kind: Any) -> bool:
+        return bool(state.targetctx.data_model_manager[kind].contains_nrt_meminfo())
+
+    if holds(state.return_type):
+        return True
+    return any(
+        _makes_array(each, state.typemap, holds) for block in state.func_ir.blocks.values() for each in block.body
+    )
+
+
+def _makes_array(statement: Any, kinds: Any, holds: Callable[[Any], bool]) -> bool:
+    if isinstance(statement, ir.SetItem | ir.StaticSetItem):  # of slices, which may lie over each other
+        return holds(kinds[statement.value.name])
+    if not isinstance(statement, ir.Assign) or not isinstance(statement.value, ir.Expr):
+        return False
+    return holds(kinds[statement.target.name]) and not _is_view(statement.value, kinds, holds)
+
+
+def _is_view(value: Any, kinds: Any, holds: Callable[[Any], bool]) -> bool:
+    if value.op == "call":
+        return isinstance(kinds[value.func.name], types.NamedTupleClass)
+    if value.op == "getitem" and holds(kinds[value.index.name]):  # the rows of an array of numbers
+        return False
+    return value.op in VIEWS
 
 
 class KernelCompiler(CompilerBase):
@@ -55,7 +113,11 @@ class PartCompiler(KernelCompiler):
         state = self.state
         state.library = PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_cpython_wrapper, state.flags.forceinline = True, self.into_callers
-        return super().define_pipelines()
+        (passes,) = super().define_pipelines()
+        passes.passes.insert(
+            [each for each, _ in passes.passes].index(NativeLowering), (NoCounting, "arrays of callers")
+        )
+        return [passes]
 
 
 class InlinedCompiler(PartCompiler):

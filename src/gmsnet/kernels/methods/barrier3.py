@@ -16,20 +16,8 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import kernel, part
 from gmsnet.kernels.star.slide3 import restrict3
-from gmsnet.kernels.star.space import (
-    GX,
-    GY,
-    GZ,
-    ISO,
-    LANES3,
-    VALUE,
-    XX,
-    XY,
-    XZ,
-    YY,
-    YZ,
-    ZZ,
-)
+from gmsnet.kernels.star.space import GX, GY, GZ, ISO, VALUE, XX, XY, XZ, YY, YZ, ZZ
+from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.kernels.star.stars3 import derive3, fetch3, judge3, settle3, store3, try_alone, workspace3_for
 
 TRIALS = 10

@@ -9,7 +9,8 @@ import numpy as np
 from gmsnet.kernels.jit.compile import inlined, kernel
 from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL
 from gmsnet.kernels.simplex.shell_measures import shape_of_row
-from gmsnet.kernels.star.shell import crossed, spokes_of, square
+from gmsnet.kernels.star.shell import crossed, square
+from gmsnet.kernels.star.shell_simplices import spokes_of
 
 
 @inlined

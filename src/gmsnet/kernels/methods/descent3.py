@@ -40,7 +40,7 @@ from gmsnet.kernels.simplex.objectives3 import (
     evaluate3,
 )
 from gmsnet.kernels.star.slide3 import confined
-from gmsnet.kernels.star.space import LANES3, is_present, rows_in, weights_in_row
+from gmsnet.kernels.star.space_blocks import LANES3, is_present, rows_in, weights_in_row
 from gmsnet.kernels.star.stars3 import truncate3
 from gmsnet.kernels.star.surface import directions_at, on_curves
 

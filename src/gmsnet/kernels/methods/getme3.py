@@ -22,7 +22,7 @@ import numpy as np
 from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.methods.descent3 import gather3
 from gmsnet.kernels.simplex.mean_ratio3 import TINY, determinant, shape_of, square
-from gmsnet.kernels.star.space import LANES3
+from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.kernels.star.stars3 import truncate3
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.methods.barrier3 import TRIALS
-from gmsnet.kernels.star.space import LANES3
+from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.kernels.star.stars3 import certify3, derive3, fetch3, judge3, settle3, store3, try_alone, workspace3_for
 
 

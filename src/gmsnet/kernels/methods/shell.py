@@ -269,23 +269,6 @@ def sweep(points, stars, first, last, guard, doublings, relaxation, stretch, tal
 
 
 @kernel
-def average(points, stars, first, last, guard, smart, tally):
-    """Visits the stars first…last once: to the mean of the neighbours. smart: only as far as Σq falls."""
-    star, floors, work = np.empty(3 * stars.most), np.empty(stars.most + 1), np.empty(24)
-    for k in range(first, last):
-        i = stars.node[k]
-        n, reach = gather(points, stars, i, guard, star, floors)
-        pattern = pattern_at(stars.patterns, stars.pattern, i)
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        mx, my, mz = mean_of(star, n, pattern)
-        value = np.inf
-        if smart:
-            value, _ = value_at(star, n, pattern, x, y, z, 1.0, 0)
-        go(points, i, stars, guard, star, n, pattern, floors, reach, mx - x, my - y, mz - z, value, 1.0, 0,
-           work[15:18], work[18:21], tally)  # fmt: skip
-
-
-@kernel
 def visit(points, stars, nodes, guard, doublings, sweeps, scale, awake, tally):
     """Visits these nodes in their order, so many times, p = 2^doublings: see kernels.methods.worst_first_cycles."""
     start, around = stars.start, stars.around

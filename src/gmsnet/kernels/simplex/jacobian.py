@@ -238,45 +238,9 @@ def quality_of(kind, bound, work):
     return minimum_bound(kind, bound, work) / mean if mean > 0.0 else -np.inf
 
 
-@part
-def take(nodes, kind, work):
-    """As ``gather_cell``, from the nodes themselves."""
-    for k in range(NODES[kind]):
-        work.nodes[k, 0], work.nodes[k, 1] = nodes[k, 0] - nodes[0, 0], nodes[k, 1] - nodes[0, 1]
-    if NODES[kind] == CORNERS[kind]:
-        straighten_edges(work.nodes, CORNERS[kind])
-
-
-@kernel
-def certified_positive(nodes, kind, delta):
-    """Is det J positive everywhere in a cell? +1 certainly, −1 certainly not, 0 undecided.
-
-    nodes: (6, 8, 9, 3 or 4, 2) float64, counter-clockwise, known up to ±delta. kind: see kernels.simplex.bernstein.
-    """
-    work = cell_workspace()
-    take(nodes, kind, work)
-    return sign_everywhere(kind, expand(kind, delta, work), work)
-
-
-@kernel
-def lower_bound(nodes, kind, delta):
-    """What det J is certainly not below anywhere in a cell. Arguments: see ``certified_positive``."""
-    work = cell_workspace()
-    take(nodes, kind, work)
-    return minimum_bound(kind, expand(kind, delta, work), work)
-
-
-@kernel
-def curved_quality(nodes, kind, delta):
-    """See ``quality_of``. Arguments: see ``certified_positive``."""
-    work = cell_workspace()
-    take(nodes, kind, work)
-    return quality_of(kind, expand(kind, delta, work), work)
-
-
 @kernel
 def judge_cells(points, cells, kinds, unit, grain, first, last, sign, quality):
-    """``certified_positive`` and ``curved_quality`` of the cells first…last, into ``sign`` and ``quality`` (C,).
+    """``sign_everywhere`` and ``quality_of`` of the cells first…last, into ``sign`` and ``quality`` (C,).
 
     points: (N, 2). cells: (C, 9), counter-clockwise. kinds: (C,). unit, grain: see kernels.star.guard.Precision.
     """

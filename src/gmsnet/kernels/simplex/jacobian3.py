@@ -63,13 +63,6 @@ def gather_solid(points, cell, form, moved, x, y, z, work):
     return reach
 
 
-@part
-def take_solid(nodes, form, work):
-    """As ``gather_solid``, from the nodes themselves."""
-    for k in range(form.nodes):
-        put(work, NODES + 3 * k, nodes[k, 0] - nodes[0, 0], nodes[k, 1] - nodes[0, 1], nodes[k, 2] - nodes[0, 2])
-
-
 @inlined
 def put(work, place, x, y, z):
     """A vector into the workspace."""

@@ -24,7 +24,8 @@ from gmsnet.kernels.simplex.cell_measures import (
     UNCERTAIN,
 )
 from gmsnet.kernels.simplex.mean_ratio2 import TINY, TWO_SQRT3, same_cell, weights_at_first
-from gmsnet.kernels.star.shell import crossed, double_of_row, half_lengths3, spokes_of, square
+from gmsnet.kernels.star.shell import crossed, half_lengths3, square
+from gmsnet.kernels.star.shell_simplices import double_of_row, spokes_of
 
 
 @inlined

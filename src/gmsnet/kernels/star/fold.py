@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from gmsnet.kernels.jit.compile import inlined, part
-from gmsnet.kernels.star.space import LANES3
+from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.kernels.star.surface import CURVED, normal_on, walk
 
 LEAST_COSINE = 0.1  # between a facet's normal and that of the surface at its middle: 84°

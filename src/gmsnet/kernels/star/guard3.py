@@ -212,14 +212,14 @@ def sound(mixture, points, i, x, y, z, unit, grain):
         dx, dy, dz = x - points[i, 0], y - points[i, 1], z - points[i, 2]
         away, slack, gone, enough = WIDER * math.sqrt(square(dx, dy, dz)), mixture.slack, mixture.gone, True
         for k in range(mixture.at[i], mixture.at[i + 1]):
-            corner = mixture.around[k]
-            enough &= slack[corner >> 3] >= gone[corner] + away
-        if not enough and not renewed(mixture, points, i, x, y, z, unit, grain, away):
-            return False
+            enough &= slack[mixture.around[k] >> 3] >= gone[k] + away
+        if not enough:
+            if not renewed(mixture, points, i, x, y, z, unit, grain, away):
+                return False
+            for k in range(mixture.at[i], mixture.at[i + 1]):
+                slack[mixture.around[k] >> 3] = abs(slack[mixture.around[k] >> 3])
         for k in range(mixture.at[i], mixture.at[i + 1]):
-            corner = mixture.around[k]
-            slack[corner >> 3] = abs(slack[corner >> 3])
-            gone[corner] += away
+            gone[k] += away
     return True
 
 
@@ -229,7 +229,7 @@ def renewed(mixture, points, i, x, y, z, unit, grain, away):
     solids, slack, gone, work = mixture.solids, mixture.slack, mixture.gone, np.empty(72)
     for k in range(mixture.at[i], mixture.at[i + 1]):
         cell = mixture.around[k] >> 3
-        if slack[cell] >= gone[mixture.around[k]] + away:
+        if slack[cell] >= gone[k] + away:
             continue
         nodes, kind = solids.nodes[cell], solids.kind[cell]
         found = slack_of(points, nodes, kind == HEXAHEDRON, unit, grain, i, x, y, z, work)
@@ -242,5 +242,6 @@ def renewed(mixture, points, i, x, y, z, unit, grain, away):
             found = 0.0
         slack[cell] = -found
         for corner in range(8 * cell, 8 * cell + 8):
-            gone[corner] = 0.0
+            if mixture.place[corner] >= 0:
+                gone[mixture.place[corner]] = 0.0
     return True

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.jit.compile import inlined, part
-from gmsnet.kernels.star.space import GX, GY, GZ, ISO, LANES3, XX, XY, XZ, YY, YZ, ZZ
+from gmsnet.kernels.star.space import GX, GY, GZ, ISO, XX, XY, XZ, YY, YZ, ZZ
+from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.kernels.star.surface import directions_at, on_curves, snap3
 
 

@@ -14,17 +14,8 @@ from gmsnet.kernels.star.fold import folds, refuse_folds
 from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.guard3 import MIXED_BOUND, WIDER, certified, floor_at, sound
 from gmsnet.kernels.star.slide3 import land3, note_places, on_surface, take_place
-from gmsnet.kernels.star.space import (
-    KEPT,
-    LANES3,
-    SUMS,
-    derive,
-    is_present,
-    judge,
-    relate,
-    rows_in,
-    weights_in_row,
-)
+from gmsnet.kernels.star.space import KEPT, SUMS, derive, judge, relate
+from gmsnet.kernels.star.space_blocks import LANES3, is_present, rows_in, weights_in_row
 from gmsnet.kernels.star.verdict3 import certify, settle
 
 LINE = 64  # bytes

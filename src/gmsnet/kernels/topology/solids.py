@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
-from gmsnet.kernels.topology.facets import ALONE, NON_MANIFOLD, OPPOSITE
+from gmsnet.kernels.simplex.mean_ratio3 import determinant
+from gmsnet.kernels.topology.facets import ALONE, NON_MANIFOLD
 
 FACETS = 6
 NONE = -1
@@ -22,13 +23,15 @@ class Tables(NamedTuple):
     """By the kind of a cell, NONE where there is nothing.
 
     facets: (K, 6, 4) corners, counter-clockwise as seen from outside. around: (3, K, 8, 4) the corners that an edge
-    joins to each; the others of its corner simplices; those of none. simplices: (K, 8, 4). inexact: (K,) whether
-    positive corner simplices do not tell that a cell is valid. facets_at: (K, 8) how many at each corner.
+    joins to each; the others of its corner simplices; those of none. simplices: (K, 8, 4). at_corner:
+    (K, 8, 8) 4s + k for each simplex s that has the corner as its vertex k. inexact: (K,) whether positive corner
+    simplices do not tell that a cell is valid. facets_at: (K, 8) how many at each corner.
     """
 
     facets: NDArray[np.int32]
     around: NDArray[np.int32]
     simplices: NDArray[np.int32]
+    at_corner: NDArray[np.int32]
     inexact: NDArray[np.bool_]
     facets_at: NDArray[np.int32]
 
@@ -155,6 +158,38 @@ def wind_solids(nodes, kind, tables, twin, piece, orientation):
 
 
 @kernel
+def list_simplices(nodes, kind, tables, rows, owner):
+    """Writes the corner simplices of all cells, cell by cell: rows (S, 4) and owner (S,), the cell."""
+    end = 0
+    for t in range(len(kind)):
+        for simplex in tables.simplices[kind[t]]:
+            if simplex[0] == NONE:
+                break
+            for k in range(4):
+                rows[end, k] = nodes[t, simplex[k]]
+            owner[end] = t
+            end += 1
+
+
+@kernel
+def corner_volumes(points, nodes, kind, tables, mean, size):
+    """Writes the mean of the determinants of the corner simplices of each cell, (T,), and that of their magnitudes."""
+    for t in range(len(kind)):
+        total, magnitude, count = 0.0, 0.0, 0
+        for simplex in tables.simplices[kind[t]]:
+            if simplex[0] == NONE:
+                break
+            d, a, b, c = nodes[t, simplex[0]], nodes[t, simplex[1]], nodes[t, simplex[2]], nodes[t, simplex[3]]
+            x, y, z = points[d, 0], points[d, 1], points[d, 2]
+            double = determinant(
+                points[a, 0] - x, points[a, 1] - y, points[a, 2] - z, points[b, 0] - x, points[b, 1] - y,
+                points[b, 2] - z, points[c, 0] - x, points[c, 1] - y, points[c, 2] - z,
+            )  # fmt: skip
+            total, magnitude, count = total + double, magnitude + abs(double), count + 1
+        mean[t], size[t] = total / count, magnitude / count
+
+
+@kernel
 def mark_solids(nodes, kind, tables, twin, region, halved, boundary, interface, non_manifold, mismatched, marks):
     """Marks the nodes of facets on the boundary, between two regions, of more than two cells, and of ``halved`` ones.
 
@@ -179,178 +214,3 @@ def mark_solids(nodes, kind, tables, twin, region, halved, boundary, interface, 
                 for i in range(4):
                     if f[i] != NONE:
                         marks[nodes[t, f[i]]] |= np.uint16(mark)
-
-
-@kernel
-def list_solids(nodes, corners, marks, start, cell, corner):
-    """The cells at each node without a mark, in CSR form: cell (M,) and which of its corners the node is.
-
-    corners: (T,) how many. start: (N + 2,) zeros before; those of node v are then start[v] … start[v + 1] − 1. cell and
-    corner have room for all corners. Returns how many there are.
-    """
-    for t in range(len(nodes)):
-        for k in range(corners[t]):
-            if not marks[nodes[t, k]]:
-                start[nodes[t, k] + 2] += 1
-    for v in range(2, len(start)):
-        start[v] += start[v - 1]
-    for t in range(len(nodes)):
-        for k in range(corners[t]):
-            v = nodes[t, k]
-            if not marks[v]:
-                at = start[v + 1]
-                start[v + 1] = at + 1
-                cell[at], corner[at] = t, k
-    return start[-1]
-
-
-@kernel
-def rings_of_solids(nodes, kind, tables, start, cell, corner, ring_start, ring, edges, core, most):
-    """The nodes around each node: first those that an edge joins, then the others of its simplices, then of its cells.
-
-    start, cell, corner: as ``list_solids`` leaves them. Writes ring_start (N + 1,), ring, with room for seven a corner,
-    edges and core (N,): how many are joined by edges, and how many are in simplices. A node with more than ``most`` in
-    simplices has none. Returns how many nodes all rings have.
-    """
-    seen = np.full(len(edges), -1, dtype=np.int64)
-    end = 0
-    for v in range(len(edges)):
-        ring_start[v] = end
-        count, first, second = 0, 0, 0
-        seen[v] = v
-        for turn in range(3):
-            for at in range(start[v], start[v + 1]):
-                t = cell[at]
-                for j in range(4):
-                    place = tables.around[turn, kind[t], corner[at], j]
-                    if place != NONE:
-                        other = nodes[t, place]
-                        if seen[other] != v:
-                            seen[other] = v
-                            ring[end + count] = other
-                            count += 1
-            first, second = count if turn == 0 else first, count if turn < 2 else second
-        if second > most:
-            count, first, second = 0, 0, 0
-        edges[v], core[v] = first, second
-        end += count
-    ring_start[len(edges)] = end
-    return end
-
-
-@kernel
-def stars_of_solids(nodes, kind, tables, roles, start, cell, corner, ring_start, ring, core, own, local, role, owner):
-    """The corner simplices at each node, by their roles: own (N + 1,) where those of each begin, local (M, 3) uint8,
-    the places in its ring where their spokes end, role (M,) and owner (M,), the cell.
-
-    roles: (K, 4) by the kind and by which vertex of the simplex the node is. local, role, owner have room for eight a
-    corner. Returns how many there are.
-    """
-    place = np.zeros(len(core), dtype=np.int64)
-    end = 0
-    for v in range(len(core)):
-        own[v] = end
-        if core[v] == 0:
-            continue
-        for j in range(core[v]):
-            place[ring[ring_start[v] + j]] = j
-        for at in range(start[v], start[v + 1]):
-            t = cell[at]
-            for s in range(8):
-                simplex = tables.simplices[kind[t], s]
-                if simplex[0] == NONE:
-                    break
-                for k in range(4):
-                    if simplex[k] == corner[at]:
-                        put_simplex(nodes, t, simplex, k, roles[kind[t], k], place, own[v], end, local, role, owner)
-                        end += 1
-    own[len(core)] = end
-    return end
-
-
-@inlined
-def put_simplex(nodes, t, simplex, k, number, place, first, end, local, role, owner):
-    """Puts a simplex behind those from first to end of its role or a lesser one."""
-    i = end
-    while i > first and role[i - 1] > number:
-        role[i], owner[i] = role[i - 1], owner[i - 1]
-        local[i, 0], local[i, 1], local[i, 2] = local[i - 1, 0], local[i - 1, 1], local[i - 1, 2]
-        i -= 1
-    role[i], owner[i] = number, t
-    for j in range(3):
-        local[i, j] = place[nodes[t, simplex[OPPOSITE[k, j]]]]
-
-
-@kernel
-def count_rows(order, first, own, role, roles, core, rows, ring_rows):
-    """How many rows the simplices of each block of stars take, and the nodes around.
-
-    order: the free nodes; first: (B + 1,) where the stars of each block begin there. rows, ring_rows: (B,).
-    """
-    most = np.empty(roles, dtype=np.int64)
-    for b in range(len(rows)):
-        most[:] = 0
-        around = 0
-        for at in range(first[b], first[b + 1]):
-            v = order[at]
-            around = max(around, core[v])
-            i = own[v]
-            while i < own[v + 1]:
-                j = i
-                while j < own[v + 1] and role[j] == role[i]:
-                    j += 1
-                most[role[i]] = max(most[role[i]], j - i)
-                i = j
-        rows[b], ring_rows[b] = most.sum(), around
-
-
-@kernel
-def fill_mixed_blocks(order, ring_start, ring, core, edges, own, local, role, owner, roles, lanes, first, blocks):
-    """Writes stars in blocks (kernels.star.space), SpaceBlocks whose rows are counted and the rest is empty."""
-    mixture = blocks.mixture
-    next_row = np.empty(roles, dtype=np.int64)
-    for b in range(len(blocks.filled)):
-        stars = first[b + 1] - first[b]
-        blocks.filled[b] = stars
-        rows, around = np.int64(blocks.simplices[b]), np.int64(blocks.degree[b])
-        at, offset, begin = blocks.at[b], blocks.offset[b], blocks.at[b] // (3 * lanes)
-        for r in range(rows):
-            mixture.present[begin + r] = 0
-        for lane in range(lanes):  # the roles of the rows
-            v = order[first[b] + min(lane, stars - 1)]
-            if lane == 0:
-                next_row[:] = 0
-            i = own[v]
-            while i < own[v + 1]:
-                j = i
-                while j < own[v + 1] and role[j] == role[i]:
-                    j += 1
-                next_row[role[i]] = max(next_row[role[i]], j - i)
-                i = j
-        row = 0
-        for r in range(roles):
-            count = next_row[r]
-            next_row[r] = row
-            for k in range(count):
-                mixture.role[begin + row + k] = r
-            row += count
-        for k in range(3 * lanes * rows):
-            blocks.spoke[at + k] = 0
-        for k in range(lanes * rows):
-            mixture.owner[at // 3 + k] = 0
-        for lane in range(lanes):
-            v = order[first[b] + min(lane, stars - 1)]
-            blocks.centre[b * lanes + lane] = v
-            mixture.edges[b * lanes + lane] = edges[v]
-            for j in range(around):
-                blocks.ring[offset + j * lanes + lane] = ring[ring_start[v] + (j if j < core[v] else 0)]
-            blocks.cells[b * lanes + lane] = own[v + 1] - own[v]
-            same, before = 0, -1
-            for i in range(own[v], own[v + 1]):
-                same = same + 1 if role[i] == before else 0
-                before = np.int64(role[i])
-                k = next_row[role[i]] + same
-                mixture.present[begin + k] |= np.uint16(1 << lane)
-                mixture.owner[at // 3 + k * lanes + lane] = owner[i]
-                for j in range(3):
-                    blocks.spoke[at + (3 * k + j) * lanes + lane] = local[i, j]

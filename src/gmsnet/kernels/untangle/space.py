@@ -10,7 +10,8 @@ from gmsnet.kernels.simplex.jacobian3 import solid_workspace
 from gmsnet.kernels.simplex.mean_ratio3 import measured_as, same_cell3, weights_at
 from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, largest_component, spokes_of
 from gmsnet.kernels.simplex.solid_measures import certainly_valid
-from gmsnet.kernels.star.space import AFTER, LANES3, VALUE
+from gmsnet.kernels.star.space import AFTER, VALUE
+from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.kernels.star.stars3 import derive3, fetch3, judge3, workspace3_for
 
 TRIALS = 4
