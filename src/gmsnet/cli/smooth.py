@@ -204,6 +204,7 @@ def smooth(
     from gmsnet.cli.file_work import Done, FileWork
     from gmsnet.cli.fix import fixed_nodes
     from gmsnet.cli.metric import values_at_nodes
+    from gmsnet.cli.rank_files import shared_format, smooth_in_pieces
     from gmsnet.cli.ranks import smooth_function
     from gmsnet.cli.smooth_report import Outcome
     from gmsnet.run.options import SmoothOptions
@@ -218,6 +219,14 @@ def smooth(
         surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles,
         **values_at_nodes(metric, size),
     )  # fmt: skip
+
+    plain = not any((fix, slide, plot, report, dry_run, format, output_format, metric, size, asked.target))
+    if whole is not None and plain and (kind := shared_format(input, whole.path)):
+        work = FileWork(
+            input, None, whole, in_place=in_place, plot=None, report=None, most_sweeps=max_sweeps, json=json,
+            quiet=quiet, command=command_of(context),
+        )  # fmt: skip
+        raise typer.Exit(smooth_in_pieces(work, replace(asked, callback=work.after_sweep), whole.path, kind))
 
     def one(job: Job, destination: Destination | None) -> tuple[int, bool]:
         work = FileWork(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.distributed.file_run import FileTask, smooth_file
 from gmsnet.distributed.gathered import Whole
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.partition import partition
@@ -36,6 +37,10 @@ def follow(comm: Any = None) -> None:
     """What all but the first rank do: they take part in what it smooths, until it says that this is all."""
     comm = mpi().COMM_WORLD if comm is None else comm
     while (options := comm.bcast(None)) is not None:
+        if isinstance(options, FileTask):
+            with contextlib.suppress(GmsnetError):
+                smooth_file(options, comm)
+            continue
         piece = comm.scatter(None)
         with contextlib.suppress(GmsnetError):  # the first rank raises it, too, and says it
             found = smoothed(piece, options, comm)
@@ -63,6 +68,13 @@ def smooth_from_first(mesh: Mesh, options: SmoothOptions, fixed: Any = None, com
         points[piece.ids] = places
     done = partial(_as_a_state, mesh, points, fixed, options, found)
     return ended(done, lambda state: result_of(state, options, began))
+
+
+def smooth_file_from_first(task: FileTask, comm: Any = None) -> RankResult:
+    """``smooth_file`` while the others ``follow``. Errors: see there."""
+    comm = mpi().COMM_WORLD if comm is None else comm
+    comm.bcast(replace(task, options=replace(task.options, callback=None)))
+    return smooth_file(task, comm)
 
 
 def _as_a_state(mesh: Mesh, points: Floats, fixed: Any, options: SmoothOptions, found: RankResult) -> State:

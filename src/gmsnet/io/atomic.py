@@ -6,7 +6,7 @@ import contextlib
 import os
 import stat
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from gmsnet.errors import InputError
 from gmsnet.io.pieces import Piece
@@ -15,14 +15,17 @@ from gmsnet.io.streams import is_special
 from gmsnet.io.temporary import Temporary, remove_leftovers
 
 
-def replace_files(files: Mapping[str, bytes | Iterable[Piece]], stamps: Stamps | None = None) -> None:
+def replace_files(
+    files: Mapping[str, bytes | Iterable[Piece]], stamps: Stamps | None = None, agree: Callable[[], None] | None = None
+) -> None:
     """Writes files (path → bytes, or pieces made as they are written): each new content goes to a temporary file beside
     its target, reaches the disk, and only when all of them have done so are the targets replaced.
 
     A link is followed, an existing file keeps its permissions. What is no regular file (a pipe, a device) is written
     straight. What killed processes have left in the folders is removed.
 
-    stamps: of the files that were read, which are replaced only if they are as they were then. Raises InputError where
+    stamps: of the files that were read, which are replaced only if they are as they were then. agree: called when all
+    is on the disk and nothing is replaced yet; what it raises, this raises. Raises InputError where
     they are not or a target cannot be written, BrokenPipeError where nobody reads a pipe any more; then, as after any
     other interruption, no temporary file is left and no target is half-written.
     """
@@ -49,6 +52,8 @@ def replace_files(files: Mapping[str, bytes | Iterable[Piece]], stamps: Stamps |
         stamps = stamps or Stamps()
         for _, _, path, _ in finished:
             stamps.check(path)
+        if agree is not None:
+            agree()
         for temporary, target, path, stamp in finished:
             try:
                 temporary.become(target)

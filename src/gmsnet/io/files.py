@@ -77,14 +77,14 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
     if (folder := case_of(name, format)) is not None:
         entry = FORMATS[OPENFOAM]
         there = [key for key in entry.optional if os.path.exists(file_in(folder, key))]
-        return entry, {key: _loaded(file_in(folder, key)) for key in (*entry.suffixes, *there)}
+        return entry, {key: loaded(file_in(folder, key)) for key in (*entry.suffixes, *there)}
     refuse_folder(name)
     if not stream:
         if not os.path.exists(name):
             raise InputError(f"{name}: there is no such file")
         refuse_unless_regular(name)
     if format is None and stream:
-        opened = _loaded(name)
+        opened = loaded(name)
         key = sniff(opened[1])
         if key is None:
             raise InputError(f"{shown}: its format cannot be seen; name it with --format ({', '.join(FORMATS)})")
@@ -92,13 +92,13 @@ def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, t
         return entry, {entry.suffixes[0]: opened}
     entry = entry_of(format) if format is not None else FORMATS[format_of_suffix(name, split_name(name)[1])]
     if len(entry.suffixes) == 1:
-        opened = _loaded(name)
+        opened = loaded(name)
         if format is None:
             entry = entry_in(opened[1], entry.key, split_name(name)[1])
         return entry, {entry.suffixes[0]: opened, **_linked(entry, name, shown, opened[1], stream)}
     if stream:
         raise InputError(f"{shown}: {entry.title} takes several files and cannot be read from a stream")
-    return entry, {suffix: _loaded(beside(name, suffix)) for suffix in entry.suffixes}
+    return entry, {suffix: loaded(beside(name, suffix)) for suffix in entry.suffixes}
 
 
 def _linked(entry: Entry, name: str, shown: str, data: Data, stream: bool) -> dict[str, tuple[str, Data, Stamp | None]]:
@@ -115,7 +115,7 @@ def _linked(entry: Entry, name: str, shown: str, data: Data, stream: bool) -> di
                 raise FormatError(f"{title}: {file[:80]!r} is named twice, or names itself")
             ways.add(os.path.normpath(place))
             try:
-                opened[path] = _loaded(place)
+                opened[path] = loaded(place)
             except InputError as error:
                 raise type(error)(f"{shown}: the file that it names cannot be read: {error}") from None
             if nested(entry, file):
@@ -149,7 +149,8 @@ def _form_told(form: str, entry: Entry, name: str) -> str:
     return told
 
 
-def _loaded(name: str) -> tuple[str, Data, Stamp | None]:
+def loaded(name: str) -> tuple[str, Data, Stamp | None]:
+    """The name, the bytes, unpacked, and the stamp of one file. Errors: see ``read``."""
     try:
         data, stamp = load(name)
         if is_packed(name):

@@ -66,17 +66,36 @@ def merged(parts: Sequence[Part]) -> Merged:
 def _joined(parts: Sequence[Part]) -> tuple[Ints, NDArray[np.bool_]]:
     """For each point of all parts the first one that is the same node, and whether several of its part are there."""
     points = np.concatenate([part.parsed.points for part in parts])
-    piece = np.repeat(np.arange(len(parts)), [len(part.parsed.points) for part in parts])
-    starts = np.cumsum([0, *(len(part.parsed.points) for part in parts)])
-    used = np.zeros(len(points), dtype=bool)
-    for part, start in zip(parts, starts.tolist(), strict=False):
-        for block in part.parsed.cells:
-            used[block.nodes.ravel() + start] = True
-    keys = list(points.T[::-1])
+    ids = None
     if all(part.ids is not None for part in parts):
-        keys.append(np.concatenate([part.ids for part in parts if part.ids is not None]))
-    rows = np.flatnonzero(used)
-    order = rows[np.lexsort([rows, *(key[rows] for key in keys)])]
+        ids = np.concatenate([part.ids for part in parts if part.ids is not None])
+    piece = np.repeat(np.arange(len(parts)), [len(part.parsed.points) for part in parts])
+    rows = np.flatnonzero(used_points(parts))
+    first, unsure = np.arange(len(points)), np.zeros(len(points), dtype=bool)
+    given = points[rows], None if ids is None else ids[rows], piece[rows]
+    first[rows], unsure[rows] = same_points(*given, rows)
+    return first, unsure
+
+
+def used_points(parts: Sequence[Part]) -> NDArray[np.bool_]:
+    """Which points of all parts, one part after another, are points of cells."""
+    found = [np.zeros(len(part.parsed.points), dtype=bool) for part in parts]
+    for part, used in zip(parts, found, strict=True):
+        for block in part.parsed.cells:
+            used[block.nodes.ravel()] = True
+    return np.concatenate([*found, np.empty(0, dtype=bool)])
+
+
+def same_points(
+    points: NDArray[np.float64], ids: Ints | None, piece: Ints, numbers: Ints
+) -> tuple[Ints, NDArray[np.bool_]]:
+    """For each point (n, dim) of cells the number of the first one that is the same node, and whether several of one
+    piece are there. ids: (n,), None where they do not count. piece: (n,) of each. numbers: (n,) over all pieces.
+    """
+    if not len(points):
+        return numbers.copy(), np.zeros(0, dtype=bool)
+    keys = list(points.T[::-1]) + ([] if ids is None else [ids])
+    order = np.lexsort([numbers, *keys])
     new = np.ones(len(order), dtype=bool)
     new[1:] = np.logical_or.reduce([key[order[1:]] != key[order[:-1]] for key in keys])
     group = np.cumsum(new) - 1
@@ -84,8 +103,8 @@ def _joined(parts: Sequence[Part]) -> tuple[Ints, NDArray[np.bool_]]:
     twice[1:] &= piece[order[1:]] == piece[order[:-1]]
     several = np.zeros(int(group[-1]) + 1, dtype=bool)
     several[group[twice]] = True
-    first, unsure = np.arange(len(points)), np.zeros(len(points), dtype=bool)
-    first[order] = np.where(several[group], order, order[np.flatnonzero(new)[group]])
+    first, unsure, sequence = np.empty_like(numbers), np.zeros(len(points), dtype=bool), numbers[order]
+    first[order] = np.where(several[group], sequence, sequence[np.flatnonzero(new)[group]])
     unsure[order] = several[group]
     return first, unsure
 
@@ -111,11 +130,11 @@ def _cells(parts: Sequence[Part], nodes: Sequence[Ints]) -> tuple[list[CellBlock
         for j, name in enumerate(shared):
             cell_data[name] += (np.concatenate([each[2][j] for each in found]),)
         copy = np.concatenate(copies[key])
-        orphans.append(copy[~_among(copy, whole)].ravel())
+        orphans.append(copy[~among(copy, whole)].ravel())
     return cells, cell_data, np.concatenate(orphans)
 
 
-def _among(some: Ints, all_of: Ints) -> NDArray[np.bool_]:
+def among(some: Ints, all_of: Ints) -> NDArray[np.bool_]:
     """(n,) which of the cells (n, k) are also in the other list (m, k), whatever the order of their nodes."""
     if not len(some):
         return np.zeros(0, dtype=bool)

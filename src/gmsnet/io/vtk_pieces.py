@@ -39,7 +39,7 @@ class PieceFormat:
         if kind != self.kind:
             raise FormatError(f"a VTKFile of type {kind} is not {self.name}: rename the file")
         links = list(leaves(files, named))
-        parts = [part for link in links if (part := _part(link, files)) is not None]
+        parts = [part for link in links if (part := part_in(link, files)) is not None]
         if not parts:
             raise FormatError("no piece has cells: there is nothing to smooth")
         if kind == BLOCKS:
@@ -57,7 +57,7 @@ class PieceFormat:
         return own_files_only(self.name)
 
 
-def _part(link: Link, files: Mapping[str, Data]) -> tuple[Part, Link] | None:
+def part_in(link: Link, files: Mapping[str, Data]) -> tuple[Part, Link] | None:
     """What a piece holds; None where it has no cells. Raises FormatError naming the piece."""
     polygons = split_name(link.path)[1].lower() == vtp.suffixes[0]
     module = vtp if polygons else vtu

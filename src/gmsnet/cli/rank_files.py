@@ -1,0 +1,47 @@
+"""Under mpiexec: a file in pieces, of which each rank reads and writes its own."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+from gmsnet.cli import output as printed
+from gmsnet.cli.file_work import FileWork
+from gmsnet.cli.ranks import rank_of
+from gmsnet.mesh.display import amount, visible
+from gmsnet.parallel.interrupts import interruptible
+
+if TYPE_CHECKING:
+    from gmsnet.run.options import SmoothOptions
+
+
+def shared_format(source: str, target: str) -> str:
+    """The format of files that several ranks read and write piece by piece; "" where one process does it."""
+    if rank_of()[1] == 1:
+        return ""
+    from gmsnet.distributed.file_run import in_pieces
+
+    return in_pieces(source, target)
+
+
+def smooth_in_pieces(work: FileWork, options: SmoothOptions, target: str, format: str) -> int:
+    """Smooths the file, prints the figures of all ranks, and returns the exit code: 1 where cells are inverted."""
+    from gmsnet.distributed.file_run import FileTask
+    from gmsnet.distributed.first import smooth_file_from_first
+
+    task = FileTask(work.input, target, format, options)
+    with interruptible(), work.progress, work.interruption:
+        work.progress.begin(visible(f"smoothing {work.input}"))
+        found = smooth_file_from_first(task)
+        work.interruption.end()
+    if work.json:
+        named = {"input": work.input, "output": target, "method": options.method_name}
+        printed.print_json({**named, **found.summary(), "notes": found.notes})
+    elif not work.quiet:
+        for line in [*repr(found).splitlines(), f"mesh written to {target}"]:
+            typer.echo(visible(line))
+    inverted = 0 if found.after is None else found.after.inverted
+    if inverted:
+        typer.echo(f"gmsnet: {amount(inverted, 'cell')} inverted still", err=True)
+    return 1 if inverted else 0

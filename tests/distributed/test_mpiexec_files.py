@@ -1,0 +1,97 @@
+"""Under mpiexec: files in pieces, each read and written by one rank, and what is left where one fails."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.pieces import save_pieces
+
+import gmsnet
+from gmsnet.mesh.mesh import Mesh
+
+pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+from distributed.test_mpiexec import MPIEXEC, mpiexec, smooth
+
+pytestmark = pytest.mark.skipif(MPIEXEC is None, reason="mpiexec is not installed")
+
+ON_RANK_1 = """
+import os, sys, signal, resource
+import gmsnet.distributed.together as together
+import gmsnet.io.atomic as atomic
+if os.environ.get('OMPI_COMM_WORLD_RANK', os.environ.get('PMI_RANK')) == '1':
+    {what}
+from gmsnet.cli import main
+sys.exit(main(['smooth', 'a.pvtu', '{target}', '--method', 'barrier'] + {more}))
+"""
+FULL = (
+    "def full(*given, write=together.replace_files):\n"
+    "        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+    "        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))\n"
+    "        write(*given)\n"
+    "    together.replace_files = full"
+)
+KILLED = "atomic._write = lambda *given: os.kill(os.getpid(), 9)"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    mesh = gmsnet.random_mesh(800, seed=1)
+    points = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
+    save_pieces(Mesh(points, mesh.cells), tmp_path, 3, ghosts=True, ids=True)
+    return tmp_path
+
+
+def saved(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(("ranks", "method"), [(2, "auto"), (3, "barrier"), (5, "getme")])
+def test_the_same_files_as_without_ranks(folder, ranks, method):
+    (folder / "serial").mkdir()
+    gmsnet.write(gmsnet.smooth(gmsnet.read(folder / "a.pvtu"), method).mesh, folder / "serial" / "b.pvtu")
+    done = smooth(ranks, "a.pvtu", "b.pvtu", "--method", method, "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    files = saved(folder)
+    for name in ("b.pvtu", *(f"b/a_{k}.vtu" for k in range(3))):
+        assert files[name] == files[f"serial/{name}"]
+    report = json.loads(done.stdout)  # of one rank
+    assert (report["method"], report["output"]) == (method, "b.pvtu")
+    assert report["nodes"] == len(gmsnet.read(folder / "a.pvtu").points)
+
+
+@pytest.mark.parametrize("target", ["a.pvtu", "b.pvtu"])
+def test_a_full_disk_on_one_rank(folder, target):
+    before = saved(folder)
+    more = "['--in-place']" if target == "a.pvtu" else "[]"
+    script = ON_RANK_1.format(what=FULL, target=target, more=more)
+    done = mpiexec(2, "-c", script.replace("'a.pvtu', 'a.pvtu'", "'a.pvtu'"), cwd=folder)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.count("cannot be written: file too large") == 1
+    assert "Traceback" not in done.stderr
+    assert saved(folder) == before
+    assert not (folder / "b").exists()
+
+
+def test_a_rank_that_is_killed_as_it_writes(folder):
+    before = saved(folder)
+    done = mpiexec(2, "-c", ON_RANK_1.format(what=KILLED, target="b.pvtu", more="[]"), cwd=folder)
+    assert done.returncode != 0
+    after = saved(folder)
+    assert {name: after[name] for name in before} == before
+    assert all(name.endswith(".tmp") for name in after.keys() - before.keys())
+    assert smooth(2, "a.pvtu", "b.pvtu", "--max-sweeps", "1", cwd=folder).returncode == 0
+    assert sorted(saved(folder)) == sorted([*before, "b.pvtu", *(f"b/a_{k}.vtu" for k in range(3))])
+
+
+def test_a_truncated_piece_is_said_once(folder):
+    piece = folder / "a" / "a_2.vtu"
+    piece.write_bytes(piece.read_bytes()[:500])
+    before = saved(folder)
+    done = smooth(2, "a.pvtu", "b.pvtu", cwd=folder)
+    assert done.returncode == 2
+    assert done.stderr.count("gmsnet: error: a.pvtu: a/a_2.vtu:") == 1
+    assert "Traceback" not in done.stderr
+    assert saved(folder) == before
