@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
+from gmsnet.kernels.star.constraint import locate
+from gmsnet.kernels.star.surface import Surface, locate3
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods.auto import Auto
 from gmsnet.parallel.executor import Executor
@@ -48,6 +50,8 @@ def _closer_one(state: State, other: State, options: SmoothOptions, executor: Ex
     """The one that is closer to the target, the other one if neither is; interrupted if the first one is."""
     if _closer(state, other, options, executor):
         return state
+    if other.constraint is not None:  # it has followed the nodes of the state that is given up
+        (locate3 if isinstance(other.constraint, Surface) else locate)(other.constraint, other.points)
     return other if state.interruption is None else other.interrupted(state.interruption)
 
 
@@ -72,7 +76,7 @@ def _miss_it(state: State, options: SmoothOptions, executor: Executor, share: fl
 def _at_large(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Sweeps over all free nodes, without a target, then patches; with the stage of the mean between, where that is
     closer to the target."""
-    plain = replace(options, target_quality=None, target_dihedral=None)
+    plain = replace(options, target_quality=None, target_angle=None, target_dihedral=None)
     all_of_it = improve_dihedrals(_sweep_all(state, plain, executor), plain, executor)
     found = reach_target(_going_on(all_of_it), options, executor)
     if found.stop_reason != NO_PROGRESS or not isinstance(state.topology, Volume):
