@@ -138,6 +138,10 @@ def test_layers_are_told_on_the_untangled_mesh():
     assert before > 100
     assert result.after.inverted == 0
     assert len(result.held[LAYER]) > 0.85 * found(mesh)[0].nodes.sum()  # untangling may move the last row
+    still = np.zeros(len(mesh.points), dtype=bool)
+    still[np.concatenate(list(result.held.values()))] = True
+    could = np.count_nonzero(~still | result.moved)
+    assert f"{result.moved.sum():,} of {could:,} free nodes moved" in repr(result)
 
 
 def test_fix_layers_without_layers_says_so():

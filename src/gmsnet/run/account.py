@@ -17,7 +17,7 @@ from gmsnet.mesh.display import amount, plain
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.protection import LAYER
 from gmsnet.run import stop
-from gmsnet.run.result import SmoothResult
+from gmsnet.run.result import SmoothResult, free_nodes
 from gmsnet.run.sweep import Sweep
 
 UNKNOWN = "not untangled, or untangling was off"
@@ -177,7 +177,7 @@ class Account:
     @property
     def free(self) -> int:
         """How many nodes could move."""
-        return len(self.mesh.points) - sum(len(ids) for ids in self.result.held.values())
+        return free_nodes(self.result)
 
     def surface(self) -> list[str]:
         """How far the surface has come from the input's, if one has changed."""

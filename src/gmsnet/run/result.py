@@ -84,8 +84,7 @@ class SmoothResult:
 
     @property
     def _done(self) -> str:
-        free = len(self.points) - sum(map(len, self.held.values()))
-        moved = f"{np.count_nonzero(self.moved):,} of {amount(free, 'free node')} moved"
+        moved = f"{np.count_nonzero(self.moved):,} of {amount(free_nodes(self), 'free node')} moved"
         return f"{moved}, {amount(self.sweeps, 'sweep')} in {plain(self.seconds)} s, {self.stop_reason}"
 
     @property
@@ -130,3 +129,11 @@ class SmoothResult:
     def limits(self) -> Limits:
         """Upper bounds of the worst cells with this connectivity and these held nodes; made when first asked for."""
         return limits(to_mesh(self.mesh)[0], self.topology)
+
+
+def free_nodes(result: SmoothResult) -> int:
+    """How many nodes could move, those among them that were held once they were untangled."""
+    still = np.zeros(len(result.points), dtype=bool)
+    for ids in result.held.values():
+        still[ids] = True
+    return int(np.count_nonzero(~still | result.moved))
