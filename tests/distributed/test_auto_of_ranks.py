@@ -12,13 +12,19 @@ import gmsnet.generate
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
+from support.blocks import block
 from support.ranks import parts_at_random, same
 
-from gmsnet.generate import sheared_mesh
+from gmsnet.generate import o_grid_section, sheared_mesh
 from gmsnet.methods.auto import WHOLE
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.rest_stage import PHASE
 
+SOLIDS = {
+    "hexahedra": block(6, 5, 6, jitter=0.27, seed=1),
+    "wedges": block(4, 4, 4, wedges=np.ndindex(4, 4), jitter=0.2, seed=3),
+    "mixed": block(5, 5, 5, wedges=np.ndindex(1, 5), pyramids=np.ndindex(2, 3, 5), jitter=0.2, seed=2),
+}
 TETRAHEDRA = gmsnet.generate.random_volume(400, seed=2)
 PLANAR = {
     "triangles": gmsnet.random_mesh(700, seed=3),
@@ -37,6 +43,27 @@ def test_tetrahedra_have_all_stages(guard):
     if guard != "star":
         assert "dihedral angles" in [sweep.stage for sweep in told.history]
     assert told.messages > 0
+
+
+@pytest.mark.parametrize("guard", ["valid", "worst", "star"])
+@pytest.mark.parametrize("method", ["auto", "worst-first", "optimize"])
+@pytest.mark.parametrize("kind", SOLIDS)
+def test_volumes_of_any_kinds(kind, method, guard):
+    mesh, rng = SOLIDS[kind], np.random.default_rng(1)
+    fixed = rng.random(len(mesh.points)) < 0.05
+    options = SmoothOptions(method=method, guard=guard, preserve="none", threads=1)
+    told = same(mesh, options, parts_at_random(mesh, 3, rng, "interleaved"), 3, fixed)
+    assert told.gathered == ""
+    assert told.messages > 0
+
+
+@pytest.mark.parametrize("guard", ["valid", "worst"])
+def test_the_mean_of_hexahedra_is_raised_last(guard):
+    mesh = gmsnet.generate.swept_volume(o_grid_section(24, 4), 12, 3.0, twist=0.6, bend=0.4)
+    options = SmoothOptions(guard=guard, preserve="none", threads=1)
+    told = same(mesh, options, parts_at_random(mesh, 2, np.random.default_rng(1), "strips"), 2)
+    assert told.gathered == ""
+    assert told.history[-1].stage == "mean of η"
 
 
 @pytest.mark.parametrize(("ranks", "how"), [(2, "strips"), (3, "interleaved")])

@@ -15,6 +15,8 @@ from gmsnet.mesh.mesh import Mesh
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
+from support import solid
+from support.blocks import block, cells_of
 from support.ranks import parts_at_random, same
 
 from gmsnet.run.options import SmoothOptions
@@ -24,6 +26,9 @@ MESHES = {
     "quads": gmsnet.generate.random_quad_mesh(400, seed=3),
     "mixed": gmsnet.generate.random_quad_mesh(400, seed=4, cells="mixed"),
     "tetrahedra": gmsnet.generate.random_volume(250, seed=2),
+    "hexahedra": block(6, 5, 6, jitter=0.25, seed=1),
+    "wedges": block(4, 4, 4, wedges=np.ndindex(4, 4), jitter=0.2, seed=3),
+    "solids": block(5, 5, 5, wedges=np.ndindex(1, 5), pyramids=np.ndindex(2, 3, 5), jitter=0.2, seed=2),
 }
 SWEEPS = 6
 
@@ -81,6 +86,16 @@ def test_a_large_floor_watches_the_same_blocks_of_cells():
     same(mesh, options, parts_at_random(mesh, 3, rng, "interleaved"), 3)
 
 
+@pytest.mark.parametrize("guard", ["valid", "worst", "star"])
+@pytest.mark.parametrize("kind", MESHES)
+def test_elements_that_are_transformed_all_at_once(kind, guard):
+    mesh, rng = MESHES[kind], np.random.default_rng(3)
+    options = SmoothOptions(
+        method="getme", variant="simultaneous", guard=guard, max_sweeps=SWEEPS, preserve="none", threads=1
+    )
+    assert same(mesh, options, parts_at_random(mesh, 4, rng, "interleaved"), 4).gathered == ""
+
+
 @pytest.mark.parametrize("method", ["getme"])
 def test_what_is_not_shared_out_is_done_by_the_first_rank(method):
     mesh, rng = MESHES["triangles"], np.random.default_rng(4)
@@ -100,3 +115,30 @@ def test_tangles_are_gathered_and_mended():
     rng = np.random.default_rng(6)
     told = same(tangled, options, parts_at_random(tangled, 2, rng, "strips"), 2)
     assert told.gathered == "inverted cells are mended one after the other"
+
+
+def test_a_hexahedron_that_is_inverted_between_its_corners_is_mended_by_the_first_rank():
+    rng, base = np.random.default_rng(4), block(3, 3, 3)
+    while True:
+        nodes = solid.random_cell(rng, "hexahedron", 0.45)
+        alone = gmsnet.quality(Mesh(nodes, [cells_of("hexahedron", [range(8)])]))
+        if alone.shape[0] > 0.0 and alone.inverted:
+            break
+    points = np.vstack([base.points, nodes + 10.0])
+    cells = np.vstack([base.cells[0].nodes, len(base.points) + np.arange(8)])
+    mesh = Mesh(points, [cells_of("hexahedron", cells)])
+    options = SmoothOptions(method="barrier", max_sweeps=5, threads=1)
+    told = same(mesh, options, parts_at_random(mesh, 2, rng, "strips"), 2)
+    assert told.gathered == "inverted cells are mended one after the other"
+
+
+def test_facets_that_do_not_match_are_seen_by_the_first_rank():
+    """Quadrilaterals on two triangles each: a rank may have one of these alone."""
+    mesh = block(3, 3, 3, pyramids=[(1, 1, 1)])
+    cubes, pyramids = mesh.cells
+    halves = [pyramids.nodes[:, corners] for corners in ([0, 1, 2, 4], [0, 2, 3, 4])]
+    mesh = Mesh(mesh.points, [cubes, cells_of("tetra", np.vstack(halves))])
+    options = SmoothOptions(method="barrier", max_sweeps=2, preserve="none", threads=1)
+    told = same(mesh, options, parts_at_random(mesh, 3, np.random.default_rng(2), "interleaved"), 3)
+    assert told.gathered == "parts of the mesh, or facets that do not match, have to be seen whole"
+    assert told.held["facet against others of other nodes"] == 8

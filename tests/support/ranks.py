@@ -37,7 +37,7 @@ def spread(mesh, options, parts, ranks, fixed=None):
         assert (np.isnan(seen) | (seen == result.points)).all(), "ranks agree on the nodes that they share"
         points[piece.ids] = result.points
     for result in results:
-        assert (result.before, result.after, result.sweeps) == (results[0].before, results[0].after, results[0].sweeps)
+        assert _figures(result) == _figures(results[0])
     return points, results
 
 
@@ -49,8 +49,13 @@ def same(mesh, options, parts, ranks, fixed=None):
     points, results = spread(mesh, options, parts, ranks, fixed)
     assert points.tobytes() == serial.points.tobytes()
     told = results[0]
-    assert told.after == serial.after.totals
+    assert repr(told.after) == repr(serial.after.totals)
     assert told.stop_reason == serial.stop_reason
     assert [sweep.moved for sweep in told.history] == [sweep.moved for sweep in serial.history]
     assert told.held == {reason: len(ids) for reason, ids in serial.held.items()}
     return told
+
+
+def _figures(result):
+    """As texts: what is not measured of volumes is nan, which is not equal to itself."""
+    return repr(result.before), repr(result.after), result.sweeps

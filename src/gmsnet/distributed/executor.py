@@ -19,6 +19,7 @@ from gmsnet.distributed.part import Part
 from gmsnet.methods.base import Field
 from gmsnet.parallel.executor import Executor, Figure, Figures, Result
 from gmsnet.parallel.threads import serial
+from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -51,7 +52,14 @@ class Ranks:
 
     def after_colour(self, colour: int, points: Floats) -> None:
         """See Executor."""
+        topology = self.part.topology
+        if not isinstance(topology, MixedVolume):
+            self.halo.after(colour, points)
+            return
+        others = self.halo.of_others(colour)
+        before = points[others, :3]
         self.halo.after(colour, points)
+        topology.moved_elsewhere(points, others, before)
 
     def exchange(self, values: Floats) -> None:
         """See Executor."""

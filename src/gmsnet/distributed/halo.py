@@ -93,6 +93,10 @@ class Halo:
             )  # fmt: skip
             self.by_colour.append(Messages(self.graph, give, take, columns))
 
+    def of_others(self, colour: int) -> Places:
+        """The places of the nodes that come after a colour."""
+        return self.by_colour[colour].into
+
     def after(self, colour: int, points: Floats) -> None:
         """The nodes of a colour are where they will be."""
         messages = self.by_colour[colour]

@@ -20,26 +20,29 @@ from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.stages import swept
-from gmsnet.kernels.topology.connectivity import NON_ORIENTABLE, ZERO_AREA
+from gmsnet.kernels.topology.connectivity import MISMATCHED, NON_ORIENTABLE, ZERO_AREA
 from gmsnet.kernels.topology.write_back import put_back
-from gmsnet.measure.signs import exact_signs
+from gmsnet.measure.report import measure
 from gmsnet.measure.totals import Totals, totals_of
-from gmsnet.measure.volumes import exact_signs3
 from gmsnet.methods import Smoother
+from gmsnet.methods.base import CELLS
 from gmsnet.preserve.protection import LAYER
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import factors_of, rank_by
 from gmsnet.run.sweep import Sweep
-from gmsnet.topology.held import REASONS
+from gmsnet.topology.held import REASONS, reasons_in_space
 from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.ordering import planar_points, space_points, taken
+from gmsnet.topology.solids import KINDS
 from gmsnet.topology.topology import Topology
-from gmsnet.topology.volume import Volume
+from gmsnet.topology.volume import MOST, Volume
 
 Floats = NDArray[np.float64]
 Callback = Callable[[Sweep], bool | None]
 
-SHARED = ("triangle", "quad", "tetra", "line", "vertex")  # the kinds of cells that sweeps over ranks know
+SHARED = (*CELLS, *KINDS, "line", "vertex")  # the kinds of cells that sweeps over ranks know
+
+UNREAD = NON_ORIENTABLE, ZERO_AREA, MISMATCHED  # what is told of whole parts of a mesh, or of facets of far cells
 
 
 def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | None = None) -> RankResult:
@@ -85,24 +88,21 @@ def _not_shared(piece: Piece, smoother: Smoother, options: SmoothOptions, comm: 
 def _not_plain(part: Part, before: Totals | None) -> str:
     """Why the mesh cannot be shared out as it is; "" if it can."""
     topology, comm = part.topology, part.comm
-    if isinstance(topology, MixedVolume):
-        return "volumes of these kinds are not shared out"
     if isinstance(topology, Topology) and topology.plane is None:
         return "surfaces in space are not shared out"
     if before is None:
         return "no cell can be smoothed"
-    orientation = topology.near_orientation
-    unread = any(REASONS[mark] in topology.held for mark in (NON_ORIENTABLE, ZERO_AREA))
+    reasons = reasons_in_space(MOST) if isinstance(topology, Volume) else REASONS
+    orientation = topology.orientation if isinstance(topology, MixedVolume) else topology.near_orientation
+    unread = any(reasons[mark] in topology.held for mark in UNREAD if mark in reasons)
     signs = np.array([np.count_nonzero(orientation > 0), np.count_nonzero(orientation < 0), unread])
     forth, back, unread = comm.allreduce(signs).tolist()
-    if (forth and back) or unread:
+    if unread:
+        return "parts of the mesh, or facets that do not match, have to be seen whole"
+    if forth and back:
         return "cells are wound in both directions"
-    if before.uncertain:
-        simplices = part.simplices
-        exact = exact_signs3 if isinstance(topology, Volume) else exact_signs
-        found = exact(part.points, simplices.rows, simplices.orientation)
-        if comm.allreduce(int(np.count_nonzero(found <= 0))):
-            return "inverted cells are mended one after the other"
+    if before.uncertain and comm.allreduce(measure(part.mesh, topology, part.points).inverted):
+        return "inverted cells are mended one after the other"
     return ""
 
 

@@ -98,6 +98,8 @@ class SequentialGetme(Smoother):
 class SimultaneousGetme(Smoother):
     """All elements at once; then the guard moves the nodes, colour by colour."""
 
+    shared_out = True
+
     def __init__(self, transformation: Transformation) -> None:
         self.transformation = transformation
 

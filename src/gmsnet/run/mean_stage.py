@@ -71,6 +71,7 @@ def _of_mixed(state: State, options: SmoothOptions, executor: Executor) -> State
     if totals is None:
         return state
     assert isinstance(topology, Volume)
+    outer, executor = executor, executor.of(topology)
     first = totals_of(state.start, topology.scored, executor)
     assert first is not None
     wanted = first.shape_mean - LOSS if not state.before.inverted else -math.inf
@@ -81,7 +82,7 @@ def _of_mixed(state: State, options: SmoothOptions, executor: Executor) -> State
             break
     if after.shape_mean < totals.shape_mean + GAIN or after.shape_min < shape - 1e-12 or after.uncertain:
         return state
-    return with_sweep(state, options, points, after, MeanInSpace.phase, tally)
+    return with_sweep(state, options, points, after, MeanInSpace.phase, tally, executor=outer)
 
 
 def _raised(

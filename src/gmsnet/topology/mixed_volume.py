@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
+from gmsnet.kernels.star.guard3 import moved_elsewhere
 from gmsnet.kernels.star.space_blocks import LANES3, Mixture, SpaceBlocks
 from gmsnet.kernels.topology import connectivity
 from gmsnet.kernels.topology import solid_stars as kernels
@@ -118,6 +120,12 @@ class MixedVolume(Volume):
             self.slack[:] = self.gone[:] = 0.0
             self.lent[0] = field
 
+    def moved_elsewhere(
+        self, points: NDArray[np.float64], nodes: NDArray[np.integer[Any]], before: NDArray[np.float64]
+    ) -> None:
+        """Others than the guard have moved some nodes (k,), by places in memory, that were at ``before`` (k, 3)."""
+        moved_elsewhere(points, nodes, before, self.inexact_at, self.inexact, self.slack, self.gone)
+
     @property
     def inside_out(self) -> str:
         """How many cells of which kinds are read in the other order, tetrahedra apart: "" if there are none."""
@@ -157,7 +165,7 @@ class MixedVolume(Volume):
         """See Volume."""
         colour = self.near_colours[nodes]
         order = nodes[np.lexsort((nodes, self.order[nodes], colour))].astype(np.int32)
-        colours = int(colour.max(initial=-1)) + 1
+        colours = max(int(colour.max(initial=-1)) + 1, self.colouring.fewest)
         sizes = np.bincount(colour, minlength=colours)
         blocks = -(-sizes // LANES3)
         of_colour = np.concatenate([[0], np.cumsum(blocks)])

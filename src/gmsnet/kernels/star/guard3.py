@@ -223,6 +223,20 @@ def sound(mixture, points, i, x, y, z, unit, grain):
     return True
 
 
+@kernel
+def moved_elsewhere(points, nodes, before, at, around, slack, gone):
+    """Takes note that another guard has moved some nodes (k,), which were at before (k, 3): of cells that have no slack
+    for that nothing is known any more. at, around, slack, gone: see kernels.star.space_blocks.Mixture."""
+    for j in range(len(nodes)):
+        i = nodes[j]
+        dx, dy, dz = points[i, 0] - before[j, 0], points[i, 1] - before[j, 1], points[i, 2] - before[j, 2]
+        away = WIDER * math.sqrt(square(dx, dy, dz))
+        for k in range(at[i], at[i + 1]):
+            gone[k] += away
+            if gone[k] > slack[around[k] >> 3]:
+                slack[around[k] >> 3] = 0.0
+
+
 @part
 def renewed(mixture, points, i, x, y, z, unit, grain, away):
     """Are those that have not slack enough certified? Theirs is made anew, with the other sign."""
