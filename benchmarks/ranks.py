@@ -1,9 +1,11 @@
 """What ranks cost: seconds and messages of a sweep, and memory, of a grid of triangles that no rank ever has whole.
 
     mpiexec -n 2 python benchmarks/ranks.py --nodes 1e6
+    python benchmarks/ranks.py --nodes 1e6 --threads 2
 
-Each rank makes its own strip of a jittered grid, with global ids. Printed by the first rank: for each rank its nodes,
-what it sends in a sweep, and its peak memory; beside it what the model says (docs/distributed.md).
+Each rank makes its own strip of a jittered grid, with global ids. Printed by the first rank: the median of the seconds
+from sweep to sweep, measures included; for each rank its nodes, what it sends in a sweep, and its peak memory; beside
+it what the model says (docs/distributed.md). With --threads one process does without ranks.
 """
 
 from __future__ import annotations
@@ -45,29 +47,40 @@ def peak() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 
+def _without_ranks(mesh: tuple[np.ndarray, np.ndarray], ids: np.ndarray, **options: object) -> gmsnet.SmoothResult:
+    return gmsnet.smooth(mesh, **options)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--nodes", type=float, default=1e6)
     parser.add_argument("--method", default="barrier")
+    parser.add_argument("--threads", type=int, default=0)
     given, comm = parser.parse_args(), mpi().COMM_WORLD
     side = math.isqrt(int(given.nodes))
+    options = {"method": given.method, "preserve": "none", "guard": "valid", "threads": max(given.threads, 1)}
+    smooth = _without_ranks if given.threads else gmsnet.distributed.smooth
     small = strip(60, comm.rank, comm.size)
-    gmsnet.distributed.smooth(small[:2], small[2], given.method, preserve="none", max_sweeps=2, threads=1)  # compiled
+    smooth(small[:2], small[2], max_sweeps=2, **options)  # compiled
     points, triangles, ids = strip(side, comm.rank, comm.size)
     before = peak()
     comm.Barrier()
-    seconds = {}
-    for sweeps in (0, SWEEPS):
-        began = time.perf_counter()
-        found = gmsnet.distributed.smooth(
-            (points, triangles), ids, given.method, preserve="none", guard="valid", max_sweeps=sweeps, threads=1
-        )
-        seconds[sweeps] = time.perf_counter() - began
+    began, ends = time.perf_counter(), list[float]()
+    found = smooth(
+        (points, triangles), ids, max_sweeps=SWEEPS, callback=lambda _: ends.append(time.perf_counter()), **options
+    )
     share = side * side / comm.size
+    sweep = float(np.median(np.diff(ends))) if ends else 0.0
+    if comm.rank == 0:
+        who = f"{given.threads} threads" if given.threads else f"{comm.size} ranks"
+        print(
+            f"{side * side:,} nodes, {who}: to the end of the first sweep {ends[0] - began:.2f} s, a sweep "
+            f"{1e3 * sweep:.1f} ms, the whole call {found.seconds:.2f} s"
+        )
+    if given.threads:
+        return
     told = comm.gather((len(ids), found.messages / found.sweeps, found.bytes / found.sweeps, before, peak()))
     if comm.rank == 0:
-        sweep = (seconds[SWEEPS] - seconds[0]) / SWEEPS
-        print(f"{side * side:,} nodes on {comm.size} ranks: set-up {seconds[0]:.2f} s, a sweep {1e3 * sweep:.1f} ms")
         print(f"least 1/q {found.before.shape_min:.4f} → {found.after.shape_min:.4f}; {found.gathered or 'shared out'}")
         for rank, (nodes, messages, size, first, last) in enumerate(told):
             neighbours = (rank > 0) + (rank < comm.size - 1)
