@@ -16,6 +16,7 @@ from gmsnet.constraints.features import dot
 from gmsnet.constraints.outline import Longs
 from gmsnet.constraints.patches import NOTHING, Patches, linked
 from gmsnet.kernels.star.surface import CONTROLS
+from gmsnet.kernels.whole import jets
 from gmsnet.kernels.whole import skin as kernels
 
 Floats = NDArray[np.float64]
@@ -57,6 +58,11 @@ def normals_of(patches: Patches, points: Floats) -> Floats:
     total[plane != NOTHING] = parts[plane[plane != NOTHING]]
     length = np.sqrt(dot(total, total))
     unit = np.divide(total, length[:, None], out=np.zeros_like(total), where=length[:, None] > 0.0)
+    place = np.zeros((count, 3))
+    place[owner] = points[rows]
+    start, facets = np.zeros(count + 2, dtype=np.int64), np.empty(rows.size, dtype=np.int32)
+    jets.list_facets(owner, start, facets)
+    jets.fit_normals(place, owner, start, facets, (plane == NOTHING) & (length > 0.0), unit)
     normals: Floats = unit[owner]
     return normals
 
