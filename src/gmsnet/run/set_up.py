@@ -89,7 +89,7 @@ def first_state(
     if unknown := unknown_cells(given):
         remarks.append(f"the nodes of {unknown} are held: gmsnet does not know this type of cells")
     given = given.without_cells()  # whatever was copied of them is given back
-    shapes = np.empty(len(topology.near) if target else 0, dtype=np.float32)
+    shapes = np.full(len(topology.near) if target else 0, np.nan, dtype=np.float32)  # of triangles alone it is written
 
     def looked_at(near: Floats) -> tuple[QualityReport, Protection]:
         before = measure(given, topology, near, executor.for_blocks(0), shapes=shapes)

@@ -146,7 +146,7 @@ def too_large(rings: int, active: Flags, left: float, topology: Topology | Volum
 def rows_missing(
     points: Floats, topology: Topology, target: Target, shapes: NDArray[np.float32] | None = None
 ) -> NDArray[np.integer[Any]]:
-    """The cells in ``near`` that miss the target, or are not clear of it. shapes: their 1/q, where it is known."""
+    """The cells in ``near`` that miss the target, or are not clear of it. shapes: their 1/q, NaN where not known."""
     simplices = topology.simplices
     if shapes is None or isinstance(topology, Shell):
         return target.corners_missing(points, simplices)

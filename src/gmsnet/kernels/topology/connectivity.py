@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.jit.compile import kernel, part
-from gmsnet.kernels.topology.layout import span
+from gmsnet.kernels.topology.layout import corners_before, span
 
 # Why a node is held, in the order in which reasons count.
 (
@@ -81,7 +81,7 @@ def walk_fans(first, corner, orientation, region, begin, identity, hub, marks, l
     for ahead in range(0, nodes, AHEAD):
         until = min(ahead + AHEAD, nodes)
         here, there = np.int64(begin[ahead]), np.int64(begin[until])
-        new = span(first, there)[0] - span(first, here)[0]
+        new = corners_before(first, there) - corners_before(first, here)
         if left < new:
             size, more = len(pair), max(len(pair), new)
             more += size

@@ -132,6 +132,12 @@ def sort_keys(keys, other, at, memory, position):
 
 
 @inlined
+def corners_before(first, face):
+    """How many corners the faces before this one have, which may be one past the last. first: see ``span``."""
+    return 3 * face if first is None else np.int64(first[face])
+
+
+@inlined
 def span(first, face):
     """Where the corners of a face begin, and how many it has. first: CSR, or None where all faces are triangles."""
     if first is None:
