@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import struct
 from pathlib import Path
 from types import ModuleType
 
@@ -19,6 +20,7 @@ from support.damage import cells_of, damaged, read_or_refuse, regions_of
 import gmsnet
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io import cgns, exodus, hdf5, med, vtkhdf
+from gmsnet.io.netcdf3 import Header
 from gmsnet.io.stored import ColumnSlots
 
 MESHES = os.environ.get("GMSNET_MESHES", "")
@@ -129,6 +131,25 @@ def test_what_is_of_another_kind_is_refused(reader: ModuleType) -> None:
     for data in (b"", b"\x89HDF\r\n\x1a\n", b"CDF\x01", b"words", made.xdmf_h5()):
         with pytest.raises(FormatError):
             read(reader, data)
+
+
+@pytest.mark.parametrize("other", [0, "coordy", "connect1"])
+def test_coordinates_that_share_their_bytes_are_refused(other: int | str) -> None:
+    data = made.exodus3(version=1)
+    header = Header(data)
+    begin, wrong = (struct.pack(">i", 4 if name == 0 else header.variables[name].begin) for name in ("coordx", other))
+    assert data[: header.end].count(begin) == 1
+    with pytest.raises(FormatError, match="the header is damaged"):
+        read(exodus, data.replace(begin, wrong, 1))
+
+
+def test_exodus_without_points() -> None:
+    data = made.exodus3()
+    size = struct.pack(">ii", len("num_nodes"), 0x6E756D5F)  # the name of the dimension begins
+    at = data.index(size) + 4 + 12
+    assert data[at : at + 4] == struct.pack(">i", 8)
+    with pytest.raises(FormatError):
+        read(exodus, data[:at] + struct.pack(">i", 0) + data[at + 4 :])
 
 
 def test_nothing_outside_the_file_is_opened(tmp_path: Path) -> None:

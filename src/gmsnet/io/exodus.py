@@ -90,7 +90,7 @@ class Classic:
             values, variable = self.header.array(key), self.header.variables[key]
             if values.dtype.kind != "f" or values.ndim != 1 + (key == "coord"):
                 raise FormatError(f"the variable {key!r} is of no coordinates")
-            for row in values.reshape(-1, values.shape[-1])[:4]:
+            for row in np.atleast_2d(values)[:4]:
                 start = variable.begin + (len(tables) * values.shape[-1] * values.itemsize if key == "coord" else 0)
                 columns.append(Column(start, values.itemsize, variable.dtype, len(tables)))
                 tables.append(row)
@@ -102,6 +102,7 @@ class Classic:
         spans = sorted(column.start for column in columns)
         if any(b - a < len(points) * columns[0].stride for a, b in pairwise(spans)):
             raise FormatError("the coordinates of two axes share their bytes: the header is damaged")
+        self.header.check_apart(names)
         return points, ColumnSlots(tuple(columns)), columns[0].dtype == ">f4"
 
 

@@ -6,6 +6,7 @@ Source: the format specification of netCDF (Unidata), section "File Format Speci
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -31,6 +32,11 @@ class Variable:
     attributes: dict[str, str]
     record: bool
 
+    @property
+    def size(self) -> int:
+        """Bytes, those of one record if there are any."""
+        return int(np.prod(self.shape, dtype=object)) * np.dtype(self.dtype).itemsize
+
 
 class Header:
     """The variables of a file by name. Raises FormatError where the header is damaged or the file is cut off."""
@@ -38,6 +44,7 @@ class Header:
     data: Data
     at: int
     dimensions: dict[str, int]
+    end: int
 
     def __init__(self, data: Data) -> None:
         self.data, self.at = data, 4
@@ -52,7 +59,7 @@ class Header:
         for _ in range(self._list(_VARIABLES)):
             name, variable = self._variable([length for _, length in dimensions])
             self.variables[name] = variable
-        self.dimensions = dict(dimensions)
+        self.dimensions, self.end = dict(dimensions), self.at
 
     def _variable(self, lengths: list[int]) -> tuple[str, Variable]:
         name = self._text()
@@ -116,10 +123,17 @@ class Header:
     def array(self, name: str) -> NDArray[Any]:
         """The values of a variable without records, in its shape. Raises FormatError where the file ends before."""
         variable = self.variables[name]
-        count = int(np.prod(variable.shape, dtype=object)) if variable.shape else 1
-        size = count * np.dtype(variable.dtype).itemsize
+        size = variable.size
         if variable.record or not 0 <= variable.begin <= len(self.data) - size or min(variable.shape, default=0) < 0:
             raise FormatError(f"the variable {name[:40]!r} is not wholly in the file: is it cut off?")
         found: NDArray[Any] = np.ndarray(variable.shape, variable.dtype, bytes(
             self.data[variable.begin : variable.begin + size]))  # fmt: skip
         return found
+
+    def check_apart(self, names: Sequence[str]) -> None:
+        """Raises FormatError where bytes of these variables are of the header or of another variable, too."""
+        own = [(each.begin, each.begin + each.size) for each in (self.variables[name] for name in names)]
+        others = [(0, self.end)] + [(each.begin, each.begin + each.size) for name, each in self.variables.items()
+                                    if name not in names]  # fmt: skip
+        if any(a < d and c < b for a, b in own for c, d in others):
+            raise FormatError(f"bytes of {', '.join(names)} are of something else, too: the header is damaged")
