@@ -76,4 +76,4 @@ def regularising(kind: CellKind, free: float) -> float:
     corners = corners - corners.mean(axis=0)
     unknown = np.column_stack([normals.ravel(), -corners.ravel()])
     (sigma, _), _, rank, _ = np.linalg.lstsq(unknown, -means.ravel(), rcond=1e-9)
-    return round(float(sigma), 12) if rank == 2 else free  # the last bits depend on which processor LAPACK runs on
+    return round(float(sigma), 14) if rank == 2 else free  # the last bits depend on which processor LAPACK runs on
