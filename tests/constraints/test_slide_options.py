@@ -16,8 +16,8 @@ MESH = random_mesh(20, "plate")
 @pytest.mark.parametrize(
     ("slide", "names"),
     [
-        (None, ()), (False, ()), (True, None), (np.True_, None), ("hole", ("hole",)),
-        (["hole", "top", "hole"], ("hole", "top")), (("top",), ("top",)), ({"top"}, ("top",)),
+        (None, ()), (False, ()), (True, None), (np.True_, None), ("all", None), (["top", "all"], None),
+        ("hole", ("hole",)), (["hole", "top", "hole"], ("hole", "top")), (("top",), ("top",)), ({"top"}, ("top",)),
         (np.array(["left", "top"]), ("left", "top")),
     ],
 )  # fmt: skip
@@ -27,7 +27,7 @@ def test_forms_of_slide(slide, names):
 
 @pytest.mark.parametrize("slide", [1, 0.5, [], [1], {"hole": 1}, b"hole", object()])
 def test_other_forms_are_refused(slide):
-    with pytest.raises(InputError, match="slide must be None, True or names of markers"):
+    with pytest.raises(InputError, match="slide must be None, True, 'all' or names of markers"):
         check_slide(MESH, slide)
 
 

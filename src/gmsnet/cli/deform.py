@@ -131,7 +131,7 @@ def deform(
     )  # fmt: skip
     options = SmoothOptions(
         max_sweeps=max_sweeps, threads=threads, preserve=preserve, fix_layers=fix_layers, guard=guard,
-        callback=work.after_sweep, slide=True if slide and "all" in slide else slide or None,
+        callback=work.after_sweep, slide=slide or None,
         feature_angle=feature_angle,
     )  # fmt: skip
 

@@ -215,7 +215,7 @@ def smooth(
         target_quality=target_quality, target_angle=target_angle, target_dihedral=target_dihedral,
         preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, weights=weights,
         best_by=best_by,
-        slide=True if slide and "all" in slide else slide or None, feature_angle=feature_angle,
+        slide=slide or None, feature_angle=feature_angle,
         surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles,
         **values_at_nodes(metric, size),
     )  # fmt: skip

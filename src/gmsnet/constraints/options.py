@@ -14,8 +14,9 @@ from gmsnet.mesh.mesh import Mesh
 FEATURE_ANGLE = 30.0  # degrees
 TOLERANCE = 0.05  # of the edges: how far nodes may go from the facets of the input
 
-SlideChoice: TypeAlias = Any  # None, True, False, a marker's name or several names: what users give is checked here
-FORMS = "slide must be None, True or names of markers"
+SlideChoice: TypeAlias = Any  # None, True, False, "all", a marker's name or several: what users give is checked here
+ALL = "all"  # stands for True, as on the command line
+FORMS = "slide must be None, True, 'all' or names of markers"
 
 
 def check_slide(
@@ -23,8 +24,8 @@ def check_slide(
 ) -> tuple[str, ...] | None:
     """The names of the markers whose nodes slide, () where none do, or None where all may.
 
-    slide: None or False (no node slides), True (all may), a name in ``mesh.markers`` or several. feature_angle: in
-    degrees, between 0 and 180. geometry: None, or an object with ``project`` and ``tangent``.
+    slide: None or False (no node slides), True or "all" (all may), a name in ``mesh.markers`` or several.
+    feature_angle: in degrees, between 0 and 180. geometry: None, or an object with ``project`` and ``tangent``.
 
     Raises InputError for names that the mesh does not have (listing those it has), anything else than these forms,
     angles out of range, objects that are no geometry, and meshes that are not planar while nodes are to slide.
@@ -60,6 +61,8 @@ def _names_of(mesh: Mesh, slide: SlideChoice) -> tuple[str, ...] | None:
         raise InputError(f"{FORMS}, got {slide!r}")
     if not slide:
         raise InputError(f"{FORMS}, got an empty list: None lets no node slide, True all")
+    if ALL in slide:
+        return None
     known = mesh.markers
     for name in slide:
         if name not in known:
