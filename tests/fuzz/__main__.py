@@ -21,7 +21,7 @@ from fuzz.promises import examine
 from gmsnet.io.formats import FORMATS
 
 LONGEST = 1 << 14  # bytes of a file that is tried
-AT_ONCE = 10_000  # files that one worker tries: Atheris does not let go of what a mutator of ours has returned
+AT_ONCE = 3000  # files that one worker tries: Atheris does not let go of what a mutator of ours has returned
 
 
 def options() -> argparse.Namespace:

@@ -208,6 +208,44 @@ def test_first_order_cells_beside_them_move_in_their_own_sweeps():
     assert len(result.after.cell) == len(nodes)
 
 
+@pytest.mark.parametrize("kind", BASES)
+def test_a_target_is_reached_by_the_cells_that_miss_it_and_those_around(kind):
+    mesh = twins(kind)[1]
+    full = gmsnet.smooth(mesh)
+    target = 0.5 * float(full.before.shape.min() + full.after.shape.min())
+    result = gmsnet.smooth(mesh, target_quality=target)
+    assert_sound(mesh, result)
+    assert result.stop_reason == stop.TARGET_REACHED
+    assert result.before.shape.min() < target <= result.after.shape.min()
+
+
+@pytest.mark.parametrize("kind", BASES)
+def test_of_a_target_that_cannot_be_reached_no_more_cells_miss_it_than_after_a_full_run(kind):
+    mesh = twins(kind)[1]
+    fixed = np.random.default_rng(3).random(len(mesh.points)) < 0.1
+    full = gmsnet.smooth(mesh, fixed=fixed).after.shape
+    target = min(1.0, 1.1 * float(full.min()))
+    result = gmsnet.smooth(mesh, target_quality=target, fixed=fixed)
+    assert_sound(mesh, result)
+    assert result.stop_reason == stop.NO_PROGRESS
+    assert 0 < (result.after.shape < target).sum() <= (full < target).sum()
+
+
+def test_a_target_is_not_reached_where_straight_cells_alone_do():
+    first = thrown(lattice_volume(3))
+    curved = second_order_volume(first)
+    far = first.points + np.array([10.0, 0.0, 0.0])
+    straight = CellBlock("tetra", first.cells[0].nodes + len(curved.points), np.zeros(len(first.cells[0].nodes)))
+    mesh = Mesh(np.concatenate([curved.points, far]), (*curved.cells, straight))
+    fixed = np.arange(len(mesh.points)) < len(curved.points)
+    held = gmsnet.smooth(mesh, target_quality=0.7, fixed=fixed)
+    assert held.before.shape.min() < 0.7
+    assert held.stop_reason == stop.NO_PROGRESS
+    assert held.moved[~fixed].any()
+    whole = gmsnet.smooth(curved, target_quality=0.7, fixed=np.ones(len(curved.points), dtype=bool))
+    assert (whole.stop_reason, whole.moved.any()) == (stop.NOTHING_TO_MOVE, False)
+
+
 def test_a_node_in_the_middle_of_two_edges_is_held():
     _, mesh = twins("tetra10")
     nodes = mesh.cells[0].nodes.copy()

@@ -24,6 +24,7 @@ from gmsnet.preserve.protection import WALL, Protection, carried_note, wall_note
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.state import Final, State
+from gmsnet.run.stop import NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.run.untangle_stage import still_inverted
 from gmsnet.topology.held import OF_SECOND_ORDER
 from gmsnet.topology.ordering import near_points
@@ -48,6 +49,9 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
         plane = list(state.mesh.plane or (0, 1))  # in the units of the input, though its extent may be another now
         near = np.ldexp(final.points[:, plane][state.topology.memory], -state.mesh.exponent)
         state = replace(state, conformity=(*state.conformity, Conformity.of(near, state.planar, state.metric)))
+    claimed = state.second_order is not None and state.stop_reason == TARGET_REACHED  # by stages for their own cells
+    if claimed and len(options.target.missed_in(final.after)):
+        state = state.ended(NO_PROGRESS if state.history else NOTHING_TO_MOVE)
     nothing = np.empty((0, 2))
     return replace(state, start=nothing, points=nothing, shapes=np.empty(0, dtype=np.float32), final=final)
 

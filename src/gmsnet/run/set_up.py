@@ -203,10 +203,10 @@ def check_target(mesh: Mesh, target: Target) -> None:
     curved = sorted(
         {block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes) and block.cell.order > 1}
     )
-    if curved and target:
+    if curved and target.dihedral is not None:
         raise InputError(
-            f"a target is of volumes of the first order so far, and this mesh has {', '.join(curved)} cells: leave the "
-            "target out"
+            f"target_dihedral is of tetrahedra of the first order, and this mesh has {', '.join(curved)} cells: give "
+            "target_quality"
         )
     if not mesh.has_volumes and target.dihedral is not None:
         raise InputError("target_dihedral is of tetrahedra, and this mesh has none: give target_angle")

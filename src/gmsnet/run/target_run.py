@@ -123,7 +123,7 @@ def cells_missing(state: State, target: Target) -> tuple[NDArray[np.int32], bool
     """The corners (K, 3 or 4) of the cells that miss the target; do all of them, however they are measured?"""
     topology, points, before = state.topology, state.points, state.before
     if isinstance(topology, Volume):
-        if points is not state.start:
+        if points is not state.start or state.second_order is not None:  # of which some are in the report alone
             return corners_missing(points, topology, target), True
         return topology.places[topology.cells[target.missed_in(before)]], False
     rows = rows_missing(points, topology, target, state.shapes if points is state.start else None)
