@@ -14,6 +14,7 @@ from support.random_stars import star
 
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import barrier as kernels
+from gmsnet.kernels.methods import barrier_lanes as lanes
 from gmsnet.kernels.methods import barrier_star
 from gmsnet.kernels.methods.barrier_star import Power
 
@@ -113,29 +114,29 @@ def valid(stars):
 @pytest.mark.parametrize("degree", [*range(3, 10), 30, 100])
 def test_derivatives_and_step(p, degree):
     rng = np.random.default_rng(degree)
-    power, sums, shift = Power.of(p), np.zeros(kernels.SUMS * LANES), np.empty(2 * LANES)
+    power, sums, shift = Power.of(p), np.zeros(lanes.SUMS * LANES), np.empty(2 * LANES)
     for place, ring in stars_of(rng, degree, 4):
         local = local_of(ring, place, float)
-        kernels.derive(local, degree, None, power, sums)
-        kernels.propose(sums, 1.0, power.ratio, shift)
-        kernels.judge(local, degree, None, power, shift, 0.1, sums)
-        rows = sums.reshape(kernels.SUMS, LANES)
+        lanes.derive(local, degree, None, power, sums)
+        lanes.propose(sums, 1.0, power.ratio, shift)
+        lanes.judge(local, degree, None, power, shift, 0.1, sums)
+        rows = sums.reshape(lanes.SUMS, LANES)
         assert (rows == rows[:, :1]).all()  # all lanes hold the same star
         f, g, h = at(p, ring, place)
-        even = 2 * rows[kernels.ROUND, 0]
-        xx, xy, yy = rows[[kernels.XX, kernels.XY, kernels.YY], 0] * (2, 1, 2)
-        assert rows[kernels.VALUE, 0] == pytest.approx(f, rel=1e-12)
-        np.testing.assert_allclose(-rows[[kernels.GX, kernels.GY], 0], g, rtol=1e-10, atol=1e-10 * np.abs(h).max())
+        even = 2 * rows[lanes.ROUND, 0]
+        xx, xy, yy = rows[[lanes.XX, lanes.XY, lanes.YY], 0] * (2, 1, 2)
+        assert rows[lanes.VALUE, 0] == pytest.approx(f, rel=1e-12)
+        np.testing.assert_allclose(-rows[[lanes.GX, lanes.GY], 0], g, rtol=1e-10, atol=1e-10 * np.abs(h).max())
         np.testing.assert_allclose([[xx + even, xy], [xy, yy + even]], h, rtol=1e-10, atol=1e-11 * np.abs(h).max())
-        assert rows[kernels.LEAST, 0] == pytest.approx(naive_objectives.least_area(ring, place), rel=1e-12)
+        assert rows[lanes.LEAST, 0] == pytest.approx(naive_objectives.least_area(ring, place), rel=1e-12)
         newton, factor = step(p, ring, place)
         np.testing.assert_allclose(shift[[0, LANES]], max(factor, 1) * newton, rtol=1e-8, atol=1e-12)
         there = place + shift[[0, LANES]]
         least = naive_objectives.least_area(ring, there)
-        assert rows[kernels.LEAST_AFTER, 0] == pytest.approx(least, rel=1e-9, abs=1e-12)
-        assert rows[kernels.LOWEST_MARGIN, 0] == pytest.approx(least_surplus(ring, there, 0.1), rel=1e-5, abs=1e-5)
+        assert rows[lanes.LEAST_AFTER, 0] == pytest.approx(least, rel=1e-9, abs=1e-12)
+        assert rows[lanes.LOWEST_MARGIN, 0] == pytest.approx(least_surplus(ring, there, 0.1), rel=1e-5, abs=1e-5)
         if least > 0:
-            assert rows[kernels.AFTER, 0] == pytest.approx(value(p, ring, there), rel=1e-10)
+            assert rows[lanes.AFTER, 0] == pytest.approx(value(p, ring, there), rel=1e-10)
         pairs = np.vstack([place, ring]).repeat(LANES, axis=0).ravel()
         found = barrier_star.derivatives(*place, pairs, degree, None, 3, power)
         np.testing.assert_allclose(found[0], f, rtol=1e-12)

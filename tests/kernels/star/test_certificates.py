@@ -12,7 +12,7 @@ from support.patterns import FAN, Linked
 from support.random_stars import star
 
 from gmsnet.kernels.jit.compile import LANES
-from gmsnet.kernels.methods import barrier, laplacian, laplacian_plain
+from gmsnet.kernels.methods import barrier, barrier_lanes, laplacian, laplacian_plain
 from gmsnet.kernels.methods.barrier_star import Power
 from gmsnet.kernels.simplex.mean_ratio2 import Weights
 from gmsnet.kernels.star import block, certificate
@@ -72,10 +72,10 @@ def from_sums(place, ring, shift, guard, star=FAN):
     """Margin and target by kernels.methods.barrier; the shift is over the star's size."""
     n, pairs, work = *block_of(place, ring), np.zeros((block.FLOORS + len(star.simplices(len(ring)))) * LANES)
     local, flat = np.empty(2 * n * LANES, dtype=np.float32), np.empty(2 * LANES, dtype=np.float32)
-    sums = np.zeros(barrier.SUMS * LANES, dtype=np.float32)
+    sums = np.zeros(barrier_lanes.SUMS * LANES, dtype=np.float32)
     barrier.relate(pairs, n, guard, work, flat, local, sums)
     step = np.repeat(shift, LANES).astype(np.float32)
-    barrier.judge(local, n, star.pattern, Power.of(1), step, max(guard.floor, 0.0), sums)
+    barrier_lanes.judge(local, n, star.pattern, Power.of(1), step, max(guard.floor, 0.0), sums)
     doubtful = barrier.certify(sums, step, guard.unit, work)
     assert doubtful == (~(work[block.MARGIN * LANES :][:LANES] > 0)).sum()
     kernels.aim(work, step.astype(float), guard.single)
