@@ -7,13 +7,15 @@ import os
 import platform
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 
 def rows_with(byte: int) -> dict[str, str]:
     """What runs make where new memory is full of a byte."""
-    environment = {**os.environ, "MALLOC_PERTURB_": str(255 - byte)}
+    found = os.pathsep.join(filter(None, [str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH")]))
+    environment = {**os.environ, "PYTHONPATH": found, "MALLOC_PERTURB_": str(255 - byte)}
     command = [sys.executable, "-m", "support.many_runs"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -1,13 +1,19 @@
-"""Units of work for the tests: processes of their own find them by the name of this module."""
+"""Units of work for the tests: processes of their own find them by the name of this module.
+
+As a program: a batch that is done, and one whose process dies; its argument is the folder of results.
+"""
 
 from __future__ import annotations
 
 import os
+import sys
 import time
+from pathlib import Path
 
 from gmsnet.errors import InputError
-from gmsnet.paper.store import Result
-from gmsnet.paper.units import Context
+from gmsnet.paper.plan import Plan
+from gmsnet.paper.store import Result, Store
+from gmsnet.paper.units import Batch, Context, Unit, carry_out
 
 
 def note(context: Context, text: str) -> Result:
@@ -40,3 +46,11 @@ def threads(context: Context) -> Result:
 def die(context: Context) -> Result:
     """As a process does that the system kills."""
     os._exit(9)
+
+
+if __name__ == "__main__":
+    from support import reproduce_work as work  # under this name processes of their own find it
+
+    done = Batch("first", [Unit("note/a", work.note, {"text": "a"})])
+    plan = Plan(runs=1, sweeps=1, seed=0, quick=True)
+    carry_out([done, Batch("second", [Unit("dies", work.die)])], plan, Store(Path(sys.argv[1])), print, lambda: False)
