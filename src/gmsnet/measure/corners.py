@@ -34,6 +34,18 @@ def of_corners(points: Floats, nodes: NDArray[np.int32], kind: CellKind, orienta
     return found
 
 
+def eta_at_corners(points: Floats, nodes: NDArray[np.int32], kind: CellKind, orientation: NDArray[np.int8]) -> Floats:
+    """(S, C) η at each corner of cells (C, n) of one kind."""
+    found, sense = np.empty((len(kind.simplices), len(nodes))), orientation.astype(np.float64)
+    for first in range(0, len(nodes), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        at = points[nodes[some, : kind.corners], :3]
+        for k, (simplex, inverse) in enumerate(zip(kind.simplices, kind.ideal, strict=True)):
+            spokes = _spokes(at, simplex)
+            found[k, some] = _mean_ratio(spokes, sense[some] * _determinant(spokes), np.array(inverse))
+    return found
+
+
 def straight_size(points: Floats, nodes: NDArray[np.int32], kind: CellKind) -> Floats:
     """(C,) the mean of the determinants at the corners of cells with straight edges."""
     total = np.zeros(len(nodes))

@@ -128,7 +128,7 @@ class SmoothResult:
     @cached_property
     def limits(self) -> Limits:
         """Upper bounds of the worst cells with this connectivity and these held nodes; made when first asked for."""
-        return limits(to_mesh(self.mesh)[0], self.topology)
+        return limits(to_mesh(self.mesh)[0], self.topology, report=self.after)
 
 
 def free_nodes(result: SmoothResult) -> int:

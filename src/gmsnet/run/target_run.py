@@ -23,6 +23,7 @@ from gmsnet.run.run import Run, Start
 from gmsnet.run.score import Score
 from gmsnet.run.state import State
 from gmsnet.run.stop import MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
+from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
@@ -65,9 +66,8 @@ def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterato
     if not len(corners):
         yield state.ended(TARGET_REACHED)
         return
-    changeable = topology.near_free.take(corners).any(axis=1)
-    hopeless = not changeable.all()  # cells that miss it and cannot change
-    corners = corners[changeable]
+    every, corners = len(corners), _changeable(corners, topology)
+    hopeless = len(corners) < every
     idle, at_first, precision = 0, len(corners), state.precision
     positive = state.before.signs is None
     floor = _floor_in_space(state, options, executor) if isinstance(topology, Volume) else None
@@ -82,7 +82,7 @@ def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterato
         fraction = len(corners) / (patch.simplices.cell_count if isinstance(patch, Volume) else len(patch.near))
         planned = for_target(target, fraction, rings=rings, floor=floor) if own_plan else None
         smoother = planned or options.smoother()
-        missing = partial(corners_missing, topology=patch, target=target)
+        missing = partial(_changeable_missing, topology=topology, patch=patch, target=target)
         measure = partial(totals_of, state.points, patch.scored)
         before = Score(measure, options.best_by, corners if clear else missing(state.points), positive)
         run = Run(
@@ -123,7 +123,8 @@ def cells_missing(state: State, target: Target) -> tuple[NDArray[np.int32], bool
     """The corners (K, 3 or 4) of the cells that miss the target; do all of them, however they are measured?"""
     topology, points, before = state.topology, state.points, state.before
     if isinstance(topology, Volume):
-        if points is not state.start or state.second_order is not None:  # of which some are in the report alone
+        if points is not state.start or state.second_order is not None or isinstance(topology, MixedVolume):
+            # the report has more cells, or cells whole, where corners without a free node must be told apart
             return corners_missing(points, topology, target), True
         return topology.places[topology.cells[target.missed_in(before)]], False
     rows = rows_missing(points, topology, target, state.shapes if points is state.start else None)
@@ -135,6 +136,18 @@ def cells_missing(state: State, target: Target) -> tuple[NDArray[np.int32], bool
     ):
         return corners, True
     return topology.places[topology.triangles[target.missed_in(before)]], False
+
+
+def _changeable(corners: NDArray[np.int32], topology: Topology | Volume) -> NDArray[np.int32]:
+    """Those with a node that is free. Of a cell that has one, simplices at its other corners may be without."""
+    return corners[topology.near_free.take(corners).any(axis=1)]
+
+
+def _changeable_missing(
+    points: Floats, topology: Topology | Volume, patch: Topology | Volume, target: Target
+) -> NDArray[np.int32]:
+    """The corners of the cells in the patch that miss the target and have a node that is free in the whole mesh."""
+    return _changeable(corners_missing(points, patch, target), topology)
 
 
 def too_large(rings: int, active: Flags, left: float, topology: Topology | Volume) -> bool:

@@ -36,10 +36,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.simplex.tetra_measures import SHAPE
 from gmsnet.measure.bounds import groups, links
+from gmsnet.measure.bounds.held_corners import held_corners
 from gmsnet.measure.cells import MeasuredCells
-from gmsnet.measure.volumes import MeasuredTetrahedra
+from gmsnet.measure.report import QualityReport, measure
+from gmsnet.measure.solids import MeasuredSolids
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import planar_points
@@ -92,11 +93,9 @@ class Limits:
         cells = self.cell[self.cells(group)].tolist()
         named = ", ".join(map(str, cells[:SHOWN])) + (f" and {len(cells) - SHOWN} more" if len(cells) > SHOWN else "")
         kind, bound = self.kind[group], f"{self.bound[group]:.3g}"
-        if kind == groups.HELD:
-            return f"cell {named}: {self._held(group)}"
-        node = int(self.node[group])
-        place = ", ".join(f"{x:.6g}" for x in self.points[node].tolist())
-        at = f"cells {named} at node {node} ({place})"
+        if kind in groups.OF_ONE_CELL:
+            return f"cell {named}: {self._of_one_cell(group)}"
+        at = f"cells {named} at {self._place(group)}"
         if kind == groups.FREE_CORNER:
             few = "only " if len(cells) < 6 else ""
             return f"{at}: poor connectivity, the node has {few}{len(cells)} neighbours: they cannot all exceed {bound}"
@@ -115,33 +114,42 @@ class Limits:
         for group in np.flatnonzero(self.bound <= target * (1.0 + 1e-9)).tolist():
             for row in self.cells(group).tolist():
                 if told.get(row) == "":
-                    told[row] = self._held(group) if self.kind[group] == groups.HELD else self.describe(group)
+                    alone = self.kind[group] in groups.OF_ONE_CELL
+                    told[row] = self._of_one_cell(group) if alone else self.describe(group)
         return {row: reason or self._otherwise(row) for row, reason in told.items()}
 
-    def _held(self, group: int) -> str:
-        return f"all its nodes are held, so its {self.symbol} stays {self.bound[group]:.3g}"
+    def _of_one_cell(self, group: int) -> str:
+        if self.kind[group] == groups.HELD:
+            return f"all its nodes are held, so its {self.symbol} stays {self.bound[group]:.3g}"
+        corner = f"its corner at {self._place(group)} is held with its neighbours"
+        return f"{corner}, so its {self.symbol} cannot exceed {self.bound[group]:.3g}"
+
+    def _place(self, group: int) -> str:
+        node = int(self.node[group])
+        return f"node {node} ({', '.join(f'{x:.6g}' for x in self.points[node].tolist())})"
 
     def _otherwise(self, row: int) -> str:
         return "all its nodes are held, so it stays as it is" if self.held[row] else "no bound known"
 
 
-def limits(mesh: Mesh, topology: Topology | Volume, below: float = 0.9) -> Limits:
-    """The bounds less than ``below`` for a planar mesh; of volumes and surfaces those of held cells alone.
+def limits(mesh: Mesh, topology: Topology | Volume, below: float = 0.9, report: QualityReport | None = None) -> Limits:
+    """The bounds less than ``below`` for a planar mesh; of volumes and surfaces those of held cells and corners.
 
-    topology: of this mesh; which nodes it holds is what counts.
+    topology: of this mesh; which nodes it holds is what counts. report: of the mesh, whose rows are meant, where there
+    is one already; it may have volumes that the topology does not have, of which nothing is known.
 
     Where free nodes are has no influence.
     """
     free = np.zeros(len(topology.memory), dtype=bool)
     free[topology.free] = True
-    if isinstance(topology, Volume):
-        cell, held = topology.cell, np.all(~free[topology.cells], axis=1)
-        found = _held_in_space(MeasuredTetrahedra.of(mesh, topology)[0], np.flatnonzero(held), below)
-    elif isinstance(topology, Shell):
-        cells, cell = MeasuredCells.of(mesh, topology)
-        held = np.concatenate([np.all(~free[topology.triangles], axis=1), np.all(~free[topology.quads], axis=1)])
-        held = held if cells.order is None else held[cells.order]
-        found = _held_in_space(cells, np.flatnonzero(held), below)
+    if isinstance(topology, Volume | Shell):
+        report = measure(mesh, topology) if report is None else report
+        cell = report.cell
+        held = np.isin(cell, _held_cells(mesh, topology, free))
+        parts = [_held_in_space(report.shape, held, below)]
+        if isinstance(report.cells, MeasuredCells | MeasuredSolids):
+            parts.append(held_corners(report.cells, free, below))
+        found = groups.Groups.joined(parts)
     elif topology.patterns is not None:
         cells, cell = MeasuredCells.of(mesh, topology)
         found, held = links.collect(cells, topology, free, below)
@@ -162,10 +170,18 @@ def limits(mesh: Mesh, topology: Topology | Volume, below: float = 0.9) -> Limit
     )
 
 
-def _held_in_space(cells: MeasuredTetrahedra | MeasuredCells, rows: Ints, below: float) -> groups.Groups:
-    """The cells of these rows that are worse than ``below``."""
-    shape = cells.columns(rows.astype(np.int32))[SHAPE]
-    rows, shape = rows[shape < below], shape[shape < below]
+def _held_cells(mesh: Mesh, topology: Volume | Shell, free: NDArray[np.bool_]) -> Ints:
+    """Those without a free node, as numbers among all cells of the mesh."""
+    if isinstance(topology, Volume):
+        return topology.cell[~free[topology.cells].any(axis=1)]
+    cells, cell = MeasuredCells.of(mesh, topology)
+    held = np.concatenate([~free[topology.triangles].any(axis=1), ~free[topology.quads].any(axis=1)])
+    found: Ints = cell[held if cells.order is None else held[cells.order]]
+    return found
+
+
+def _held_in_space(shape: Floats, held: NDArray[np.bool_], below: float) -> groups.Groups:
+    """The held cells that are worse than ``below``. shape, held: of each row of a report."""
+    rows = np.flatnonzero(held & (shape < below))
     nowhere, one = np.full(len(rows), groups.NOWHERE), np.ones(len(rows), dtype=np.intp)
-    made = groups.Groups.of(groups.HELD, nowhere, np.zeros(len(rows)), shape, one, rows)
-    return groups.Groups.joined([made])
+    return groups.Groups.of(groups.HELD, nowhere, np.zeros(len(rows)), shape[rows], one, rows)

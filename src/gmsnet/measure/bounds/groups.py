@@ -16,7 +16,8 @@ Floats = NDArray[np.float64]
 Places = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 
-HELD, FREE_CORNER, CORNER, RING = range(4)  # kinds of groups
+HELD, FREE_CORNER, CORNER, RING, HELD_CORNER = range(5)  # kinds of groups
+OF_ONE_CELL = (HELD, HELD_CORNER)
 NOWHERE = -1  # no node
 ABOVE = 1e-6  # what is added to a bound for rounding
 

@@ -1,6 +1,6 @@
-"""Bounds of meshes that are not all triangles, and of those whose boundary slides: from held cells and free corners.
+"""Bounds of meshes that are not all triangles, and of those whose boundary slides: from what is held, and free corners.
 
-*Held cells.* A cell whose nodes are all held keeps its 1/q.
+*Held cells.* A cell whose nodes are all held keeps its 1/q. So does a held corner of a quad (held_corners).
 
 *Quads around a free node.* Of a square corner of angle θ, 1/q = 2|e₁||e₂| sin θ/(|e₁|² + |e₂|²) ≤ sin θ. The angles of
 the n quads of a closed star add up to 360°, so that one is 360°/n or less where n > 4, and one is 360°/n or more where
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex.measures import SHAPE
 from gmsnet.measure.bounds.groups import ABOVE, FREE_CORNER, HELD, NOWHERE, Groups
+from gmsnet.measure.bounds.held_corners import held_corners
 from gmsnet.measure.cells import MeasuredCells
 from gmsnet.topology.topology import Topology
 
@@ -46,4 +47,5 @@ def collect(cells: MeasuredCells, topology: Topology, free: Flags, below: float)
     corner = corner[np.argsort(cells.quads.ravel()[corner], kind="stable")]
     rows = place[len(cells.corners) + corner // 4]
     parts.append(Groups.of(FREE_CORNER, nodes, np.zeros(len(nodes)), bound, quads[nodes], rows))
+    parts.append(held_corners(cells, free, below))
     return Groups.joined(parts), held
