@@ -108,7 +108,7 @@ def _write(files: Mapping[str, bytes], stem: Path) -> Path:
 
 
 def _checked(message: str, path: Path, files: Mapping[str, bytes]) -> str:
-    beside = (path.with_suffix(suffix) for suffix in files if path.stem == "mesh" and suffix.startswith("."))
+    beside = (path.with_suffix(name) if name.startswith(".") else path.with_name(name) for name in files)
     name = next((f"{one}: " for one in (path, *beside) if message.startswith(f"{one}: ")), "")
     if not name:
         raise Broken(f"the message does not begin with the file: {message[:200]!r}")

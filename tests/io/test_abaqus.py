@@ -262,6 +262,7 @@ def test_a_deck_without_a_mesh(data: bytes) -> None:
         ("C3D10M", "tetra10"), ("C3D8R", "hexahedron"), ("C3D20RH", "hexahedron20"), ("CPE4RH", "quad"),
         ("S4R5", "quad"), ("S8R5", "quad8"), ("S9R5", "quad9"), ("STRI65", "triangle6"), ("SC8R", "hexahedron"),
         ("SC6R", "wedge"), ("B31H", "line"), ("B32", "line3"), ("SAX1", "line"), ("DC2D6", "triangle6"),
+        ("C3D" + 8000 * "1", None),
         ("C3D15V", None), ("C3D27", None), ("COH3D8", None), ("CIN3D8", None), ("U1", None), ("", None),
     ],
 )  # fmt: skip

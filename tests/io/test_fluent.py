@@ -152,6 +152,10 @@ def test_a_plain_file() -> None:
     assert len(signs) == 1
 
 
+def test_a_dimension_of_too_many_digits_is_none() -> None:
+    assert len(read(fluent, VOLUME.replace(b"(2 3)", b"(2 " + 5000 * b"9" + b")")).points) == 9
+
+
 def test_volumes() -> None:
     parsed = read(fluent, VOLUME)
     assert sorted(cells_of(parsed, "hexahedron")[0]) == list(range(8))

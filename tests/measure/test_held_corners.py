@@ -17,7 +17,11 @@ from gmsnet.measure.report import connectivity_of, measure
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.run import stop
 
-KINDS = {"hexahedra": {}, "wedges": {"wedges": [(0, 0), (1, 2), (2, 2)]}, "pyramids": {"pyramids": [(1, 1, 1), (2, 1, 1)]}}
+KINDS = {
+    "hexahedra": {},
+    "wedges": {"wedges": [(0, 0), (1, 2), (2, 2)]},
+    "pyramids": {"pyramids": [(1, 1, 1), (2, 1, 1)]},
+}
 ROUNDING = 2e-6
 
 
@@ -38,19 +42,17 @@ def slow_bounds(mesh, topology, report):
             row = np.flatnonzero(report.cell == before + at)
             if not len(row):
                 continue
-            sense = 1.0
             if not free & set(nodes):
                 found[before + at] = report.shape[row[0]]
                 continue
-            values = []
+            values, dimension = [], kind.dimension
             for simplex, inverse in zip(kind.simplices, kind.ideal, strict=True):
                 if free & {nodes[k] for k in simplex} or len(kind.simplices) in (3, 1):
                     continue
-                spokes = mesh.points[[nodes[k] for k in simplex[1:]], : kind.dimension] - mesh.points[nodes[simplex[0]], : kind.dimension]  # fmt: skip
-                t = spokes.T @ np.array(inverse)
-                size = sense * np.linalg.det(t)
-                power, dimension = 2.0 / kind.dimension, kind.dimension
-                values.append(np.sign(size) * dimension * abs(size) ** power / (t * t).sum())
+                root, *ends = mesh.points[[nodes[k] for k in simplex], :dimension]
+                deviation = (np.array(ends) - root).T @ np.array(inverse)
+                size = np.linalg.det(deviation)
+                values.append(np.sign(size) * dimension * abs(size) ** (2 / dimension) / (deviation**2).sum())
             if values:
                 found[before + at] = min(values)
         before += len(block.nodes)
@@ -70,7 +72,9 @@ def test_bounds_of_volumes_are_those_of_a_slow_twin(more, below):
         assert bound == pytest.approx(slow[cell], abs=ROUNDING)
 
 
-@pytest.mark.parametrize("mesh", [structured_mesh(7), random_quad_mesh(80, cells="mixed", seed=2)], ids=["quads", "mixed"])
+@pytest.mark.parametrize(
+    "mesh", [structured_mesh(7), random_quad_mesh(80, cells="mixed", seed=2)], ids=["quads", "mixed"]
+)
 def test_bounds_of_planar_quads_are_those_of_a_slow_twin(mesh):
     rng = np.random.default_rng(3)
     points = mesh.points + 0.0

@@ -137,6 +137,24 @@ def form_of(name: str) -> JacobianForm:
     return JacobianForm._make([ints, floats, *first, *then, *counts, *bounds])
 
 
+@cache
+def derivatives_on_edges(name: str, parts: int) -> NDArray[np.float64]:
+    """(P, 3, nodes) of a volume cell the weights of its nodes in the derivatives along the axes of the reference cell.
+
+    At points that cut each edge into so many equal parts, its ends among them. Not for pyramids.
+    """
+    kind = CELLS[name]
+    vertices, at = _FAMILIES[kind.corners or 0]
+    factors = Factors(tuple(len(factor) for factor in vertices))
+    corner = [np.array(factors.corner((1,) * len(vertices), place), dtype=np.float64) for place in at]
+    shares = np.linspace(0.0, 1.0, parts + 1)
+    places = [(1.0 - s) * corner[edge[0]] + s * corner[edge[1]] for edge in kind.edges for s in shares]
+    groups = _derivatives(kind, factors, at)
+    found = np.array([[sum(factors.value(i, p) * row for i, row in group) for group in groups] for p in places])
+    found.flags.writeable = False
+    return found
+
+
 def _packed(tables: tuple[Any, ...], dtype: type) -> tuple[NDArray[Any], list[Any]]:
     """One array of all tables, and where each begins."""
     flat: list[NDArray[Any]] = [np.asarray(table, dtype=dtype).ravel() for table in tables]

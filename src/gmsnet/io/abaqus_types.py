@@ -21,7 +21,7 @@ _SINGLE = {"MASS": "vertex", "ROTARYI": "vertex", "SPRING1": "vertex", "DASHPOT1
            "CONN3D2": "line", "GAPUNI": "line", "RB2D2": "line", "RB3D2": "line"}  # fmt: skip
 _LINE2 = re.compile(r"(T[23]D2|B[23][13]|R2D2|RAX2|SAX1|MAX1|DC1D2)[A-Z]*")
 _LINE3 = re.compile(r"(T[23]D3|B[23]2|SAX2|MAX2|DC1D3)[A-Z]*")
-_TYPE = re.compile(rf"({'|'.join(sorted((*_FLAT, *_SOLID), key=len, reverse=True))})(\d+)([A-Z]*\d?)")
+_TYPE = re.compile(rf"({'|'.join(sorted((*_FLAT, *_SOLID), key=len, reverse=True))})(\d{{1,4}})([A-Z]*\d?)")
 _SIZES = {"STRI65": 6}  # whose number is not that of its nodes
 _VARIES = "V"  # how many nodes a cell has is not told by its type: C3D15V
 

@@ -23,6 +23,7 @@ MOST_DEEP, MOST_SECTIONS = 50, 100_000
 
 _OPEN = re.compile(rb"\s*\(\s*(\d{1,5})(?=[\s()\"])")
 _NEXT = re.compile(rb"[()\"]")
+_COUNT = re.compile(rb"\d{1,15}")
 _HEX = re.compile(rb"[0-9A-Fa-f]{1,15}")
 
 
@@ -114,12 +115,12 @@ def _in_binary(key: int, start: int, there: Binary) -> Section:
 def _section(data: Data, key: int, start: int, begin: int, lists: list[tuple[int, int]], stop: int) -> Section:
     if key == 2:
         words = bytes(data[begin : stop - 1]).split()
-        return Section(key, start, (int(words[0]),) if words and words[0].isdigit() else (), None, "")
+        return Section(key, start, (int(words[0]),) if words and _COUNT.fullmatch(words[0]) else (), None, "")
     if key not in (*NODES, *CELLS, *FACES, *NAMES) or not lists:
         return Section(key, start, (), None, "")
     words = bytes(data[slice(*lists[0])]).split()
     if key in NAMES:
-        zone = int(words[0]) if words and words[0].isdigit() and len(words[0]) < 16 else 0
+        zone = int(words[0]) if words and _COUNT.fullmatch(words[0]) else 0
         title = words[2].decode("utf-8", "replace") if len(words) > 2 else ""
         return Section(key, start, (zone,), None, "".join(c for c in title if c.isprintable()) or str(zone))
     if any(not _HEX.fullmatch(word) for word in words) or not words:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.descend import improve_nodes, straighten, untangling_sweep
 from gmsnet.kernels.curved.stars import CENTRE, NO_EDGE, CurvedMesh, dragged
-from gmsnet.kernels.simplex.bernstein import QUAD9
+from gmsnet.kernels.simplex.bernstein import KINDS, QUAD9
 from gmsnet.kernels.simplex.jacobian import judge_cells, straight_signs
 from gmsnet.kernels.star.guard import Guard, Precision
 from gmsnet.measure.curved import judge_curved
@@ -33,6 +33,11 @@ class PlanarCells(NamedTuple):
     mesh: CurvedMesh
     free: Flags
     precision: Precision = Precision()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the numbers in ``mesh.kinds`` stand for."""
+        return KINDS
 
     @property
     def low(self) -> float:

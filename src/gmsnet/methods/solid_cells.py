@@ -13,6 +13,7 @@ from gmsnet.kernels.curved.descend3 import improve_nodes3, straighten3, untangli
 from gmsnet.kernels.curved.stars3 import NO_FOLLOWER, CurvedSolids, put_all
 from gmsnet.kernels.star.guard import Guard, Precision, plain_guard
 from gmsnet.measure.solid import exact_signs_of
+from gmsnet.topology.curved_solids import CURVED
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,6 +31,11 @@ class SolidCells(NamedTuple):
     mesh: CurvedSolids
     free: Flags
     precision: Precision = Precision()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the numbers in ``mesh.kinds`` stand for."""
+        return CURVED
 
     @property
     def low(self) -> float:

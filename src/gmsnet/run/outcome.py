@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -71,7 +71,7 @@ def result_of(state: State, options: SmoothOptions, began: float) -> SmoothResul
         held=_held(state),
         history=list(state.history),
         notes=_notes(state),
-        unmended=still_inverted(after, state.reasons),
+        unmended=still_inverted(after, _why_not_mended(state)),
         topology=_with_corners(state),
         seconds=time.perf_counter() - began,
         invalid_curved=0 if state.second_order is None else state.second_order.invalid[1],
@@ -79,6 +79,11 @@ def result_of(state: State, options: SmoothOptions, began: float) -> SmoothResul
         asked=options.asked,
         compared=_compared(state, points),
     )
+
+
+def _why_not_mended(state: State) -> Mapping[int, str]:
+    given = state.second_order
+    return state.reasons if given is None else {**state.reasons, **given.reasons}
 
 
 def _compared(state: State, points: Floats) -> Compared | None:

@@ -38,6 +38,8 @@ from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
 SWEEPS = 10
+FOR_GOOD = "its determinant is not positive where held nodes alone decide it"
+NOT_FOUND = "no valid shape of it was found"
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -72,7 +74,8 @@ def second_order_of(mesh: Mesh, topology: Topology, options: SmoothOptions) -> S
     may[_held_middles(table, kind, np.concatenate(regions), edges, len(may))] = False
     twin = straight(mesh)
     whole, near = Topology.and_points(twin, ~may)
-    return SecondOrder(table, kind, may, whole, protected(twin, whole, options.preserved, options.fix_layers, near))
+    protection = protected(twin, whole, options.preserved, options.fix_layers, near)
+    return SecondOrder(table, kind, may, whole, protection, number)
 
 
 def straight(mesh: Mesh) -> Mesh:
@@ -130,8 +133,13 @@ def untangle_second_order(state: State, options: SmoothOptions, executor: Execut
         return state
     from gmsnet.untangle.curved import untangle_curved  # untangling takes 0.15 s more to import
 
-    untangle_curved(cells, _corners(known).topology, executor)
-    return _protected_anew(_judged(state, cells), options)
+    for_good = untangle_curved(cells, _corners(known).topology, executor).for_good
+    state = _judged(state, cells)
+    assert state.second_order is not None
+    assert state.second_order.sign is not None
+    left = np.flatnonzero(state.second_order.sign != 1)
+    reasons = {int(given.numbers[k]): FOR_GOOD if for_good[k] else NOT_FOUND for k in left.tolist()}
+    return _protected_anew(replace(state, second_order=replace(state.second_order, reasons=reasons)), options)
 
 
 def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> State:

@@ -45,4 +45,4 @@ def second_order_solids_of(mesh: Mesh, topology: Volume, options: SmoothOptions)
     may &= corner | ~at_corners
     corners, near = whole.holding(first, FIRST_ORDER), taken(space_points(mesh), whole.memory)
     protection = protected_volume(corners, options.preserved, options.fix_layers, near, firm=False)
-    return SecondOrder(table, kinds, may, whole, protection)
+    return SecondOrder(table, kinds, may, whole, protection, number)

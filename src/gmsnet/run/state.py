@@ -52,8 +52,8 @@ class SecondOrder:
     protection: of that, and what of it is protected. sign: (C,) of det J in each cell, as it is now. invalid: how many
     second-order cells are not certified valid, least: the least certified bound over a straight cell's size, of volumes
     over its least determinant at a corner, both at first and now. None of the three is known before the first stage.
-    unable: why the method does
-    not move corners.
+    unable: why the method does not move corners. numbers: (C,) of each cell among all of the mesh. reasons: why cells,
+    by these, could not be made valid.
     """
 
     cells: NDArray[np.int32]
@@ -61,10 +61,12 @@ class SecondOrder:
     free: NDArray[np.bool_]
     whole: Topology | Volume
     protection: Protection
+    numbers: NDArray[np.int64]
     sign: NDArray[np.int8] | None = None
     invalid: tuple[int, int] = (0, 0)
     least: tuple[float, float] = (0.0, 0.0)
     unable: str = ""
+    reasons: Mapping[int, str] = field(default_factory=dict)
 
     @property
     def solid(self) -> bool:

@@ -45,7 +45,7 @@ def _blocks(cells: MeasuredCells | MeasuredSolids) -> Iterator[tuple[NDArray[np.
 
 def _of_quads(cells: MeasuredCells) -> Floats:
     """(4, Q) 1/q of the corners; of surfaces without sign, which is no less."""
-    at = (planar_points(cells) if cells.plane is not None else space_points(cells))[cells.quads]
+    at = (planar_points(cells) if cells.plane is not None else space_points(cells)[:, :3])[cells.quads]
     found = np.empty((4, len(at)))
     for k, (corner, after, before) in enumerate(CELLS["quad"].simplices):
         u, v = at[:, after] - at[:, corner], at[:, before] - at[:, corner]
