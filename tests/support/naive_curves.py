@@ -54,7 +54,7 @@ def naive_chains(mesh: Mesh, angle: float) -> set[tuple[bool, frozenset[tuple[in
         if not (back.any() and ahead.any()):
             return False
         turn = abs(math.atan2(back[0] * ahead[1] - back[1] * ahead[0], back @ ahead))
-        return turn <= math.radians(min(angle, 90.0)) + 1e-12
+        return turn < math.radians(angle) - 1e-12 and turn <= math.radians(90.0) + 1e-12
 
     through = {node for node in at if goes_through(node)}
     found, left = set(), set(edges)

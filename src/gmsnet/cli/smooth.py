@@ -104,13 +104,13 @@ def smooth(
         typer.Option(
             metavar="WHAT",
             help="Let nodes of boundaries, interfaces and markers move along their curves, and boundary nodes of "
-            "tetrahedra on their surface: all, or a marker's name. Repeatable.",
+            "volumes on their surface: all, or a marker's name. Repeatable.",
         ),
     ] = None,
     feature_angle: Annotated[
         float,
         typer.Option(
-            help="With --slide: curves end, and edges of surfaces are sharp, where they turn by more degrees than this."
+            help="With --slide: curves end, and edges of surfaces are sharp, where they turn by so many degrees."
         ),
     ] = 30.0,
     surface_tolerance: Annotated[

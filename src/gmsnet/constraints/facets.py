@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import CELLS
 from gmsnet.constraints.features import lengths_of
 from gmsnet.constraints.outline import Flags, Longs, line_cells, mark_sets
 from gmsnet.mesh.mesh import Mesh
@@ -44,9 +45,11 @@ def boundary_of(mesh: Mesh, wound: Wound | WoundSolids) -> Facets:
     rows = wound.memory[wound.boundary].astype(np.int64)
     region = wound.region[wound.boundary_cell] if len(wound.region) else np.zeros(len(rows), dtype=np.int64)
     lines, line_marks, still = line_cells(mesh)
+    halves = wound.boundary_halves if isinstance(wound, WoundSolids) else 0
     marks, names = _marks(mesh, rows, still, halves=isinstance(wound, WoundSolids))
     table, label = np.unique(np.column_stack([region, marks]), axis=0, return_inverse=True)
-    return Facets(rows, label.reshape(-1), tuple(names[row] for row in table[:, 1].tolist()), lines, line_marks, still)
+    of_label = tuple(names[row] for row in table[:, 1].tolist())
+    return Facets(rows, label.reshape(-1), of_label, lines, line_marks, still, halves=halves)
 
 
 def surface_itself(mesh: Mesh, topology: Topology) -> Facets:
@@ -90,20 +93,43 @@ def _marks(mesh: Mesh, rows: Longs, still: Flags, *, halves: bool) -> tuple[Long
     return mark_sets(mesh, owner[owner >= 0], numbers[owner >= 0], len(rows), 2)
 
 
-def edge_lengths(facets: Facets, points: Floats) -> Floats:
-    """(N,) the mean length of the edges of cells at each node; inside of a surface each counts twice."""
-    real = np.ones((len(facets.rows), 3), dtype=bool)  # of the edge from corner k to the next one
-    quads = facets.halves // 2
-    real[len(real) - 2 * quads : len(real) - quads, 2] = real[len(real) - quads :, 0] = False
-    total, count = np.zeros(len(points)), np.zeros(len(points), dtype=np.int64)
-    for k in range(3):
-        one, other = facets.rows[real[:, k], k], facets.rows[real[:, k], (k + 1) % 3]
-        length = lengths_of(points[other] - points[one])
-        for end in (one, other):
-            total += np.bincount(end, length, len(points))
-            count += np.bincount(end, minlength=len(points))
-    lengths: Floats = total / np.maximum(count, 1)
+def edge_lengths(facets: Facets, points: Floats, mesh: Mesh) -> Floats:
+    """(N,) the mean length of the edges of cells at each node of the facets, those inside of volumes among them."""
+    nodes = len(points)
+    if facets.closed:
+        at = np.zeros(nodes, dtype=bool)
+        at[facets.rows] = True
+        pairs = _edges_of_volumes(mesh, at)
+    else:
+        real = np.ones((len(facets.rows), 3), dtype=bool)  # of the edge from corner k to the next one
+        quads = facets.halves // 2
+        real[len(real) - 2 * quads : len(real) - quads, 2] = real[len(real) - quads :, 0] = False
+        pairs = np.stack([facets.rows, np.roll(facets.rows, -1, axis=1)], axis=2)[real]
+    low, high = np.divmod(np.unique(pairs.min(axis=1) * nodes + pairs.max(axis=1)), nodes)
+    length, ends = lengths_of(points[high] - points[low]), np.concatenate([low, high])
+    lengths: Floats = np.bincount(ends, np.tile(length, 2), nodes) / np.maximum(np.bincount(ends, minlength=nodes), 1)
     return lengths
+
+
+def _edges_of_volumes(mesh: Mesh, at: Flags) -> Longs:
+    """(E, 2) those of volume cells that have a node in ``at`` (N,); some stand there more than once."""
+    pairs = [np.empty((0, 2), dtype=np.int64)]
+    for block in mesh.cells:
+        if block.dimension == 3 and block.kind in CELLS:
+            rows = block.nodes[at[block.nodes].any(axis=1)]
+            found = rows[:, [edge[:2] for edge in CELLS[block.kind].edges]].reshape(-1, 2)
+            pairs.append(found[at[found].any(axis=1)].astype(np.int64))
+    return np.concatenate(pairs)
+
+
+def diagonals_apart(facets: Facets, points: Floats) -> Floats:
+    """(N,) how far the middles of the two diagonals of a quadrilateral at each node are apart, at most; 0 elsewhere."""
+    quads, found = facets.halves // 2, np.zeros(len(points))
+    first, second = facets.rows[len(facets.rows) - 2 * quads :][:quads], facets.rows[len(facets.rows) - quads :]
+    corners = np.column_stack([first, second[:, 2]])
+    a, b, c, d = points[corners].transpose(1, 0, 2)
+    np.maximum.at(found, corners, lengths_of(0.5 * ((a + c) - (b + d)))[:, None])
+    return found
 
 
 def facet_keys(rows: Longs, nodes: int) -> Longs:

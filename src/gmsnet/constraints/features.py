@@ -22,9 +22,7 @@ from gmsnet.topology.polygons import Ints
 Floats = NDArray[np.float64]
 
 COLLINEAR = 1e-12  # of a curve's length: nodes this near to the line through its ends are on it, besides rounding
-SLACK = (
-    0.5e-12  # of the cosine of the feature angle: a polygon that turns by just this angle has no corner for rounding
-)
+SLACK = 0.5e-12  # of the cosine of the feature angle: a polygon that turns by just this angle has corners, all of them
 RUN = 3  # edges: so many on a line, within a curve, are a curve of their own
 
 
@@ -69,7 +67,7 @@ def curves_of(
     """The curves of a planar mesh, and which nodes slide on them.
 
     A curve is a maximal chain of edges of one kind (boundary, interface, line cells inside a region), between the same
-    regions and with the same marks. It ends where it turns by more than the feature angle, where not exactly two such
+    regions and with the same marks. It ends where it turns by the feature angle or more, where not exactly two such
     edges meet, at nodes that are still (``outline_of``), and where a straight run of RUN edges or more begins.
 
     slide: None (no node slides), True (all may), or names of ``mesh.markers``: only nodes of these slide.
@@ -110,7 +108,7 @@ def may_slide(mesh: Mesh, names: Sequence[str] | None, held: Flags | None) -> Fl
 
 
 def _chains(outline: Outline, points: Floats, feature_angle: float) -> tuple[list[Ints], list[bool]]:
-    """Maximal chains of edges that turn nowhere by more than the feature angle, and whether each is closed."""
+    """Maximal chains of edges that turn nowhere by the feature angle or more, and whether each is closed."""
     edges = outline.edges
     ids, ends = np.unique(edges, return_inverse=True)
     ends = ends.reshape(edges.shape)
@@ -124,7 +122,7 @@ def _chains(outline: Outline, points: Floats, feature_angle: float) -> tuple[lis
     ahead = points[edges[two].sum(axis=1) - ids[nodes]] - points[ids[nodes]]
     lengths = lengths_of(back) * lengths_of(ahead)
     cosine = -(back * ahead).sum(axis=1)
-    least = max(math.cos(math.radians(feature_angle)), 0.0) - SLACK
+    least = max(math.cos(math.radians(feature_angle)) + SLACK, -SLACK)
     smooth = (lengths > 0.0) & (cosine >= least * lengths)
     through[nodes] = smooth & (outline.label[one] == outline.label[two])
     order, begin = np.empty(2 * len(edges), dtype=np.int64), np.empty(len(edges) + 1, dtype=np.int64)

@@ -44,7 +44,7 @@ def patches_of(
 
     free_needles: edges are not sharp that are so only because a facet there is thin (constraints/needles.py).
 
-    An edge is sharp where its two facets turn by more than the feature angle, differ in their region or marks, or have
+    An edge is sharp where its two facets turn by the feature angle or more, differ in their region or marks, or have
     no area, where it belongs to one facet or more than two, and where there is a line cell.
     """
     rows, nodes = facets.rows, len(points)
@@ -62,7 +62,7 @@ def patches_of(
     turning, size = _of_cells(facets, normal, unit, area)
     cosine = dot(turning[f], turning[g])
     smooth = two & (size[f] > 0.0) & (size[g] > 0.0) & (facets.label[f] == facets.label[g])
-    least = math.cos(math.radians(feature_angle)) - SLACK
+    least = math.cos(math.radians(feature_angle)) + SLACK
     gentle = smooth & (cosine >= least)
     if free_needles:
         triangles = len(rows) - facets.halves

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.constraints.facets import Facets, boundary_of, edge_lengths
+from gmsnet.constraints.facets import Facets, boundary_of, diagonals_apart, edge_lengths
 from gmsnet.constraints.features import may_slide
 from gmsnet.constraints.geometry import Geometry
 from gmsnet.constraints.on_geometry import OnGeometry
@@ -27,6 +27,8 @@ from gmsnet.topology.solids import WoundSolids
 from gmsnet.topology.wound import Wound
 
 Floats = NDArray[np.float64]
+
+BETWEEN = 0.5  # of the distance of the diagonals: about what lies between the two halvings of a quadrilateral
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ class SurfaceSliding:
         nodes = np.zeros(len(points), dtype=bool)
         nodes[free] = True
         nodes &= patches.slides | patches.curves.slides
-        limit = tolerance * edge_lengths(facets, points) if tolerance < math.inf else None
+        limit = np.maximum(_room(facets, points, mesh, tolerance), 0.0) if tolerance < math.inf else None
         bound = None
         if hausdorff is not None:
             bound = CLOSER * hausdorff * float(np.linalg.norm(np.ptp(points[facets.rows.ravel()], axis=0)))
@@ -98,14 +100,24 @@ def enclosed(points: Floats, facets: Facets) -> float:
 
 def patches_to_slide_on(
     mesh: Mesh, wound: Wound | WoundSolids, names: Sequence[str] | None, feature_angle: float = FEATURE_ANGLE,
-    held: Flags | None = None,
+    held: Flags | None = None, tolerance: float = math.inf,
 ) -> tuple[Facets, Patches] | None:  # fmt: skip
     """The boundary of a mesh of volumes and its patches; None where no node is to slide.
 
-    names: as ``check_slide`` gives them. held: (N,) bool.
+    names: as ``check_slide`` gives them. held: (N,) bool. tolerance: as of SurfaceSliding. Nodes stay where it cannot
+    be kept, for quadrilaterals are warped.
     """
     if names == ():
         return None
     facets = boundary_of(mesh, wound)
     points = space_points(mesh)[:, :3].copy()
-    return facets, patches_of(facets, points, feature_angle, mesh.single, may_slide(mesh, names, held))
+    may = may_slide(mesh, names, held)
+    if tolerance < math.inf:
+        may &= _room(facets, points, mesh, tolerance) >= 0.0
+    return facets, patches_of(facets, points, feature_angle, mesh.single, may)
+
+
+def _room(facets: Facets, points: Floats, mesh: Mesh, tolerance: float) -> Floats:
+    """(N,) how far nodes may go from the facets for the tolerance to be kept by either halving of quadrilaterals."""
+    room: Floats = tolerance * edge_lengths(facets, points, mesh) - BETWEEN * diagonals_apart(facets, points)
+    return room

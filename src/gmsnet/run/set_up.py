@@ -147,7 +147,7 @@ def _first_of_volume(
     """The same of a mesh of volumes."""
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     wound, sliding = wound_of(given, asked), None
-    surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked)
+    surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked, options.distance)
     if surface is None:
         topology = volume_of(wound)
     else:

@@ -144,19 +144,27 @@ class WoundSolids:
 
     @cached_property
     def boundary(self) -> Ints:
-        """(F, 3) the facets of one cell alone, counter-clockwise as seen from outside; those of four are ``halved``."""
+        """(F, 3) the facets of one cell alone, counter-clockwise as seen from outside.
+
+        Those of four nodes are ``halved``: their first halves, then the second ones, stand behind all others.
+        """
         return self._outside[1]
 
+    @property
+    def boundary_halves(self) -> int:
+        """How many of these are halves."""
+        return self._outside[2]
+
     @cached_property
-    def _outside(self) -> tuple[NDArray[np.int64], Ints]:
+    def _outside(self) -> tuple[NDArray[np.int64], Ints, int]:
         number = np.flatnonzero(self.twin == ALONE)
         corners = tables().facets[self.solids.kind[number // FACETS], number % FACETS]
         real, four = corners[:, 0] != NONE, corners[:, 3] != NONE
         nodes = self.solids.nodes[(number // FACETS)[:, None], np.maximum(corners, 0)]
         three = real & ~four
         halves = self.position[halved(self.memory[nodes[four]])]
-        cell = np.concatenate([number[three] // FACETS, np.repeat(number[four] // FACETS, 2)])
-        return cell, np.concatenate([nodes[three, :3], halves]).astype(np.int32)
+        cell = np.concatenate([number[three], number[four], number[four]]) // FACETS
+        return cell, np.concatenate([nodes[three, :3], halves[0::2], halves[1::2]]).astype(np.int32), len(halves)
 
     @cached_property
     def boundary_facets(self) -> NDArray[np.int64]:
