@@ -79,12 +79,28 @@ def test_either_halving_keeps_the_tolerance(amount, seed):
         for rows in halvings:
             assert distance(result.points[node], mesh.points[rows]) <= TOLERANCE * local[node] + 1e-12
     apart = np.zeros(len(mesh.points))
-    a, b, c, d = mesh.points[quads].transpose(1, 0, 2)
-    np.maximum.at(apart, quads, np.linalg.norm(0.5 * (a + c - b - d), axis=1)[:, None])
-    beyond = np.flatnonzero(0.5 * apart > TOLERANCE * local * (1 + 1e-9))
+    for quad in quads:
+        a, b, c, d = mesh.points[quad]
+        normal = np.cross(c - a, d - b)
+        apart[quad] = np.maximum(apart[quad], abs((b - a) @ normal) / np.linalg.norm(normal))
+    beyond = np.flatnonzero(apart > TOLERANCE * local * (1 + 1e-9))
     assert not np.isin(beyond, moved).any()
     assert len(moved) > (10 if amount < 0.1 else 0)
     assert amount < 0.1 or len(beyond) > 5
+
+
+def test_a_tolerance_of_next_to_nothing_leaves_planes_to_slide_on():
+    mesh = blocks.block(SIZE, SIZE, SIZE, scale=0.1)
+    points = mesh.points.copy()
+    low, high = points.min(axis=0), points.max(axis=0)
+    throw = np.random.default_rng(0).uniform(-0.03, 0.03, points.shape)
+    points += throw * ((points > low) & (points < high))  # on sides, along these
+    mesh = Mesh(points, mesh.cells)
+    result = gmsnet.smooth(mesh, slide=True, surface_tolerance=1e-15)
+    faces = np.unique(outside(mesh))
+    assert result.moved[faces].sum() > 6 * (SIZE - 1) ** 2
+    np.testing.assert_array_equal(result.points.min(axis=0), low)
+    np.testing.assert_array_equal(result.points.max(axis=0), high)
 
 
 def test_an_edge_is_sharp_by_the_normals_of_whole_quadrilaterals():

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS
-from gmsnet.constraints.features import lengths_of
+from gmsnet.constraints.features import dot, lengths_of
 from gmsnet.constraints.outline import Flags, Longs, line_cells, mark_sets
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.held import SMOOTHED
@@ -123,12 +123,14 @@ def _edges_of_volumes(mesh: Mesh, at: Flags) -> Longs:
 
 
 def diagonals_apart(facets: Facets, points: Floats) -> Floats:
-    """(N,) how far the middles of the two diagonals of a quadrilateral at each node are apart, at most; 0 elsewhere."""
+    """(N,) how far apart the two diagonals of a quadrilateral at each node pass each other, at most: 0 in a plane."""
     quads, found = facets.halves // 2, np.zeros(len(points))
     first, second = facets.rows[len(facets.rows) - 2 * quads :][:quads], facets.rows[len(facets.rows) - quads :]
     corners = np.column_stack([first, second[:, 2]])
     a, b, c, d = points[corners].transpose(1, 0, 2)
-    np.maximum.at(found, corners, lengths_of(0.5 * ((a + c) - (b + d)))[:, None])
+    normal = np.cross(c - a, d - b)
+    length, across = lengths_of(normal), abs(dot(b - a, normal))
+    np.maximum.at(found, corners, np.divide(across, length, out=np.zeros(quads), where=length > 0.0)[:, None])
     return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets, boundary_of, diagonals_apart, edge_lengths
-from gmsnet.constraints.features import may_slide
+from gmsnet.constraints.features import may_slide, rounding_of
 from gmsnet.constraints.geometry import Geometry
 from gmsnet.constraints.on_geometry import OnGeometry
 from gmsnet.constraints.on_surface import surface_of
@@ -27,8 +27,6 @@ from gmsnet.topology.solids import WoundSolids
 from gmsnet.topology.wound import Wound
 
 Floats = NDArray[np.float64]
-
-BETWEEN = 0.5  # of the distance of the diagonals: about what lies between the two halvings of a quadrilateral
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +111,11 @@ def patches_to_slide_on(
     points = space_points(mesh)[:, :3].copy()
     may = may_slide(mesh, names, held)
     if tolerance < math.inf:
-        may &= _room(facets, points, mesh, tolerance) >= 0.0
+        may &= _room(facets, points, mesh, tolerance) >= -rounding_of(points, mesh.single)
     return facets, patches_of(facets, points, feature_angle, mesh.single, may)
 
 
 def _room(facets: Facets, points: Floats, mesh: Mesh, tolerance: float) -> Floats:
     """(N,) how far nodes may go from the facets for the tolerance to be kept by either halving of quadrilaterals."""
-    room: Floats = tolerance * edge_lengths(facets, points, mesh) - BETWEEN * diagonals_apart(facets, points)
+    room: Floats = tolerance * edge_lengths(facets, points, mesh) - diagonals_apart(facets, points)
     return room
