@@ -173,8 +173,10 @@ def _untangle_straight(curved: Cells, straight: Topology | Volume, executor: Exe
 def _mend(curved: Cells) -> tuple[int, Mask]:
     """Mends a mesh patch by patch; returns how many cells are not certainly valid, and which cannot be."""
     mesh, nodes = curved.mesh, _Nodes(curved.inner, curved.corner)
-    for_good = bad_for_good(curved.points, mesh.cells, mesh.kinds, curved.names, nodes.inner | nodes.corner)
-    bad = np.flatnonzero((curved.signs(_all(curved)) != 1) & ~for_good)
+    bad, for_good = np.flatnonzero(curved.signs(_all(curved)) != 1), np.zeros(len(mesh.cells), dtype=bool)
+    may = nodes.inner | nodes.corner
+    for_good[bad] = bad_for_good(curved.points, mesh.cells[bad], mesh.kinds[bad], curved.names, may)
+    bad = bad[~for_good[bad]]
     left = BUDGET
     for rings, sweeps, thresholds in TRIES:
         for cells in _patches(mesh, bad, rings):
