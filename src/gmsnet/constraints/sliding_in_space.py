@@ -110,7 +110,7 @@ def patches_to_slide_on(
     facets = boundary_of(mesh, wound)
     points = space_points(mesh)[:, :3].copy()
     may = may_slide(mesh, names, held)
-    if tolerance < math.inf:
+    if facets.halves and tolerance < math.inf:
         may &= _room(facets, points, mesh, tolerance) >= -rounding_of(points, mesh.single)
     return facets, patches_of(facets, points, feature_angle, mesh.single, may)
 
