@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.damage import cells_of, regions_of
+from support.gmsh_split import split
 from support.gmsh_variants import Out
+from support.pieces import ring, strips
 
 import gmsnet
 from gmsnet.io import gmsh
+from gmsnet.mesh.cell_block import CellBlock
 
 # Three rows of three nodes; the part left of x = 1 is partition 1, that right of it partition 2.
 POINTS = [(float(x), float(y), 0.0) for y in range(3) for x in range(3)]
@@ -161,3 +164,38 @@ def test_without_partitions_lines_without_a_group_are_shape() -> None:
     parsed = gmsh.read({".msh": data})
     assert len(cells_of(parsed, "line")) == 10
     assert len(cells_of(parsed, "vertex")) == 2
+
+
+def test_a_face_between_partitions_of_a_volume_is_no_shape() -> None:
+    """Two tetrahedra: that between them Gmsh adds as a triangle of an entity whose parent is the volume."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1.0]])
+    cells = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
+    mesh = gmsnet.Mesh(points, [CellBlock("tetra", cells, np.zeros(2, dtype=np.int64))])
+    (data,) = split(mesh, 1)
+    between = data.replace(b"\n0 0 0 1\n", b"\n0 0 1 1\n9 3 1 2 1 2 0 0 0 0 0 0 0 0 \n")
+    between = between.replace(b"$Elements\n1 2 1 2\n", b"$Elements\n2 3 1 3\n2 9 2 1\n3 2 3 4 \n")
+    assert between.count(b"\n2 9 2 1\n") == between.count(b"\n9 3 1 2 1 2 ") == 1
+    parsed = gmsh.read({".msh": between})
+    assert [(block.kind, len(block.nodes)) for block in parsed.cells] == [("tetra", 2)]
+    assert "1 faces, lines and points between partitions" in parsed.unread
+    named = gmsh.read({".msh": between.replace(b"1 2 0 0 0 0 0 0 0 0 \n", b"1 2 0 0 0 0 0 0 1 7 0 \n")})
+    assert [(block.kind, len(block.nodes)) for block in named.cells] == [("triangle", 1), ("tetra", 2)]
+
+
+@pytest.mark.parametrize("order", ["", "<", ">"])
+def test_cells_that_another_file_owns_are_held(order: str, tmp_path: Path) -> None:
+    flat = gmsnet.random_mesh(120, seed=3)
+    mesh = gmsnet.Mesh(np.column_stack([flat.points, np.zeros(len(flat.points))]), flat.cells)
+    own = strips(mesh, 2)[0]
+    path = tmp_path / "a_1.msh"
+    path.write_bytes(split(mesh, 2, ghosts=True, order=order)[0])
+    read = gmsnet.read(path)
+    copies = ring(mesh, own)
+    assert len(read.cells[0].nodes) == len(own) + len(copies)
+    place = {tuple(point): k for k, point in enumerate(read.points.tolist())}
+    held = {place[tuple(point)] for point in mesh.points[np.unique(mesh.cells[0].nodes[copies])].tolist()}
+    result = gmsnet.smooth(read, "laplacian", max_sweeps=2)
+    assert result.moved.any()
+    assert not held & set(np.flatnonzero(result.moved).tolist())
+    gmsnet.write(result.mesh, tmp_path / "b_1.msh")
+    assert gmsnet.read(tmp_path / "b_1.msh").points.tobytes() == result.mesh.points.tobytes()

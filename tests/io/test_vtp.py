@@ -11,6 +11,7 @@ from support.contracts import check_splice, read, refused
 from support.damage import cells_of, damaged, read_or_refuse, regions_of
 
 import gmsnet
+from gmsnet.errors import FormatError
 from gmsnet.io import vtp
 
 PLAIN = b"""<?xml version="1.0"?>
@@ -84,3 +85,9 @@ def test_files_of_vtk(mode: str, zlib: bool, single: bool, tmp_path: Path) -> No
     reader.SetFileName(str(tmp_path / "b.vtp"))
     reader.Update()
     assert vtk_to_numpy(reader.GetOutput().GetPoints().GetData()).tolist() == new.tolist()
+
+
+def test_a_file_without_a_piece_is_told() -> None:
+    end = PLAIN.index(b"<Piece"), PLAIN.index(b"</Piece>") + len(b"</Piece>")
+    with pytest.raises(FormatError, match=r"^the file has no Piece of PolyData$"):
+        vtp.read({".vtp": PLAIN[: end[0]] + PLAIN[end[1] :]})

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io import convert
+from gmsnet.io import convert, vtk_ghosts
 from gmsnet.io import gmsh_sections as sections
 from gmsnet.io.cell_table import table_blocks
 from gmsnet.io.cells import counted, distinct, first_repeated, places_of
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.gmsh_entities import merge_groups, read_entities, without_interfaces
+from gmsnet.io.gmsh_entities import ghost_marks, merge_groups, read_entities, without_interfaces
 from gmsnet.io.gmsh_sections import KINDS, Contents, Cursor, Elements, Nodes
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.text import quoted
@@ -37,7 +37,11 @@ _NAME = re.compile(rb'\s*([0-3])\s+(-?\d{1,18})\s+"([^"\r\n]*)"')
 
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
-    data = files[".msh"]
+    return vtk_ghosts.held(facts(files[".msh"])[0])
+
+
+def facts(data: Data) -> tuple[Parsed, NDArray[np.int64]]:
+    """The facts of a file, and the tags of its nodes. Cells that other files own are marked as VTK marks ghosts."""
     source, old = _open(data)
     found, seen = Contents(), set[bytes]()
     while title := source.word():
@@ -52,7 +56,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
         raise FormatError(f"{' and '.join(missing)} missing: the file is cut off")
     if not len(found.elements.codes):
         raise FormatError("the file has no elements: there is nothing to smooth")
-    return _assemble(found, found.nodes, found.elements)
+    return _assemble(found, found.nodes, found.elements), found.nodes.tags
 
 
 _READERS = (b"$PhysicalNames", b"$Entities", b"$PartitionedEntities", b"$Nodes", b"$Elements")
@@ -145,14 +149,16 @@ def _assemble(found: Contents, nodes: Nodes, elements: Elements) -> Parsed:
     unread = _unread(found, nodes, elements, regions)
     kept, between = without_interfaces(found, elements)
     codes, sizes = elements.codes, elements.sizes
+    marks = ghost_marks(found, elements)
     if between:
         codes, regions, place, sizes = codes[kept], regions[kept], place[np.repeat(kept, sizes)], sizes[kept]
-    cells, _ = table_blocks(KINDS, codes, sizes, place, regions, {})
+        marks = {key: values[kept] for key, values in marks.items()}
+    cells, cell_data = table_blocks(KINDS, codes, sizes, place, regions, marks)
     for block in cells:  # a negative tag means: the same group, turned round
         for region in np.unique(block.regions[block.regions < 0]).tolist():
             if (block.cell.dimension, -region) in names:
                 names.setdefault((block.cell.dimension, region), names[block.cell.dimension, -region])
-    return Parsed(nodes.points, cells, nodes.slots, names, unread=[*unread, *between])
+    return Parsed(nodes.points, cells, nodes.slots, names, cell_data=cell_data, unread=[*unread, *between])
 
 
 def _unread(found: Contents, nodes: Nodes, elements: Elements, regions: NDArray[np.int64]) -> list[str]:

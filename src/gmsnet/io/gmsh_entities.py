@@ -1,7 +1,8 @@
 """Geometrical entities of a Gmsh file, and what partitioning a mesh makes of them and of their groups.
 
-Gmsh cuts each entity at the partitions and adds lines and points between partitions, which are no part of the geometry.
-On demand (Mesh.PartitionCreatePhysicals) it replaces each physical group by one for each of its parts.
+Gmsh cuts each entity at the partitions and adds faces, lines and points between partitions, which are no part of the
+geometry. On demand it replaces each physical group by one for each of its parts (Mesh.PartitionCreatePhysicals), and
+adds the cells of other partitions that touch those of a file (Mesh.PartitionCreateGhostCells).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from gmsnet.cells.table import CELLS
 from gmsnet.io import gmsh_sections as sections
 from gmsnet.io.gmsh_sections import KINDS, SIZES, Contents, Elements
+from gmsnet.io.vtk_ghosts import DUPLICATE, TYPES
 from gmsnet.io.words import Words
 
 # What Gmsh calls the part of a physical group in a partition, or between several.
@@ -25,7 +27,7 @@ def read_entities(words: Words, partitioned: bool, found: Contents) -> None:
     """The physical tags, and of partitions the parents, of each geometrical entity of version 4.1."""
     if partitioned:
         sections.counts(words, 1)  # partitions
-        sections.skip(words, (2 * sections.counts(words, 1)[0], "i4"))  # ghost entities
+        found.ghosts = set(sections.ints(words, 2 * sections.counts(words, 1)[0])[::2])
     for dimension, count in enumerate(sections.counts(words, 4)):
         for _ in range(count):
             (tag,) = sections.ints(words, 1)
@@ -59,14 +61,14 @@ def merge_groups(found: Contents, elements: Elements) -> dict[tuple[int, int], s
 
 
 def without_interfaces(found: Contents, elements: Elements) -> tuple[NDArray[np.bool_], list[str]]:
-    """(n,) which elements are no mere lines or points between partitions; and how many are, in words, if any are.
+    """(n,) which elements are not merely between partitions; and how many are, in words, if any are.
 
-    In version 4.1 their entity is a part of one of more dimensions. In version 2.2 they name no partition, while faces
-    and other lines or points do. Whatever belongs to a physical group is kept.
+    In version 4.1 their entity is a part of one of more dimensions. In version 2.2 these are lines and points that name
+    no partition, while faces and other lines or points do. Whatever belongs to a physical group is kept.
     """
     if elements.entity is not None and elements.number is not None:
         keys = [(dim, tag) for dim, tag in elements.entity.tolist()]
-        between = [key[0] < min(2, found.parents.get(key, 0)) and not found.physical.get(key) for key in keys]
+        between = [key[0] < found.parents.get(key, 0) and not found.physical.get(key) for key in keys]
         kept = np.repeat(~np.array(between, dtype=bool), elements.number)
     else:
         assert elements.physical is not None
@@ -76,4 +78,14 @@ def without_interfaces(found: Contents, elements: Elements) -> tuple[NDArray[np.
         if (elements.partitioned & small).any() and (elements.partitioned & ~small).any():
             kept = ~small | elements.partitioned | (elements.physical != 0)
     count = int(np.count_nonzero(~kept))
-    return kept, [f"{count} lines and points between partitions"] if count else []
+    faces = bool((_DIMENSIONS[elements.codes[~kept]] == 2).any())
+    return kept, [f"{count} {'faces, ' * faces}lines and points between partitions"] if count else []
+
+
+def ghost_marks(found: Contents, elements: Elements) -> dict[str, NDArray[np.uint8]]:
+    """Cell data (n,) by name that marks the copies of cells of other partitions; none where there are no copies."""
+    if not found.ghosts or elements.entity is None or elements.number is None:
+        return {}
+    copies = np.isin(elements.entity[:, 1], list(found.ghosts))
+    copies &= [(dim, tag) not in found.physical for dim, tag in elements.entity.tolist()]
+    return {TYPES: np.repeat(copies, elements.number).astype(np.uint8) * DUPLICATE} if copies.any() else {}

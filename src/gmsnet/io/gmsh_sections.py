@@ -81,12 +81,14 @@ class Contents:
     """What the sections of a file add up to.
 
     physical: (dimension, entity) → its physical tags. parents: of the entities that partitioning made, the dimension of
-    those that they are parts of. others: the titles of sections that are not read.
+    those that they are parts of. ghosts: the tags of entities of cells that other partitions own. others: the titles of
+    sections that are not read.
     """
 
     names: dict[tuple[int, int], str] = field(default_factory=dict)
     physical: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
     parents: dict[tuple[int, int], int] = field(default_factory=dict)
+    ghosts: set[int] = field(default_factory=set)
     nodes: Nodes | None = None
     elements: Elements | None = None
     others: dict[str, None] = field(default_factory=dict)

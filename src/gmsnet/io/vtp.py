@@ -32,7 +32,9 @@ def is_empty(reader: Reader) -> bool:
 
 
 def _count(reader: Reader, section: str) -> int:
-    return reader.count(f"NumberOf{section}") if f"NumberOf{section}" in reader.document.pieces[0] else 0
+    """How many cells a section has; one that the piece does not count has none."""
+    counted = not reader.document.pieces or f"NumberOf{section}" in reader.document.pieces[0]
+    return reader.count(f"NumberOf{section}") if counted else 0
 
 
 def facts(reader: Reader) -> Parsed:
