@@ -172,8 +172,12 @@ def gmsh(out: Sample, version: str) -> Files:
         out.line("$EndPhysicalNames")
     {"2.2": _gmsh_old, "4.1": _gmsh_new}[version](out)
     if out.has("more"):
-        for text in ("$Periodic", "0", "$EndPeriodic"):
-            out.line(text)
+        out.line("$Periodic")
+        if out.order and version == "4.1":
+            out.row(("Q", [0]))
+        else:
+            out.line("0")
+        out.close("$EndPeriodic")
     if out.has("point data"):
         for text in ("$NodeData", "1", '"speed"', "1", "0.0", "3", "0", "1", str(len(out.points))):
             out.line(text)

@@ -14,7 +14,6 @@ from support.damage import check_cuts, damaged, facts, read_or_refuse
 import gmsnet
 from gmsnet.errors import FormatError
 from gmsnet.io import su2
-from gmsnet.io.splice import FileSource
 
 # Four columns of three nodes, x = 0 to 3: of the two in the middle, each of x = 1 is the image of one of x = 3.
 PERIODIC = b"""% made up
@@ -85,14 +84,12 @@ def replaced(*changes: tuple[bytes, bytes]) -> bytes:
     return data
 
 
-def test_the_copied_nodes_are_vertices_of_one_marker_and_in_pairs() -> None:
+def test_the_copied_nodes_are_vertices_of_one_marker() -> None:
     parsed = su2.read({".su2": PERIODIC})
     vertices = [block for block in parsed.cells if block.kind == "vertex"]
     assert [block.nodes.ravel().tolist() for block in vertices] == [[1, 5, 4], [3, 7, 6]]
     assert [set(block.regions.tolist()) for block in vertices] == [{2}, {2}]
     assert dict(parsed.region_names) == {(1, 1): "wall", (0, 2): "SEND_RECEIVE"}
-    assert parsed.matched is not None
-    assert parsed.matched.tolist() == [[1, 3], [5, 7], [4, 6]]
     assert parsed.unread == ["the keyword SEND_TO", "the keyword NPERIODIC", "the keyword PERIODIC_INDEX"]
 
 
@@ -107,35 +104,14 @@ def test_smoothing_holds_them_and_changes_nothing_else(tmp_path: Path) -> None:
     assert gmsnet.write(result.mesh, out) == []
     old, new = data.splitlines(), out.read_bytes().splitlines()
     assert [a for a, b in zip(old, new, strict=True) if a != b] == [b"2.0 1.25 6"]
-    assert isinstance(result.mesh.source, FileSource)
-    assert result.mesh.source.matched is not None
-    assert result.mesh.source.matched.tolist() == [[1, 3], [5, 7], [4, 7]]
-    assert not result.mesh.source.matched.flags.writeable
 
 
-def test_a_part_of_a_partitioned_mesh_has_no_pairs() -> None:
+def test_so_are_those_of_a_part_of_a_partitioned_mesh() -> None:
     """What it sends to another part and receives from there are other nodes, whatever their number."""
     data = replaced((b"1 1 1\n1 5 1\n1 4 2", b"1 1 0\n1 5 0\n1 4 0"), (b"1 3 1\n1 7 1\n1 6 2", b"1 3 0\n1 7 0\n1 6 0"))
     for each in (data, data[: data.index(b"NPERIODIC")].replace(b"SEND_TO= ", b"SEND_TO=").replace(b"1\n1", b"2\n1")):
         parsed = su2.read({".su2": each})
-        assert parsed.matched is not None
-        assert parsed.matched.shape == (0, 2)
         assert sum(len(block.nodes) for block in parsed.cells if block.kind == "vertex") == 6
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "pairs"),
-    [
-        (b"1 6 2", b"1 6 1", []),  # other transformations than those sent
-        (b"SEND_TO= -1", b"SEND_TO= -2", []),  # received from elsewhere
-        (b"MARKER_ELEMS= 3\nSEND_TO= -1\n1 3 1\n", b"MARKER_ELEMS= 2\nSEND_TO= -1\n", []),  # one fewer
-        (b"1 5 1\n1 4 2", b"1 5 1 0\n1 4 2 0", [[1, 3], [5, 7], [4, 6]]),  # with a zone
-    ],
-)
-def test_lists_that_do_not_fit_give_no_pairs(old: bytes, new: bytes, pairs: list[list[int]]) -> None:
-    parsed = su2.read({".su2": replaced((old, new))})
-    assert parsed.matched is not None
-    assert parsed.matched.tolist() == pairs
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,8 @@ from gmsnet.mesh.rounding import Rounding
 class Parsed:
     """The facts of a file: the fields of a Mesh, and where its coordinates stand.
 
-    unread: what else the file holds, in words; it stays in the file, but no conversion can keep it. matched: (pairs, 2)
-    nodes that the file says to be images of each other, such as those of periodic boundaries; None where it has none.
+    unread: what else the file holds, in words; it stays in the file, but no conversion can keep it. images: (n,) nodes
+    of periodic boundaries, that are images of others or have some: they are held, or they would no longer match.
     node_sets, rounding: see Mesh. form: which of its format's forms the file has (see Entry). main: which of several
     files has the coordinates, where that is not the first. shares: of a mesh whose coordinates stand in several files,
     the part of each of these.
@@ -37,7 +37,7 @@ class Parsed:
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
     single: bool = False
     unread: Sequence[str] = ()
-    matched: NDArray[np.int64] | None = None
+    images: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     rounding: Rounding | None = None
     form: str = ""

@@ -189,7 +189,7 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamp
     companions = {suffix: data for suffix, data in files.items() if suffix != main}
     source = FileSource(
         entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions,
-        mesh.region_names, mesh.point_data, mesh.cell_data, tuple(parsed.unread), stamps, parsed.matched,
+        mesh.region_names, mesh.point_data, mesh.cell_data, tuple(parsed.unread), stamps, parsed.images,
         mesh.node_sets, parsed.form, parsed.shares,
     )  # fmt: skip
     return replace(mesh, source=source)

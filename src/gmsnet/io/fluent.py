@@ -30,6 +30,7 @@ suffixes: tuple[str, ...] = (".msh",)
 Ints = NDArray[np.int64]
 
 PARENT = 31  # the type of boundary of a refined cell's whole side
+PERIODIC = (8, 12)  # types of boundary: a periodic one, and its image
 
 
 def read(files: Mapping[str, Data]) -> Parsed:
@@ -66,7 +67,15 @@ def read(files: Mapping[str, Data]) -> Parsed:
     known = {0, 1, 2, *NODES, *FACES, *CELLS, *NAMES}
     unread = [f"sections of the number {key}" for key in sorted({k.key for k in found} - known)]
     single = isinstance(slots, BinarySlots) and slots.dtype.endswith("4")
-    return Parsed(points, blocks, slots, names, single=single, unread=["the faces and their order", *unread])
+    images = _images(found, zones, sizes, nodes)
+    unread = ["the faces and their order", *unread]
+    return Parsed(points, blocks, slots, names, single=single, unread=unread, images=images)
+
+
+def _images(found: list[Section], zones: Ints, sizes: Ints, nodes: Ints) -> Ints:
+    """The nodes of periodic boundaries."""
+    periodic = [k.zone for k in found if k.key in FACES and k.body and len(k.head) > 3 and k.head[3] in PERIODIC]
+    return np.unique(nodes[np.repeat(np.isin(zones, periodic), sizes)])
 
 
 def _points(data: Data, found: list[Section], dimension: int) -> tuple[Points, TextSlots | BinarySlots]:

@@ -30,6 +30,11 @@ class Faces(NamedTuple):
         found: Ints = np.cumsum(self.sizes) - self.sizes
         return found
 
+    def points_of(self, chosen: Ints) -> Ints:
+        """(n,) the points of some faces, each once."""
+        found: Ints = np.unique(self.points[ranges(self.starts[chosen], self.sizes[chosen])])
+        return found
+
     def corners(self, chosen: Ints, size: int) -> Ints:
         """(n, size) the points of faces that all have so many."""
         found: Ints = self.points[self.starts[chosen][:, None] + np.arange(size)]

@@ -29,6 +29,16 @@ class Patch(NamedTuple):
     start: int
     faces: int
 
+    @property
+    def members(self) -> Ints:
+        """(faces,) its faces."""
+        return np.arange(self.start, self.start + self.faces)
+
+    @property
+    def is_periodic(self) -> bool:
+        """Whether it has an image that its points must match."""
+        return "cyclic" in self.kind.lower()
+
 
 def patches(data: Data, faces: int, internal: int) -> list[Patch]:
     """The patches. Raises FormatError where they are not all faces behind the internal ones, one after another."""

@@ -110,7 +110,7 @@ def cells_in(
         blocks.append(CellBlock(face_name(size), plane.node[faces.corners(some, size)], regions[faces.owner[some]]))
     for number, patch in enumerate(patches, 1):
         if patch.kind != "empty" and patch.faces:
-            sides = faces.corners(np.arange(patch.start, patch.start + patch.faces), 4)
+            sides = faces.corners(patch.members, 4)
             edges = sides[~back[sides]].reshape(-1, 2)
             blocks.append(CellBlock("line", plane.node[edges], np.full(len(edges), number)))
     return blocks

@@ -40,6 +40,10 @@ class ForeignSource:
     title: str
     format: str = ""
 
+    def images_in(self, mesh: Mesh) -> NDArray[np.int64]:
+        """None: they are not read."""
+        return np.empty(0, dtype=np.int64)
+
     def splice(self, points: NDArray[np.float64]) -> Mapping[str, Iterable[bytes]]:
         """Raises InputError: where its coordinates stand is not known."""
         raise InputError(f"{self.title} files are only converted: name an output of another format, such as .vtu")

@@ -21,6 +21,7 @@ from gmsnet.io.cells import counted, distinct, first_repeated, places_of
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.gmsh_entities import ghost_marks, merge_groups, read_entities, without_interfaces
+from gmsnet.io.gmsh_periodic import nodes_of_images, read_images
 from gmsnet.io.gmsh_sections import KINDS, Contents, Cursor, Elements, Nodes
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.text import quoted
@@ -92,6 +93,11 @@ def _section(source: Cursor, title: bytes, found: Contents, old: bool) -> None:
         source.fail(source.at, "$ParametricNodes are not supported: save the mesh without parametric coordinates")
     if title == b"PhysicalNames":
         _physical_names(source, found)
+    elif title == b"Periodic":
+        words = source.words(title, as_text=old)
+        found.images = np.concatenate([found.images, read_images(words, old)])
+        found.others["$Periodic"] = None
+        source.close(title, words)
     elif title not in (b"Entities", b"PartitionedEntities", b"Nodes", b"Elements") or (old and b"Entities" in title):
         source.skip_section(title)
         if title != b"Comments":
@@ -158,7 +164,10 @@ def _assemble(found: Contents, nodes: Nodes, elements: Elements) -> Parsed:
         for region in np.unique(block.regions[block.regions < 0]).tolist():
             if (block.cell.dimension, -region) in names:
                 names.setdefault((block.cell.dimension, region), names[block.cell.dimension, -region])
-    return Parsed(nodes.points, cells, nodes.slots, names, cell_data=cell_data, unread=[*unread, *between])
+    return Parsed(
+        nodes.points, cells, nodes.slots, names, cell_data=cell_data, unread=[*unread, *between],
+        images=nodes_of_images(found.images, nodes.tags),
+    )  # fmt: skip
 
 
 def _unread(found: Contents, nodes: Nodes, elements: Elements, regions: NDArray[np.int64]) -> list[str]:

@@ -81,8 +81,8 @@ class Contents:
     """What the sections of a file add up to.
 
     physical: (dimension, entity) → its physical tags. parents: of the entities that partitioning made, the dimension of
-    those that they are parts of. ghosts: the tags of entities of cells that other partitions own. others: the titles of
-    sections that are not read.
+    those that they are parts of. ghosts: the tags of entities of cells that other partitions own. images: (n, 2) the
+    tags of nodes of periodic entities. others: the titles of sections that are not read, or not all.
     """
 
     names: dict[tuple[int, int], str] = field(default_factory=dict)
@@ -91,6 +91,7 @@ class Contents:
     ghosts: set[int] = field(default_factory=set)
     nodes: Nodes | None = None
     elements: Elements | None = None
+    images: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     others: dict[str, None] = field(default_factory=dict)
 
 
@@ -124,9 +125,9 @@ class Cursor:
             self.fail(self.at, f"$End{show(title)} is missing: the file is cut off")
         self.at = found + len(title) + 4
 
-    def words(self, title: bytes) -> Words:
-        """The numbers of the section that begins here."""
-        if self.order:
+    def words(self, title: bytes, as_text: bool = False) -> Words:
+        """The numbers of the section that begins here. as_text: it is a text in binary files, too."""
+        if self.order and not as_text:
             return ByteWords(self.data, self.order, self.at)
         stop = self.data.find(b"$End" + title, self.at)
         if stop < 0:

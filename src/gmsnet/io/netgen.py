@@ -53,7 +53,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
     elements = list[tuple[str, Rows]]()
     names = dict[tuple[int, int], str]()
     points: Rows | None = None
-    unread = list[str]()
+    unread, images = list[str](), list[Rows]()
     while (found := text.next(at)) is not None:
         start, at = found
         key = text.token(start).decode("ascii", "replace")
@@ -74,6 +74,9 @@ def read(files: Mapping[str, Data]) -> Parsed:
             points = rows
         elif key in ELEMENTS:
             elements.append((key, rows))
+        elif key == "identifications":
+            images.append(rows)
+            unread.append(key)
         elif key in NAMES:
             names |= {(dimension - NAMES[key], number): word for number, word in _names(text, rows).items()}
         else:
@@ -85,7 +88,20 @@ def read(files: Mapping[str, Data]) -> Parsed:
     starts = np.ascontiguousarray(points.columns(0, 3))
     coordinates, ends = text.spans(starts)
     cells = [block for key, rows in elements for block in _blocks(text, key, rows, len(coordinates))]
-    return Parsed(coordinates, cells, TextSlots(starts, ends), names, unread=list(dict.fromkeys(unread)))
+    matching = np.unique(np.concatenate([np.empty(0, dtype=np.int64),
+                                         *(_identified(text, rows, len(points)) for rows in images)]))  # fmt: skip
+    slots = TextSlots(starts, ends)
+    return Parsed(coordinates, cells, slots, names, unread=list(dict.fromkeys(unread)), images=matching)
+
+
+def _identified(text: Text, rows: Rows, count: int) -> NDArray[np.int64]:
+    """The nodes of pairs, of which each is the image of the other."""
+    if (rows.lengths < 2).any():
+        text.fail(rows.where(int(np.argmax(rows.lengths < 2))), "an identification is of two points")
+    starts = rows.columns(0, 2)
+    nodes: NDArray[np.int64] = text.integers(starts) - 1
+    check_nodes(text, starts, nodes, count, base=1)
+    return nodes.reshape(-1)
 
 
 def _names(text: Text, rows: Rows) -> dict[int, str]:

@@ -20,7 +20,7 @@ from gmsnet.io.foam_cells import Faces, Ints, volumes
 from gmsnet.io.foam_lists import coordinates, faces, head_of, labels
 from gmsnet.io.foam_patches import ZONES, Patch, patches, zones
 from gmsnet.io.foam_plane import Plane, cells_in, plane_of
-from gmsnet.io.places import Places, ranges
+from gmsnet.io.places import Places
 from gmsnet.io.splice import BinarySlots, Slots, TextSlots
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -39,12 +39,15 @@ def read(files: Mapping[str, Data]) -> Parsed:
     regions, region_names = _regions(files, cells)
     plane = plane_of(points, found, known, cells)
     held = _of_zones(files, found, len(points))
+    none = np.empty(0, dtype=np.int64)
+    images = found.points_of(np.concatenate([none, *(patch.members for patch in known if patch.is_periodic)]))
     if plane is not None:
         back = np.ones(len(points), dtype=bool)
         back[plane.points] = False
         blocks = cells_in(plane, found, known, back, regions)
         slots = _in_plane(slots, plane)
         points, held = sealed(points[plane.points][:, plane.axes]), np.unique(plane.node[held])
+        images = np.unique(plane.node[images])
     else:
         blocks = volumes(found, cells, regions) + _walls(found, known)
     dimension = 2 if plane is not None else 3
@@ -55,7 +58,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
         blocks.append(CellBlock("vertex", held[:, None], np.ones(len(held), dtype=np.int64)))
         names[0, 1] = "zones"
     unread = ["the faces and their order, types of patches"]
-    return Parsed(points, blocks, slots, names, single=single, unread=unread)
+    return Parsed(points, blocks, slots, names, single=single, unread=unread, images=images)
 
 
 def _faces(files: Mapping[str, Data], points: int) -> Faces:
@@ -93,7 +96,7 @@ def _of_zones(files: Mapping[str, Data], found: Faces, points: int) -> Ints:
     parts = [np.empty(0, dtype=np.int64)]
     if "faceZones" in files:
         for _, members in zones(files["faceZones"], "faceZones", len(found.sizes)):
-            parts.append(found.points[ranges(found.starts[members], found.sizes[members])])
+            parts.append(found.points_of(members))
     if "pointZones" in files:
         parts += [members for _, members in zones(files["pointZones"], "pointZones", points)]
     return np.unique(np.concatenate(parts))
@@ -103,7 +106,7 @@ def _walls(found: Faces, known: list[Patch]) -> list[CellBlock]:
     """The faces of all patches, those of one size together."""
     blocks = []
     for number, patch in enumerate(known, 1):
-        own = np.arange(patch.start, patch.start + patch.faces)
+        own = patch.members
         for size in np.unique(found.sizes[own]).tolist():
             some = own[found.sizes[own] == size]
             blocks.append(CellBlock(face_name(size), found.corners(some, size), np.full(len(some), number)))

@@ -166,8 +166,8 @@ class FileSource:
     format: its name in the table of formats. data: the file that holds the coordinates, under the suffix ``main``.
     points, cells, region_names, point_data, cell_data, node_sets: as read (see Mesh). companions: other files of the
     same mesh by suffix, which never change (Triangle's ``.ele``). unread: what else there is in the file (see Parsed).
-    stamps: of the files, so that what others write into them meanwhile is not overwritten. matched: (pairs, 2) nodes
-    that the file says to be images of each other (see Parsed), read-only. form, shares: see Parsed.
+    stamps: of the files, so that what others write into them meanwhile is not overwritten. images, form, shares: see
+    Parsed.
     """
 
     format: str
@@ -182,7 +182,7 @@ class FileSource:
     cell_data: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
     unread: tuple[str, ...] = ()
     stamps: Stamps = field(default_factory=Stamps, repr=False)
-    matched: NDArray[np.int64] | None = field(default=None, repr=False)
+    images: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64), repr=False)
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict, repr=False)
     form: str = ""
     shares: Mapping[str, Share] = field(default_factory=dict, repr=False)
@@ -193,7 +193,7 @@ class FileSource:
         names, fields, cell_fields = (dict(each) for each in (self.region_names, self.point_data, self.cell_data))
         return FileSource, (
             self.format, self.main, self.data[:], self.points, self.slots, self.cells, files,
-            names, fields, cell_fields, self.unread, self.stamps, self.matched, dict(self.node_sets),
+            names, fields, cell_fields, self.unread, self.stamps, self.images, dict(self.node_sets),
             self.form, dict(self.shares),
         )  # fmt: skip
 
@@ -216,6 +216,11 @@ class FileSource:
                 )  # one a block, and the blocks are equal
             )
         )
+
+    def images_in(self, mesh: Mesh) -> NDArray[np.int64]:
+        """(n,) the nodes of periodic boundaries, if the mesh has the cells of the file."""
+        same = len(mesh.points) == len(self.points) and _same_cells(mesh.cells, self.cells)
+        return self.images if same else self.images[:0]
 
     def splice(self, points: Points) -> dict[str, Pieces]:
         """Suffix → each file of the mesh, with the coordinates of ``points`` (N×dim) in their slots."""

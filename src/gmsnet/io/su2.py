@@ -21,7 +21,7 @@ from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
-from gmsnet.io.su2_markers import COPIED, Marker, check_transformation, matched, send
+from gmsnet.io.su2_markers import COPIED, Marker, check_transformation, send
 from gmsnet.io.text import Rows, Starts, Text, quoted
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -93,7 +93,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
         names |= {(b.cell.dimension, numbers[marker.tag]): marker.tag for b in blocks}
         cells += blocks
     unread = [f"the keyword {key}" for key in found.others]
-    return Parsed(points, cells, TextSlots(starts, ends), names, unread=unread, matched=matched(text, found.markers))
+    return Parsed(points, cells, TextSlots(starts, ends), names, unread=unread)
 
 
 def _sections(text: Text) -> Iterator[Section]:

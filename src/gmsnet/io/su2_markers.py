@@ -10,10 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gmsnet.io.cells import sealed
 from gmsnet.io.text import Rows, Starts, Text
 
 COPIED = "SEND_RECEIVE"
@@ -54,21 +50,3 @@ def check_transformation(text: Text, at: int, rows: Rows) -> None:
     if len(rows) != 3 or (rows.lengths != 3).any():
         text.fail(at, "PERIODIC_INDEX must be followed by 3 rows of 3 numbers: is the file cut off?")
     text.floats(rows.starts)
-
-
-def matched(text: Text, markers: Sequence[Marker]) -> NDArray[np.int64]:
-    """(pairs, 2) each node that is copied within the mesh by a periodic transformation, and its image.
-
-    The nodes sent to k and those received from k stand in the same order if they are as many, and of the same
-    transformations; the number 0 is none, but a copy to another part of the mesh.
-    """
-    tables: dict[int, list[NDArray[np.int64]]] = {}
-    for marker in markers:
-        if marker.sent is not None and marker.rows is not None and (marker.rows.lengths > 2).all():
-            tables.setdefault(marker.sent, []).append(text.integers(marker.rows.columns(1, 2)))
-    pairs = [np.empty((0, 2), dtype=np.int64)]
-    for sent in (key for key in tables if key > 0 and -key in tables):
-        one, other = np.concatenate(tables[sent]), np.concatenate(tables[-sent])
-        if one.shape == other.shape and (one[:, 1] == other[:, 1]).all():
-            pairs.append(np.stack([one[:, 0], other[:, 0]], axis=1)[one[:, 1] != 0])
-    return sealed(np.concatenate(pairs))

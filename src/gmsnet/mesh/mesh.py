@@ -38,6 +38,10 @@ class Source(Protocol):
         """Its name in the table of formats."""
         ...
 
+    def images_in(self, mesh: Mesh) -> NDArray[np.int64]:
+        """(n,) the nodes of periodic boundaries, if the mesh has the cells of the file: they must go on to match."""
+        ...
+
     def splice(self, points: NDArray[np.float64]) -> Mapping[str, Iterable[bytes | memoryview]]:
         """The files (suffix → pieces) with the coordinates of ``points`` (N×dim) where they differ from the file's."""
         ...

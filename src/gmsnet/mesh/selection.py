@@ -18,7 +18,9 @@ FORMS = "must be node ids, a mask of bools or names of markers"
 
 
 def fixed_mask(mesh: Mesh, fixed: Any = None) -> NDArray[np.bool_]:
-    """(N,) bool: the nodes named by ``fixed`` and those whose point data ``fixed`` in the mesh is not zero.
+    """(N,) bool: the nodes named by ``fixed``, and those that the mesh itself wants held.
+
+    The latter are nodes whose point data ``fixed`` is not zero, and nodes of boundaries that its file calls periodic.
 
     fixed: None, a mask (bool, one per node), node ids (integers, counted from 0), a marker's name, or several names.
     Several may be an array, a list, a tuple, a set or a range. Point data ``fixed`` may have several columns, of which
@@ -76,16 +78,25 @@ def _is_mask_of_numbers(values: NDArray[Any], count: int) -> bool:
 
 def _own(mesh: Mesh) -> NDArray[np.bool_]:
     """The nodes that the mesh itself wants held."""
+    mask = images(mesh)
     if "fixed" not in mesh.point_data:
-        return np.zeros(len(mesh.points), dtype=bool)
+        return mask
     own = mesh.point_data["fixed"]
     if own.dtype.kind not in "biuf":
         raise InputError(
             f"the point data 'fixed' of the mesh must be numbers (0: free, all else: held), got {own.dtype} values: "
             "make them numbers or give the data another name"
         )
-    held: NDArray[np.bool_] = (own != 0).any(axis=tuple(range(1, own.ndim)))
+    held: NDArray[np.bool_] = mask | (own != 0).any(axis=tuple(range(1, own.ndim)))
     return held
+
+
+def images(mesh: Mesh) -> NDArray[np.bool_]:
+    """(N,) bool: nodes of periodic boundaries, each of which has an image that it must go on to match."""
+    mask = np.zeros(len(mesh.points), dtype=bool)
+    if mesh.source is not None:
+        mask[mesh.source.images_in(mesh)] = True
+    return mask
 
 
 def _values(fixed: Any, what: str) -> NDArray[Any]:

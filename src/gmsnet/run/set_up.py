@@ -20,7 +20,7 @@ from gmsnet.measure.report import ASPECT, QualityReport, measure
 from gmsnet.measure.target import Target
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured, unmoved
-from gmsnet.mesh.selection import fixed_mask
+from gmsnet.mesh.selection import fixed_mask, images
 from gmsnet.methods import Smoother, StarSmoother
 from gmsnet.methods.auto import Auto
 from gmsnet.methods.cells import check_cells
@@ -71,7 +71,7 @@ def first_state(
         return _first_of_volume(given, restore, asked, fixed, smoother, options, executor)
     if given.plane is None:
         state, shell = first_of_surface(given, restore, asked, smoother, options, executor)
-        return replace(state, remarks=(*state.remarks, *held_anyway(asked, shell, fixed, options.slides)))
+        return replace(state, remarks=(*state.remarks, *held_anyway(given, asked, shell, fixed, options.slides)))
     threads = options.thread_count if len(given.points) >= MANY else 1
     still = asked if moved is None else asked | moved
     curves = curves_to_slide_on(given, options.slide, options.feature_angle, still)
@@ -79,7 +79,7 @@ def first_state(
     sliding = None
     if curves is not None:
         sliding = Sliding.of(given, curves, topology.memory, topology.free, options.geometry)
-    remarks += held_anyway(asked, topology, fixed, options.slides)
+    remarks += held_anyway(given, asked, topology, fixed, options.slides)
     second = second_order_of(given, topology, options)
     if options.adapts and second is not None:
         raise InputError("a metric for second-order cells cannot be had so far: leave out metric, size and preserve")
@@ -126,17 +126,29 @@ def first_state(
     )
 
 
-def held_anyway(asked: NDArray[np.bool_], topology: Topology | Volume, fixed: Any, slides: bool) -> list[str]:
-    """Says so where all nodes that are to be held are held for other reasons. slides: else some might slide."""
+def held_anyway(
+    given: Mesh, asked: NDArray[np.bool_], topology: Topology | Volume, fixed: Any, slides: bool
+) -> list[str]:
+    """Says so where all nodes that are to be held are held for other reasons. slides: else some might slide.
+
+    And how many are held because they must match others, where they might move else.
+    """
+    matching = images(given)
+    asked = asked & ~matching
+    on_surface = given.plane is None and not given.has_volumes
+    said = []
+    if matching.any() and (slides or on_surface):
+        said.append(f"nodes of periodic boundaries are held, so that they go on to match: {matching.sum():,}")
     if not asked.any() or REASONS[CHOSEN] in topology.held:
-        return []
+        return said
     count = np.count_nonzero(asked)
     named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
     where = " by the point data 'fixed' of the mesh" if fixed is None else ""
     return [
+        *said,
         f"fixed: {named}{where}, and {'does' if count == 1 else 'do'} not slide"
         if slides
-        else f"fixed: {named}{where}, and held for other reasons anyway"
+        else f"fixed: {named}{where}, and held for other reasons anyway",
     ]
 
 
@@ -153,7 +165,7 @@ def _first_of_volume(
     else:
         topology = volume_of(wound, surface[1].slides | surface[1].curves.slides)
         sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, options.distance, options.geometry)
-    remarks = held_anyway(asked, topology, fixed, options.slides)
+    remarks = held_anyway(given, asked, topology, fixed, options.slides)
     if others := unmoved(given):
         remarks.append(f"not measured, and their nodes are held: {others}")
     if isinstance(topology, MixedVolume) and (turned := topology.inside_out):
