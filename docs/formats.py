@@ -165,6 +165,13 @@ of the case. One layer of cells between `empty` patches is read as the mesh of a
 Patches are markers, zones of cells regions; points of other zones are held. Polyhedra are read and held. No other
 format is converted into a case.
 
+Meshes in several files that no file lists are one mesh, and all their files are written:
+
+- `processor0`, `processor1`, … of a decomposed case, by the folder of the case. Where the case has a mesh of the whole,
+  too, `--format decomposed` takes the processors. Faces between processors are no boundary. Only `points` change.
+- `a_1.msh`, `a_2.msh`, … of Gmsh (`Mesh.PartitionSplitMeshFiles`), by the name `a.msh`, which is no file then. The output
+  `b.msh` becomes `b_1.msh`, …; `--output-format gmsh` makes one file of them. Ghost cells are known as such.
+
 What else these formats have:
 
 - Abaqus: `*PART` and `*INSTANCE` are read, each part in its own coordinates. `*INCLUDE`, `SYSTEM=` and generated nodes

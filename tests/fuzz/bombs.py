@@ -22,9 +22,8 @@ from pathlib import Path
 
 import gmsnet
 from fuzz.corpus import stored
-from fuzz.promises import MEMORY, NEXT, PAIR, parts
+from fuzz.promises import MEMORY, NEXT, PAIR, parts, path_of, save
 from gmsnet.errors import InputError
-from gmsnet.io.formats import FORMATS
 
 MANY = 1_000_000
 _HOMES = [str(Path(gmsnet.__file__).parents[1]), str(Path(__file__).parents[1])]  # of what the process imports
@@ -249,7 +248,7 @@ def with_little_memory(files: Sequence[tuple[str, bytes]]) -> list[tuple[str, fl
     """
     with tempfile.TemporaryDirectory() as folder:
         for k, (key, data) in enumerate(files):
-            _write(Path(folder), f"{k}", key, data)
+            save(key, parts(key, data), _stem(Path(folder), k))
         run = subprocess.run(
             [sys.executable, "-m", "fuzz.bombs", folder, *(key for key, _ in files)],
             stdout=subprocess.PIPE, timeout=600, check=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(_HOMES)},
@@ -257,19 +256,8 @@ def with_little_memory(files: Sequence[tuple[str, bytes]]) -> list[tuple[str, fl
     return [tuple(row) for row in json.loads(run.stdout)]
 
 
-def _write(folder: Path, stem: str, key: str, data: bytes) -> Path:
-    files = parts(key, data)
-    path = _path(folder, stem, key)
-    path.parent.mkdir(exist_ok=True)
-    for suffix, part in files.items():
-        (path.parent / (suffix if FORMATS[key].folder else f"{stem}{suffix}")).write_bytes(part)
-    return path
-
-
-def _path(folder: Path, stem: str, key: str) -> Path:
-    """Of the file that is read; that of a folder of files is its first."""
-    first = FORMATS[key].suffixes[0]
-    return folder / stem / first if FORMATS[key].folder else folder / f"{stem}{first}"
+def _stem(folder: Path, number: int) -> Path:
+    return folder / f"{number}" / "mesh"
 
 
 def _read_all(folder: Path, keys: list[str]) -> None:
@@ -277,12 +265,12 @@ def _read_all(folder: Path, keys: list[str]) -> None:
     for key in sorted(set(keys)):  # loads all that there is to load
         for data in stored(key):
             with suppress(InputError):
-                gmsnet.read(_write(folder, "small", key, data), key)
+                gmsnet.read(save(key, parts(key, data), _stem(folder, len(keys))), key)
     rows = []
     for k, key in enumerate(keys):
-        path = _path(folder, f"{k}", key)
+        path = path_of(key, _stem(folder, k))
         have = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-        room = have + MEMORY + path.stat().st_size
+        room = have + MEMORY + sum(each.stat().st_size for each in _stem(folder, k).parent.rglob("*") if each.is_file())
         resource.setrlimit(resource.RLIMIT_AS, (room, resource.getrlimit(resource.RLIMIT_AS)[1]))
         before, start = _peak(), time.process_time()
         try:

@@ -19,6 +19,7 @@ from gmsnet.errors import InputError
 from gmsnet.io import cells, contents, gmsh_sections, places, splice, stl, text
 from gmsnet.io.formats import FORMATS
 from gmsnet.io.splice import FileSource
+from gmsnet.io.split_files import DECOMPOSED, FILES, SPLIT
 from gmsnet.mesh.mesh import Mesh
 
 SECONDS = 5.0  # of the processor, for one file
@@ -51,6 +52,13 @@ def parts(key: str, data: bytes) -> dict[str, bytes]:
         split = data.split(NEXT)
         split += [b""] * (len(suffixes) - len(split))
         return dict(zip((*suffixes, *FORMATS[key].optional), split, strict=False))
+    if key == SPLIT:
+        return {f"_{k}.msh": part for k, part in enumerate(data.split(NEXT), 1)}
+    if key == DECOMPOSED:
+        split, names = data.split(NEXT), (*FILES, "pointProcAddressing")
+        split += [b""] * (-len(split) % len(names))
+        where = [f"processor{k}/constant/polyMesh/{name}" for k in range(len(split) // len(names)) for name in names]
+        return dict(zip(where, split, strict=True))
     if FORMATS[key].within:  # a file that names others
         split = data.split(NEXT)
         kind = ".vtp" if key == "pvtp" else ".vtu"
@@ -72,11 +80,11 @@ def examine(key: str, data: bytes, folder: Path) -> str:
 def _examine(key: str, data: bytes, folder: Path) -> str:
     before, peak = time.process_time(), _peak()
     files = parts(key, data)
-    path = _write(files, folder / "mesh")
+    path = save(key, files, folder / "mesh")
     try:
         mesh = gmsnet.read(path, key)
     except InputError as error:
-        said = _checked(str(error), path, files)
+        said = _checked(str(error), key, folder / "mesh", files)
     else:
         said = ""
         _check_splice(mesh, files, folder, np.random.default_rng(len(data)))
@@ -92,23 +100,37 @@ def _peak() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def _write(files: Mapping[str, bytes], stem: Path) -> Path:
-    if not next(iter(files)).startswith("."):  # a folder, with nothing of an earlier one in it
-        shutil.rmtree(stem, ignore_errors=True)
-        stem.mkdir()
-        stem = stem / "polyMesh"
-        stem.mkdir()
-    folder = stem if stem.name == "polyMesh" else stem.parent
-    for old in folder.glob("[0-9]*.vt[up]"):  # pieces of an earlier one
+def path_of(key: str, stem: Path) -> Path:
+    """What is given to ``gmsnet.read`` of a mesh that ``save`` writes."""
+    if FORMATS[key].folder:
+        return stem / "polyMesh" / FORMATS[key].suffixes[0]
+    return stem if key == DECOMPOSED else stem.with_suffix(".msh" if key == SPLIT else FORMATS[key].suffixes[0])
+
+
+def save(key: str, files: Mapping[str, bytes], stem: Path) -> Path:
+    """Writes the files of a mesh, with nothing of an earlier one among them. Returns ``path_of``."""
+    shutil.rmtree(stem, ignore_errors=True)
+    for old in (*stem.parent.glob("[0-9]*.vt[up]"), *stem.parent.glob(f"{stem.name}_*.msh")):  # pieces
         old.unlink()
-    paths = [stem.with_suffix(name) if name.startswith(".") else folder / name for name in files]
-    for path, part in zip(paths, files.values(), strict=True):
-        path.write_bytes(part)
-    return paths[0]
+    for name, part in files.items():
+        place = _place(key, name, stem)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(part)
+    return path_of(key, stem)
 
 
-def _checked(message: str, path: Path, files: Mapping[str, bytes]) -> str:
-    beside = (path.with_suffix(name) if name.startswith(".") else path.with_name(name) for name in files)
+def _place(key: str, name: str, stem: Path) -> Path:
+    """Of the file of this suffix or name."""
+    if FORMATS[key].folder:
+        return stem / "polyMesh" / name
+    if key == DECOMPOSED:
+        return stem / name
+    return stem.with_name(stem.name + name) if name.startswith((".", "_")) else stem.parent / name
+
+
+def _checked(message: str, key: str, stem: Path, files: Mapping[str, bytes]) -> str:
+    path = path_of(key, stem)
+    beside = (_place(key, name, stem) for name in files)
     name = next((f"{one}: " for one in (path, *beside) if message.startswith(f"{one}: ")), "")
     if not name:
         raise Broken(f"the message does not begin with the file: {message[:200]!r}")
@@ -130,7 +152,7 @@ def _check_splice(mesh: Mesh, files: Mapping[str, bytes], folder: Path, random: 
     if source.shares:  # points of one piece at one place, which are held: apart, they would be other nodes
         held = np.concatenate([[], *(b.nodes.ravel() for b in mesh.cells if b.kind == "vertex")]).astype(int)
         new[held] = mesh.points[held]
-    again = gmsnet.read(_write(_spliced(source, new), folder / "moved"), source.format)
+    again = gmsnet.read(save(source.format, _spliced(source, new), folder / "moved"), source.format)
     if again.points.tobytes() != new.tobytes():
         raise Broken("the moved points do not read back")
     if not _fits(source, again) or again.single != mesh.single:
@@ -139,7 +161,7 @@ def _check_splice(mesh: Mesh, files: Mapping[str, bytes], folder: Path, random: 
     if source.format == "stl" and len(np.unique(mesh.points, axis=0)) < len(mesh.points):
         return  # nodes that only their decimals tell apart
     kept = mesh.points if again.rounding is None else again.rounding.kept(again.points, mesh.points)
-    back = gmsnet.read(_write(_spliced(again.source, kept), folder / "back"), source.format)
+    back = gmsnet.read(save(source.format, _spliced(again.source, kept), folder / "back"), source.format)
     if not np.array_equal(back.points, kept) or not _fits(source, back):
         raise Broken("points that are moved there and back are not the same")
 

@@ -11,7 +11,9 @@ import numpy as np
 
 from fuzz.promises import NEXT, PAIR
 from gmsnet.errors import FormatError
+from gmsnet.generate import random_mesh
 from gmsnet.io.formats import FORMATS
+from gmsnet.mesh.mesh import Mesh
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "io"))  # the tests of the readers, and what they share
 
@@ -25,6 +27,7 @@ import test_netgen
 import test_obj
 import test_off
 import test_openfoam
+import test_periodic
 import test_ply
 import test_stl
 import test_su2
@@ -38,7 +41,7 @@ import test_vtk_pieces
 import test_vtp
 import test_vtu
 import test_xdmf
-from support import binary_meshes, gmsh_variants, pieces
+from support import binary_meshes, decomposed, gmsh_split, gmsh_variants, pieces
 from support.damage import triangle_grid
 from support.vtk_variants import grid_of, legacy_variants, mixed_mesh, polydata_of, vtu_variants
 from test_su2_volumes import VOLUMES
@@ -213,6 +216,16 @@ def seeds() -> Iterator[tuple[str, bytes]]:
     zone = "1(a{type %sZone;%sLabels List<label> 1{0};})"
     zones = [(test_openfoam.head("regIOobject", k) + zone % (k, k)).encode() for k in ("cell", "face", "point")]
     yield "openfoam", NEXT.join((*test_openfoam.in_text(test_openfoam.VOLUMES).values(), *zones))
+    for version, order in test_periodic.FORMS:
+        yield "gmsh", test_periodic.square(version, order)[0]
+    yield "netgen", test_netgen.PLAIN.replace(b"face_colours", b"identifications\n2\n1 4 1\n2 3 1\nface_colours")
+    flat = random_mesh(12, seed=1)
+    flat = Mesh(np.column_stack([flat.points, np.zeros(len(flat.points))]), flat.cells)
+    for version, order, ghosts in (("4.1", "", True), ("4.1", "<", False), ("2.2", "", False), ("2.2", ">", False)):
+        yield "split", NEXT.join(gmsh_split.split(flat, 2, ghosts=ghosts, order=order, version=version))
+    for case in (decomposed.block(2), decomposed.plane(3, 2)):
+        for make in (test_openfoam.in_text, test_openfoam.in_binary):
+            yield "decomposed", NEXT.join(case.parts([*decomposed.strips(case, 2), []], make).values())
     yield "fluent", test_fluent.PLAIN
     yield "fluent", test_fluent.VOLUME
     yield from (("fluent", data) for data in test_fluent.FORMS.values())

@@ -12,6 +12,7 @@ from support.gmsh_variants import Out
 from support.pieces import ring, strips
 
 import gmsnet
+from gmsnet.errors import FormatError
 from gmsnet.io import gmsh
 from gmsnet.mesh.cell_block import CellBlock
 
@@ -199,3 +200,13 @@ def test_cells_that_another_file_owns_are_held(order: str, tmp_path: Path) -> No
     assert not held & set(np.flatnonzero(result.moved).tolist())
     gmsnet.write(result.mesh, tmp_path / "b_1.msh")
     assert gmsnet.read(tmp_path / "b_1.msh").points.tobytes() == result.mesh.points.tobytes()
+
+
+def test_numbers_of_groups_that_no_array_holds() -> None:
+    parts = new("", "cut").replace(b"_physical{1}", b"_physical{%d}" % 10**30)
+    assert gmsh.read({".msh": parts}).region_names[2, 6].endswith("}_dim{2}")  # a name like any other
+    data = new("", "kept")
+    twice = data.replace(b" 1 1 0 \n22", b" 2 1 %d 0 \n22" % (2**63 - 1))
+    assert twice != data
+    with pytest.raises(FormatError, match="the physical tag 9223372036854775807 is larger than those that Gmsh has"):
+        gmsh.read({".msh": twice})

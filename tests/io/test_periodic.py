@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.foam import VOLUMES, in_text, layer
 from support.gmsh_variants import Out
 from test_fluent import PLAIN as FLUENT
 from test_netgen import PLAIN as NETGEN
-from test_openfoam import VOLUMES, in_text, layer
 
 import gmsnet
 from gmsnet.errors import FormatError

@@ -105,7 +105,7 @@ def deform(
     from gmsnet.cli.destination import check_picture, check_report, destination_of, refuse_mixture
     from gmsnet.cli.moves import split
 
-    destination = destination_of(input, output, in_place, output_format)
+    destination = destination_of(input, output, in_place, output_format, format)
     refuse_mixture(destination, json)
     if plot is not None:
         check_picture(plot, input, destination)

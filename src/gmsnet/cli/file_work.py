@@ -68,6 +68,7 @@ class FileWork:
         self.number, self.dry_run = number, dry_run
         self.progress, self.interruption = Progress(most_sweeps, enabled=not quiet), Deferral()
         self.written: str | None = None
+        self.aside = ""
 
     def after_sweep(self, sweep: Sweep) -> None:
         """The callback of a run."""
@@ -97,6 +98,8 @@ class FileWork:
             if self.written is None:
                 raise
             raise Interrupted(f"interrupted; the mesh is written to {self.written}") from None
+        if self.aside:
+            typer.echo(visible(f"gmsnet: {self.number}{self.aside}"), err=True)
         faults = outcome.faults()
         for fault in faults:
             typer.echo(f"gmsnet: {visible(f'{self.number}{fault}')}", err=True)
@@ -112,6 +115,7 @@ class FileWork:
 
     def _work(self, check: Callable[[Mesh], None], make: Callable[[Mesh], Callable[[], SmoothResult]]) -> Done:
         from gmsnet import io
+        from gmsnet.io.split_files import other_points
 
         self.progress.begin(visible(f"{self.number}reading {shown(self.input)}"))
         mesh = io.read(self.input, self.format)
@@ -140,6 +144,10 @@ class FileWork:
             self.progress.begin(visible(f"writing {destination.path}"))
             lost = io.write(result.mesh, destination.path, destination.format)
             self.written = destination.path
+            if others := other_points(destination.path, destination.format):
+                self.aside = (
+                    f"{others}, …: the points of the processors stay as they are; --format decomposed moves these"
+                )
         self.interruption.end()
         if self.plot is not None:
             self.progress.begin(visible(f"drawing {self.plot}"))

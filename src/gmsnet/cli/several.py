@@ -16,6 +16,7 @@ from gmsnet.io.foam_case import MESH, mesh_folder
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, entry_of, known
 from gmsnet.io.packed import split_name
 from gmsnet.io.paths import files_of
+from gmsnet.io.split_files import group_of
 from gmsnet.io.streams import STANDARD_INPUT
 from gmsnet.mesh.display import amount
 
@@ -44,7 +45,9 @@ def only_output(others: Sequence[str], out_dir: str | None, given: Sequence[str]
     return None
 
 
-def jobs_of(names: Sequence[str], out_dir: str, output_format: str | None, *, dry_run: bool) -> list[Job]:
+def jobs_of(
+    names: Sequence[str], out_dir: str, output_format: str | None, *, dry_run: bool, read_as: str | None = None
+) -> list[Job]:
     """The files that are named, by themselves, by their folders or by patterns, and where each is written.
 
     The folder is made, unless the run is dry. Raises InputError where it cannot be, where there are no files, and where
@@ -66,14 +69,21 @@ def jobs_of(names: Sequence[str], out_dir: str, output_format: str | None, *, dr
     if not dry_run:
         os.makedirs(out_dir, exist_ok=True)
         for job in jobs:
-            if output_format is None and _is_case(job.source):
-                os.makedirs(os.path.join(job.output, MESH), exist_ok=True)
+            for folder in _folders(job.source, read_as) if output_format is None else ():
+                os.makedirs(os.path.join(job.output, folder), exist_ok=True)
     return jobs
 
 
 def _is_case(name: str) -> bool:
-    """Whether a path is the folder of an OpenFOAM case, or of its mesh."""
-    return os.path.isdir(name) and mesh_folder(name) is not None
+    """Whether a path is the folder of an OpenFOAM case, decomposed or not, or of its mesh."""
+    return os.path.isdir(name) and (mesh_folder(name) is not None or group_of(name) is not None)
+
+
+def _folders(name: str, read_as: str | None) -> list[str]:
+    """The folders of the mesh in a case of OpenFOAM, from that of the case; none where a path leads to none."""
+    if os.path.isdir(name) and (group := group_of(name, read_as)) is not None:
+        return list(dict.fromkeys(map(os.path.dirname, group.keys)))
+    return [MESH] if os.path.isdir(name) and mesh_folder(name) is not None else []
 
 
 def _name(source: str, output_format: str | None) -> str:

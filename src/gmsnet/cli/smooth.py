@@ -189,7 +189,7 @@ def smooth(
     single = {"--in-place": in_place, "--plot": plot is not None, "--report": report is not None}
     output = only_output(others or [], out_dir, [option for option, given in single.items() if given])
     whole = None if out_dir is not None or (dry_run and output is None and not in_place) else destination_of(
-        input, output, in_place, output_format
+        input, output, in_place, output_format, format
     )  # fmt: skip
     if whole is not None:
         refuse_mixture(whole, json)
@@ -248,11 +248,11 @@ def smooth(
         raise typer.Exit(one(Job(input, output or "", ""), whole)[0])
 
     def into_folder(job: Job) -> tuple[int, bool]:
-        return one(job, None if dry_run else destination_of(job.source, job.output, False, output_format))
+        return one(job, None if dry_run else destination_of(job.source, job.output, False, output_format, format))
 
     def fail(job: Job, text: str) -> None:
         if json:
             printed.print_json({"input": job.source, "error": text}, line=True)
 
-    jobs = jobs_of([input, *(others or [])], out_dir, output_format, dry_run=dry_run)
+    jobs = jobs_of([input, *(others or [])], out_dir, output_format, dry_run=dry_run, read_as=format)
     carry_out_each(jobs, into_folder, fail, quiet=quiet or json)

@@ -59,7 +59,8 @@ def _first(comm: Any, parts: Sequence[Part], points: Floats, first_piece: int, s
     ids = np.concatenate([*(part.ids for part in parts if numbered and part.ids is not None), points[:0, 0]])
     ids = ids.astype(np.int64) if numbered else np.zeros(len(points), dtype=np.int64)
     piece = first_piece + np.repeat(np.arange(len(parts)), [len(part.parsed.points) for part in parts])
-    number, used = start + np.arange(len(points)), np.flatnonzero(used_points(parts))
+    number = start + np.arange(len(points))
+    used = np.arange(len(points)) if numbered else np.flatnonzero(used_points(parts))
     lists = [used[rows] for rows in by_rank(_homes(points[used], ids[used], comm.size), comm.size)]
     came = comm.alltoall([(points[rows], ids[rows], piece[rows], number[rows]) for rows in lists])
     found = same_points(*(np.concatenate(each) for each in zip(*came, strict=True)))

@@ -27,6 +27,7 @@ from gmsnet.io.linked import links_of, nested
 from gmsnet.io.packed import MAGIC, is_packed, split_name, unpacked
 from gmsnet.io.paths import beside, name_of
 from gmsnet.io.splice import FileSource
+from gmsnet.io.split_files import group_of
 from gmsnet.io.stamps import Stamp, Stamps
 from gmsnet.io.streams import STANDARD_INPUT
 from gmsnet.mesh.mesh import Mesh
@@ -36,7 +37,8 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
     """The mesh in a file; ``mesh.source`` keeps the file, so that ``write`` can put new coordinates into it.
 
     path: the file; ``-`` is the standard input. Of Triangle's pair either file may be named. A file whose name ends
-    with ``.gz`` is unpacked. Of an OpenFOAM case give the folder. format: a name of the table of formats
+    with ``.gz`` is unpacked. Of an OpenFOAM case give the folder, of Gmsh's parts ``a_1.msh``, ``a_2.msh``, … the name
+    ``a.msh``. format: a name of the table of formats
     (``gmsnet.io.FORMATS``: su2, gmsh, vtk, …); by default the suffix tells, or the contents where there is none to tell
     (standard input, pipes).
 
@@ -50,10 +52,10 @@ def read(path: str | os.PathLike[str], format: str | None = None) -> Mesh:
         return foreign.read(name, suffix)
     entry, opened = _open(name, shown, format)
     files = {suffix: data for suffix, (_, data, _) in opened.items()}
-    if len(files) > 1 and not entry.linked:
+    if len(files) > 1 and not (entry.linked or entry.parts):
         shown = opened[entry.suffixes[0]][0]
     try:
-        check_contents(files[entry.suffixes[0]], entry.key)
+        check_contents(files[entry.suffixes[0]], entry.parts or entry.key)
         parsed = entry.load().read(files)
         if not _is_stream(name):
             parsed = replace(parsed, form=_form_told(parsed.form, entry, name))
@@ -74,6 +76,8 @@ def _of_mark(files: Mapping[str, Data]) -> str:
 def _open(name: str, shown: str, format: str | None) -> tuple[Entry, dict[str, tuple[str, Data, Stamp | None]]]:
     """The format and, by suffix, the path, the bytes and the stamp of each file of the mesh."""
     stream = _is_stream(name)
+    if (group := group_of(name, format)) is not None:
+        return FORMATS[group.format], {key: loaded(group.path(key)) for key in group.keys}
     if (folder := case_of(name, format)) is not None:
         entry = FORMATS[OPENFOAM]
         there = [key for key in entry.optional if os.path.exists(file_in(folder, key))]

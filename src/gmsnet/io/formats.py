@@ -27,6 +27,7 @@ class Entry:
     are the names of its files; those of ``optional`` may be there. own: files of this format are only written again,
     and no other mesh is converted to it. linked: the file may name others, which hold the numbers: the module that
     knows them (``io/linked.py``). within: the module that has the format beside others; by default it is one by itself.
+    parts: the mesh stands in several files that no file lists (``io/split_files.py``), of this format each.
     """
 
     key: str
@@ -39,6 +40,7 @@ class Entry:
     own: bool = False
     linked: str = ""
     within: str = ""
+    parts: str = ""
 
     def form_of(self, path: str) -> str:
         """The form that the name of a file says."""
@@ -99,6 +101,15 @@ FORMATS = {
             Entry(key, key.upper(), (f".{key}",), own=True, linked="vtk_links", within="vtk_pieces")
             for key in ("pvtu", "pvtp", "vtm")
         ),
+        Entry("split", "Gmsh (split)", ("_1.msh",), own=True, within="split_parts", parts="gmsh"),
+        Entry(
+            "decomposed",
+            "OpenFOAM (decomposed)",
+            ("processor0/constant/polyMesh/points",),
+            own=True,
+            within="split_parts",
+            parts="openfoam",
+        ),
         Entry("netgen", "Netgen", (".vol",), own=True),
         Entry("mfem", "MFEM", (".mesh",), own=True),
         Entry("fluent", "Fluent", (".msh",), (".cas",), own=True),
@@ -106,7 +117,7 @@ FORMATS = {
 }
 BY_SUFFIX: dict[str, str] = {}  # the first format of each; the contents tell it from others of that suffix
 for _key, _entry in FORMATS.items():
-    for _suffix in () if _entry.folder else (*_entry.suffixes, *_entry.aliases):
+    for _suffix in () if _entry.folder or _entry.parts else (*_entry.suffixes, *_entry.aliases):
         BY_SUFFIX.setdefault(_suffix, _key)
 
 MENDS = {  # files that one may well have, but that are not read

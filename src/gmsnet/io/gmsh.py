@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,17 +33,27 @@ suffixes: tuple[str, ...] = (".msh",)
 
 CODES = {kind.name: code for code, kind in KINDS.items()}
 _HEAD = re.compile(rb"\s*\$MeshFormat\s+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*(?:\r\n?|\n)")
+MOST_TAG = 2**31
 _BEGIN = 4096  # bytes, white space and what an old file begins with
 _NAME = re.compile(rb'\s*([0-3])\s+(-?\d{1,18})\s+"([^"\r\n]*)"')
 
 
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
-    return vtk_ghosts.held(facts(files[".msh"])[0])
+    return vtk_ghosts.held(facts(files[".msh"]).parsed)
 
 
-def facts(data: Data) -> tuple[Parsed, NDArray[np.int64]]:
-    """The facts of a file, and the tags of its nodes. Cells that other files own are marked as VTK marks ghosts."""
+class Facts(NamedTuple):
+    """parsed: its cells that other files own are marked as VTK marks ghosts. tags: (N,) of nodes. partitions: how many
+    the whole mesh has; 0 where the file is no part of one, -1 where it does not say how many there are."""
+
+    parsed: Parsed
+    tags: NDArray[np.int64]
+    partitions: int
+
+
+def facts(data: Data) -> Facts:
+    """The facts of a file. Raises the errors of ``read``."""
     source, old = _open(data)
     found, seen = Contents(), set[bytes]()
     while title := source.word():
@@ -57,7 +68,10 @@ def facts(data: Data) -> tuple[Parsed, NDArray[np.int64]]:
         raise FormatError(f"{' and '.join(missing)} missing: the file is cut off")
     if not len(found.elements.codes):
         raise FormatError("the file has no elements: there is nothing to smooth")
-    return _assemble(found, found.nodes, found.elements), found.nodes.tags
+    partitions = found.partitions
+    if found.elements.partitioned is not None and found.elements.partitioned.any():
+        partitions = -1
+    return Facts(_assemble(found, found.nodes, found.elements), found.nodes.tags, partitions)
 
 
 _READERS = (b"$PhysicalNames", b"$Entities", b"$PartitionedEntities", b"$Nodes", b"$Elements")
@@ -192,7 +206,10 @@ def _regions(found: Contents, elements: Elements, names: dict[tuple[int, int], s
     groups = [found.physical.get((dim, tag), ()) for dim, tag in entities.tolist()]
     tags = [abs(tag) for group in found.physical.values() for tag in group] + [abs(tag) for _, tag in names]
     combined = sorted({group for group in groups if len(group) > 1})
-    number = {group: 1 + max(tags, default=0) + k for k, group in enumerate(combined)}
+    last = max(tags, default=0)
+    if combined and last >= MOST_TAG:
+        raise FormatError(f"the physical tag {last} is larger than those that Gmsh has, of 32 bits")
+    number = {group: 1 + last + k for k, group in enumerate(combined)}
     for (dim, _), group in zip(entities.tolist(), groups, strict=True):
         if group in number:
             parts = [names.get((dim, abs(tag)), str(tag)) for tag in group]

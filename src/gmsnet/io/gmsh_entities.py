@@ -19,14 +19,14 @@ from gmsnet.io.vtk_ghosts import DUPLICATE, TYPES
 from gmsnet.io.words import Words
 
 # What Gmsh calls the part of a physical group in a partition, or between several.
-_PART = re.compile(r"_part\{(\d+(?:,\d+)*)\}_physical\{(\d+)\}_dim\{[0-3]\}")
+_PART = re.compile(r"_part\{(\d+(?:,\d+)*)\}_physical\{(\d{1,18})\}_dim\{[0-3]\}")
 _DIMENSIONS = np.array([CELLS[KINDS[code].name].dimension if code in KINDS else 3 for code in range(len(SIZES))])
 
 
 def read_entities(words: Words, partitioned: bool, found: Contents) -> None:
     """The physical tags, and of partitions the parents, of each geometrical entity of version 4.1."""
     if partitioned:
-        sections.counts(words, 1)  # partitions
+        (found.partitions,) = sections.counts(words, 1)
         found.ghosts = set(sections.ints(words, 2 * sections.counts(words, 1)[0])[::2])
     for dimension, count in enumerate(sections.counts(words, 4)):
         for _ in range(count):

@@ -81,13 +81,15 @@ class Contents:
     """What the sections of a file add up to.
 
     physical: (dimension, entity) → its physical tags. parents: of the entities that partitioning made, the dimension of
-    those that they are parts of. ghosts: the tags of entities of cells that other partitions own. images: (n, 2) the
-    tags of nodes of periodic entities. others: the titles of sections that are not read, or not all.
+    those that they are parts of. partitions: how many there are in all, of version 4.1. ghosts: the tags of entities of
+    cells that other partitions own. images: (n, 2) the tags of nodes of periodic entities. others: the titles of
+    sections that are not read, or not all.
     """
 
     names: dict[tuple[int, int], str] = field(default_factory=dict)
     physical: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
     parents: dict[tuple[int, int], int] = field(default_factory=dict)
+    partitions: int = 0
     ghosts: set[int] = field(default_factory=set)
     nodes: Nodes | None = None
     elements: Elements | None = None

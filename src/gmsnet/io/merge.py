@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.errors import FormatError
 from gmsnet.io.document import Parsed
-from gmsnet.io.splice import Untouched
-from gmsnet.io.vtk_ghosts import LEVELS, TYPES, ghosts
+from gmsnet.io.splice import Share, Untouched
+from gmsnet.io.vtk_ghosts import LEVELS, TYPES, ghosts, with_vertices
 from gmsnet.mesh.cell_block import CellBlock
 
 Ints = NDArray[np.int64]
@@ -45,8 +46,8 @@ def merged(parts: Sequence[Part]) -> Merged:
     """One mesh of all parts.
 
     Points of different parts are one node where their coordinates are equal, and their ids where all parts have some.
-    Only points of cells count. Where one part has several points at a place, such as the two sides of a crack, none of
-    them is taken together with another one: which belong together is not known.
+    Without ids, only points of cells count. Where one part has several points at a place, such as the two sides of a
+    crack, none of them is taken together with another one: which belong together is not known.
     """
     first, unsure = _joined(parts)
     numbers, node = np.unique(first, return_inverse=True)
@@ -59,8 +60,23 @@ def merged(parts: Sequence[Part]) -> Merged:
     names = {key: name for part in parts for key, name in part.parsed.region_names.items()}
     unread = [text for part in parts for text in part.parsed.unread] + [f"the point data {name!r}" for name in lost]
     single = any(part.parsed.single for part in parts)
-    parsed = Parsed(points, cells, Untouched(), names, point_data, cell_data, single, unread)
+    images = np.unique(np.concatenate([node[part.parsed.images] for part, node in zip(parts, nodes, strict=True)]))
+    parsed = Parsed(points, cells, Untouched(), names, point_data, cell_data, single, unread, images=images)
     return Merged(parsed, nodes, np.unique(np.concatenate([node.reshape(-1)[unsure], orphans])))
+
+
+def one_mesh(parts: Mapping[str, Part], files: int) -> Parsed:
+    """The mesh of parts that each have a file with their coordinates, whose key is that of the part.
+
+    files: how many there are. Raises FormatError where no part has cells.
+    """
+    if not parts:
+        raise FormatError("no piece has cells: there is nothing to smooth")
+    whole = merged(list(parts.values()))
+    shares = {key: Share(part.parsed.slots, node) for (key, part), node in zip(parts.items(), whole.nodes, strict=True)}
+    unread = dict.fromkeys([f"the division into {files} files", *whole.parsed.unread])
+    parsed = replace(whole.parsed, shares=shares, unread=list(unread))
+    return with_vertices(parsed, whole.held, "coincident points and ghost cells")
 
 
 def _joined(parts: Sequence[Part]) -> tuple[Ints, NDArray[np.bool_]]:
@@ -70,7 +86,7 @@ def _joined(parts: Sequence[Part]) -> tuple[Ints, NDArray[np.bool_]]:
     if all(part.ids is not None for part in parts):
         ids = np.concatenate([part.ids for part in parts if part.ids is not None])
     piece = np.repeat(np.arange(len(parts)), [len(part.parsed.points) for part in parts])
-    rows = np.flatnonzero(used_points(parts))
+    rows = np.flatnonzero(used_points(parts)) if ids is None else np.arange(len(points))
     first, unsure = np.arange(len(points)), np.zeros(len(points), dtype=bool)
     given = points[rows], None if ids is None else ids[rows], piece[rows]
     first[rows], unsure[rows] = same_points(*given, rows)
@@ -89,7 +105,7 @@ def used_points(parts: Sequence[Part]) -> NDArray[np.bool_]:
 def same_points(
     points: NDArray[np.float64], ids: Ints | None, piece: Ints, numbers: Ints
 ) -> tuple[Ints, NDArray[np.bool_]]:
-    """For each point (n, dim) of cells the number of the first one that is the same node, and whether several of one
+    """For each point (n, dim) the number of the first one that is the same node, and whether several of one
     piece are there. ids: (n,), None where they do not count. piece: (n,) of each. numbers: (n,) over all pieces.
     """
     if not len(points):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from gmsnet.io.cells import sealed
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.foam_cells import Faces, Ints, volumes
-from gmsnet.io.foam_lists import coordinates, faces, head_of, labels
+from gmsnet.io.foam_lists import coordinates, faces, head_of, labels, list_at
 from gmsnet.io.foam_patches import ZONES, Patch, patches, zones
 from gmsnet.io.foam_plane import Plane, cells_in, plane_of
 from gmsnet.io.places import Places
@@ -28,16 +29,32 @@ from gmsnet.mesh.mesh import Mesh
 name = "OpenFOAM"
 suffixes: tuple[str, ...] = ("points", "faces", "owner", "neighbour", "boundary")
 optional = ZONES
+BETWEEN = "processor"  # the type of patches between processors; processorCyclic is one on the boundary
+
+
+class Facts(NamedTuple):
+    """rows: (N,) the point of the file that is each node. names: of patches between no two processors, and of zones."""
+
+    parsed: Parsed
+    rows: Ints
+    names: tuple[str, ...]
 
 
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format; the names of the files stand for suffixes."""
+    return facts(files).parsed
+
+
+def facts(files: Mapping[str, Data], whole: bool = True) -> Facts:
+    """The facts of a mesh. whole: else it is that of one processor, and faces to others are no boundary."""
     points, slots, single = coordinates(files["points"], head_of(files["points"], "points"), "points")
     found = _faces(files, len(points))
     cells = 1 + int(max(found.owner.max(), found.neighbour.max(initial=0)))
     known = patches(files["boundary"], len(found.sizes), len(found.neighbour))
+    if not whole:
+        known = [patch._replace(faces=0) if patch.kind == BETWEEN else patch for patch in known]
     regions, region_names = _regions(files, cells)
-    plane = plane_of(points, found, known, cells)
+    plane, rows = plane_of(points, found, known, cells), np.arange(len(points))
     held = _of_zones(files, found, len(points))
     none = np.empty(0, dtype=np.int64)
     images = found.points_of(np.concatenate([none, *(patch.members for patch in known if patch.is_periodic)]))
@@ -46,6 +63,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
         back[plane.points] = False
         blocks = cells_in(plane, found, known, back, regions)
         slots = _in_plane(slots, plane)
+        rows = plane.points
         points, held = sealed(points[plane.points][:, plane.axes]), np.unique(plane.node[held])
         images = np.unique(plane.node[images])
     else:
@@ -58,7 +76,13 @@ def read(files: Mapping[str, Data]) -> Parsed:
         blocks.append(CellBlock("vertex", held[:, None], np.ones(len(held), dtype=np.int64)))
         names[0, 1] = "zones"
     unread = ["the faces and their order, types of patches"]
-    return Parsed(points, blocks, slots, names, single=single, unread=unread, images=images)
+    told = (*(patch.name for patch in known if BETWEEN not in patch.kind), *region_names.values())
+    return Facts(Parsed(points, blocks, slots, names, single=single, unread=unread, images=images), rows, told)
+
+
+def is_empty(files: Mapping[str, Data]) -> bool:
+    """Whether there are no faces, as where a processor has no cells."""
+    return list_at(files["owner"], head_of(files["owner"], "owner").body, "owner")[0] == 0
 
 
 def _faces(files: Mapping[str, Data], points: int) -> Faces:

@@ -21,6 +21,7 @@ from gmsnet.io.packed import is_packed, packed, split_name
 from gmsnet.io.paths import beside, name_of
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import FileSource, most_rounded
+from gmsnet.io.split_files import takes_parts, targets_of
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.streams import STANDARD_OUTPUT, is_special, standard_output
 from gmsnet.mesh.mesh import Mesh, Source
@@ -79,13 +80,16 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
 
 def _targets(name: str, entry: Entry, keys: list[str], stamps: Stamps) -> dict[str, str]:
     """Suffix → the path of each file that is written. Files of a case that were read and do not change are not."""
-    folder = case_of(name, entry.key)
-    if folder is None:
+    if entry.parts:
+        paths = targets_of(name, entry.key, keys)
+    elif (folder := case_of(name, entry.key)) is not None:
+        paths = {key: file_in(folder, key, is_packed(name)) for key in keys}
+    else:
         return {key: beside(name, key) if len(keys) > 1 else name for key in keys}
-    paths = {key: file_in(folder, key, is_packed(name)) for key in keys}
+    changed = os.path.basename(entry.suffixes[0])
     return {
         key: path for key, path in paths.items()
-        if key == entry.suffixes[0] or os.path.abspath(path) not in stamps.known
+        if os.path.basename(key) == changed or entry.parts == "gmsh" or os.path.abspath(path) not in stamps.known
     }  # fmt: skip
 
 
@@ -128,6 +132,9 @@ def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
     """The format that ``write`` takes. Raises the InputErrors of ``write`` that do not need the conversion."""
     stream = path in STANDARD_OUTPUT or is_special(path)
     shown = "standard output" if path in STANDARD_OUTPUT else path
+    own = FORMATS.get(mesh.source.format) if mesh.source is not None else None
+    if own is not None and own.parts and format in (None, own.key) and takes_parts(path, own.key):
+        return own
     if case_of(path, format) is not None:
         return FORMATS[OPENFOAM]
     refuse_folder(path)
@@ -140,7 +147,6 @@ def output_format(mesh: Mesh, path: str, format: str | None = None) -> Entry:
     else:
         suffix = split_name(path)[1]
         entry = FORMATS[format_of_suffix(path, suffix, reading=False)]
-        own = FORMATS.get(mesh.source.format) if mesh.source is not None else None
         if own is not None and suffix.lower() in (*own.suffixes, *own.aliases):
             entry = own  # of several formats with this suffix the one that was read
     if stream and len(entry.suffixes) > 1:

@@ -9,6 +9,7 @@ from gmsnet.errors import InputError
 from gmsnet.io.foam_case import case_of, file_in
 from gmsnet.io.formats import BY_SUFFIX, Entry
 from gmsnet.io.packed import is_packed, split_name
+from gmsnet.io.split_files import group_of
 
 
 def name_of(path: Any) -> str:
@@ -28,6 +29,9 @@ def beside(name: str, suffix: str) -> str:
 
 def files_of(name: str, entry: Entry) -> list[str]:
     """The files that a mesh of this name and format stands in: more than one where its format says so."""
+    if entry.parts:
+        group = group_of(name, entry.key)
+        return [] if group is None else group.paths
     if (folder := case_of(name, entry.key)) is not None:
         return [file_in(folder, key, is_packed(name)) for key in entry.suffixes]
     return [name] if len(entry.suffixes) == 1 else [beside(name, suffix) for suffix in entry.suffixes]

@@ -6,7 +6,7 @@ The file that names the others stays as it is; in each of these the coordinates 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,10 +14,8 @@ from gmsnet.errors import FormatError, InputError
 from gmsnet.io import vtp, vtu
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
-from gmsnet.io.merge import Part, merged
+from gmsnet.io.merge import Part, one_mesh
 from gmsnet.io.packed import split_name
-from gmsnet.io.splice import Share, Untouched
-from gmsnet.io.vtk_ghosts import with_vertices
 from gmsnet.io.vtk_links import BLOCKS, Link, kind_of, leaves
 from gmsnet.io.vtu_reader import Reader
 from gmsnet.mesh.mesh import Mesh
@@ -40,17 +38,9 @@ class PieceFormat:
             raise FormatError(f"a VTKFile of type {kind} is not {self.name}: rename the file")
         links = list(leaves(files, named))
         parts = [part for link in links if (part := part_in(link, files)) is not None]
-        if not parts:
-            raise FormatError("no piece has cells: there is nothing to smooth")
         if kind == BLOCKS:
             parts = _numbered(parts, links)
-        whole = merged([part for part, _ in parts])
-        shares = {
-            link.path: Share(part.parsed.slots, node) for (part, link), node in zip(parts, whole.nodes, strict=True)
-        }
-        unread = dict.fromkeys([f"the division into {len(links)} files", *whole.parsed.unread])
-        parsed = replace(whole.parsed, slots=Untouched(), shares=shares, unread=list(unread))
-        return with_vertices(parsed, whole.held, "coincident points and ghost cells")
+        return one_mesh({link.path: part for part, link in parts}, len(links))
 
     def write(self, mesh: Mesh) -> Written:
         """Raises FormatError: only files of this format are written again."""
