@@ -38,9 +38,9 @@ def run(folder, ranks, target="b.pvtu", method="barrier"):
     return together(ranks, lambda comm: smooth_file(task, comm))
 
 
-def assert_read_alike(path, ranks):
+def assert_read_alike(path, ranks, kind="pvtu"):
     mesh = gmsnet.read(path)
-    whole = together(ranks, lambda comm: gathered(read_pieces(str(path), "pvtu", comm).piece, comm))[0]
+    whole = together(ranks, lambda comm: gathered(read_pieces(str(path), kind, comm).piece, comm))[0]
     assert whole.ids.tolist() == list(range(len(mesh.points)))
     assert whole.mesh.points.tobytes() == mesh.points.tobytes()
     cells = [block for block in mesh.cells if block.kind != "vertex"]

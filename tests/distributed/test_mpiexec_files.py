@@ -7,9 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.decomposed import block, strips
+from support.foam_processors import save
+from support.gmsh_split import save_split
 from support.pieces import save_pieces
 
 import gmsnet
+from gmsnet.generate import random_volume
 from gmsnet.mesh.mesh import Mesh
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
@@ -95,3 +99,27 @@ def test_a_truncated_piece_is_said_once(folder):
     assert done.stderr.count("gmsnet: error: a.pvtu: a/a_2.vtu:") == 1
     assert "Traceback" not in done.stderr
     assert saved(folder) == before
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_a_decomposed_case_has_the_bytes_of_one_process(tmp_path, ranks):
+    """As a solver leaves it: the mesh of the whole case is beside the processors."""
+    case = block()
+    for name in ("serial", "ranks"):
+        save({f"constant/polyMesh/{key}": data for key, data in case.whole().items()}, tmp_path / name)
+        save(case.parts(strips(case, 3)), tmp_path / name)
+    serial = gmsnet.smooth(gmsnet.read(tmp_path / "serial", "decomposed"))
+    gmsnet.write(serial.mesh, tmp_path / "serial", "decomposed")
+    done = smooth(ranks, "ranks", "--in-place", "--format", "decomposed", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["nodes"] == len(case.points)
+    assert saved(tmp_path / "serial") == saved(tmp_path / "ranks")
+
+
+def test_split_files_have_the_bytes_of_one_process(tmp_path):
+    path = save_split(random_volume(300, seed=1), tmp_path, 3, ghosts=True)
+    gmsnet.write(gmsnet.smooth(gmsnet.read(path)).mesh, tmp_path / "serial.msh")
+    done = smooth(2, "a.msh", "ranks.msh", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for k in (1, 2, 3):
+        assert (tmp_path / f"serial_{k}.msh").read_bytes() == (tmp_path / f"ranks_{k}.msh").read_bytes()

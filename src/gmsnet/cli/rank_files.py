@@ -16,13 +16,16 @@ if TYPE_CHECKING:
     from gmsnet.run.options import SmoothOptions
 
 
-def shared_format(source: str, target: str) -> str:
-    """The format of files that several ranks read and write piece by piece; "" where one process does it."""
+def shared_format(source: str, target: str, read_as: str | None, write_as: str | None) -> str:
+    """The format of files that several ranks read and write part by part; "" where one process does it.
+
+    read_as, write_as: the formats that are asked for.
+    """
     if rank_of()[1] == 1:
         return ""
-    from gmsnet.distributed.file_run import in_pieces
+    from gmsnet.distributed import layouts
 
-    return in_pieces(source, target)
+    return layouts.shared_format(source, target, read_as, write_as)
 
 
 def smooth_in_pieces(work: FileWork, options: SmoothOptions, target: str, format: str) -> int:

@@ -1,8 +1,7 @@
-"""Files in pieces (``.pvtu``, ``.pvtp``): each rank reads its own, and all of them are one mesh."""
+"""A mesh in several files: each rank reads its own, and all of them are one mesh."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,49 +11,44 @@ from numpy.typing import NDArray
 
 from gmsnet.distributed.agreement import everywhere
 from gmsnet.distributed.joining import Joined, joined, orphans
+from gmsnet.distributed.layouts import Layout, Opened, layout_of
 from gmsnet.distributed.piece import Cells, Piece
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.contents import Data
-from gmsnet.io.files import loaded
-from gmsnet.io.formats import FORMATS, check_contents
 from gmsnet.io.merge import Part
 from gmsnet.io.pieces import Pieces
-from gmsnet.io.stamps import Stamp, Stamps
+from gmsnet.io.stamps import Stamps
 from gmsnet.io.vtk_ghosts import ghosts
-from gmsnet.io.vtk_links import Link, kind_of
-from gmsnet.io.vtk_pieces import part_in
 
-KINDS = {"pvtu": "PUnstructuredGrid", "pvtp": "PPolyData"}  # format → type of the file
 Ids = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class FilePieces:
-    """What one rank has of a file in pieces. index: the naming file. links: the files of all ranks. opened: path →
-    (name, bytes, stamp) of those of this rank. parts: of these that have cells, and paths, their names in the index.
-    joined: their points as nodes; piece: the mesh of them."""
+    """What one rank has of a mesh in several files. layout: of all ranks. opened: key → files of this rank. parts: what
+    those hold that have cells, by the key of their coordinates. joined: their points as nodes; piece: the mesh of them.
+    """
 
-    index: tuple[str, Data, Stamp | None]
-    links: Sequence[str]
-    opened: Mapping[str, tuple[str, Data, Stamp | None]]
-    parts: Sequence[Part]
-    paths: Sequence[str]
+    layout: Layout
+    opened: Mapping[str, Opened]
+    parts: Mapping[str, Part]
     joined: Joined
     piece: Piece
 
     @property
     def stamps(self) -> Stamps:
         """Of all files that this rank has read."""
-        return Stamps.of([self.index, *self.opened.values()])
+        index = [] if self.layout.index is None else [self.layout.index]
+        return Stamps.of([*index, *self.opened.values()])
 
     def spliced(self, points: NDArray[np.float64], moved: bool) -> dict[str, Pieces]:
-        """Path → each file of this rank with new points (n, dim) of the piece. moved: whether any rank moved a node."""
-        files = {path: _as_it_is(data) for path, (_, data, _) in self.opened.items()}
-        cuts = np.cumsum([len(part.parsed.points) for part in self.parts])[:-1]
+        """Key → each file of this rank with new points (n, dim) of the piece. moved: whether any rank moved a node."""
+        files = {key: _as_it_is(data) for key, (_, data, _) in self.opened.items()}
+        cuts = np.cumsum([len(part.parsed.points) for part in self.parts.values()])[:-1]
         at = np.searchsorted(self.piece.ids, self.joined.node)
-        for part, path, rows in zip(self.parts, self.paths, np.split(at, cuts), strict=True) if self.parts else ():
+        for (key, part), rows in zip(self.parts.items(), np.split(at, cuts), strict=True) if self.parts else ():
             if moved:
-                files[path] = _replaced(part, self.opened[path][1], self.piece.points[rows], points[rows])
+                files[key] = _replaced(part, self.opened[key][1], self.piece.points[rows], points[rows])
         return files
 
 
@@ -67,56 +61,44 @@ def _replaced(part: Part, data: Data, old: NDArray[np.float64], new: NDArray[np.
 
 
 def read_pieces(name: str, format: str, comm: Any) -> FilePieces:
-    """All ranks call it; each reads as many pieces as the others, one after another in the file.
+    """All ranks call it; each reads as many parts as the others, one after another in the order of the mesh.
 
     The mesh is that of ``gmsnet.read``. Raises InputError, on all ranks, with what it says.
     """
-    told = everywhere(comm, lambda: _index(name, format) if comm.rank == 0 else None)
-    index, links = comm.bcast(told)
-    first, last = (len(links) * rank // comm.size for rank in (comm.rank, comm.rank + 1))
-    opened, found = everywhere(comm, lambda: _opened(name, links[first:last]))
-    parts = [part for part, _ in found]
-    if not comm.allreduce(len(parts)):
-        raise FormatError(f"{name}: no piece has cells: there is nothing to smooth")
+    layout = comm.bcast(everywhere(comm, lambda: layout_of(name, format) if comm.rank == 0 else None))
+    first, last = (len(layout.parts) * rank // comm.size for rank in (comm.rank, comm.rank + 1))
+    opened, found, told = everywhere(comm, lambda: _opened(name, layout, layout.parts[first:last]))
+    everyone = [each for some in comm.allgather(told) for each in some]
+    everywhere(comm, lambda: _checked(name, layout, everyone))
+    parts = list(found.values())
     before = comm.exscan(len(parts)) or 0
     dims = [each for each in comm.allgather([part.parsed.points.shape[1] for part in parts]) if each]
     nodes = joined(comm, parts, before, dims[0][0])
-    piece = _piece(comm, parts, nodes)
-    return FilePieces(index, [link.path for link in links], opened, parts, [link.path for _, link in found], nodes,
-                      piece)  # fmt: skip
-
-
-def _index(name: str, format: str) -> tuple[tuple[str, bytes, Stamp | None], list[Link]]:
-    """The naming file and what it names."""
-    path, data, stamp = loaded(name)
-    try:
-        check_contents(data, format)
-        kind, links = kind_of(data)
-        if kind != KINDS[format]:
-            raise FormatError(f"a VTKFile of type {kind} is not {FORMATS[format].title}: rename the file")
-    except InputError as error:
-        raise FormatError(f"{name}: {error}") from None
-    return (path, bytes(data[:]), stamp), links
+    return FilePieces(layout, opened, found, nodes, _piece(comm, parts, nodes))
 
 
 def _opened(
-    name: str, links: Sequence[Link]
-) -> tuple[dict[str, tuple[str, Data, Stamp | None]], list[tuple[Part, Link]]]:
-    """The files of a rank, and what those hold that have cells."""
-    opened = {}
+    name: str, layout: Layout, some: Sequence[tuple[str, ...]]
+) -> tuple[dict[str, Opened], dict[str, Part], list[Any]]:
+    """The files of a rank, what those parts hold that have cells, by the first key of each, and what they tell."""
+    opened = {key: layout.load(key) for keys in some for key in keys}
+    data = {key: data for key, (_, data, _) in opened.items()}
     try:
-        for link in links:
-            try:
-                opened[link.path] = loaded(os.path.join(os.path.dirname(name), link.path))
-            except InputError as error:
-                raise type(error)(f"{name}: the file that it names cannot be read: {error}") from None
-        data = {path: data for path, (_, data, _) in opened.items()}
-        return opened, [found for link in links if (found := part_in(link, data)) is not None]
-    except FormatError as error:
-        text = str(error)
-        raise FormatError(text if text.startswith(name) else f"{name}: {text}") from None
+        found = {keys[0]: there for keys in some if (there := layout.part_in(keys, data)) is not None}
+    except InputError as error:
+        raise FormatError(f"{name}: {error}") from None
     except MemoryError:
         raise InputError(f"{name}: there is not enough memory for this mesh") from None
+    return opened, {key: part for key, (part, _) in found.items()}, [told for _, told in found.values()]
+
+
+def _checked(name: str, layout: Layout, told: Sequence[Any]) -> None:
+    if not told:
+        raise FormatError(f"{name}: no piece has cells: there is nothing to smooth")
+    try:
+        layout.check(told)
+    except InputError as error:
+        raise FormatError(f"{name}: {error}") from None
 
 
 def _piece(comm: Any, parts: Sequence[Part], nodes: Joined) -> Piece:
@@ -126,8 +108,9 @@ def _piece(comm: Any, parts: Sequence[Part], nodes: Joined) -> Piece:
     names = [kind for kind, _ in kinds]
     if len(set(names)) < len(names):
         raise InputError("cells of one kind have different numbers of nodes: smooth this file without ranks")
-    blocks, held = [], [nodes.node[nodes.unsure]]
     cuts = np.cumsum([0, *(len(part.parsed.points) for part in parts)])
+    images = [nodes.node[start + part.parsed.images] for part, start in zip(parts, cuts[:-1], strict=True)]
+    blocks, held = [], [nodes.node[nodes.unsure], *images]
     for kind, width in kinds:
         own, copies = [np.empty((0, width), dtype=np.int64)], [np.empty((0, width), dtype=np.int64)]
         regions = [np.empty(0, dtype=np.int64)]

@@ -81,15 +81,14 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
 def _targets(name: str, entry: Entry, keys: list[str], stamps: Stamps) -> dict[str, str]:
     """Suffix → the path of each file that is written. Files of a case that were read and do not change are not."""
     if entry.parts:
-        paths = targets_of(name, entry.key, keys)
-    elif (folder := case_of(name, entry.key)) is not None:
-        paths = {key: file_in(folder, key, is_packed(name)) for key in keys}
-    else:
+        return targets_of(name, entry.key, keys, stamps.known)
+    folder = case_of(name, entry.key)
+    if folder is None:
         return {key: beside(name, key) if len(keys) > 1 else name for key in keys}
-    changed = os.path.basename(entry.suffixes[0])
+    paths = {key: file_in(folder, key, is_packed(name)) for key in keys}
     return {
         key: path for key, path in paths.items()
-        if os.path.basename(key) == changed or entry.parts == "gmsh" or os.path.abspath(path) not in stamps.known
+        if key == entry.suffixes[0] or os.path.abspath(path) not in stamps.known
     }  # fmt: skip
 
 

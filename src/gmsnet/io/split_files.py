@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 from gmsnet.errors import InputError
@@ -69,9 +69,10 @@ def takes_parts(name: str, format: str) -> bool:
     return split_name(name)[1] == NUMBERED if format == SPLIT else os.path.isdir(_case(name))
 
 
-def targets_of(name: str, format: str, keys: Sequence[str]) -> dict[str, str]:
-    """Key → path of the files of a mesh that is written by this name.
+def targets_of(name: str, format: str, keys: Sequence[str], known: Collection[str] = ()) -> dict[str, str]:
+    """Key → path of the files that are written of a mesh by this name.
 
+    known: the absolute paths of files that were read; of a case those that do not change are not written over these.
     Raises InputError where these would not be the mesh that the name stands for.
     """
     root = split_name(name)[0] if format == SPLIT else os.path.join(_case(name), "")
@@ -93,6 +94,8 @@ def targets_of(name: str, format: str, keys: Sequence[str]) -> dict[str, str]:
             )
         if os.path.isdir(f"{root}processor{len({key.partition('/')[0] for key in keys})}"):
             raise InputError(others)
+        changed = FILES[0]
+        paths = {k: p for k, p in paths.items() if os.path.basename(k) == changed or os.path.abspath(p) not in known}
     return paths
 
 
