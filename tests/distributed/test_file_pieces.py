@@ -106,6 +106,32 @@ def test_the_bytes_of_a_serial_run(tmp_path, ranks, pieces, method):
     assert [again[f"a/a_{k}.vtu"] for k in range(pieces)] == [after[f"b/a_{k}.vtu"] for k in range(pieces)]
 
 
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("width", [0, 2])
+def test_point_data_that_hold_nodes(tmp_path, ranks, width):
+    """The first copy of a node counts, as without ranks; data that a piece does not have are none."""
+    mesh = flat()
+    save_pieces(mesh, tmp_path, 3)
+    chosen = np.random.default_rng(1).random(len(mesh.points)) < 0.3
+    place = {tuple(point): k for k, point in enumerate(mesh.points.tolist())}
+    for k in range(3):
+        part = gmsnet.read(tmp_path / f"a/a_{k}.vtu")
+        mine = chosen[[place[tuple(point)] for point in part.points.tolist()]] & (k != 1)
+        values = np.column_stack([0.0 * mine, mine]) if width else mine.astype(np.int32)
+        fields = {**part.point_data, "fixed": values}
+        gmsnet.write(Mesh(part.points, part.cells, point_data=fields, cell_data=part.cell_data),
+                     tmp_path / f"a/a_{k}.vtu")  # fmt: skip
+    whole = gmsnet.read(tmp_path / "a.pvtu")
+    result = gmsnet.smooth(whole, "barrier", max_sweeps=5)
+    assert "fixed by the user" in result.held
+    (tmp_path / "serial").mkdir()
+    gmsnet.write(result.mesh, tmp_path / "serial" / "b.pvtu")
+    run(tmp_path, ranks)
+    after = saved(tmp_path)
+    for k in range(3):
+        assert after[f"b/a_{k}.vtu"] == after[f"serial/b/a_{k}.vtu"]
+
+
 def test_more_ranks_than_nodes(tmp_path):
     mesh = flat(12)
     save_pieces(mesh, tmp_path, 2)

@@ -19,8 +19,10 @@ from gmsnet.io.merge import Part
 from gmsnet.io.pieces import Pieces
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.vtk_ghosts import ghosts
+from gmsnet.mesh.selection import held_by_data
 
 Ids = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +128,18 @@ def _piece(comm: Any, parts: Sequence[Part], nodes: Joined) -> Piece:
         blocks.append(Cells(kind, cells, np.concatenate(regions), number))
         held.append(ghost_cells[orphans(comm, ghost_cells, cells)].ravel())
     ids, first = np.unique(nodes.node, return_index=True)
-    fixed = np.isin(ids, np.concatenate(held))
+    own = (ids >= nodes.starts[comm.rank]) & (ids < nodes.starts[comm.rank + 1])  # of others the points are copies
+    fixed = np.isin(ids, np.concatenate(held)) | (own & _fixed(comm, parts)[first])
     single = any(comm.allgather(any(part.parsed.single for part in parts)))
     return everywhere(comm, lambda: Piece(ids, nodes.points[first], fixed, tuple(blocks), single))
+
+
+def _fixed(comm: Any, parts: Sequence[Part]) -> Flags:
+    """(n,) bool: the points of this rank whose point data ``fixed`` hold them, if all parts have such."""
+    data = [part.parsed.point_data.get("fixed") for part in parts]
+    told = [None if each is None else (each.shape[1:], each.dtype.kind) for each in data]
+    common = {each for some in comm.allgather(told) for each in some}
+    if len(common) != 1 or None in common:
+        return np.zeros(sum(len(part.parsed.points) for part in parts), dtype=bool)
+    masks = everywhere(comm, lambda: [held_by_data(each) for each in data if each is not None])
+    return np.concatenate([np.zeros(0, dtype=bool), *masks])

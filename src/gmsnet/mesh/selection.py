@@ -81,13 +81,17 @@ def _own(mesh: Mesh) -> NDArray[np.bool_]:
     mask = images(mesh)
     if "fixed" not in mesh.point_data:
         return mask
-    own = mesh.point_data["fixed"]
+    return mask | held_by_data(mesh.point_data["fixed"])
+
+
+def held_by_data(own: NDArray[Any]) -> NDArray[np.bool_]:
+    """(N,) bool: which nodes the point data ``fixed`` (N, …) hold. Raises InputError where these are no numbers."""
     if own.dtype.kind not in "biuf":
         raise InputError(
             f"the point data 'fixed' of the mesh must be numbers (0: free, all else: held), got {own.dtype} values: "
             "make them numbers or give the data another name"
         )
-    held: NDArray[np.bool_] = mask | (own != 0).any(axis=tuple(range(1, own.ndim)))
+    held: NDArray[np.bool_] = (own != 0).any(axis=tuple(range(1, own.ndim)))
     return held
 
 
