@@ -123,3 +123,13 @@ def test_split_files_have_the_bytes_of_one_process(tmp_path):
     assert done.returncode == 0, done.stderr
     for k in (1, 2, 3):
         assert (tmp_path / f"serial_{k}.msh").read_bytes() == (tmp_path / f"ranks_{k}.msh").read_bytes()
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_a_binary_file_that_ranks_share_has_the_bytes_of_one_process(tmp_path, ranks):
+    gmsnet.write(random_volume(800, seed=1), tmp_path / "a.lb8.ugrid")
+    gmsnet.write(gmsnet.smooth(gmsnet.read(tmp_path / "a.lb8.ugrid")).mesh, tmp_path / "serial.lb8.ugrid")
+    done = smooth(ranks, "a.lb8.ugrid", "ranks.lb8.ugrid", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "inverted" in str(json.loads(done.stdout)["after"])
+    assert (tmp_path / "serial.lb8.ugrid").read_bytes() == (tmp_path / "ranks.lb8.ugrid").read_bytes()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import queue
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -24,8 +25,8 @@ def combined(operation, values):
 class Comm:
     """What a rank gets of others it gets as copies."""
 
-    def __init__(self, rank, size, board, meeting):
-        self.rank, self.size, self.board, self.meeting = rank, size, board, meeting
+    def __init__(self, rank, size, board, meeting, mail=None):
+        self.rank, self.size, self.board, self.meeting, self.mail = rank, size, board, meeting, mail
         self.calls = []
 
     def _exchanged(self, value, name):
@@ -63,6 +64,12 @@ class Comm:
 
     def scatter(self, values, root=0):
         return self._exchanged(values, "scatter")[root][self.rank]
+
+    def send(self, value, dest):
+        self.mail[self.rank, dest].put(pickle.dumps(value))
+
+    def recv(self, source):
+        return pickle.loads(self.mail[source, self.rank].get(timeout=120))
 
     def Create_dist_graph_adjacent(self, sources, destinations):
         assert list(sources) == list(destinations)
@@ -109,10 +116,11 @@ class Request:
 def together(count, work):
     """What work(comm) returns on each of so many ranks; raises what the first raises that fails."""
     board, meeting = [None] * count, threading.Barrier(count, timeout=120)
+    mail = {(one, other): queue.SimpleQueue() for one in range(count) for other in range(count)}
 
     def one(rank):
         try:
-            return work(Comm(rank, count, board, meeting))
+            return work(Comm(rank, count, board, meeting, mail))
         except BaseException:
             meeting.abort()
             raise

@@ -13,9 +13,11 @@ from gmsnet.distributed.agreement import everywhere
 from gmsnet.distributed.joining import Joined, joined, orphans
 from gmsnet.distributed.layouts import Layout, Opened, layout_of
 from gmsnet.distributed.piece import Cells, Piece
+from gmsnet.distributed.together import replace_together
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.contents import Data
 from gmsnet.io.merge import Part
+from gmsnet.io.packed import is_packed, packed
 from gmsnet.io.pieces import Pieces
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.vtk_ghosts import ghosts
@@ -42,6 +44,22 @@ class FilePieces:
         """Of all files that this rank has read."""
         index = [] if self.layout.index is None else [self.layout.index]
         return Stamps.of([*index, *self.opened.values()])
+
+    def write(self, target: str, points: NDArray[np.float64], comm: Any) -> None:
+        """All ranks call it: the same files with new points (n, dim) of the piece, by another name or in place.
+
+        Raises InputError, on all ranks, where they cannot be written; then none is.
+        """
+        moved = bool(comm.allreduce(int((points != self.piece.points).any())))
+        known = {path: stamp for each in comm.allgather(self.stamps.known) for path, stamp in each.items()}
+        targets = self.layout.targets(target, known)
+        files: dict[str, Any] = {
+            targets[key]: file for key, file in self.spliced(points, moved).items() if key in targets
+        }
+        if comm.rank == 0:
+            files |= self.layout.renamed(target, targets)
+        files = {path: packed(file) if is_packed(path) else file for path, file in files.items()}
+        replace_together(comm, target, files, list(targets.values()), Stamps(known.items()))
 
     def spliced(self, points: NDArray[np.float64], moved: bool) -> dict[str, Pieces]:
         """Key → each file of this rank with new points (n, dim) of the piece. moved: whether any rank moved a node."""

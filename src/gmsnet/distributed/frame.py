@@ -19,7 +19,7 @@ def framed(comm: Any, mesh: Mesh) -> Mesh:
     volumes, quads = (bool(comm.allreduce(each, mpi().LOR)) for each in (mesh.has_volumes, mesh.has_quads))
     plane = _plane(comm, mesh)
     points = mesh.points if plane is None else in_plane(mesh.points, plane)
-    box = _box(comm, points)
+    box = box_of(comm, points)
     exponent = exponent_of(box, None, mesh.single)
     return mesh.as_part(plane, (volumes, quads), exponent, np.ldexp(box, -exponent))
 
@@ -28,17 +28,17 @@ def _plane(comm: Any, mesh: Mesh) -> tuple[int, int] | None:
     """See ``Mesh.plane``."""
     if mesh.points.shape[1] == 2:
         return (0, 1)
-    low, high = _box(comm, mesh.points[:, 2:])
+    low, high = box_of(comm, mesh.points[:, 2:])
     if low == high:
         return (0, 1)
     used = np.zeros(len(mesh.points), dtype=bool)
     for block in mesh.cells:
         used[block.nodes] = True
-    box = _box(comm, 0.25 * mesh.points[used])
+    box = box_of(comm, 0.25 * mesh.points[used])
     return flat_axes(box[1] - box[0]) if np.isfinite(box).all() else (0, 1)
 
 
-def _box(comm: Any, points: Floats) -> Floats:
+def box_of(comm: Any, points: Floats) -> Floats:
     """(2, D) the least and the greatest coordinates of all ranks."""
     low, high = np.empty((2, points.shape[1]))
     comm.Allreduce(points.min(axis=0, initial=np.inf), low, mpi().MIN)

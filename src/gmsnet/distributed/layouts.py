@@ -7,13 +7,14 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
+from gmsnet.distributed.file_ranges import planned_format
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io import vtk_links
 from gmsnet.io.contents import Data
 from gmsnet.io.files import loaded
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, check_contents
 from gmsnet.io.merge import Part
-from gmsnet.io.packed import split_name
+from gmsnet.io.packed import is_packed, split_name
 from gmsnet.io.pieces import Pieces
 from gmsnet.io.split_files import Group, group_of, takes_parts, targets_of
 from gmsnet.io.split_parts import SplitFormat
@@ -155,7 +156,12 @@ def shared_format(source: str, target: str, read_as: str | None = None, write_as
     if read_as or write_as:
         return ""
     first, second = (BY_SUFFIX.get(split_name(path)[1].lower(), "") for path in (source, target))
-    return first if first == second and first in KINDS else ""
+    if first != second or not first:
+        return ""
+    if first in KINDS:
+        return first
+    alike = FORMATS[first].form_of(source) == FORMATS[first].form_of(target)
+    return planned_format(source, first) if alike and not (is_packed(source) or is_packed(target)) else ""
 
 
 def layout_of(name: str, format: str) -> Layout:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.distributed.frame import box_of
 from gmsnet.distributed.library import metis
+from gmsnet.kernels.topology.layout import morton_codes
 from gmsnet.mesh.mesh import Mesh
 
 Ranks = NDArray[np.int32]
 Floats = NDArray[np.float64]
+SAMPLES = 256  # of each rank, for each of all ranks
 
 
 def partition(mesh: Mesh, ranks: int) -> list[Ranks]:
@@ -42,6 +47,26 @@ def bisection(points: Floats, parts: int) -> Ranks:
         middle = len(order) * left // count
         stack += [(order[:middle], first, left), (order[middle:], first + left, count - left)]
     return found
+
+
+def along_curve(comm: Any, points: Floats) -> Ranks:
+    """(n,) the rank for each point (n, dim) of this rank: each rank gets about as many, near one another.
+
+    All ranks call it. Points are shared out along a Morton curve over the box of all, by samples of each rank.
+    """
+    box = box_of(comm, 0.25 * points)  # a quarter, lest differences overflow
+    codes = np.zeros(len(points), dtype=np.uint32)
+    if len(points) and np.isfinite(box).all():
+        morton_codes(np.ascontiguousarray(0.25 * points), box, codes)
+    ordered = np.sort(codes)
+    sample = ordered[np.linspace(0, len(codes) - 1, min(len(codes), SAMPLES * comm.size)).astype(np.int64)]
+    given = [each for each in comm.allgather((sample, len(codes))) if each[1]]
+    values = np.concatenate([sample[:0], *(each for each, _ in given)])
+    weights = np.concatenate([np.zeros(0), *(np.full(len(each), count / len(each)) for each, count in given)])
+    order = np.argsort(values, kind="stable")
+    reached = np.cumsum(weights[order])
+    cuts = np.searchsorted(reached, reached[-1:] * np.arange(1, comm.size) / comm.size) if len(values) else []
+    return np.searchsorted(values[order][cuts], codes, side="right").astype(np.int32)
 
 
 def _by_metis(library: object, mesh: Mesh, ranks: int) -> Ranks:

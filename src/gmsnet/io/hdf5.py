@@ -7,6 +7,7 @@ library says of a damaged file is said as a FormatError.
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -70,6 +71,21 @@ class File:
         self.budget = ANYWAY + PER_BYTE * len(data)
         with _said_of(""):
             self.root = Node(self, "", self.h5py.File(io.BytesIO(data[:]), "r"))
+
+    @classmethod
+    @contextmanager
+    def opened(cls, path: str) -> Iterator[File]:
+        """A file that is not in memory, of which some numbers are read. Raises FormatError for a damaged one."""
+        file = cls.__new__(cls)
+        file.h5py, file.data = library(), b""
+        file.budget = ANYWAY + PER_BYTE * os.path.getsize(path)
+        with _said_of(""):
+            handle = file.h5py.File(path, "r")
+        try:
+            file.root = Node(file, "", handle)
+            yield file
+        finally:
+            handle.close()
 
     def take(self, path: str, count: int) -> None:
         """Counts numbers that are about to be read. Raises FormatError where they are too many."""
@@ -177,6 +193,23 @@ class Node:
             self.file.take(self.path, int(np.prod(shape, dtype=object)) if shape else 1)
             found: NDArray[Any] = np.asarray(self.thing[()])
         return found
+
+    def some(self, first: int, last: int) -> NDArray[np.int64]:
+        """Some of the whole numbers of a data set with one number in a row. Raises FormatError for another one."""
+        with _said_of(self.path):
+            if self.thing.dtype.kind not in "iu" or self.thing.ndim != 1:
+                raise FormatError(f"{shown(self.path)}: a list of whole numbers was expected")
+            return np.asarray(self.thing[first:last]).astype(np.int64)
+
+    def dtype(self) -> str:
+        """The type of the numbers of a data set, as NumPy writes it."""
+        with _said_of(self.path):
+            return str(self.thing.dtype.str)
+
+    def is_elsewhere(self) -> bool:
+        """Whether the values of a data set are kept in another file."""
+        with _said_of(self.path):
+            return bool(self.thing.external or self.thing.is_virtual)
 
     def numeric(self) -> bool:
         """Whether a data set is of whole numbers or of floats of four or eight bytes."""

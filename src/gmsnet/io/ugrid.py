@@ -7,6 +7,7 @@ endian), the digit for the bytes of a coordinate. What follows the volumes is ke
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
@@ -22,6 +23,7 @@ from gmsnet.io.cells import distinct, sealed
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
+from gmsnet.io.ranges import Plan, Ranges, Rows, Table
 from gmsnet.io.text import Text
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 from gmsnet.mesh.cell_block import CellBlock
@@ -49,6 +51,7 @@ class Form(NamedTuple):
         return 28 + 12 * self.records
 
 
+HEAD = 44  # bytes that tell the form
 FORMS = {
     f"{little}{how}{real}": Form("<" if little else ">", real, how == "r")
     for real in (8, 4) for how in "br" for little in ("", "l")
@@ -97,24 +100,51 @@ def _table(words: Words, kind: str, count: int, points: int) -> NDArray[np.int64
     return sealed(np.ascontiguousarray(nodes[:, PYRAMID]) if kind == "pyramid" else nodes)
 
 
-def form_of(data: Data) -> str:
+def plan(file: Ranges) -> Plan | None:
+    """How the numbers of a binary file lie; None of a text, and where the name says another form."""
+    head = bytes(file.read(0, min(file.size, HEAD)))
+    key = form_of(head, file.size)
+    told = os.path.basename(file.path).split(".")[-2:-1]
+    if key == _TEXT or (told and told[0].lower() in FORMS and told[0].lower() != key):
+        return None
+    form, at = FORMS[key], FORMS[key].head
+    counts = struct.unpack_from(f"{form.order}7i", head, 4 * form.records)
+    whole = f"{form.order}i4"
+    points = Rows(at, counts[0], 3 * form.real, f"{form.order}f{form.real}", 3)
+    at += 3 * form.real * counts[0]
+    tables = []
+    for kind, count in zip(KINDS, counts[1:], strict=True):
+        width = nodes_of(kind)
+        if kind == KINDS[FACES]:  # behind the numbers of the surfaces
+            at += 4 * (counts[1] + counts[2])
+        tables.append(Table(kind, Rows(at, count, 4 * width, whole, width), 1, PYRAMID if kind == "pyramid" else None))
+        at += 4 * width * count
+    surfaces = tables[FACES].nodes.start - 4 * (counts[1] + counts[2])
+    for k in range(FACES):
+        tables[k] = tables[k]._replace(regions=Rows(surfaces, counts[1 + k], 4, whole))
+        surfaces += 4 * counts[1 + k]
+    return Plan(points, [[table] for table in tables if table.nodes.rows], form.real == 4)
+
+
+def form_of(data: Data, size: int | None = None) -> str:
     """The form of a file, "" for text: that whose counts give the length of the file, else b8 or lb8 if it is longer.
 
-    Raises FormatError where none fits.
+    size: of the file, where ``data`` is only its head. Raises FormatError where none fits.
     """
+    size = len(data) if size is None else size
     if not any(byte < 9 or byte > 126 for byte in bytes(data[:28])):
         return _TEXT
     lengths = {key: _length(data, form) for key, form in FORMS.items()}
     for key, length in lengths.items():
-        if length == len(data):
+        if length == size:
             return key
     for key, length in lengths.items():
-        if length is not None and length < len(data) and FORMS[key].real == 8 and not FORMS[key].records:
+        if length is not None and length < size and FORMS[key].real == 8 and not FORMS[key].records:
             return key
     known = [length for length in lengths.values() if length is not None]
     if not known:
         raise FormatError("byte 0: seven counts were expected: the file is damaged, or no UGRID mesh")
-    return fail_at(len(data), f"the file ends, but its counts ask for {min(known)} bytes: is it cut off?")
+    return fail_at(size, f"the file ends, but its counts ask for {min(known)} bytes: is it cut off?")
 
 
 def _length(data: Data, form: Form) -> int | None:

@@ -1,0 +1,216 @@
+"""One binary file that ranks share: each reads some of its cells, and none holds the whole.
+
+The first rank writes. It copies the file, and asks for the coordinates of some rows at a time the rank that has them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.distributed.agreement import agreed, everywhere, raise_everywhere
+from gmsnet.distributed.by_rank import by_rank
+from gmsnet.distributed.partition import along_curve
+from gmsnet.distributed.piece import Cells, Piece
+from gmsnet.errors import FormatError, GmsnetError, InputError
+from gmsnet.io.atomic import replace_files
+from gmsnet.io.formats import FORMATS
+from gmsnet.io.pieces import Piece as Bytes
+from gmsnet.io.ranges import AT_ONCE, Plan, Ranges
+from gmsnet.io.stamps import Stamps
+
+PLANNED = ("ugrid", "vtkhdf")  # formats whose files can tell how their numbers lie
+Floats = NDArray[np.float64]
+Ids = NDArray[np.int64]
+
+
+def plan_of(file: Ranges, format: str) -> Plan | None:
+    """How the numbers of a file lie; None where only a reader of the whole can tell. Raises FormatError."""
+    plan = cast(Callable[[Ranges], Plan | None], import_module(f"gmsnet.io.{FORMATS[format].key}").plan)
+    try:
+        return plan(file)
+    except FormatError as error:
+        raise FormatError(f"{file.path}: {error}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class FileRanges:
+    """What one rank has of a file. piece: its share of the cells, and their nodes. rows: (ranks + 1,) where the rows of
+    coordinates begin that each rank keeps."""
+
+    file: Ranges
+    plan: Plan
+    piece: Piece
+    rows: Ids
+
+    def write(self, target: str, points: Floats, comm: Any) -> None:
+        """All ranks call it: a file of the same bytes but for the points (n, dim) of the piece that are elsewhere.
+
+        Raises InputError, on all ranks, where it cannot be written; then nothing is.
+        """
+        ids, new = self._brought(points, comm)
+        wrong = ""
+        if comm.rank == 0:
+            try:
+                replace_files(
+                    {target: self._contents(ids, new, comm)}, Stamps.of([(self.file.path, None, self.file.stamp)])
+                )
+            except GmsnetError as error:
+                wrong = str(error)
+            finally:
+                for rank in range(1, comm.size):
+                    comm.send(None, rank)
+        else:
+            while (asked := comm.recv(source=0)) is not None:
+                try:
+                    comm.send((self._rows(asked[0], asked[1], ids, new), ""), 0)
+                except GmsnetError as error:
+                    comm.send((b"", str(error)), 0)
+        self.file.close()
+        raise_everywhere(comm, wrong)
+
+    def _brought(self, points: Floats, comm: Any) -> tuple[Ids, Floats]:
+        """Of the rows that this rank keeps: the nodes that have moved on any rank, ascending, and where they are."""
+        rows = np.flatnonzero((points != self.piece.points).any(axis=1))
+        homes = np.searchsorted(self.rows, self.piece.ids[rows], side="right") - 1
+        lists = by_rank(homes, comm.size)
+        came = comm.alltoall([(self.piece.ids[rows[some]], points[rows[some]]) for some in lists])
+        ids, first = np.unique(np.concatenate([each for each, _ in came]), return_index=True)
+        return ids, np.concatenate([each for _, each in came])[first]
+
+    def _contents(self, ids: Ids, new: Floats, comm: Any) -> Iterator[Bytes]:
+        """The file, on the first rank."""
+        table, at = self.plan.points, 0
+        step = max(1, AT_ONCE // table.stride)
+        yield from self._copied(0, table.start)
+        for rank in range(comm.size):
+            for begin in range(int(self.rows[rank]), int(self.rows[rank + 1]), step):
+                end = min(begin + step, int(self.rows[rank + 1]))
+                if rank == 0:
+                    yield self._rows(begin, end, ids, new)
+                    continue
+                comm.send((begin, end), rank)
+                found, wrong = comm.recv(source=rank)
+                if wrong:
+                    raise InputError(wrong)
+                yield found
+        at = table.start + table.rows * table.stride
+        yield from self._copied(at, self.file.size)
+        self.file.check()
+
+    def _copied(self, begin: int, end: int) -> Iterator[Bytes]:
+        for at in range(begin, end, AT_ONCE):
+            yield bytes(self.file.read(at, min(AT_ONCE, end - at)))
+
+    def _rows(self, begin: int, end: int, ids: Ids, new: Floats) -> bytes:
+        """The bytes of some rows of coordinates, those of moved nodes in their new places."""
+        table = self.plan.points
+        data = self.file.read(table.start + begin * table.stride, (end - begin) * table.stride)
+        size = np.dtype(table.dtype).itemsize
+        values = np.ndarray((end - begin, table.width), table.dtype, data, 0, (table.stride, size))
+        first, last = np.searchsorted(ids, [begin, end])
+        here, places = ids[first:last] - begin, new[first:last]
+        old = values[here].astype(np.float64)
+        values[here] = np.where(places != old, places, old)
+        return bytes(data)
+
+
+def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
+    """All ranks call it; each reads as many cells of each block as the others.
+
+    The mesh is that of ``gmsnet.read``. Raises InputError, on all ranks, with what it says.
+    """
+    file = everywhere(comm, lambda: Ranges(name))
+    try:
+        agreed(comm, (file.stamp.size, file.stamp.modified), f"{name}: the file")
+        plan = comm.bcast(everywhere(comm, lambda: plan_of(file, format) if comm.rank == 0 else None))
+        rows = np.array([plan.points.rows * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
+        read = everywhere(comm, lambda: _blocks(file, plan, comm))
+        mine = everywhere(comm, lambda: _points(file, plan, int(rows[comm.rank]), int(rows[comm.rank + 1])))
+        blocks = _shared_out(comm, read, *_asked(comm, rows, mine, _ids_of([block.nodes[:, 0] for block in read]))[:2])
+        ids, points, lonely = _asked(comm, rows, mine, _ids_of([block.nodes for block in blocks]))
+        alone = np.flatnonzero(lonely)
+        order = np.argsort(ids := np.concatenate([ids, alone + rows[comm.rank]]))
+        ids, points = ids[order], np.concatenate([points, mine[alone]])[order]
+        everywhere(comm, file.check)
+        none = np.zeros(len(ids), dtype=bool)
+        piece = everywhere(comm, lambda: Piece(ids, points, none, tuple(blocks), plan.single))
+    except BaseException:
+        file.close()
+        raise
+    return FileRanges(file, plan, piece, rows)
+
+
+def _blocks(file: Ranges, plan: Plan, comm: Any) -> list[Cells]:
+    try:
+        return [
+            Cells(tables[0].kind, *plan.cells(file, block, comm.rank, comm.size))
+            for block, tables in enumerate(plan.blocks)
+        ]
+    except FormatError as error:
+        raise FormatError(f"{file.path}: {error}") from None
+    except MemoryError:
+        raise InputError(f"{file.path}: there is not enough memory for this mesh") from None
+
+
+def _points(file: Ranges, plan: Plan, first: int, last: int) -> Floats:
+    found = plan.points.of(file, first, last).astype(np.float64)
+    if not np.isfinite(found).all():
+        row = first + int(np.argmin(np.isfinite(found).all(axis=1)))
+        raise FormatError(f"{file.path}: byte {plan.points.start + row * plan.points.stride}: a coordinate of node "
+                          f"{row} (counted from 0) is not finite")  # fmt: skip
+    return found
+
+
+def _ids_of(nodes: Sequence[Ids]) -> Ids:
+    found: Ids = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *(each.ravel() for each in nodes)]))
+    return found
+
+
+def _shared_out(comm: Any, blocks: Sequence[Cells], ids: Ids, points: Floats) -> list[Cells]:
+    """The cells of each block that lie near one another, as many for each rank, in ascending order.
+
+    ids, points: the first node of each cell. So it does not matter in which order a file has its cells.
+    """
+    found = []
+    for block in blocks:
+        ranks = along_curve(comm, points[np.searchsorted(ids, block.nodes[:, 0])])
+        came = comm.alltoall([block.take(rows) for rows in by_rank(ranks, comm.size)])
+        parts = (np.concatenate([getattr(each, name) for each in came]) for name in ("nodes", "regions", "numbers"))
+        whole = Cells(block.kind, *parts)
+        found.append(whole.take(np.argsort(whole.numbers)))
+    return found
+
+
+def _asked(comm: Any, rows: Ids, mine: Floats, needed: Ids) -> tuple[Ids, Floats, NDArray[np.bool_]]:
+    """Some nodes (n,), ascending, their points, and which rows of this rank no rank asks for."""
+    lists = by_rank(np.searchsorted(rows, needed, side="right") - 1, comm.size)
+    start, asked = int(rows[comm.rank]), comm.alltoall([needed[some] for some in lists])
+    lonely = np.ones(len(mine), dtype=bool)
+    for each in asked:
+        lonely[each - start] = False
+    answers = comm.alltoall([mine[each - start] for each in asked])
+    points = np.empty((len(needed), mine.shape[1]))
+    for some, places in zip(lists, answers, strict=True):
+        points[some] = places
+    return needed, points, lonely
+
+
+def planned_format(source: str, format: str) -> str:
+    """The format where a file of it can be shared by ranks, "" where not."""
+    if format not in PLANNED or not os.path.isfile(source):
+        return ""
+    entry, file = FORMATS[format], Ranges(source)
+    try:
+        plan = plan_of(file, format)
+    except GmsnetError:  # told by the reader of the whole
+        plan = None
+    finally:
+        file.close()
+    return entry.key if plan is not None else ""

@@ -1,0 +1,130 @@
+"""Binary files of which a process reads and writes ranges only, as ranks do that share one: how their numbers lie.
+
+A format that can tell so without reading the numbers has a function ``plan(file) -> Plan | None``. What a rank makes of
+a plan is the mesh that the format's reader makes of the whole file.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.errors import FormatError, InputError
+from gmsnet.io.atomic import reason
+from gmsnet.io.contents import refuse_unless_regular
+from gmsnet.io.stamps import Stamp
+
+AT_ONCE = 1 << 22  # bytes that are copied together
+
+
+class Ranges:
+    """A context manager: a file that is open for reading, with the stamp that it has then."""
+
+    path: str
+    stamp: Stamp
+    size: int
+
+    def __init__(self, path: str) -> None:
+        refuse_unless_regular(path)
+        self.path = path
+        try:
+            self._descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {reason(error)}") from None
+        self.stamp = Stamp.of(os.fstat(self._descriptor))
+        self.size = self.stamp.size
+
+    def close(self) -> None:
+        """The file is not needed any more."""
+        os.close(self._descriptor)
+
+    def read(self, begin: int, count: int) -> bytearray:
+        """``count`` bytes from ``begin`` on. Raises FormatError where the file ends before."""
+        found, at = bytearray(count), 0
+        try:
+            while at < count and (some := os.preadv(self._descriptor, [memoryview(found)[at:]], begin + at)):
+                at += some
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be read: {reason(error)}") from None
+        if at < count:
+            raise FormatError(f"byte {begin + at}: the file ends, is it cut off?")
+        return found
+
+    def check(self) -> None:
+        """Raises InputError where others have written into the file meanwhile."""
+        if Stamp.of(os.fstat(self._descriptor)) != self.stamp:
+            raise InputError(f"{self.path}: the file changed while it was read: read it again once it is finished")
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of binary numbers: row k has ``width`` numbers of the type from the byte start + k · stride on."""
+
+    start: int
+    rows: int
+    stride: int
+    dtype: str
+    width: int = 1
+
+    def of(self, file: Ranges, first: int, last: int) -> NDArray[np.generic]:
+        """(last − first, width) the numbers of some rows."""
+        count, size = last - first, np.dtype(self.dtype).itemsize
+        if count <= 0:
+            return np.empty((0, self.width), dtype=self.dtype)
+        data = file.read(self.start + first * self.stride, (count - 1) * self.stride + self.width * size)
+        return np.ndarray((count, self.width), self.dtype, data, 0, (self.stride, size))
+
+
+class Table(NamedTuple):
+    """Cells of one kind. nodes: of each, counted from ``base``. order: see Kind. region: of all of them, where
+    ``regions`` does not tell that of each."""
+
+    kind: str
+    nodes: Rows
+    base: int
+    order: tuple[int, ...] | None = None
+    region: int = 0
+    regions: Rows | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """points: the coordinates, three to a row. blocks: of the mesh, each of one table or several of one kind. single:
+    see Mesh."""
+
+    points: Rows
+    blocks: Sequence[Sequence[Table]]
+    single: bool
+
+    def cells(self, file: Ranges, block: int, rank: int, ranks: int) -> tuple[NDArray[np.int64], ...]:
+        """Nodes (n, k), regions (n,) and numbers (n,) of the cells of a block that are the share of one of so many.
+
+        Raises FormatError where a cell names a node that is not there.
+        """
+        nodes, regions, numbers, before = [], [], [], 0
+        for table in self.blocks[block]:
+            first, last = (table.nodes.rows * part // ranks for part in (rank, rank + 1))
+            listed = table.nodes.of(file, first, last).astype(np.int64) - table.base
+            self._check(listed, table, first)
+            nodes.append(listed if table.order is None else listed[:, table.order])
+            own = None if table.regions is None else table.regions.of(file, first, last)
+            alike = np.full(last - first, table.region, dtype=np.int64)
+            regions.append(alike if own is None else own[:, 0].astype(np.int64))
+            numbers.append(before + np.arange(first, last))
+            before += table.nodes.rows
+        return np.concatenate(nodes), np.concatenate(regions), np.concatenate(numbers)
+
+    def _check(self, nodes: NDArray[np.int64], table: Table, first: int) -> None:
+        wrong = ((nodes < 0) | (nodes >= self.points.rows)).any(axis=1)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            node = nodes[row][(nodes[row] < 0) | (nodes[row] >= self.points.rows)][0]
+            raise FormatError(
+                f"byte {table.nodes.start + (first + row) * table.nodes.stride}: a cell names the node {node}, but the "
+                f"nodes are 0 to {self.points.rows - 1} (counted from 0)"
+            )

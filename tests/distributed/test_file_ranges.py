@@ -1,0 +1,259 @@
+"""Binary files that ranks share: each reads some of the cells, and what is written has the bytes of one process."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import gmsnet
+from gmsnet.distributed import file_ranges
+from gmsnet.distributed.file_ranges import planned_format, read_ranges
+from gmsnet.distributed.file_run import FileTask, smooth_file
+from gmsnet.distributed.gathered import gathered
+from gmsnet.distributed.layouts import shared_format
+from gmsnet.errors import InputError
+from gmsnet.generate import random_mesh, random_volume, recombine
+from gmsnet.io import ugrid
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.run.options import SmoothOptions
+
+pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+from distributed.test_file_pieces import saved
+from support.comm import together
+
+SIZE = 4  # cells along the edge of a block
+
+
+def mixed() -> Mesh:
+    """A block of hexahedra, wedges, pyramids and tetrahedra, whose inner nodes are thrown; cells in a wild order, faces
+    of two surfaces, and a node that no cell has."""
+    random, wide = np.random.default_rng(4), SIZE + 1
+    points = np.array([[x, y, z] for z in range(wide) for y in range(wide) for x in range(wide)], dtype=np.float64)
+    inner = ((points > 0) & (points < SIZE)).all(axis=1)
+    points[inner] += random.uniform(-0.2, 0.2, (int(inner.sum()), 3))
+    found: dict[str, list[list[int]]] = {"tetra": [], "pyramid": [], "wedge": [], "hexahedron": []}
+    centres = []
+    for x, y, z in np.ndindex(SIZE, SIZE, SIZE):
+        a, b, c, d = (i + wide * (j + wide * z) for i, j in ((x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)))
+        e, f, g, h = (k + wide * wide for k in (a, b, c, d))
+        if x == 0:  # six pyramids around its middle, of which those at the boundary are halved
+            top = len(points) + len(centres)
+            centres.append(points[[a, b, c, d, e, f, g, h]].mean(axis=0))
+            sides = [[a, b, c, d], [e, h, g, f], [a, e, f, b], [c, g, h, d], [b, f, g, c], [a, d, h, e]]
+            found["pyramid"] += [[*side, top] for side in sides[:5]]
+            found["tetra"] += [[a, d, h, top], [a, h, e, top]]
+        elif x == 1:
+            found["wedge"] += [[a, b, c, e, f, g], [a, c, d, e, g, h]]
+        else:
+            found["hexahedron"].append([a, b, c, d, e, f, g, h])
+    points = np.concatenate([points, centres, [[9.0, 9.0, 9.0]]])
+    faces = {"triangle": [cell[:3] for cell in found["tetra"] if (points[cell[:3], 0] == 0).all()],
+             "quad": [[cell[1], cell[2], cell[6], cell[5]] for cell in found["hexahedron"]
+                      if (points[[cell[1], cell[2], cell[6], cell[5]], 0] == SIZE).all()]}  # fmt: skip
+    blocks = [CellBlock(kind, np.array(cells), np.arange(len(cells)) % 2 + 3) for kind, cells in faces.items()]
+    for kind, cells in found.items():
+        rows = random.permutation(np.array(cells))
+        blocks.append(CellBlock(kind, rows, np.zeros(len(rows), dtype=np.int64)))
+    return Mesh(points, tuple(blocks))
+
+
+def save_vtkhdf(mesh: Mesh, path: Path, kind: type = np.float64, **how: object) -> Path:
+    codes = {"line": 3, "triangle": 5, "quad": 9, "tetra": 10, "wedge": 13}
+    with h5py.File(path, "w") as file:
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"], root.attrs["Type"] = [1, 0], np.bytes_("UnstructuredGrid")
+        nodes = np.concatenate([block.nodes.ravel() for block in mesh.cells])
+        sizes = np.concatenate([np.full(len(block.nodes), block.nodes.shape[1]) for block in mesh.cells])
+        for name, value in (("Points", len(mesh.points)), ("Cells", len(sizes)), ("ConnectivityIds", len(nodes))):
+            root.create_dataset(f"NumberOf{name}", data=[value])
+        points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1])))
+        root.create_dataset("Points", data=points.astype(kind), **how)
+        root.create_dataset("Connectivity", data=nodes)
+        root.create_dataset("Offsets", data=np.concatenate([[0], np.cumsum(sizes)]))
+        root.create_dataset("Types", data=np.concatenate([np.full(len(b.nodes), codes[b.kind]) for b in mesh.cells]))
+    return path
+
+
+def save_ugrid(mesh: Mesh, path: Path) -> Path:
+    gmsnet.write(mesh, path)
+    return path
+
+
+SAVED = {
+    **{form: lambda folder, form=form: save_ugrid(mixed(), folder / f"a.{form}.ugrid") for form in ugrid.FORMS},
+    "b8, and more": lambda folder: _longer(save_ugrid(mixed(), folder / "a.b8.ugrid")),
+    "faces": lambda folder: save_ugrid(_in_space(random_mesh(300, seed=1)), folder / "a.lb8.ugrid"),
+    "vtkhdf": lambda folder: save_vtkhdf(random_volume(200, seed=1), folder / "a.vtkhdf"),
+    "vtkhdf, single": lambda folder: save_vtkhdf(_in_runs(), folder / "a.vtkhdf", np.float32),
+}
+
+
+def _longer(path: Path) -> Path:
+    path.write_bytes(path.read_bytes() + b"what follows")
+    return path
+
+
+def _in_space(mesh: Mesh) -> Mesh:
+    return Mesh(np.column_stack([mesh.points, np.full(len(mesh.points), 0.5)]), mesh.cells)
+
+
+def _in_runs() -> Mesh:
+    """Triangles, quads and triangles again."""
+    whole = recombine(random_mesh(300, seed=3))
+    of = {block.kind: block.nodes for block in whole.cells}
+    triangles, quads = of["triangle"], of["quad"]
+    some = len(triangles) // 2
+    parts = (("triangle", triangles[:some]), ("quad", quads), ("triangle", triangles[some:]))
+    return Mesh(
+        whole.points, tuple(CellBlock(kind, nodes, np.zeros(len(nodes), dtype=np.int64)) for kind, nodes in parts)
+    )
+
+
+def format_of(kind: str) -> str:
+    return "vtkhdf" if kind.startswith("vtkhdf") else "ugrid"
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3, 7])
+@pytest.mark.parametrize("kind", SAVED)
+def test_ranks_read_the_mesh_of_one_process(kind: str, ranks: int, tmp_path: Path) -> None:
+    path = SAVED[kind](tmp_path)
+    mesh = gmsnet.read(path)
+    assert planned_format(str(path), format_of(kind)) == format_of(kind)
+    whole = together(ranks, lambda comm: gathered(read_ranges(str(path), format_of(kind), comm).piece, comm))[0]
+    assert whole.ids.tolist() == list(range(len(mesh.points)))
+    assert whole.mesh.points.tobytes() == mesh.points.tobytes()
+    assert whole.mesh.single == mesh.single
+    assert [block.kind for block in whole.mesh.cells] == [block.kind for block in mesh.cells]
+    for mine, block in zip(whole.mesh.cells, mesh.cells, strict=True):
+        assert mine.nodes.tolist() == block.nodes.tolist()
+        assert mine.regions.tolist() == block.regions.tolist()
+
+
+@pytest.mark.parametrize(("ranks", "method"), [(1, "barrier"), (2, "auto"), (3, "laplacian"), (5, "barrier")])
+@pytest.mark.parametrize("kind", ["lb8", "r4", "b8, and more", "faces", "vtkhdf", "vtkhdf, single"])
+def test_the_bytes_of_a_serial_run(kind: str, ranks: int, method: str, tmp_path: Path) -> None:
+    path = SAVED[kind](tmp_path)
+    before, end = path.read_bytes(), path.name.removeprefix("a")
+    serial, shared = tmp_path / f"serial{end}", tmp_path / f"shared{end}"
+    gmsnet.write(gmsnet.smooth(gmsnet.read(path), method, max_sweeps=4).mesh, serial)
+    options = SmoothOptions(method=method, max_sweeps=4, threads=1)
+    for target in (shared, path):
+        task = FileTask(str(path), str(target), format_of(kind), options)
+        together(ranks, lambda comm, task=task: smooth_file(task, comm))
+        assert target.read_bytes() == serial.read_bytes() != before
+
+
+def test_each_rank_has_cells_that_lie_together(tmp_path: Path) -> None:
+    """Though a file lists them in a wild order; and no rank has all the nodes."""
+    mesh = random_volume(2000, seed=2)
+    rows = np.random.default_rng(0).permutation(len(mesh.cells[0].nodes))
+    wild = Mesh(mesh.points, (CellBlock("tetra", mesh.cells[0].nodes[rows], np.zeros(len(rows), dtype=np.int64)),))
+    path = save_ugrid(wild, tmp_path / "a.lb8.ugrid")
+    pieces = together(4, lambda comm: read_ranges(str(path), "ugrid", comm).piece)
+    assert sum(len(piece.blocks[0].nodes) for piece in pieces) == len(rows)
+    for piece in pieces:
+        assert len(piece.blocks[0].nodes) < 0.4 * len(rows)
+        assert len(piece.ids) < 0.5 * len(mesh.points)
+
+
+def test_more_ranks_than_cells(tmp_path: Path) -> None:
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    block = CellBlock("tetra", np.array([[0, 1, 2, 3]]), np.zeros(1, dtype=np.int64))
+    path = save_ugrid(Mesh(points, (block,)), tmp_path / "a.b8.ugrid")
+    pieces = together(6, lambda comm: read_ranges(str(path), "ugrid", comm).piece)
+    assert sum(len(piece.blocks[0].nodes) for piece in pieces) == 1
+    assert np.unique(np.concatenate([piece.ids for piece in pieces])).tolist() == [0, 1, 2, 3]
+
+
+def test_which_files_are_shared(tmp_path: Path) -> None:
+    path = str(save_ugrid(mixed(), tmp_path / "a.lb8.ugrid"))
+    assert shared_format(path, str(tmp_path / "b.lb8.ugrid")) == "ugrid"
+    assert shared_format(path, path) == "ugrid"
+    for target in ("b.b8.ugrid", "b.ugrid", "b.lb8.ugrid.gz", "b.vtu"):
+        assert shared_format(path, str(tmp_path / target)) == ""
+    text = str(save_ugrid(mixed(), tmp_path / "a.ugrid"))
+    assert shared_format(text, str(tmp_path / "b.ugrid")) == ""
+    packed = str(save_vtkhdf(random_mesh(50, seed=1), tmp_path / "p.vtkhdf", compression="gzip"))
+    assert shared_format(packed, str(tmp_path / "b.vtkhdf")) == ""
+    assert shared_format(str(tmp_path / "none.lb8.ugrid"), str(tmp_path / "b.lb8.ugrid")) == ""
+
+
+@pytest.mark.parametrize("name", ["PointData/fixed", "CellData/material", "CellData/vtkGhostType"])
+def test_fields_that_mean_more_are_for_the_reader_of_the_whole(name: str, tmp_path: Path) -> None:
+    mesh = random_mesh(50, seed=1)
+    path = save_vtkhdf(mesh, tmp_path / "a.vtkhdf")
+    assert planned_format(str(path), "vtkhdf") == "vtkhdf"
+    with h5py.File(path, "a") as file:
+        rows = len(mesh.points) if name.startswith("Point") else sum(len(block.nodes) for block in mesh.cells)
+        file["VTKHDF"].create_dataset(name, data=np.zeros(rows, dtype=np.int32))
+    assert planned_format(str(path), "vtkhdf") == ""
+
+
+def heard(ranks: int, path: Path, kind: str, options: SmoothOptions | None = None) -> list[str]:
+    """What all ranks say that fail to smooth a file in place."""
+    found, options = list[str](), options or SmoothOptions(method="barrier", max_sweeps=2, threads=1)
+
+    def one(comm):
+        with pytest.raises(InputError) as raised:
+            smooth_file(FileTask(str(path), str(path), kind, options), comm)
+        found.append(str(raised.value))
+
+    together(ranks, one)
+    assert len(found) == ranks
+    assert len(set(found)) == 1
+    return found
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda data: data[:-8], r"a.lb8.ugrid: .*cut off"),
+        (
+            lambda data: data[:-4] + np.int32(10**6).tobytes(),
+            r"byte \d+: a cell names the node 999999, but",
+        ),
+        (lambda data: data[:28] + np.float64("nan").tobytes() + data[36:], r"byte 28: a coordinate of node 0 .*finite"),
+    ],
+)
+def test_damage_is_named_on_all_ranks(damage, said: str, tmp_path: Path) -> None:
+    path = save_ugrid(mixed(), tmp_path / "a.lb8.ugrid")
+    path.write_bytes(damage(path.read_bytes()))
+    before = saved(tmp_path)
+    assert re.search(said, heard(3, path, "ugrid")[0])
+    assert saved(tmp_path) == before
+
+
+def test_a_file_that_others_change_is_not_overwritten(tmp_path: Path, monkeypatch) -> None:
+    path = save_ugrid(mixed(), tmp_path / "a.lb8.ugrid")
+    write = file_ranges.FileRanges.write
+
+    def changed(self, target, points, comm):
+        if comm.rank == 0:
+            path.write_bytes(path.read_bytes()[::-1])
+        comm.allgather(None)
+        write(self, target, points, comm)
+
+    monkeypatch.setattr(file_ranges.FileRanges, "write", changed)
+    before = path.read_bytes()
+    assert "changed" in heard(3, path, "ugrid")[0]
+    assert saved(tmp_path) == {path.name: before[::-1]}
+
+
+@pytest.mark.parametrize("rank", [0, 1])
+def test_a_failure_of_one_rank_leaves_the_file(rank: int, tmp_path: Path, monkeypatch) -> None:
+    path = save_ugrid(mixed(), tmp_path / "a.lb8.ugrid")
+    before, rows = saved(tmp_path), file_ranges.FileRanges._rows
+
+    def broken(self, begin, end, ids, new):
+        if (begin and rank) or (not begin and not rank):
+            raise InputError("the disk is broken")
+        return rows(self, begin, end, ids, new)
+
+    monkeypatch.setattr(file_ranges.FileRanges, "_rows", broken)
+    assert heard(3, path, "ugrid")[0] == "the disk is broken"
+    assert saved(tmp_path) == before
