@@ -149,7 +149,8 @@ def _check_splice(mesh: Mesh, files: Mapping[str, bytes], folder: Path, random: 
     if same != {name: files[name] for name in same}:
         raise Broken("the same points do not give the same file")
     new = moved(mesh, random)
-    if source.shares or FORMATS[source.format].parts:  # points of one piece at one place, which are held: apart, they would be other nodes
+    if source.shares or FORMATS[source.format].parts:
+        # Points of one piece at one place are held: apart, they would be other nodes.
         held = np.concatenate([[], *(b.nodes.ravel() for b in mesh.cells if b.kind == "vertex")]).astype(int)
         new[held] = mesh.points[held]
     again = gmsnet.read(save(source.format, _spliced(source, new), folder / "moved"), source.format)
