@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from support.contracts import contents, spliced
+from support.contracts import check_splice, contents, spliced
 from support.damage import (
     ENDS,
     FEW,
@@ -45,6 +45,7 @@ MARKER_ELEMS= 2
 MARKER_TAG= far field
 MARKER_ELEMS= 0
 """
+MARKERS = PLAIN[PLAIN.index(b"NMARK=") :]
 
 
 def test_a_plain_file() -> None:
@@ -127,7 +128,8 @@ def test_a_cut_file_is_refused_or_the_same(case: tuple[bytes, dict[str, object]]
 
 
 def test_a_cut_plain_file_is_refused_or_the_same() -> None:
-    check_cuts(su2, {".su2": PLAIN}, ".su2", lambda rest: False)
+    """Where markers begin a file without any might end: they are lost already."""
+    check_cuts(su2, {".su2": PLAIN}, ".su2", lambda left: left == PLAIN.removesuffix(MARKERS))
 
 
 @given(st.data())
@@ -149,7 +151,7 @@ def test_garbage_is_refused_in_words(data: bytes) -> None:
         (b"NDIME= 2\n", b"", r"^NDIME missing: the file is cut off"),
         (b"NELEM= 2", b"NELEM= 3", r"line 2: NELEM= 3 is followed by 2 rows instead of 3"),
         (b"NPOIN= 5", b"NPOIN= 4", r"line 5: NPOIN= 4 is followed by 5 rows instead of 4"),
-        (b"NMARK= 2\n", b"", r"^NMARK missing: .*a mesh without markers says NMARK= 0"),
+        (b"NMARK= 2\n", b"", r"^NMARK missing: the file is cut off"),
         (b"NMARK= 2", b"NMARK= 3", r"NMARK announces 3 markers, but the file has 2"),
         (b"NMARK= 2", b"NPOIN= 0\nNMARK= 2", r"line 11: NPOIN is given twice"),
         (b"NMARK= 2", b"SEND_RECV= 1", r"line 11: SEND_RECV: this is one part of a partitioned mesh"),
@@ -224,3 +226,14 @@ def test_conversion_names_the_third_coordinate_and_data() -> None:
         su2.write(Mesh(curved, (block,)))
     with pytest.raises(FormatError, match="SU2 cannot hold cells of type 'tetra10'"):
         su2.write(Mesh(points, (CellBlock("tetra10", [range(10)], [0]),)))
+
+
+def test_without_markers_their_number_may_be_left_out() -> None:
+    """As Gmsh does where there are no physical groups."""
+    data = PLAIN.removesuffix(MARKERS)
+    parsed = su2.read({".su2": data})
+    assert {block.dimension for block in parsed.cells} == {2}
+    assert parsed.region_names == {}
+    check_splice(su2, data)
+    with pytest.raises(FormatError, match=r"NPOIN= 5 is followed by 4 rows"):
+        su2.read({".su2": data[: data.rstrip().rindex(b"\n") + 1]})

@@ -39,7 +39,7 @@ COUNTS = {"NDIME": "dimensions", "NZONE": "zones", "NPOIN": "points", "NELEM": "
 COMMENT = b"%"
 MOST_KEYWORDS = 100_000  # each costs time; a mesh has two for each marker
 _LINE_END = re.compile(rb"[\r\n]")
-REQUIRED = ("NDIME", "NPOIN", "NELEM", "NMARK")  # SU2 wants all four; without NMARK a cut could not be seen
+REQUIRED = ("NDIME", "NPOIN", "NELEM", "NMARK")
 ROWS = ("NPOIN", "NELEM", "MARKER_ELEMS")
 
 
@@ -69,10 +69,11 @@ def read(files: Mapping[str, Data]) -> Parsed:
     """See Format. Markers become cells of fewer dimensions whose region is named; cells of the domain have region 0."""
     text = Text(files[".su2"], COMMENT)
     found = _collect(text)
+    if not found.markers and text.data[len(text.data) - 1 :] in (b"\n", b"\r"):  # else the file may be cut off
+        found.counts.setdefault("NMARK", 0)  # Gmsh leaves it out where there is no physical group
     missing = [key for key in REQUIRED if key not in found.counts]
     if missing or found.points is None or found.elements is None:
-        hint = " (a mesh without markers says NMARK= 0)" if missing == ["NMARK"] else ""
-        raise FormatError(f"{', '.join(missing)} missing: the file is cut off or no SU2 mesh{hint}")
+        raise FormatError(f"{', '.join(missing)} missing: the file is cut off or no SU2 mesh")
     if found.counts["NMARK"] != len(found.markers):
         raise FormatError(f"NMARK announces {found.counts['NMARK']} markers, but the file has {len(found.markers)}")
 
