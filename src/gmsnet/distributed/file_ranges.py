@@ -58,9 +58,8 @@ class FileRanges:
         wrong = ""
         if comm.rank == 0:
             try:
-                replace_files(
-                    {target: self._contents(ids, new, comm)}, Stamps.of([(self.file.path, None, self.file.stamp)])
-                )
+                stamps = Stamps.of([(self.file.path, None, self.file.stamp)])
+                replace_files({target: self._contents(ids, new, comm)}, stamps)
             except GmsnetError as error:
                 wrong = str(error)
             finally:
@@ -86,7 +85,7 @@ class FileRanges:
 
     def _contents(self, ids: Ids, new: Floats, comm: Any) -> Iterator[Bytes]:
         """The file, on the first rank."""
-        table, at = self.plan.points, 0
+        table = self.plan.points
         step = max(1, AT_ONCE // table.stride)
         yield from self._copied(0, table.start)
         for rank in range(comm.size):
@@ -100,8 +99,7 @@ class FileRanges:
                 if wrong:
                     raise InputError(wrong)
                 yield found
-        at = table.start + table.rows * table.stride
-        yield from self._copied(at, self.file.size)
+        yield from self._copied(table.start + table.rows * table.stride, self.file.size)
         self.file.check()
 
     def _copied(self, begin: int, end: int) -> Iterator[Bytes]:
@@ -133,11 +131,12 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
         rows = np.array([plan.points.rows * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
         read = everywhere(comm, lambda: _blocks(file, plan, comm))
         mine = everywhere(comm, lambda: _points(file, plan, int(rows[comm.rank]), int(rows[comm.rank + 1])))
-        blocks = _shared_out(comm, read, *_asked(comm, rows, mine, _ids_of([block.nodes[:, 0] for block in read]))[:2])
+        ids, points, _ = _asked(comm, rows, mine, _ids_of([block.nodes[:, 0] for block in read]))
+        blocks = _shared_out(comm, read, ids, points)
         ids, points, lonely = _asked(comm, rows, mine, _ids_of([block.nodes for block in blocks]))
-        alone = np.flatnonzero(lonely)
-        order = np.argsort(ids := np.concatenate([ids, alone + rows[comm.rank]]))
-        ids, points = ids[order], np.concatenate([points, mine[alone]])[order]
+        ids = np.concatenate([ids, np.flatnonzero(lonely) + rows[comm.rank]])
+        order = np.argsort(ids)
+        ids, points = ids[order], np.concatenate([points, mine[lonely]])[order]
         everywhere(comm, file.check)
         none = np.zeros(len(ids), dtype=bool)
         piece = everywhere(comm, lambda: Piece(ids, points, none, tuple(blocks), plan.single))
@@ -174,14 +173,15 @@ def _ids_of(nodes: Sequence[Ids]) -> Ids:
 
 
 def _shared_out(comm: Any, blocks: Sequence[Cells], ids: Ids, points: Floats) -> list[Cells]:
-    """The cells of each block that lie near one another, as many for each rank, in ascending order.
+    """Cells that lie near one another, as many for each rank, those of each block in ascending order.
 
     ids, points: the first node of each cell. So it does not matter in which order a file has its cells.
     """
-    found = []
-    for block in blocks:
-        ranks = along_curve(comm, points[np.searchsorted(ids, block.nodes[:, 0])])
-        came = comm.alltoall([block.take(rows) for rows in by_rank(ranks, comm.size)])
+    first = [np.searchsorted(ids, block.nodes[:, 0]) for block in blocks]
+    ranks = along_curve(comm, points[np.concatenate([np.empty(0, dtype=np.int64), *first])])
+    found, cuts = [], np.cumsum([len(each) for each in first])[:-1]
+    for block, chosen in zip(blocks, np.split(ranks, cuts), strict=True):
+        came = comm.alltoall([block.take(rows) for rows in by_rank(chosen, comm.size)])
         parts = (np.concatenate([getattr(each, name) for each in came]) for name in ("nodes", "regions", "numbers"))
         whole = Cells(block.kind, *parts)
         found.append(whole.take(np.argsort(whole.numbers)))

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 from gmsnet.errors import InputError
-from gmsnet.io.foam_case import GZ, OPENFOAM, mesh_folder
+from gmsnet.io.foam_case import GZ, OPENFOAM, file_in, mesh_folder
 from gmsnet.io.packed import is_packed, split_name
 
 SPLIT, DECOMPOSED = "split", "decomposed"  # formats
@@ -35,7 +35,7 @@ class Group(NamedTuple):
 
     def path(self, key: str) -> str:
         """Of a file, compressed where it is only so."""
-        return _path(self.root, key)
+        return file_in("", self.root + key)
 
     @property
     def paths(self) -> list[str]:
@@ -76,14 +76,14 @@ def targets_of(name: str, format: str, keys: Sequence[str], known: Collection[st
     Raises InputError where these would not be the mesh that the name stands for.
     """
     root = split_name(name)[0] if format == SPLIT else os.path.join(_case(name), "")
-    paths = {key: _path(root, key, is_packed(name)) for key in keys}
+    paths = {key: file_in("", root + key, is_packed(name)) for key in keys}
     others = (
         f"{name}: there are more parts of this name than those that are written: remove them, or name another output"
     )
     if format == SPLIT:
         if os.path.exists(name):
             raise InputError(f"{name}: this file would hide the parts {root}_1{NUMBERED}, …: name another output")
-        if any(os.path.exists(_path(root, f"_{len(keys) + 1}{NUMBERED}{gz}")) for gz in ("", GZ)):
+        if any(os.path.exists(f"{root}_{len(keys) + 1}{NUMBERED}{gz}") for gz in ("", GZ)):
             raise InputError(others)
     else:
         missing = [path for path in map(os.path.dirname, paths.values()) if not os.path.isdir(path)]
@@ -103,12 +103,6 @@ def other_points(name: str, format: str | None) -> str:
     """The path of processor folders that keep their points when the mesh of the whole case is written; "" for none."""
     first = os.path.join(_case(name), "processor0")
     return first if format == OPENFOAM and os.path.isdir(first) else ""
-
-
-def _path(root: str, key: str, gz: bool = False) -> str:
-    """Of a file: plain if it is there, else compressed if that is; else as ``gz`` says."""
-    plain = root + key
-    return plain if os.path.exists(plain) or not (gz or os.path.exists(plain + GZ)) else plain + GZ
 
 
 def _case(name: str) -> str:
