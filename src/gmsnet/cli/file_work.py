@@ -39,13 +39,14 @@ class FileWork:
     picture and of a page. command: as it was given.
 
     destination: None where there is none. dry_run: nothing is written. number: of one of several files, of which a line
-    each is printed.
+    each is printed. aside: what is to be said besides.
     """
 
     input: str
     format: str | None
     destination: Destination | None
     in_place: bool
+    aside: str
     plot: str | None
     report: str | None
     command: str

@@ -28,7 +28,12 @@ SFEPY = {"1_2": "line", "2_3": "triangle", "2_4": "quad", "3_4": "tetra", "3_8":
 VOLUMES = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron"}
 # PETSc's cells have their first facet seen from outside: where a Mesh's nodes stand in theirs (DMPlexReorderCell). Its
 # tensor products of a triangle or a quad with a segment have them as a Mesh has.
-PLEX = {4: (1, 0, 2, 3), 5: (0, 3, 2, 1, 4), 6: (0, 2, 1, 3, 4, 5), 8: (0, 3, 2, 1, 4, 5, 6, 7)}
+PLEX: dict[int, tuple[int, ...]] = {
+    4: (1, 0, 2, 3),
+    5: (0, 3, 2, 1, 4),
+    6: (0, 2, 1, 3, 4, 5),
+    8: (0, 3, 2, 1, 4, 5, 6, 7),
+}
 PLEX_TENSORS = (9, 10)  # numbers of DM_POLYTOPE
 
 

@@ -89,6 +89,7 @@ class Auto(Smoother):
     pass_gain: float
     passes: int
     least: float
+    least_before: float
     again: int
     made: int
     rounds: int
