@@ -195,6 +195,17 @@ def test_the_output_of_parts_of_gmsh(tmp_path: Path, capsys) -> None:
     assert sorted(each.name for each in (tmp_path / "out").iterdir()) == ["b_1.msh", "b_2.msh", "b_3.msh"]
 
 
+def test_a_report_and_a_picture_beside_parts(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    path, case = save_split(flat(), tmp_path, 2), block()
+    folder, copy = (save(case.parts(strips(case, 2)), tmp_path / name) for name in ("case", "copy"))
+    for source, target in ((path, tmp_path / "b.msh"), (folder, copy)):
+        made = [str(tmp_path / f"{target.stem}{suffix}") for suffix in (".html", ".png")]
+        asked = ["--report", made[0], "--plot", made[1], "--max-sweeps", "2", "--quiet"]
+        assert main(["smooth", str(source), str(target), *asked]) == 0
+        assert all(Path(each).stat().st_size > 1000 for each in made)
+
+
 def test_a_part_by_itself_holds_what_it_shares(tmp_path: Path) -> None:
     case = block()
     folder = save(case.parts(strips(case, 2)), tmp_path)

@@ -30,8 +30,8 @@ def beside(name: str, suffix: str) -> str:
 def files_of(name: str, entry: Entry) -> list[str]:
     """The files that a mesh of this name and format stands in: more than one where its format says so."""
     if entry.parts:
-        group = group_of(name, entry.key)
-        return [] if group is None else group.paths
+        group = group_of(name)  # those that are there; there need be none yet
+        return [] if group is None or group.format != entry.key else group.paths
     if (folder := case_of(name, entry.key)) is not None:
         return [file_in(folder, key, is_packed(name)) for key in entry.suffixes]
     return [name] if len(entry.suffixes) == 1 else [beside(name, suffix) for suffix in entry.suffixes]
