@@ -132,6 +132,15 @@ def test_point_data_that_hold_nodes(tmp_path, ranks, width):
         assert after[f"b/a_{k}.vtu"] == after[f"serial/b/a_{k}.vtu"]
 
 
+def test_in_place_the_file_that_names_the_others_keeps_their_names(tmp_path):
+    path = save_pieces(flat(), tmp_path, 2)
+    path.write_text(path.read_text().replace('"a/a_', '"./a/a_'))
+    before = saved(tmp_path)
+    run(tmp_path, 2, "a.pvtu")
+    after = saved(tmp_path)
+    assert {name for name in after if after[name] != before[name]} == {"a/a_0.vtu", "a/a_1.vtu"}
+
+
 def test_more_ranks_than_nodes(tmp_path):
     mesh = flat(12)
     save_pieces(mesh, tmp_path, 2)

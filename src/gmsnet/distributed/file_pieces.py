@@ -57,7 +57,7 @@ class FilePieces:
             targets[key]: file for key, file in self.spliced(points, moved).items() if key in targets
         }
         if comm.rank == 0:
-            files |= self.layout.renamed(target, targets)
+            files |= self.layout.renamed(target)
         files = {path: packed(file) if is_packed(path) else file for path, file in files.items()}
         replace_together(comm, target, files, list(targets.values()), Stamps(known.items()))
 

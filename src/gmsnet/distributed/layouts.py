@@ -55,8 +55,8 @@ class Layout(Protocol):
         """Key → path of the files to be written by a name. known: the absolute paths of those that were read."""
         ...
 
-    def renamed(self, name: str, targets: Mapping[str, str]) -> dict[str, Pieces]:
-        """Path → the file that lists the others at these paths, to be written by a name; none where there is none."""
+    def renamed(self, name: str) -> dict[str, Pieces]:
+        """Path → the file that lists the others at their targets, to be written by a name; none where there is none."""
         ...
 
 
@@ -91,19 +91,23 @@ class Listed:
 
     def targets(self, name: str, known: Collection[str]) -> dict[str, str]:
         """See Layout."""
-        in_place = os.path.abspath(name) in known
-        names = vtk_links.placed(name, {key: key for (key,) in self.parts}, in_place)
-        paths = {key: os.path.join(os.path.dirname(name), path) for key, path in names.items()}
-        lost = [path for path in paths.values() if os.path.abspath(path) in known and not in_place]
+        paths = {key: os.path.join(os.path.dirname(name), path) for key, path in self._placed(name).items()}
+        lost = [path for path in paths.values() if os.path.abspath(path) in known and not self._is_own(name)]
         if lost:
             raise InputError(f"{lost[0]}: holds the numbers of the mesh that was read: name another output")
         return paths
 
-    def renamed(self, name: str, targets: Mapping[str, str]) -> dict[str, Pieces]:
+    def renamed(self, name: str) -> dict[str, Pieces]:
         """See Layout."""
-        below = {key: os.path.relpath(path, os.path.dirname(name) or os.curdir) for key, path in targets.items()}
-        text = vtk_links.relinked(bytes(self.index[1]), below)
+        text = vtk_links.relinked(bytes(self.index[1]), self._placed(name))
         return {name: Pieces(lambda: [text])}
+
+    def _placed(self, name: str) -> dict[str, str]:
+        """The path that each file gets below the folder of the file that lists it, if this is written by a name."""
+        return vtk_links.placed(name, {key: key for (key,) in self.parts}, self._is_own(name))
+
+    def _is_own(self, name: str) -> bool:
+        return os.path.abspath(name) in (os.path.abspath(self.name), os.path.realpath(self.name))
 
 
 @dataclass(frozen=True)
@@ -141,7 +145,7 @@ class Unlisted:
         """See Layout."""
         return targets_of(name, self.group.format, self.group.keys, known)
 
-    def renamed(self, name: str, targets: Mapping[str, str]) -> dict[str, Pieces]:
+    def renamed(self, name: str) -> dict[str, Pieces]:
         """See Layout."""
         return {}
 
