@@ -23,7 +23,7 @@ AT_ONCE = 1 << 22  # bytes that are copied together
 
 
 class Ranges:
-    """A context manager: a file that is open for reading, with the stamp that it has then."""
+    """A file that is open for reading, with the stamp that it has then."""
 
     path: str
     stamp: Stamp
@@ -33,21 +33,22 @@ class Ranges:
         refuse_unless_regular(path)
         self.path = path
         try:
-            self._descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
+            self._file = open(path, "rb", buffering=0)
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {reason(error)}") from None
-        self.stamp = Stamp.of(os.fstat(self._descriptor))
+        self.stamp = Stamp.of(os.fstat(self._file.fileno()))
         self.size = self.stamp.size
 
     def close(self) -> None:
         """The file is not needed any more."""
-        os.close(self._descriptor)
+        self._file.close()
 
     def read(self, begin: int, count: int) -> bytearray:
         """``count`` bytes from ``begin`` on. Raises FormatError where the file ends before."""
         found, at = bytearray(count), 0
         try:
-            while at < count and (some := os.preadv(self._descriptor, [memoryview(found)[at:]], begin + at)):
+            self._file.seek(begin)
+            while at < count and (some := self._file.readinto(memoryview(found)[at:])):
                 at += some
         except OSError as error:
             raise InputError(f"{self.path}: cannot be read: {reason(error)}") from None
@@ -57,7 +58,7 @@ class Ranges:
 
     def check(self) -> None:
         """Raises InputError where others have written into the file meanwhile."""
-        if Stamp.of(os.fstat(self._descriptor)) != self.stamp:
+        if Stamp.of(os.fstat(self._file.fileno())) != self.stamp:
             raise InputError(f"{self.path}: the file changed while it was read: read it again once it is finished")
 
 
