@@ -33,7 +33,7 @@ class Ranges:
         refuse_unless_regular(path)
         self.path = path
         try:
-            self._file = open(path, "rb", buffering=0)
+            self._file = open(path, "rb", buffering=0)  # noqa: SIM115 - it is open until ``close``
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {reason(error)}") from None
         self.stamp = Stamp.of(os.fstat(self._file.fileno()))
