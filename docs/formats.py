@@ -169,8 +169,8 @@ Meshes in several files that no file lists are one mesh, and all their files are
 
 - `processor0`, `processor1`, … of a decomposed case, by the folder of the case. Where the case has a mesh of the whole,
   too, `--format decomposed` takes the processors. Faces between processors are no boundary. Only `points` change.
-- `a_1.msh`, `a_2.msh`, … of Gmsh (`Mesh.PartitionSplitMeshFiles`), by the name `a.msh`, which is no file then. The output
-  `b.msh` becomes `b_1.msh`, …; `--output-format gmsh` makes one file of them. Ghost cells are known as such.
+- `a_1.msh`, `a_2.msh`, … of Gmsh (`Mesh.PartitionSplitMeshFiles`), by the name `a.msh`, which is no file then. The
+  output `b.msh` becomes `b_1.msh`, …; `--output-format gmsh` makes one file of them. Ghost cells are known as such.
 
 What else these formats have:
 
