@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any, cast
 
 import numpy as np
@@ -32,7 +31,7 @@ Ids = NDArray[np.int64]
 
 def plan_of(file: Ranges, format: str) -> Plan | None:
     """How the numbers of a file lie; None where only a reader of the whole can tell. Raises FormatError."""
-    plan = cast(Callable[[Ranges], Plan | None], import_module(f"gmsnet.io.{FORMATS[format].key}").plan)
+    plan: Callable[[Ranges], Plan | None] = cast(Any, FORMATS[format].load()).plan
     try:
         return plan(file)
     except FormatError as error:
@@ -71,7 +70,6 @@ class FileRanges:
                     comm.send((self._rows(asked[0], asked[1], ids, new), ""), 0)
                 except GmsnetError as error:
                     comm.send((b"", str(error)), 0)
-        self.file.close()
         raise_everywhere(comm, wrong)
 
     def _brought(self, points: Floats, comm: Any) -> tuple[Ids, Floats]:
@@ -125,24 +123,20 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     The mesh is that of ``gmsnet.read``. Raises InputError, on all ranks, with what it says.
     """
     file = everywhere(comm, lambda: Ranges(name))
-    try:
-        agreed(comm, (file.stamp.size, file.stamp.modified), f"{name}: the file")
-        plan = comm.bcast(everywhere(comm, lambda: plan_of(file, format) if comm.rank == 0 else None))
-        rows = np.array([plan.points.rows * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
-        read = everywhere(comm, lambda: _blocks(file, plan, comm))
-        mine = everywhere(comm, lambda: _points(file, plan, int(rows[comm.rank]), int(rows[comm.rank + 1])))
-        ids, points, _ = _asked(comm, rows, mine, _ids_of([block.nodes[:, 0] for block in read]))
-        blocks = _shared_out(comm, read, ids, points)
-        ids, points, lonely = _asked(comm, rows, mine, _ids_of([block.nodes for block in blocks]))
-        ids = np.concatenate([ids, np.flatnonzero(lonely) + rows[comm.rank]])
-        order = np.argsort(ids)
-        ids, points = ids[order], np.concatenate([points, mine[lonely]])[order]
-        everywhere(comm, file.check)
-        none = np.zeros(len(ids), dtype=bool)
-        piece = everywhere(comm, lambda: Piece(ids, points, none, tuple(blocks), plan.single))
-    except BaseException:
-        file.close()
-        raise
+    agreed(comm, (file.stamp.size, file.stamp.modified), f"{name}: the file")
+    plan = comm.bcast(everywhere(comm, lambda: plan_of(file, format) if comm.rank == 0 else None))
+    rows = np.array([plan.points.rows * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
+    read = everywhere(comm, lambda: _blocks(file, plan, comm))
+    mine = everywhere(comm, lambda: _points(file, plan, int(rows[comm.rank]), int(rows[comm.rank + 1])))
+    ids, points, _ = _asked(comm, rows, mine, _ids_of([block.nodes[:, 0] for block in read]))
+    blocks = _shared_out(comm, read, ids, points)
+    ids, points, lonely = _asked(comm, rows, mine, _ids_of([block.nodes for block in blocks]))
+    ids = np.concatenate([ids, np.flatnonzero(lonely) + rows[comm.rank]])
+    order = np.argsort(ids)
+    ids, points = ids[order], np.concatenate([points, mine[lonely]])[order]
+    everywhere(comm, file.check)
+    none = np.zeros(len(ids), dtype=bool)
+    piece = everywhere(comm, lambda: Piece(ids, points, none, tuple(blocks), plan.single))
     return FileRanges(file, plan, piece, rows)
 
 
@@ -206,11 +200,8 @@ def planned_format(source: str, format: str) -> str:
     """The format where a file of it can be shared by ranks, "" where not."""
     if format not in PLANNED or not os.path.isfile(source):
         return ""
-    entry, file = FORMATS[format], Ranges(source)
     try:
-        plan = plan_of(file, format)
+        plan = plan_of(Ranges(source), format)
     except GmsnetError:  # told by the reader of the whole
-        plan = None
-    finally:
-        file.close()
-    return entry.key if plan is not None else ""
+        return ""
+    return format if plan is not None else ""

@@ -6,9 +6,11 @@ a plan is the mesh that the format's reader makes of the whole file.
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from io import FileIO
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +25,7 @@ AT_ONCE = 1 << 22  # bytes that are copied together
 
 
 class Ranges:
-    """A file that is open for reading, with the stamp that it has then."""
+    """A file as it is now. It is open only while some of it is read."""
 
     path: str
     stamp: Stamp
@@ -32,33 +34,40 @@ class Ranges:
     def __init__(self, path: str) -> None:
         refuse_unless_regular(path)
         self.path = path
-        try:
-            self._file = open(path, "rb", buffering=0)  # noqa: SIM115 - it is open until ``close``
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read: {reason(error)}") from None
-        self.stamp = Stamp.of(os.fstat(self._file.fileno()))
+        with self._opened() as file:
+            self.stamp = Stamp.of(os.fstat(file.fileno()))
         self.size = self.stamp.size
 
-    def close(self) -> None:
-        """The file is not needed any more."""
-        self._file.close()
-
     def read(self, begin: int, count: int) -> bytearray:
-        """``count`` bytes from ``begin`` on. Raises FormatError where the file ends before."""
+        """``count`` bytes from ``begin`` on.
+
+        Raises FormatError where the file ends before, and InputError where others have changed it since.
+        """
         found, at = bytearray(count), 0
-        try:
-            self._file.seek(begin)
-            while at < count and (some := self._file.readinto(memoryview(found)[at:])):
+        with self._opened() as file:
+            file.seek(begin)
+            while at < count and (some := file.readinto(memoryview(found)[at:])):
                 at += some
-        except OSError as error:
-            raise InputError(f"{self.path}: cannot be read: {reason(error)}") from None
+            self._check(file)
         if at < count:
             raise FormatError(f"byte {begin + at}: the file ends, is it cut off?")
         return found
 
     def check(self) -> None:
-        """Raises InputError where others have written into the file meanwhile."""
-        if Stamp.of(os.fstat(self._file.fileno())) != self.stamp:
+        """Raises InputError where others have changed the file since."""
+        with self._opened() as file:
+            self._check(file)
+
+    @contextlib.contextmanager
+    def _opened(self) -> Iterator[FileIO]:
+        try:
+            with open(self.path, "rb", buffering=0) as file:
+                yield file
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be read: {reason(error)}") from None
+
+    def _check(self, file: FileIO) -> None:
+        if Stamp.of(os.fstat(file.fileno())) != self.stamp:
             raise InputError(f"{self.path}: the file changed while it was read: read it again once it is finished")
 
 
