@@ -26,6 +26,77 @@ def test_the_values_of_an_option_are_one_argument():
     ]  # fmt: skip
 
 
+def test_volumes_take_as_many_numbers_as_follow():
+    given = ["deform", "a", "--move", "hole", "-1", "2", "3", "b", "--rotate", "hole", "3", *"0001", "0", "0", "b"]
+    assert joined(given) == [
+        "deform", "a", "--move", "hole\0-1\0002\0003", "b", "--rotate", "hole\0003\0000\0000\0000\0001\0000\0000", "b",
+    ]  # fmt: skip
+
+
+@pytest.fixture
+def cube(tmp_path):
+    path = tmp_path / "cube.su2"
+    write(gmsnet.generate.random_volume(200, seed=1), path)
+    return path
+
+
+def test_a_side_of_a_volume_turns_and_moves(run, cube, tmp_path):
+    out = tmp_path / "out.su2"
+    done = run(
+        "deform", cube, out, "--rotate", "top", "5", "0.5", "0.5", "1", "0", "0", "2", "--move", "top", "0", "0", "0.05"
+    )
+    assert (done.code, done.err) == (0, "")
+    assert "the boundary is in place" in done.out
+    before, after = gmsnet.read(cube), gmsnet.read(out)
+    ids, angle = before.markers["top"], np.radians(5.0)
+    x, y, z = before.points[ids].T - 0.5
+    wanted = (
+        np.column_stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, z + 0.05]) + 0.5
+    )
+    assert after.points[ids] == pytest.approx(wanted, abs=1e-15)
+    assert gmsnet.quality(after).inverted == 0
+
+
+def test_a_file_of_displacements_of_a_volume(run, cube, tmp_path):
+    mesh, out, moves = gmsnet.read(cube), tmp_path / "out.su2", tmp_path / "moves.txt"
+    ids = mesh.markers["top"]
+    moves.write_text("".join(f"{node} 0 0 0.0625\n" for node in ids))
+    assert run("deform", cube, out, "--displacement", moves).code == 0
+    assert (gmsnet.read(out).points[ids] == mesh.points[ids] + [0.0, 0.0, 0.0625]).all()
+    moves.write_text("".join(f"{x!r} {y!r} {z + 0.0625 * (z == 1.0)!r}\n" for x, y, z in mesh.points.tolist()))
+    again = tmp_path / "again.su2"
+    assert run("deform", cube, again, "--displacement", moves).code == 0
+    assert again.read_bytes() == out.read_bytes()
+    moves.write_text("3 0.1\n")
+    done = run("deform", cube, out, "--displacement", moves)
+    assert (done.code, done.err) == (
+        2,
+        f"gmsnet: error: {moves}, line 1: 2 values: give lines 'node dx dy dz', or a table with one line 'x y z' for "
+        "each node of the mesh, its new place\n",
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--move", "top", "1", "0"), "--move takes MARKER DX DY DZ for a volume, got 2 numbers after 'top'"),
+        (("--rotate", "top", "1", "0", "0"), "--rotate takes MARKER DEGREES CX CY CZ AX AY AZ for a volume"),
+        (("--rotate", "top", "1", "0", "0", "0", "0", "0", "0"), "the axis of a rotation must have a length"),
+        (("--rotate", "top", "1", "0", "0", "0"), "--rotate takes MARKER DEGREES CX CY or MARKER DEGREES CX CY CZ AX"),
+    ],
+)
+def test_numbers_that_a_volume_does_not_take(run, cube, tmp_path, arguments, message):
+    done = run("deform", cube, tmp_path / "out.su2", *arguments)
+    assert done.code == 2
+    assert message in done.err
+
+
+def test_numbers_that_a_mesh_in_a_plane_does_not_take(run, plate, tmp_path):
+    done = run("deform", plate, tmp_path / "out.su2", "--move", "hole", "0", "0", "1")
+    assert done.code == 2
+    assert "--move takes MARKER DX DY for a mesh in a plane, got 3 numbers after 'hole'" in done.err
+
+
 def test_a_marker_is_moved_and_only_coordinates_change(run, plate, tmp_path):
     out = tmp_path / "out.su2"
     done = run("deform", plate, out, "--move", "hole", "-0.1", "0.05")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gmsnet import CellBlock, InputError, Mesh, random_mesh
+from gmsnet.generate import random_volume
 from gmsnet.motion.prescribed import Prescribed
 
 
@@ -102,3 +103,29 @@ def test_what_cannot_be_used_is_refused(square, given, message):
 def test_zero_everywhere_is_nothing(square):
     with pytest.raises(InputError, match="nothing to move"):
         Prescribed.of(square, np.zeros((len(square.points), 2)))
+
+
+def test_rotations_of_volumes_are_about_an_axis():
+    cube = random_volume(30, seed=1)
+    ids = cube.markers["top"]
+    made = Prescribed.of(cube, (0.0, 0.0, 1.0), ids, rotate=(ids, 90, (0, 0, 1), (0, 0, 3)))
+    x, y, z = cube.points[ids].T
+    assert (made.places[ids] == np.column_stack([-y, x, z + 1.0])).all()
+    assert made.turn[ids] == pytest.approx(np.tile([0.0, 0.0, np.pi / 2], (len(ids), 1)))
+    twice = Prescribed.of(cube, rotate=[(ids, 200.0, (0, 0, 0), (1, 0, 0)), (ids, 200.0, (0, 0, 0), (1, 0, 0))])
+    assert twice.turn[ids] == pytest.approx(np.tile([np.radians(400.0), 0.0, 0.0], (len(ids), 1)))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"rotate": ("top", 3, (0, 0))}, "a rotation of a volume must be"),
+        ({"rotate": ("top", 3, (0, 0, 0))}, "a rotation of a volume must be"),
+        ({"rotate": ("top", 3, (0, 0, 0), (0, 0, 0))}, "axis of a rotation must have a length"),
+        ({"rotate": ("top", 3, (0, 0, 0), (0, 0, float("nan")))}, "finite numbers"),
+        ({"displacement": (1, 2), "nodes": "top"}, "one vector of 3 numbers"),
+    ],
+)
+def test_what_volumes_do_not_take_is_refused(given, message):
+    with pytest.raises(InputError, match=message):
+        Prescribed.of(random_volume(30, seed=1), **given)

@@ -6,11 +6,24 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 import gmsnet
-from gmsnet import CellBlock, InputError, Mesh
-from gmsnet.generate import layered_mesh, moved_hole_mesh, random_mesh, second_order, structured_mesh
+from gmsnet import InputError, Mesh
+from gmsnet.generate import (
+    block_volume,
+    layered_mesh,
+    layered_volume,
+    moved_hole_mesh,
+    random_mesh,
+    random_volume,
+    second_order,
+    second_order_volume,
+    sphere_surface,
+    structured_mesh,
+)
 from gmsnet.run import stop
+from gmsnet.topology.mixed_volume import volume_of, wound_of
 from gmsnet.topology.topology import Topology
 
 HOLE = np.array([0.5, 0.5])
@@ -23,7 +36,8 @@ def plate():
 
 def held_nodes(mesh):
     held = np.zeros(len(mesh.points), dtype=bool)
-    for ids in Topology.of(mesh).held.values():
+    topology = Topology.of(mesh) if mesh.plane else volume_of(wound_of(mesh, held))
+    for ids in topology.held.values():
         held[ids] = True
     return held
 
@@ -36,7 +50,7 @@ def check(mesh, result, ids, places):
     still[ids] = False
     assert (result.points[still] == mesh.points[still]).all()
     if result.fraction == 1.0:
-        assert (result.points[ids, :2] == places).all()
+        assert (result.points[ids, : places.shape[1]] == places).all()
         assert result.reason == ""
     else:
         assert result.reason
@@ -44,18 +58,30 @@ def check(mesh, result, ids, places):
     assert all((one.nodes == other.nodes).all() for one, other in zip(mesh.cells, result.mesh.cells, strict=True))
 
 
-@settings(max_examples=10, deadline=None)
+def small(cells, seed):
+    """A mesh of some tens of nodes in the unit square or cube."""
+    if cells == "triangle":
+        return random_mesh(40, seed=seed)
+    if cells == "quad":
+        return structured_mesh(6, 4)
+    return random_volume(60, seed=seed) if cells == "tetra" else block_volume(4, cells)
+
+
+KINDS = ["triangle", "quad", "tetra", "hexahedron", "wedge", "mixed"]
+
+
+@settings(max_examples=30, deadline=None)
 @given(
-    st.integers(0, 5), st.sampled_from(["triangle", "quad"]), st.floats(0.0, 0.4), st.floats(-1.0, 1.0),
+    st.integers(0, 5), st.sampled_from(KINDS), st.floats(0.0, 0.4), st.floats(-1.0, 1.0),
     st.sampled_from(["top", "every"]), st.booleans(),
 )  # fmt: skip
 def test_whatever_is_asked_for_no_cell_is_inverted(seed, cells, noise, shift, which, single):
-    mesh = random_mesh(40, seed=seed) if cells == "triangle" else structured_mesh(6, 4)
+    mesh = small(cells, seed)
     if single:
         mesh = Mesh(mesh.points.astype(np.float32), mesh.cells, mesh.region_names, single=True)
     ids = np.flatnonzero(held_nodes(mesh)) if which == "every" else mesh.markers["top"]
-    rng = np.random.default_rng(seed)
-    places = mesh.points[ids, :2] + shift + noise * rng.normal(size=(len(ids), 2))
+    rng, dimension = np.random.default_rng(seed), 2 if mesh.plane else 3
+    places = mesh.points[ids, :dimension] + shift + noise * rng.normal(size=(len(ids), dimension))
     if single:
         places = places.astype(np.float32).astype(float)
     result = gmsnet.deform(mesh, places=places, nodes=ids, threads=1)
@@ -235,9 +261,59 @@ def test_what_cannot_be_used_is_refused(plate):
         gmsnet.deform(plate, (0.1, 0.0), "hole", fixed="hole")
     with pytest.raises(InputError, match="second-order cells"):
         gmsnet.deform(second_order(structured_mesh(3, 3)), (0.1, 0.0), "top")
-    points = np.random.default_rng(1).random((4, 3))
-    tet = Mesh(points, (CellBlock("tetra", np.array([[0, 1, 2, 3]]), np.zeros(1, dtype=int)),))
-    with pytest.raises(InputError, match="boundaries of volumes cannot be moved yet"):
-        gmsnet.deform(tet, (0.1, 0.0, 0.0), [0])
+    with pytest.raises(InputError, match=r"second-order cells \(tetra10\)"):
+        gmsnet.deform(second_order_volume(random_volume(30, seed=1)), (0.1, 0.0, 0.0), "top")
+    with pytest.raises(InputError, match="boundaries of surfaces in space cannot be moved"):
+        gmsnet.deform(sphere_surface(100).mesh, (0.1, 0.0, 0.0), [0])
     with pytest.raises(InputError, match="max_sweeps"):
         gmsnet.deform(plate, (0.1, 0.0), "hole", max_sweeps=-1)
+
+
+@pytest.mark.parametrize("degrees", [30.0, 90.0, 179.0, 200.0])
+@pytest.mark.parametrize("cells", ["tetra", "mixed"])
+def test_a_volume_whose_boundary_moves_as_one_body_moves_so(cells, degrees):
+    mesh = small(cells, 3)
+    axis, centre = (1.0, 2.0, 2.0), (0.3, 0.2, 0.1)
+    ids = np.flatnonzero(held_nodes(mesh))
+    result = gmsnet.deform(mesh, (1.0, 2.0, 3.0), ids, rotate=(ids, degrees, centre, axis), max_sweeps=0)
+    assert (result.fraction, result.steps) == (1.0, 1)
+    turn = Rotation.from_rotvec(np.radians(degrees) * np.array(axis) / 3.0)
+    wanted = turn.apply(mesh.points - centre) + np.array(centre) + [1.0, 2.0, 3.0]
+    assert np.abs(result.points - wanted).max() < 1e-6
+
+
+def test_a_side_of_a_volume_is_pushed_in():
+    mesh = random_volume(600, seed=2)
+    ids = mesh.markers["top"]
+    x, y, _ = mesh.points[ids].T
+    shifts = np.column_stack([0.0 * x, 0.0 * x, -0.3 * np.sin(np.pi * x) ** 2 * np.sin(np.pi * y) ** 2])
+    result = gmsnet.deform(mesh, shifts, ids)
+    check(mesh, result, ids, mesh.points[ids] + shifts)
+    assert result.fraction == 1.0
+    assert result.after.shape.min() > 0.9 * result.before.shape.min()
+    assert (result.points == gmsnet.deform(mesh, shifts, ids, threads=2).points).all()
+
+
+def test_cells_between_held_nodes_alone_end_the_way():
+    mesh = block_volume(5)
+    result = gmsnet.deform(mesh, (0.0, 0.0, -0.5), "top")
+    check(mesh, result, mesh.markers["top"], None)
+    assert 0.3 < result.fraction <= 0.4  # the cells beside the sides are as high as a fifth of the cube
+    assert "all its nodes are held, at 0" in result.reason
+
+
+@pytest.mark.parametrize("cells", ["tetra", "wedge"])
+def test_a_wall_of_a_volume_takes_its_layers_along(cells):
+    rows, side = 8, 9
+    mesh = layered_volume(side - 1, rows, kind=cells)
+    ids = mesh.markers["bottom"]
+    x, y, _ = mesh.points[ids].T
+    shifts = np.column_stack([0.0 * x, 0.0 * x, 0.2 * np.sin(np.pi * x) ** 2 * np.sin(np.pi * y) ** 2])
+    result = gmsnet.deform(mesh, shifts, ids)
+    check(mesh, result, ids, mesh.points[ids] + shifts)
+    assert result.fraction == 1.0
+    before, after = (
+        np.linalg.norm(np.diff(points[: 4 * side**2].reshape(4, side, side, 3), axis=0), axis=-1)
+        for points in (mesh.points, result.points)
+    )
+    assert np.abs(after / before - 1.0)[:, 1:-1, 1:-1].max() < 0.02

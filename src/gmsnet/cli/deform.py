@@ -23,20 +23,22 @@ def deform(
     ] = None,
     move: Annotated[
         list[str] | None,
-        typer.Option(metavar="MARKER DX DY", help="Move the nodes of a marker by a vector. Repeatable."),
+        typer.Option(metavar="MARKER DX DY [DZ]", help="Move the nodes of a marker by a vector. Repeatable."),
     ] = None,
     rotate: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="MARKER DEGREES CX CY",
-            help="Turn the nodes of a marker counter-clockwise about a centre, before they are moved. Repeatable.",
+            metavar="MARKER DEGREES CX CY [CZ AX AY AZ]",
+            help="Turn the nodes of a marker counter-clockwise about a centre, in space about an axis through it that "
+            "points at the viewer, before they are moved. Repeatable.",
         ),
     ] = None,
     displacement: Annotated[
         str | None,
         typer.Option(
             metavar="FILE",
-            help="Lines 'node dx dy', nodes counted from 0; or a line 'x y' for each node of the mesh, its new place.",
+            help="Lines 'node dx dy', nodes counted from 0; or a line 'x y' for each node of the mesh, its new place. "
+            "Of volumes each has one number more.",
         ),
     ] = None,
     fix: Annotated[

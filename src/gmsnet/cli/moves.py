@@ -20,16 +20,23 @@ if TYPE_CHECKING:
 
 FILE_BYTES, FILE_BYTES_PER_NODE = 1 << 20, 256  # that a file of displacements takes at most
 APART = "\0"
-VALUES = {"--move": "MARKER DX DY", "--rotate": "MARKER DEGREES CX CY"}
+# Of meshes in a plane and of volumes.
+VALUES = {
+    "--move": ("MARKER DX DY", "MARKER DX DY DZ"),
+    "--rotate": ("MARKER DEGREES CX CY", "MARKER DEGREES CX CY CZ AX AY AZ"),
+}
 Moves = Mapping[str, Sequence[tuple[str, tuple[float, ...]]]]  # option → marker and numbers, each time it was given
-FORMS = "give lines 'node dx dy', or a table with one line 'x y' for each node of the mesh, its new place"
+FORMS = (
+    "give lines 'node dx dy', or a table with one line 'x y' for each node of the mesh, its new place",
+    "give lines 'node dx dy dz', or a table with one line 'x y z' for each node of the mesh, its new place",
+)
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
     """The arguments of ``gmsnet deform`` with the values of each --move and --rotate as one.
 
     Typer has no options of several values that can be given more than once. A NUL, which no argument can hold, parts
-    the values.
+    the values: the marker, and all numbers that follow, but for more than a volume takes.
     """
     out = list(arguments[:1])
     rest = list(arguments[1:])
@@ -39,7 +46,10 @@ def joined(arguments: Sequence[str]) -> list[str]:
         if argument == "--":
             return out + rest
         if argument in VALUES:
-            count = len(VALUES[argument].split())
+            fewest, most = (len(form.split()) for form in VALUES[argument])
+            count = min(fewest, len(rest))
+            while count < min(most, len(rest)) and _is_number(rest[count]):
+                count += 1
             values, rest = rest[:count], rest[count:]
             out.append(APART.join(values))
     return out
@@ -48,9 +58,10 @@ def joined(arguments: Sequence[str]) -> list[str]:
 def split(option: str, given: str) -> tuple[str, tuple[float, ...]]:
     """The marker and the numbers of one --move or --rotate. Raises InputError where they are none."""
     marker, *texts = given.split(APART)
-    wanted = VALUES[option]
-    if len(texts) != len(wanted.split()) - 1:
-        raise InputError(f"{option} takes {wanted}, got {' '.join([marker, *texts])!r}")
+    forms = VALUES[option]
+    wanted = next((form for form in forms if len(form.split()) == 1 + len(texts)), "")
+    if not wanted:
+        raise InputError(f"{option} takes {' or '.join(forms)}, got {' '.join([marker, *texts])!r}")
     return marker, tuple(_number(text, f"{option} {wanted}") for text in texts)
 
 
@@ -62,27 +73,36 @@ def prescribed(mesh: Mesh, moves: Moves, displacement: str | None) -> Prescribed
     import numpy as np
 
     from gmsnet.mesh.selection import chosen_nodes
-    from gmsnet.motion.prescribed import Prescribed
+    from gmsnet.motion.prescribed import Prescribed, rotations_of
 
     made = Prescribed.still(mesh)
     for option in ("--rotate", "--move"):
         for marker, numbers in moves.get(option, ()):
-            ids = np.unique(chosen_nodes(mesh, marker, option))
-            if option == "--rotate":
-                made.rotate(ids, numbers[0], (numbers[1], numbers[2]))
-            else:
+            ids, wanted = np.unique(chosen_nodes(mesh, marker, option)), VALUES[option][made.dimension - 2]
+            if len(numbers) != len(wanted.split()) - 1:
+                what = "a volume" if made.dimension == 3 else "a mesh in a plane"
+                raise InputError(f"{option} takes {wanted} for {what}, got {len(numbers)} numbers after {marker!r}")
+            if option == "--move":
                 made.displace(ids, np.array(numbers))
+            else:
+                [(_, degrees, centre, axis)] = rotations_of([turn_of(ids, numbers)], made.dimension)
+                made.rotate(ids, degrees, centre, axis)
     if displacement is not None:
         read_displacements(displacement, mesh, made)
     return made.checked(mesh)
 
 
+def turn_of(ids: NDArray[np.int64], numbers: tuple[float, ...]) -> tuple[object, ...]:
+    """What ``gmsnet.deform`` takes as a rotation, of the numbers of one --rotate."""
+    return (ids, numbers[0], numbers[1:]) if len(numbers) == 3 else (ids, numbers[0], numbers[1:4], numbers[4:])
+
+
 def read_displacements(path: str, mesh: Mesh, made: Prescribed) -> None:
-    """Adds what a file says, in the plane of the mesh.
+    """Adds what a file says, in the plane of the mesh or in space.
 
     Lines ``node dx dy``, nodes counted from 0, name the nodes that move. A file of as many lines ``x y`` as the mesh
-    has nodes gives the new place of each; those that it changes move. Values are parted by blanks or commas; # begins a
-    comment. Raises InputError, with the line, for anything else.
+    has nodes gives the new place of each; those that it changes move. Of volumes each line has one number more. Values
+    are parted by blanks or commas; # begins a comment. Raises InputError, with the line, for anything else.
     """
     import numpy as np
 
@@ -90,6 +110,8 @@ def read_displacements(path: str, mesh: Mesh, made: Prescribed) -> None:
     from gmsnet.mesh.plane import in_plane
 
     count, values, lines, width = len(mesh.points), array("d"), array("q"), 0
+    dimension = made.dimension
+    forms = FORMS[dimension - 2]
     try:
         data = small(path, FILE_BYTES + FILE_BYTES_PER_NODE * count, f"displacements of {count:,} nodes")
     except OSError as error:
@@ -100,23 +122,24 @@ def read_displacements(path: str, mesh: Mesh, made: Prescribed) -> None:
             if not texts:
                 continue
             width = width or len(texts)
-            if len(texts) != width or width not in (2, 3):
-                raise InputError(f"{path}, line {number}: {len(texts)} values: {FORMS}")
-            if width == 3 and not re.fullmatch(r"\d{1,18}", texts[0]):
-                raise InputError(f"{path}, line {number}: {texts[0]!r} is not a node: {FORMS}")
+            if len(texts) != width or width not in (dimension, dimension + 1):
+                raise InputError(f"{path}, line {number}: {len(texts)} values: {forms}")
+            if width > dimension and not re.fullmatch(r"\d{1,18}", texts[0]):
+                raise InputError(f"{path}, line {number}: {texts[0]!r} is not a node: {forms}")
             values.extend(_number(text, f"{path}, line {number}") for text in texts)
             lines.append(number)
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: this is not a file of displacements: {FORMS}") from error
+        raise InputError(f"{path}: this is not a file of displacements: {forms}") from error
     if not lines:
-        raise InputError(f"{path}: the file has no displacements: {FORMS}")
+        raise InputError(f"{path}: the file has no displacements: {forms}")
     table = np.array(values).reshape(-1, width)
-    if width == 3:
+    if width > dimension:
         made.displace(*_listed(path, table, np.array(lines), count))
         return
     if len(table) != count:
-        raise InputError(f"{path}: {len(table):,} places for a mesh of {count:,} nodes: {FORMS}")
-    moved = np.flatnonzero((table != in_plane(mesh.points, mesh.plane)).any(axis=1))
+        raise InputError(f"{path}: {len(table):,} places for a mesh of {count:,} nodes: {forms}")
+    start = mesh.points if mesh.plane is None else in_plane(mesh.points, mesh.plane)
+    moved = np.flatnonzero((table != start).any(axis=1))
     if not len(moved):
         raise InputError(f"{path}: all places are those of the mesh, so there is nothing to move")
     if made.moved[moved].any():
@@ -144,11 +167,16 @@ def _listed(
     return ids, table[:, 1:]
 
 
-def _number(text: str, where: str) -> float:
+def _is_number(text: str) -> bool:
     try:
-        value = float(text) if "_" not in text else math.nan
+        float(text)
     except ValueError:
-        value = math.nan
+        return False
+    return "_" not in text
+
+
+def _number(text: str, where: str) -> float:
+    value = float(text) if _is_number(text) else math.nan
     if not math.isfinite(value):
         raise InputError(f"{where}: {text!r} is not a finite number")
     return value

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,3 +72,26 @@ class Multigrid:
 
     def _matrix(self, level: int) -> Matrix:
         return self.levels[level][0] if level < len(self.levels) else self.coarsest
+
+
+def approach(
+    matrix: Matrix, inverse: Callable[[Floats], Floats], rest: Floats
+) -> Iterator[tuple[Floats, float, float]]:
+    """Conjugate gradients from x = 0: after each iteration x (n, 2), and the squares of what is left of ``rest`` (n, 2)
+    and of what that was at first. x is changed by the next iteration. Ends where nothing can be gained.
+
+    inverse: an approximate inverse of the matrix.
+    """
+    x, first = np.zeros_like(rest), multigrid.product(rest, rest)
+    z = inverse(rest)
+    along, slope, image = z, multigrid.product(rest, z), np.empty_like(z)
+    while slope > 0.0:
+        multigrid.times(matrix, along, image)
+        share = slope / multigrid.product(along, image)
+        x += share * along
+        before, rest = rest, rest - share * image
+        yield x, multigrid.product(rest, rest), first
+        z = inverse(rest)
+        following = multigrid.product(rest, z)
+        along = z + ((following - multigrid.product(before, z)) / slope) * along  # z is not quite linear in rest
+        slope = following

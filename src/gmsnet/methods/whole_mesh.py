@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,11 @@ from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import VALID
 from gmsnet.kernels.untangle.barrier import energy
 from gmsnet.kernels.untangle.cells import find_bad
-from gmsnet.kernels.whole import graph, multigrid, powers, steps
+from gmsnet.kernels.whole import graph, powers, steps
 from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.methods.conjugate import minimise
-from gmsnet.methods.multigrid import Multigrid
+from gmsnet.methods.multigrid import Multigrid, approach
 from gmsnet.methods.sliders import Sliders
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
@@ -129,28 +130,17 @@ class Problem:
     def harmonic(self, points: Floats) -> Iterator[Floats]:
         """Each node that moves at the weighted mean of its neighbours, more and more exactly."""
         inverse = self.cycle(points, even=True)
-        rest, x = np.empty((len(self.moved), 2)), np.zeros((len(self.moved), 2))
+        rest = np.empty((len(self.moved), 2))
         graph.pull_of_neighbours(points, self.cells, self.table, self.number, rest)
-        first = multigrid.product(rest, rest)
-        z = inverse(rest)
-        along, slope, image = z, multigrid.product(rest, z), np.empty_like(z)
         goals = list(ACCURATE)
-        for _ in range(HARMONIC_ITERATIONS):
-            if not (slope > 0.0 and goals):
-                return
-            multigrid.times(self.matrix, along, image)
-            share = slope / multigrid.product(along, image)
-            x += share * along
-            before, rest = rest, rest - share * image
-            if multigrid.product(rest, rest) <= goals[0] * goals[0] * first:
+        for x, left, first in islice(approach(self.matrix, inverse, rest), HARMONIC_ITERATIONS):
+            if left <= goals[0] * goals[0] * first:
                 goals.pop(0)
                 found = points.copy()
                 found[self.moved] += x
                 yield found
-            z = inverse(rest)
-            following = multigrid.product(rest, z)
-            along = z + ((following - multigrid.product(before, z)) / slope) * along  # z is not quite linear in rest
-            slope = following
+            if not goals:
+                return
 
     def start(self, points: Floats) -> Floats:
         """The points, or harmonic places where these have a smaller Σq."""

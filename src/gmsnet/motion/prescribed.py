@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,19 +15,21 @@ from gmsnet.mesh.arrays import plain_array
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.plane import in_plane
 from gmsnet.mesh.selection import chosen_nodes
+from gmsnet.motion.rotations import Rotations, rotations_in
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 ROTATION = "a rotation must be (nodes, degrees, (x, y)) or several of these"
+ROTATION_IN_SPACE = "a rotation of a volume must be (nodes, degrees, (x, y, z), (axis)) or several of these"
 
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
     """Where nodes are to go. moved: (N,) bool by id, which have a place prescribed, if only their own.
 
-    places: (N, 2) in the plane of the mesh, in its units; of others where they are. turn: (N,) radians, by how much the
-    surroundings of a node are to turn, as far as rotations say so.
+    places: (N, 2) in the plane of the mesh, (N, 3) of a volume, in its units; of others where they are. turn: (N, k),
+    by how much the surroundings of a node are to turn, as far as rotations say so (motion/rotations.py).
     """
 
     moved: Flags
@@ -50,8 +52,8 @@ class Prescribed:
         if places is not None and rotate is not None:
             raise InputError("places says where nodes are to go: leave rotate out")
         made = cls.still(mesh)
-        for chosen, degrees, centre in rotations_of(rotate):
-            made.rotate(chosen_nodes(mesh, chosen, "rotate"), degrees, centre)
+        for chosen, degrees, centre, axis in rotations_of(rotate, made.dimension):
+            made.rotate(chosen_nodes(mesh, chosen, "rotate"), degrees, centre, axis)
         given, what = (displacement, "displacement") if places is None else (places, "places")
         if given is not None:
             ids = np.arange(len(mesh.points)) if nodes is None else chosen_nodes(mesh, nodes, "nodes")
@@ -67,8 +69,19 @@ class Prescribed:
     @classmethod
     def still(cls, mesh: Mesh) -> Prescribed:
         """No node is moved."""
-        start = in_plane(mesh.points, mesh.plane)
-        return cls(np.zeros(len(start), dtype=bool), start.copy(), np.zeros(len(start)))
+        start = mesh.points if mesh.plane is None else in_plane(mesh.points, mesh.plane)
+        made = cls(np.zeros(len(start), dtype=bool), start.copy(), np.empty(0))
+        return replace(made, turn=np.zeros((len(start), made.rotations.k)))
+
+    @property
+    def dimension(self) -> int:
+        """2, or 3 of a volume."""
+        return int(self.places.shape[1])
+
+    @property
+    def rotations(self) -> Rotations:
+        """Those of the dimension."""
+        return rotations_in(self.dimension)
 
     def checked(self, mesh: Mesh) -> Prescribed:
         """The same, as the mesh can hold it; InputError where nothing is moved, or to no finite place."""
@@ -82,33 +95,43 @@ class Prescribed:
             raise InputError(f"node {wrong[0]} would be moved to a place that is no finite number")
         return self
 
-    def rotate(self, ids: NDArray[np.int64], degrees: float, centre: tuple[float, float]) -> None:
-        """Turns some nodes about a centre, counter-clockwise."""
-        angle = math.radians(degrees)
-        cosine, sine = math.cos(angle), math.sin(angle)
-        if degrees % 90.0 == 0.0:  # so that quarter turns are exact
-            cosine, sine = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(degrees / 90.0 % 4.0)]
+    def rotate(self, ids: NDArray[np.int64], degrees: float, centre: Sequence[float], axis: Sequence[float]) -> None:
+        """Turns some nodes about a centre, counter-clockwise; in space about an axis (3,) that points at the viewer."""
         ids = np.unique(ids)
         with np.errstate(over="ignore", invalid="ignore"):
-            x, y = (self.places[ids] - centre).T
-            self.places[ids] = np.column_stack([cosine * x - sine * y, sine * x + cosine * y]) + centre
-        self.turn[ids] += angle
+            self.places[ids] = (self.places[ids] - centre) @ _matrix(degrees, axis).T + centre
+        turn = math.radians(degrees) * np.array(axis)
+        self.turn[ids] = self.rotations.joined(self.turn[ids], np.broadcast_to(turn, (len(ids), len(turn))))
         self.moved[ids] = True
 
     def displace(self, ids: NDArray[np.int64], shifts: Floats) -> None:
-        """Adds shifts (n, 2) to the places of some nodes."""
+        """Adds shifts (n, D) to the places of some nodes."""
         with np.errstate(over="ignore"):
             self.places[ids] += shifts
         self.moved[ids] = True
 
     def put(self, ids: NDArray[np.int64], places: Floats) -> None:
-        """Some nodes go to places (n, 2)."""
+        """Some nodes go to places (n, D)."""
         self.places[ids] = places
         self.moved[ids] = True
 
 
+def _matrix(degrees: float, axis: Sequence[float]) -> Floats:
+    """(D, D) of a rotation; axis: of unit length, of one number in the plane."""
+    angle = math.radians(degrees)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    if degrees % 90.0 == 0.0:  # so that quarter turns are exact
+        cosine, sine = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(degrees / 90.0 % 4.0)]
+    if len(axis) == 1:
+        return np.array([[cosine, -sine], [sine, cosine]])
+    x, y, z = axis
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    found: Floats = cosine * np.eye(3) + sine * across + (1.0 - cosine) * np.outer(axis, axis)
+    return found
+
+
 def rows_of(mesh: Mesh, given: Any, count: int, what: str, *, every: bool) -> Floats:
-    """(count, 2) shifts or places in the plane of the mesh, of one vector for all or of one for each node.
+    """(count, D) shifts or places in the plane of the mesh, or in space, of one vector for all or of one for each node.
 
     every: one row for each node of the mesh is asked for. Raises InputError for anything else, and where a number is
     not finite or leads out of the plane.
@@ -117,7 +140,7 @@ def rows_of(mesh: Mesh, given: Any, count: int, what: str, *, every: bool) -> Fl
     if values.dtype.kind not in "iuf":
         raise InputError(f"{what} must be numbers, got {values.dtype} values")
     values = values.astype(np.float64)
-    widths = (2,) if mesh.points.shape[1] == 2 else (2, 3)
+    widths = (3,) if mesh.plane is None else (2,) if mesh.points.shape[1] == 2 else (2, 3)
     one = values.ndim == 1 and len(values) in widths and not every
     if not (one or (values.ndim == 2 and len(values) == count and values.shape[1] in widths)):
         width = " or ".join(map(str, widths))
@@ -139,33 +162,41 @@ def rows_of(mesh: Mesh, given: Any, count: int, what: str, *, every: bool) -> Fl
                 f"give {level:g} as its {'xyz'[across]}"
             )
         return rows[:, list(mesh.plane)]
-    return rows[:, :2]
+    return rows if mesh.plane is None else rows[:, :2]
 
 
-def rotations_of(rotate: Any) -> list[tuple[Any, float, tuple[float, float]]]:
-    """The rotations, each (nodes, degrees, (x, y)). Raises InputError for what is none."""
+def rotations_of(rotate: Any, dimension: int) -> list[tuple[Any, float, tuple[float, ...], tuple[float, ...]]]:
+    """The rotations, each with nodes, degrees, centre and axis, of one number in the plane, and of unit length.
+
+    Raises InputError for what is none.
+    """
     if rotate is None:
         return []
+    what = ROTATION if dimension == 2 else ROTATION_IN_SPACE
     if not isinstance(rotate, Sequence) or isinstance(rotate, str):
-        raise InputError(f"{ROTATION}, got {rotate!r}")
-    several = rotate if all(_is_rotation(each) for each in rotate) else [rotate]
+        raise InputError(f"{what}, got {rotate!r}")
+    several = rotate if all(_is_rotation(each, dimension) for each in rotate) else [rotate]
     found = []
     for each in several:
-        if not _is_rotation(each):
-            raise InputError(f"{ROTATION}, got {each!r}")
-        nodes, degrees, centre = each
-        numbers = (degrees, *centre)
+        if not _is_rotation(each, dimension):
+            raise InputError(f"{what}, got {each!r}")
+        nodes, degrees, centre, *axis = each
+        numbers = (degrees, *centre, *(axis[0] if axis else ()))
         if not all(_is_number(value) and math.isfinite(value) for value in numbers):
-            raise InputError(f"degrees and centre of a rotation must be finite numbers, got {numbers!r}")
-        found.append((nodes, float(degrees), (float(centre[0]), float(centre[1]))))
+            raise InputError(f"degrees, centre and axis of a rotation must be finite numbers, got {numbers!r}")
+        direction = np.array(axis[0], dtype=np.float64) if axis else np.ones(1)
+        if not direction.any():
+            raise InputError(f"the axis of a rotation must have a length, got {tuple(axis[0])!r}")
+        direction /= np.abs(direction).max()  # whose square then neither under- nor overflows
+        unit = direction / np.linalg.norm(direction)
+        found.append((nodes, float(degrees), tuple(map(float, centre)), tuple(unit.tolist())))
     return found
 
 
-def _is_rotation(thing: Any) -> bool:
-    if not (isinstance(thing, (tuple, list)) and len(thing) == 3):
+def _is_rotation(thing: Any, dimension: int) -> bool:
+    if not (isinstance(thing, (tuple, list)) and len(thing) == dimension + 1 and np.ndim(thing[1]) == 0):
         return False
-    centre = thing[2]
-    return isinstance(centre, (tuple, list, np.ndarray)) and len(centre) == 2 and np.ndim(thing[1]) == 0
+    return all(isinstance(each, (tuple, list, np.ndarray)) and len(each) == dimension for each in thing[2:])
 
 
 def _is_number(value: Any) -> bool:

@@ -1,37 +1,48 @@
 """How nodes inside follow a boundary that moves: each edge turns with its surroundings and keeps its length as it can.
 
-Minimised is Σ w s |(y_j − y_i) − e^{iθ} (x_j − x_i)|² over the edges, θ the mean of the rotations at its two ends, and
+Minimised is Σ w s |(y_j − y_i) − R (x_j − x_i)|² over the edges, R half way between the rotations at its two ends, and
 w = 1/|x_j − x_i|²: relative changes count, so small cells near walls are the stiffest, and thin layers keep their
-spacing. s is ten times as much in layers, and falls slowly with the distance from what moves. Rotations of the boundary
-are known; inside they are harmonic at first (Zayer, Rössl, Karni, Seidel: Harmonic guidance for surface deformation,
-Computer Graphics Forum 24, 2005). Then places and best rotations follow each other by turns (Sorkine, Alexa:
-As-rigid-as-possible surface modeling, Symposium on Geometry Processing, 2007). Motions of all boundaries as one body
-are reproduced but for rounding.
+spacing. s is ten times as much in layers, where short edges among long ones have up to a hundred times more, so that
+rows keep their heights where a wall is stretched; and falls slowly with the distance from what moves. Rotations of the
+boundary are known; inside they are harmonic at first (Zayer, Rössl, Karni, Seidel: Harmonic guidance for surface
+deformation, Computer Graphics Forum 24, 2005). Then places and best rotations follow each other by turns (Sorkine,
+Alexa: As-rigid-as-possible surface modeling, Symposium on Geometry Processing, 2007). Motions of all boundaries as one
+body are reproduced but for rounding, in space to ``ACCURATE``.
+
+The systems are solved by factors in the plane. In space these would be too large, and conjugate gradients with
+multigrid take their place.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 import scipy.sparse
 import scipy.spatial
 
-from gmsnet.motion.path import Complex, Flags, Floats, Ints, as_points
+from gmsnet.kernels.whole.graph import Matrix
+from gmsnet.methods.multigrid import Multigrid, approach
+from gmsnet.motion.path import Flags, Floats, Ints
+from gmsnet.motion.rotations import rotations_in
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 from gmsnet.untangle.harmonic import solver_of
 
 ITERATIONS, SMALL_TURN = 12, 1e-3  # radians
 TINY, FLAT = 1e-300, 1e-28  # FLAT: of the longest edge's square; shorter edges count as that long
-IN_LAYERS = 10.0  # times as stiff
+IN_LAYERS, SHORT = 10.0, 100.0  # times as stiff; times as much again, at most, are short edges among long ones
 REACH = 0.5  # of the extent of what moves: at this distance from it edges are 1/√2 times as stiff
+ACCURATE, MOST = 1e-6, 60  # of the residual, where systems are solved step by step, and steps
 
 
 @dataclass(frozen=True, eq=False)
 class Follower:
     """edges: (E, 2) of all cells with a free node, diagonals of quads too, by places in memory. free: (N,) bool.
 
-    layers: (E,) those within layers and near refined walls. stiffness: (E,) beside what follows from their lengths.
+    layers: (E,) those within layers and near refined walls. stiffness: (E,) beside what follows from all lengths.
     """
 
     edges: Ints
@@ -40,64 +51,85 @@ class Follower:
     stiffness: Floats
 
     @classmethod
-    def of(cls, topology: Topology, points: Complex, moving: Flags, kept: Flags) -> Follower:
-        """Of the free nodes of a topology. moving: (N,) held nodes that go elsewhere. kept: (N,) of layers."""
-        rows = topology.near
-        edges = np.sort(np.concatenate([rows[:, [0, 1]], rows[:, [0, 2]], rows[:, [1, 2]]]), axis=1)
-        edges = edges[topology.near_free[edges].any(axis=1)]
-        key = np.unique(edges[:, 0].astype(np.int64) * len(topology.memory) + edges[:, 1])
-        edges = np.column_stack(np.divmod(key, len(topology.memory))).astype(np.int32)
-        layers = (kept | ~topology.near_free)[edges].all(axis=1) & kept[edges].any(axis=1)
-        at, bodies = as_points(points), as_points(points[moving if moving.any() else ~topology.near_free])
-        away, _ = scipy.spatial.cKDTree(bodies).query(at)
+    def of(cls, topology: Topology | Volume, points: Floats, moving: Flags, kept: Flags) -> Follower:
+        """Of the free nodes of a topology. points: (N, D). moving: (N,) held nodes that go elsewhere. kept: (N,) of
+        layers."""
+        rows, free = topology.near, topology.near_free
+        rows = rows[free[rows].any(axis=1)]
+        corners = rows.shape[1]
+        edges = np.concatenate([rows[:, [i, j]] for i in range(corners) for j in range(i + 1, corners)])
+        edges = np.sort(edges[free[edges].any(axis=1)], axis=1)
+        key = np.unique(edges[:, 0].astype(np.int64) * len(free) + edges[:, 1])
+        edges = np.column_stack(np.divmod(key, len(free))).astype(np.int32)
+        layers = (kept | ~free)[edges].all(axis=1) & kept[edges].any(axis=1)
+        bodies = points[moving if moving.any() else ~free]
+        away, _ = scipy.spatial.cKDTree(bodies).query(points)
         reach = max(REACH * float(np.ptp(bodies, axis=0).max()), TINY)
-        stiffness = np.where(layers, IN_LAYERS, 1.0) / np.sqrt(1.0 + away[edges].mean(axis=1) / reach)
-        return cls(edges, topology.near_free, layers, stiffness)
+        stiffness = 1.0 / np.sqrt(1.0 + away[edges].mean(axis=1) / reach)
+        stiffness[layers] *= IN_LAYERS * _shortness(points, edges[layers])
+        return cls(edges, free, layers, stiffness)
 
     def follow(
-        self, points: Complex, turned: Floats, unturned: Complex, places: Complex, turns: Floats, sure: Flags
-    ) -> tuple[Complex, Floats]:
-        """The points when held nodes are at new places, and by how much the surroundings of each node have turned.
+        self, points: Floats, attitude: Floats, ways: Floats, places: Floats, turns: Floats, since: Floats, sure: Flags
+    ) -> tuple[Floats, Floats]:  # fmt: skip
+        """The points (N, D) when held nodes are at new places, and the attitudes of the surroundings of each node then.
 
-        points: (N,) as they are now, after surroundings have turned by ``turned`` (N,) radians. unturned: (E,) the ways
-        along the edges that are to be kept, as they were before any rotation. places, turns: (N,) of held nodes. sure:
-        (N,) where ``turns`` is known; of other held nodes it follows.
+        points, attitude: (N, D) and of each node, as they are now. ways: (E, D) along the edges, that are to be kept,
+        as they were before any rotation. places, turns: (N, D) and (N, k) of held nodes. since: (N, k) by about how
+        much they turn now. sure: (N,) where ``turns`` is known; of other held nodes it follows.
         """
         a, b = self.edges.T
-        count, free = len(points), self.free
+        count, free, rotations = len(points), self.free, rotations_in(points.shape[1])
         if not free.any():
-            return places, turns
-        square = unturned.real**2 + unturned.imag**2
+            return places, rotations.turn(rotations.still(count), turns)
+        square = (ways**2).sum(axis=1)
         weight = self.stiffness / np.maximum(square, max(FLAT * float(square.max()), TINY))
         matrix = scipy.sparse.csr_array((weight, (a, b)), shape=(count, count))
-        matrix = matrix + matrix.T
+        matrix = (matrix + matrix.T).tocsr()
         rows = np.flatnonzero(free)
         inner = matrix[rows]
-        diagonal = np.bincount(a, weight, count) + np.bincount(b, weight, count)
-        solve = solver_of(scipy.sparse.diags_array(diagonal[rows], format="csc") - inner[:, rows].tocsc())
-        turn = np.where(free, turned, turns)
-        shift = np.where(free, 0.0, turn - turned)
-        turn[rows] += solve(inner @ shift)
-        refit, new = free | ~sure, np.where(free, points, places)
-        for _ in range(ITERATIONS):
-            wanted = np.exp(0.5j * (turn[a] + turn[b])) * unturned
-            pull = weight * (wanted - (new[b] - new[a]))
-            rest = _at_nodes(a, b, -pull, pull, count)[rows]
-            shift = solve(np.column_stack([rest.real, rest.imag]))
-            new[rows] += shift[:, 0] + 1j * shift[:, 1]
-            fit = weight * np.conj(unturned) * (new[b] - new[a])
-            more = np.where(refit, np.angle(_at_nodes(a, b, fit, fit, count) * np.exp(-1j * turn)), 0.0)
-            if np.abs(more).max(initial=0.0) < SMALL_TURN:
+        diagonal = np.asarray(np.bincount(a, weight, count) + np.bincount(b, weight, count), dtype=np.float64)[rows]
+        solve = _solver(inner[:, rows], diagonal, points.shape[1])
+        shift = np.where(free[:, None], 0.0, rotations.toward(attitude, turns, since))
+        shift[rows] = solve(inner @ shift)
+        attitude, refit = rotations.turn(attitude, shift), free | ~sure
+        new = np.where(free[:, None], points, places)
+        for iteration in range(ITERATIONS):
+            new[rows] += solve(rotations.pulls(self.edges, weight, ways, attitude, new)[rows])
+            settled = rotations.fit(self.edges, weight, ways, new, refit, attitude) < SMALL_TURN
+            if settled and iteration:  # the second one makes places exact that are solved for step by step
                 break
-            turn += more
-        return new, turn
+        return new, attitude
 
 
-def _at_nodes(a: Ints, b: Ints, of_a: Complex, of_b: Complex, count: int) -> Complex:
-    """(count,) sums of values of edges at their two ends."""
-    parts = [
-        np.bincount(a, of_a_part, count) + np.bincount(b, of_b_part, count)
-        for of_a_part, of_b_part in ((of_a.real, of_b.real), (of_a.imag, of_b.imag))
-    ]
-    sums: Complex = parts[0] + 1j * parts[1]
-    return sums
+def _shortness(points: Floats, edges: Ints) -> Floats:
+    """(E,) the squared length of the longest edge at either end over that of each edge, ``SHORT`` at most."""
+    square = np.maximum(((points[edges[:, 1]] - points[edges[:, 0]]) ** 2).sum(axis=1), TINY)
+    longest = np.zeros(len(points))
+    for end in range(2):
+        np.maximum.at(longest, edges[:, end], square)
+    found: Floats = np.minimum(longest[edges].max(axis=1) / square, SHORT)
+    return found
+
+
+def _solver(joins: scipy.sparse.csr_array, diagonal: Floats, dimension: int) -> Callable[[Floats], Floats]:
+    """Solves systems with a diagonal less what joins nodes, for right-hand sides (n, k)."""
+    if dimension == 2:
+        return solver_of(scipy.sparse.diags_array(diagonal, format="csc") - joins.tocsc())
+    joins = joins.tocsr()
+    joins.sort_indices()
+    matrix = Matrix(joins.indptr.astype(np.int64), joins.indices.astype(np.int32), joins.data, diagonal)
+    inverse = Multigrid(matrix)
+
+    def solve(right: Floats) -> Floats:
+        out = np.zeros_like(right)
+        for first in range(0, right.shape[1], 2):  # two columns at a time
+            pair = np.zeros((len(right), 2))
+            pair[:, : right.shape[1] - first] = right[:, first : first + 2]
+            for found, left, all_of_it in islice(approach(matrix, inverse, pair), MOST):
+                out[:, first : first + 2] = found[:, : right.shape[1] - first]
+                if left <= ACCURATE * ACCURATE * all_of_it:
+                    break
+        return out
+
+    return solve

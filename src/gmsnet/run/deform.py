@@ -125,13 +125,14 @@ def deform_with(mesh: Any, options: SmoothOptions, prescribed: Prescribed, fixed
 
 
 def check_deformable(mesh: Mesh) -> None:
-    """InputError for meshes that cannot be deformed: volumes, curved surfaces, second-order cells."""
+    """InputError for meshes that cannot be deformed: curved surfaces, second-order cells."""
     check_mesh(mesh, Target(None, None))
-    if mesh.has_volumes:
-        raise InputError("boundaries of volumes cannot be moved yet: deform takes meshes in a plane")
-    if mesh.plane is None:
-        raise InputError("boundaries of surfaces in space cannot be moved yet: deform takes meshes in a plane")
-    kinds = sorted({block.kind for block in mesh.cells if block.kind in NAMES and len(block.nodes)})
+    if mesh.plane is None and not mesh.has_volumes:
+        raise InputError("boundaries of surfaces in space cannot be moved: deform takes volumes, and meshes in a plane")
+    blocks = [block for block in mesh.cells if len(block.nodes)]
+    kinds = sorted({
+        block.kind for block in blocks if block.kind in NAMES or (block.dimension == 3 and block.cell.order > 1)
+    })  # fmt: skip
     if kinds:
         raise InputError(
             f"the mesh has second-order cells ({', '.join(kinds)}): boundaries of first-order cells alone can be moved "

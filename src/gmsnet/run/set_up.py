@@ -68,7 +68,7 @@ def first_state(
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     asked = fixed_mask(given, fixed)
     if given.has_volumes:
-        return _first_of_volume(given, restore, asked, fixed, smoother, options, executor)
+        return _first_of_volume(given, restore, asked, fixed, smoother, options, executor, moved)
     if given.plane is None:
         state, shell = first_of_surface(given, restore, asked, smoother, options, executor)
         return replace(state, remarks=(*state.remarks, *held_anyway(given, asked, shell, fixed, options.slides)))
@@ -154,12 +154,13 @@ def held_anyway(
 
 def _first_of_volume(
     given: Mesh, restore: Callable[[Floats], Any], asked: NDArray[np.bool_], fixed: Any, smoother: Smoother,
-    options: SmoothOptions, executor: Executor,
+    options: SmoothOptions, executor: Executor, moved: NDArray[np.bool_] | None,
 ) -> State:  # fmt: skip
     """The same of a mesh of volumes."""
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
-    wound, sliding = wound_of(given, asked), None
-    surface = patches_to_slide_on(given, wound, names, options.feature_angle, asked, options.distance)
+    still = asked if moved is None else asked | moved
+    wound, sliding = wound_of(given, still), None
+    surface = patches_to_slide_on(given, wound, names, options.feature_angle, still, options.distance)
     if surface is None:
         topology = volume_of(wound)
     else:

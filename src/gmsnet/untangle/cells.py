@@ -1,4 +1,4 @@
-"""Cells of a mesh by the rows of ``Topology.near``: a triangle is one, a quad the four of its corners in turn."""
+"""Cells of a mesh by the rows of ``near``: a triangle or tetrahedron is one, others those of their corners in turn."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Ints = NDArray[np.int32]
 Flags = NDArray[np.bool_]
@@ -21,9 +22,9 @@ class Corners(NamedTuple):
     sides: Rows
 
 
-def whole_cells(topology: Topology, rows: Flags) -> Flags:
+def whole_cells(topology: Topology | Volume, rows: Flags) -> Flags:
     """(T,) all rows of the cells that have one of some rows (T, bool)."""
-    cells = topology.near_cells
+    cells = topology.simplices.cells
     if cells is None:
         return rows
     chosen = np.zeros(int(cells.max(initial=-1)) + 1, dtype=bool)
@@ -31,12 +32,12 @@ def whole_cells(topology: Topology, rows: Flags) -> Flags:
     return np.take(chosen, cells)
 
 
-def first_rows(topology: Topology, rows: Flags) -> Rows:
+def first_rows(topology: Topology | Volume, rows: Flags) -> Rows:
     """The first row of each cell of which all rows, or none, are chosen (T, bool)."""
-    chosen = np.flatnonzero(rows)
-    if topology.near_cells is None:
+    chosen, cells = np.flatnonzero(rows), topology.simplices.cells
+    if cells is None:
         return chosen
-    return np.compress(np.diff(topology.near_cells[chosen], prepend=-1) != 0, chosen)
+    return np.compress(np.diff(cells[chosen], prepend=-1) != 0, chosen)
 
 
 def corners_of(topology: Topology, first: Rows) -> Corners:

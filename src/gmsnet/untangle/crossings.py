@@ -8,9 +8,7 @@ import numpy as np
 import scipy.spatial
 from numpy.typing import NDArray
 
-from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL
 from gmsnet.measure.signs import exact_signs
-from gmsnet.topology.topology import Topology
 from gmsnet.untangle.patch import Floats, Ints
 
 MOST = 3_000_000  # pairs of boxes
@@ -89,17 +87,6 @@ def by_size(low: Floats, high: Floats) -> Iterator[tuple[NDArray[np.intp], Float
     for each in np.unique(size):
         rows = np.flatnonzero(size == each)
         yield rows, (low[rows] + high[rows]) / 2, float(half[rows].max())
-
-
-def held_edges(topology: Topology) -> tuple[Ints, Ints]:
-    """The edges of cells whose two nodes are held (e, 2), by places in memory: those of one cell, and all."""
-    near, whole = topology.near, topology.near
-    if topology.near_shapes is not None:  # of a quad, whose corners are all there, each gives the edge that follows it
-        whole = near[topology.near_shapes == EQUILATERAL]
-    edges = np.concatenate([near[:, [0, 1]], whole[:, [1, 2]], whole[:, [2, 0]]])
-    edges = np.sort(edges[~topology.near_free[edges].any(axis=1)], axis=1)
-    every, cells = np.unique(edges, axis=0, return_counts=True)
-    return every[cells == 1], every
 
 
 def crossings(points: Floats, pairs: Ints) -> Floats:

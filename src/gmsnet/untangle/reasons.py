@@ -7,14 +7,14 @@ import scipy.optimize
 import scipy.sparse
 
 from gmsnet.measure.signs import exact_signs
+from gmsnet.topology.outline import held_edges
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.cells import corners_of, first_rows, whole_cells
-from gmsnet.untangle.crossings import held_edges, near_crossings
+from gmsnet.untangle.crossings import near_crossings
 from gmsnet.untangle.patch import Flags, Floats, Ints, free_among
-from gmsnet.untangle.result import StillInverted
+from gmsnet.untangle.result import HELD, StillInverted
 from gmsnet.untangle.state import UntanglingState
 
-HELD = "all its nodes are held"
 CROSSING = "the boundary crosses itself here"
 HELD_CROSSING = "edges whose nodes are held cross each other here"
 EMPTY = "no position of its free node makes all cells of its star positive"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 ALL, PART, NOTHING = "all", "part", "nothing"
+HELD = "all its nodes are held"
 
 
 class UntanglingStep(NamedTuple):

@@ -19,7 +19,7 @@ from gmsnet.kernels.untangle.space import find_bad, find_bad_inside, soften
 from gmsnet.measure.volumes import exact_signs3
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume
-from gmsnet.untangle.result import ALL, NOTHING, PART, StillInverted, Untangled, UntanglingStep
+from gmsnet.untangle.result import ALL, HELD, NOTHING, PART, StillInverted, Untangled, UntanglingStep
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -30,7 +30,6 @@ CLOSE = (0, 1, 2)  # rings, where some cells are left
 EARLY, MANY = 2, 0.1  # after so many rounds, with so many of the cells bad still, another start is taken
 SHRINK, FINEST = 0.6, 1e-4  # of ε from sweep to sweep, and of the median of |D| at last
 HARMONIC, ITERATIONS = 1e-6, 2000
-HELD = "all its nodes are held"
 
 
 class Attempt:
@@ -61,16 +60,7 @@ class Attempt:
 
     def look(self) -> int:
         """Measures all cells; how many are bad."""
-        simplices = self.topology.simplices
-        unit, grain = self.precision.unit, self.precision.grain
-        self.left = int(
-            find_bad(
-                self.points, simplices.rows, simplices.orientation, unit, grain, self.bad, self.inverted, self.ratio,
-                simplices.shapes,
-            )
-        )  # fmt: skip
-        if simplices.shapes is not None:
-            self.left = int(find_bad_inside(self.points, simplices, unit, grain, self.bad, self.inverted))
+        self.left = look(self.points, self.topology, self.precision, self.bad, self.inverted, self.ratio)
         return self.left
 
     @property
@@ -164,6 +154,22 @@ class Attempt:
             first = first or int(np.count_nonzero(broken))
             self.points[back] = self.start[back]
             self.look()
+
+
+def look(
+    points: Floats, topology: Volume, precision: Precision, bad: Flags, inverted: Flags, ratio: NDArray[np.float64]
+) -> int:
+    """Writes what ``find_bad`` says of all simplices, those of cells that may be bad between their corners as bad, too.
+
+    points: (N, 3 or more) by places in memory. Returns how many are bad.
+    """
+    simplices, unit, grain = topology.simplices, precision.unit, precision.grain
+    left = int(
+        find_bad(
+            points, simplices.rows, simplices.orientation, unit, grain, bad, inverted, ratio, simplices.shapes
+        )
+    )  # fmt: skip
+    return left if simplices.shapes is None else int(find_bad_inside(points, simplices, unit, grain, bad, inverted))
 
 
 def rows_at(near: NDArray[np.int32], chosen: Flags) -> NDArray[np.int32]:
