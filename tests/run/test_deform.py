@@ -317,3 +317,35 @@ def test_a_wall_of_a_volume_takes_its_layers_along(cells):
         for points in (mesh.points, result.points)
     )
     assert np.abs(after / before - 1.0)[:, 1:-1, 1:-1].max() < 0.02
+
+
+@pytest.mark.parametrize("way", [-0.4, 0.5])
+@pytest.mark.parametrize("cells", ["triangle", "quad", "tetra", "hexahedron", "mixed"])
+def test_sides_that_slide_follow_a_piston(cells, way):
+    mesh = small(cells, 2)
+    dimension = 2 if mesh.plane else 3
+    ids, up = mesh.markers["top"], np.eye(dimension)[-1]
+    result = gmsnet.deform(mesh, way * up, "top", slide=True)
+    assert (result.fraction, result.steps, result.after.inverted) == (1.0, 1, 0)
+    assert (result.points[ids, :dimension] == mesh.points[ids, :dimension] + way * up).all()
+    for axis in range(dimension - 1):
+        for side in (0.0, 1.0):
+            there = mesh.points[:, axis] == side
+            assert (result.points[there, axis] == side).all()
+    assert (result.points[mesh.points[:, dimension - 1] == 0.0, dimension - 1] == 0.0).all()
+    slid = held_nodes(mesh) & result.moved & ~np.isin(np.arange(len(mesh.points)), ids)
+    shift = (result.points - mesh.points)[slid, dimension - 1]
+    assert np.sign(shift.mean()) == np.sign(way)
+    assert (result.points == gmsnet.deform(mesh, way * up, "top", slide=True, threads=2).points).all()
+
+
+def test_a_wing_on_a_symmetry_plane_moves_with_its_root():
+    mesh = random_volume(800, seed=4)
+    x, y, _ = mesh.points.T
+    ids = mesh.markers["bottom"][(np.hypot(x - 0.5, y - 0.5) < 0.2)[mesh.markers["bottom"]]]
+    with_slide, without = (gmsnet.deform(mesh, (0.2, 0.0, 0.0), ids, slide=slide) for slide in ("bottom", None))
+    assert (with_slide.fraction, with_slide.after.inverted) == (1.0, 0)
+    assert (with_slide.points[mesh.markers["bottom"], 2] == 0.0).all()
+    assert without.fraction < 1.0
+    others = np.setdiff1d(np.arange(len(x)), mesh.markers["bottom"])
+    assert not with_slide.moved[np.intersect1d(others, np.flatnonzero(held_nodes(mesh)))].any()

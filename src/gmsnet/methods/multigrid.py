@@ -75,18 +75,18 @@ class Multigrid:
 
 
 def approach(
-    matrix: Matrix, inverse: Callable[[Floats], Floats], rest: Floats
-) -> Iterator[tuple[Floats, float, float]]:
+    times: Callable[[Floats, Floats], None], inverse: Callable[[Floats], Floats], rest: Floats
+) -> Iterator[tuple[Floats, float, float]]:  # fmt: skip
     """Conjugate gradients from x = 0: after each iteration x (n, 2), and the squares of what is left of ``rest`` (n, 2)
     and of what that was at first. x is changed by the next iteration. Ends where nothing can be gained.
 
-    inverse: an approximate inverse of the matrix.
+    times: writes the product of a matrix and its first argument into the second one. inverse: about its inverse.
     """
     x, first = np.zeros_like(rest), multigrid.product(rest, rest)
     z = inverse(rest)
     along, slope, image = z, multigrid.product(rest, z), np.empty_like(z)
     while slope > 0.0:
-        multigrid.times(matrix, along, image)
+        times(along, image)
         share = slope / multigrid.product(along, image)
         x += share * along
         before, rest = rest, rest - share * image

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -27,7 +28,7 @@ from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import VALID
 from gmsnet.kernels.untangle.barrier import energy
 from gmsnet.kernels.untangle.cells import find_bad
-from gmsnet.kernels.whole import graph, powers, steps
+from gmsnet.kernels.whole import graph, multigrid, powers, steps
 from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.methods.conjugate import minimise
@@ -133,7 +134,9 @@ class Problem:
         rest = np.empty((len(self.moved), 2))
         graph.pull_of_neighbours(points, self.cells, self.table, self.number, rest)
         goals = list(ACCURATE)
-        for x, left, first in islice(approach(self.matrix, inverse, rest), HARMONIC_ITERATIONS):
+        for x, left, first in islice(
+            approach(partial(multigrid.times, self.matrix), inverse, rest), HARMONIC_ITERATIONS
+        ):
             if left <= goals[0] * goals[0] * first:
                 goals.pop(0)
                 found = points.copy()

@@ -58,12 +58,16 @@ class Path:
     sure: Flags
 
     @classmethod
-    def of(cls, prescribed: Prescribed, topology: Topology | Volume, start: Floats, exponent: int) -> Path:
-        """start: (N, D) ``near_points``. exponent: of the mesh."""
+    def of(
+        cls, prescribed: Prescribed, topology: Topology | Volume, start: Floats, exponent: int,
+        told: Flags | None = None,
+    ) -> Path:  # fmt: skip
+        """start: (N, D) ``near_points``. exponent: of the mesh. told: (N,) whose edges tell turns; None: all nodes."""
         memory = topology.memory
         moved, turn = prescribed.moved[memory], prescribed.turn[memory]
         end = np.where(moved[:, None], np.ldexp(prescribed.places[memory], -exponent), start)
         edges, rotations = outline(topology, moved), rotations_in(start.shape[1])
+        edges = edges if told is None else edges[told[edges].all(axis=1)]
         a, b = edges.T
         _, sure = rotations.at_nodes(edges, start[b] - start[a], end[b] - end[a], len(start))
         bodies = _bodies(start, end, turn, moved, edges, rotations)

@@ -22,19 +22,25 @@ from itertools import islice
 import numpy as np
 import scipy.sparse
 import scipy.spatial
+from numpy.typing import NDArray
 
+from gmsnet.kernels.whole import multigrid
 from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.multigrid import Multigrid, approach
 from gmsnet.motion.path import Flags, Floats, Ints
+from gmsnet.motion.rails import Rails
 from gmsnet.motion.rotations import rotations_in
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 from gmsnet.untangle.harmonic import solver_of
 
+Solve = Callable[..., Floats]
+
 ITERATIONS, SMALL_TURN = 12, 1e-3  # radians
 TINY, FLAT = 1e-300, 1e-28  # FLAT: of the longest edge's square; shorter edges count as that long
 IN_LAYERS, SHORT = 10.0, 100.0  # times as stiff; times as much again, at most, are short edges among long ones
 REACH = 0.5  # of the extent of what moves: at this distance from it edges are 1/√2 times as stiff
+NOBODY, NOWHERE = np.empty(0, dtype=np.intp), np.empty((0, 0, 0))
 ACCURATE, MOST = 1e-6, 60  # of the residual, where systems are solved step by step, and steps
 
 
@@ -70,13 +76,15 @@ class Follower:
         return cls(edges, free, layers, stiffness)
 
     def follow(
-        self, points: Floats, attitude: Floats, ways: Floats, places: Floats, turns: Floats, since: Floats, sure: Flags
+        self, points: Floats, attitude: Floats, ways: Floats, places: Floats, turns: Floats, since: Floats, sure: Flags,
+        rails: Rails | None = None,
     ) -> tuple[Floats, Floats]:  # fmt: skip
         """The points (N, D) when held nodes are at new places, and the attitudes of the surroundings of each node then.
 
         points, attitude: (N, D) and of each node, as they are now. ways: (E, D) along the edges, that are to be kept,
         as they were before any rotation. places, turns: (N, D) and (N, k) of held nodes. since: (N, k) by about how
-        much they turn now. sure: (N,) where ``turns`` is known; of other held nodes it follows.
+        much they turn now. sure: (N,) where ``turns`` is known; of other held nodes it follows. rails: on which some of
+        the free nodes slide.
         """
         a, b = self.edges.T
         count, free, rotations = len(points), self.free, rotations_in(points.shape[1])
@@ -89,13 +97,18 @@ class Follower:
         rows = np.flatnonzero(free)
         inner = matrix[rows]
         diagonal = np.asarray(np.bincount(a, weight, count) + np.bincount(b, weight, count), dtype=np.float64)[rows]
-        solve = _solver(inner[:, rows], diagonal, points.shape[1])
+        solve = _solver(inner[:, rows], diagonal, points.shape[1], rails)
         shift = np.where(free[:, None], 0.0, rotations.toward(attitude, turns, since))
         shift[rows] = solve(inner @ shift)
         attitude, refit = rotations.turn(attitude, shift), free | ~sure
         new = np.where(free[:, None], points, places)
         for iteration in range(ITERATIONS):
-            new[rows] += solve(rotations.pulls(self.edges, weight, ways, attitude, new)[rows])
+            pull = rotations.pulls(self.edges, weight, ways, attitude, new)[rows]
+            if rails is None:
+                new[rows] += solve(pull)
+            else:
+                new[rows] += solve(pull, np.searchsorted(rows, rails.nodes), rails.ways(new))
+                rails.land(new)
             settled = rotations.fit(self.edges, weight, ways, new, refit, attitude) < SMALL_TURN
             if settled and iteration:  # the second one makes places exact that are solved for step by step
                 break
@@ -112,24 +125,55 @@ def _shortness(points: Floats, edges: Ints) -> Floats:
     return found
 
 
-def _solver(joins: scipy.sparse.csr_array, diagonal: Floats, dimension: int) -> Callable[[Floats], Floats]:
-    """Solves systems with a diagonal less what joins nodes, for right-hand sides (n, k)."""
-    if dimension == 2:
+class System:
+    """A Laplacian of n nodes in D dimensions, some of which slide, solved by conjugate gradients with multigrid.
+
+    Numbers stand in pairs of columns, (pairs · n, 2).
+    """
+
+    def __init__(self, joins: scipy.sparse.csr_array, diagonal: Floats) -> None:
+        joins = joins.tocsr()
+        joins.sort_indices()
+        self.matrix = Matrix(joins.indptr.astype(np.int64), joins.indices.astype(np.int32), joins.data, diagonal)
+        self.cycle = Multigrid(self.matrix)
+
+    def solve(self, right: Floats, rows: NDArray[np.intp] = NOBODY, ways: Floats = NOWHERE) -> Floats:
+        """For right-hand sides (n, k). In some rows (K,) the solution is along ways (K, k, k), each a projection."""
+        count, columns = right.shape
+        pairs = -(-columns // 2)
+
+        def parts(values: Floats) -> list[Floats]:
+            return [values[count * k : count * (k + 1)] for k in range(pairs)]
+
+        def projected(values: Floats) -> Floats:
+            if len(rows):
+                some = np.column_stack([part[rows] for part in parts(values)])
+                some[:, :columns] = np.einsum("nij,nj->ni", ways, some[:, :columns])
+                for k, part in enumerate(parts(values)):
+                    part[rows] = some[:, 2 * k : 2 * k + 2]
+            return values
+
+        def times(values: Floats, out: Floats) -> None:
+            for part, image in zip(parts(values), parts(out), strict=True):
+                multigrid.times(self.matrix, part, image)
+            projected(out)
+
+        def inverse(values: Floats) -> Floats:
+            return projected(np.concatenate([self.cycle(part) for part in parts(values)]))
+
+        rest = np.zeros((count, 2 * pairs))
+        rest[:, :columns] = right
+        rest = projected(np.concatenate([rest[:, 2 * k : 2 * k + 2] for k in range(pairs)]))
+        found = np.zeros_like(rest)
+        for x, left, all_of_it in islice(approach(times, inverse, rest), MOST):
+            found = x
+            if left <= ACCURATE * ACCURATE * all_of_it:
+                break
+        return np.column_stack(parts(found))[:, :columns]
+
+
+def _solver(joins: scipy.sparse.csr_array, diagonal: Floats, dimension: int, rails: Rails | None) -> Solve:
+    """Solves systems with a diagonal less what joins nodes; see ``System.solve``."""
+    if dimension == 2 and rails is None:
         return solver_of(scipy.sparse.diags_array(diagonal, format="csc") - joins.tocsc())
-    joins = joins.tocsr()
-    joins.sort_indices()
-    matrix = Matrix(joins.indptr.astype(np.int64), joins.indices.astype(np.int32), joins.data, diagonal)
-    inverse = Multigrid(matrix)
-
-    def solve(right: Floats) -> Floats:
-        out = np.zeros_like(right)
-        for first in range(0, right.shape[1], 2):  # two columns at a time
-            pair = np.zeros((len(right), 2))
-            pair[:, : right.shape[1] - first] = right[:, first : first + 2]
-            for found, left, all_of_it in islice(approach(matrix, inverse, pair), MOST):
-                out[:, first : first + 2] = found[:, : right.shape[1] - first]
-                if left <= ACCURATE * ACCURATE * all_of_it:
-                    break
-        return out
-
-    return solve
+    return System(joins, diagonal).solve

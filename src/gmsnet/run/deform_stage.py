@@ -22,6 +22,7 @@ from gmsnet.measure.totals import totals_of
 from gmsnet.methods.sized import Sized
 from gmsnet.motion.path import Flags, Floats, Path
 from gmsnet.motion.prescribed import Prescribed
+from gmsnet.motion.rails import Rails, rails_of
 from gmsnet.motion.rigid import Follower
 from gmsnet.motion.rotations import Rotations
 from gmsnet.parallel.executor import Executor
@@ -63,13 +64,15 @@ class Step:
 class Journey:
     """What stays the same on the way.
 
-    held: the topology in which nodes that are moved, and those that slide, stand still. dimension: of points.
-    wrong: (T,) rows of cells that were not positive when the boundary began to move; shapes: (T,) 1/q then; least: the
-    minimum.
+    held: the topology in which nodes that are moved, and those that slide, stand still; base: that in which the latter
+    are free; rails: what they slide on. dimension: of points. wrong: (T,) rows of cells that were not positive when the
+    boundary began to move; shapes: (T,) 1/q then; least: the minimum.
     """
 
     slides: Flags | None
     held: Topology | Volume
+    base: Topology | Volume
+    rails: Rails | None
     dimension: int
     path: Path
     start: Floats
@@ -79,7 +82,8 @@ class Journey:
     least: float
 
     def __init__(self, state: State, prescribed: Prescribed) -> None:
-        base = state.protection.base
+        self.base = base = state.protection.base
+        self.rails = rails_of(state.constraint, base.near_free)
         self.dimension = prescribed.dimension
         self.slides = None if state.sliding is None else state.sliding.nodes
         self.held = base if self.slides is None else base.holding(self.slides, REASON)
@@ -87,13 +91,14 @@ class Journey:
         bytes_per_node = BYTES_PER_NODE[self.dimension]
         refuse_unless_free(bytes_per_node * len(base.free), f"moving the nodes around {len(base.free):,}")
         self.start = self.places_of(state.points)
-        self.path = Path.of(prescribed, self.held, self.places_of(state.start), state.mesh.exponent)
+        still = self.held.near_free | ~base.near_free
+        self.path = Path.of(prescribed, self.held, self.places_of(state.start), state.mesh.exponent, still)
         kept = np.zeros(len(self.start), dtype=bool)
         for nodes in (state.protection.layers, state.protection.near_walls):
             if nodes is not None:
                 kept |= nodes[base.memory]
         moving = (self.path.end != self.path.start).any(axis=1)
-        self.follower = Follower.of(self.held, self.start, moving, kept)
+        self.follower = Follower.of(base, self.start, moving, kept)
         self.wrong = self.inverted(state.points)
         self.shapes = self.shape(state.points)
         self.least = float(self.shapes.min(initial=1.0))
@@ -140,7 +145,9 @@ class Journey:
         ways[follower.layers] = (self.start[b] - self.start[a])[follower.layers]
         since = turns - self.path.turns(shares[0]) if shares[0] else turns
         with np.errstate(over="ignore", invalid="ignore"):
-            found, attitude = follower.follow(now, attitude, ways, places, turns, since, self.path.sure)
+            found, attitude = follower.follow(
+                now, attitude, ways, places, turns, since, self.path.sure, self.rails
+            )  # fmt: skip
         points = np.zeros_like(state.points)
         points[:, : self.dimension] = _rounded(found, places, follower.free, single=state.precision.single)
         reach = FARTHER * max(float(np.abs(self.path.start).max()), float(np.abs(places).max()))
@@ -210,7 +217,7 @@ class Journey:
         """Which cells would be inverted whose nodes are all held, in words; "" if none."""
         points = np.zeros_like(state.points)
         points[:, : self.dimension] = places
-        topology = self.held
+        topology = self.base
         loose = whole_cells(topology, np.asarray(topology.near_free[topology.near].any(axis=1)))
         wrong = ~loose & ~self.wrong
         if wrong.any():
@@ -245,6 +252,8 @@ def move_boundary(state: State, options: SmoothOptions, executor: Executor, pres
             shares = motion.fraction, share
             step = journey.step(state, attitude, shares, executor if options.untangle else None)
             if step.why:
+                if journey.rails is not None:
+                    journey.rails.locate(journey.places_of(state.points))
                 motion, length = replace(motion, reason=step.why), length / 2.0
                 continue
             attitude = step.attitude

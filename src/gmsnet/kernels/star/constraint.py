@@ -252,6 +252,40 @@ def locate(constraint, points):
 
 
 @kernel
+def land_all(constraint, nodes, points, tangents):
+    """Puts these nodes (K,) of points (N, 2) to the nearest places on their curves; writes the tangents there (K, 2).
+
+    Straight curves go on behind their ends, for these may have moved. No neighbour is in the way. Parameters are
+    stored, those of places behind an end as of the end.
+    """
+    piece = constraint.piece
+    for i in range(len(nodes)):
+        node = nodes[i]
+        x, y = points[node, 0], points[node, 1]
+        row = constraint.row[node]
+        curve, u = constraint.curve[row], constraint.parameter[row]
+        kind, count = constraint.kind[curve], float(constraint.first[curve + 1] - constraint.first[curve])
+        low, high = (u - 0.5 * count, u + 0.5 * count) if constraint.closed[curve] else (0.0, count)
+        v = nearest(constraint, curve, u, low, high, x, y)
+        k, t = piece_at(constraint, curve, v)
+        if kind != ARCS:
+            t = piece_parameter(piece, k, x, y)
+        px, py = piece_point(piece, k, t)
+        if kind == SAME_X:
+            px, py = piece[k, 0], y
+        elif kind == SAME_Y:
+            px, py = x, piece[k, 1]
+        if constraint.single:
+            px, py = float(np.float32(px)), float(np.float32(py))
+        points[node, 0], points[node, 1] = px, py
+        tangents[i, 0], tangents[i, 1] = piece_tangent(piece, k, t)
+        if constraint.closed[curve]:
+            v += count if v < 0.0 else 0.0
+            v -= count if v >= count else 0.0
+        constraint.parameter[row] = v
+
+
+@kernel
 def slide_all(constraint, nodes, points, parameters, tangents):
     """Puts all of these nodes (K,) of points (N, 2) onto their curves, as ``snap`` does, each as if it moved alone.
 

@@ -267,3 +267,15 @@ def locate3(surface, points):
         else:
             _, _, _, place = snap3(surface, row, x, y, z)
         kept[row] = place
+
+
+@kernel
+def land_all3(surface, nodes, points, directions):
+    """Puts these nodes (K,) of points (N, 3 or 4) where ``snap3`` says, and writes ``directions_at`` there (K, 3)."""
+    for i in range(len(nodes)):
+        node = nodes[i]
+        row = surface.row[node]
+        x, y, z, place = snap3(surface, row, points[node, 0], points[node, 1], points[node, 2])
+        surface.place[row] = place
+        points[node, 0], points[node, 1], points[node, 2] = x, y, z
+        directions[i, 0], directions[i, 1], directions[i, 2] = directions_at(surface, row, x, y, z)
