@@ -1,10 +1,12 @@
 """Movers of meshes as others have them, for comparison: linear elasticity, radial basis functions, a Laplacian.
 
-Each takes points (N, 2), cells (triangles (T, 3), quads (Q, 4)), which nodes have places prescribed, and these; and
-returns new points. None looks at whether cells are inverted.
+Each takes points (N, D), cells (in the plane triangles (T, 3) and quads (Q, 4), in space tetrahedra (T, 4)), which
+nodes have places prescribed, and these; and returns new points. None looks at whether cells are inverted.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,28 +31,30 @@ def in_steps(mover, steps):
 
 
 def gradients(points, nodes):
-    """Gradients of the linear or bilinear shape functions (G, C, n, 2) at Gauss points, and their areas (G, C)."""
-    x = points[nodes]
-    if nodes.shape[1] == 3:
-        local = np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]])
-        weight = 0.5
+    """Gradients of the linear or bilinear shape functions (G, C, n, D) at Gauss points, and their shares (G, C)."""
+    x, dimension = points[nodes], points.shape[1]
+    if nodes.shape[1] == dimension + 1:
+        local = np.vstack([-np.ones(dimension), np.eye(dimension)])[None]
+        weight = 1.0 / math.factorial(dimension)
     else:
         sign = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         local = np.stack([0.25 * sign * (1 + sign * at)[:, ::-1] for at in GAUSS])
         weight = 1.0
     jacobian = np.einsum("gni,cnj->gcij", local, x)
     area = np.linalg.det(jacobian)
-    inverse = np.linalg.inv(np.where(np.abs(area)[..., None, None] > 1e-300, jacobian, np.eye(2)))
+    inverse = np.linalg.inv(np.where(np.abs(area)[..., None, None] > 1e-300, jacobian, np.eye(dimension)))
     return np.einsum("gcij,gnj->gcni", inverse, local), weight * area
 
 
 def elasticity(points, cells, known, places):
-    """Linear elasticity in plane strain, the stiffness of a cell the inverse of its area: SU2's DEFORM_MESH.
+    """Linear elasticity, in the plane of plane strain, the stiffness of a cell the inverse of its area or volume: SU2's
+    DEFORM_MESH.
 
     Source: T. D. Economon, F. Palacios, S. R. Copeland, T. W. Lukaczyk, J. J. Alonso, "SU2: An open-source suite for
     multiphysics simulation and design", AIAA Journal 54(3), 2016; DEFORM_STIFFNESS_TYPE= INVERSE_VOLUME.
     """
-    count = 2 * len(points)
+    dimension = points.shape[1]
+    count = dimension * len(points)
     rows, columns, values = [], [], []
     for nodes in cells:
         if not len(nodes):
@@ -64,18 +68,20 @@ def elasticity(points, cells, known, places):
         dot = np.einsum("gc,gcak,gcbk->cab", weight, slope, slope)
         block = lame[:, None, None, None, None] * both
         block = block + mu[:, None, None, None, None] * both.transpose(0, 1, 4, 3, 2)
-        block = block + mu[:, None, None, None, None] * dot[:, :, None, :, None] * np.eye(2)[None, None, :, None, :]
-        size = 2 * nodes.shape[1]
-        unknown = (2 * nodes[:, :, None] + np.arange(2)).reshape(len(nodes), size)
+        block = (
+            block + mu[:, None, None, None, None] * dot[:, :, None, :, None] * np.eye(dimension)[None, None, :, None, :]
+        )
+        size = dimension * nodes.shape[1]
+        unknown = (dimension * nodes[:, :, None] + np.arange(dimension)).reshape(len(nodes), size)
         rows.append(np.repeat(unknown, size, axis=1).ravel())
         columns.append(np.tile(unknown, (1, size)).ravel())
         values.append(block.reshape(len(nodes), -1).ravel())
     matrix = sp.csr_array(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count)
     )
-    held = np.repeat(known, 2)
+    held = np.repeat(known, dimension)
     shift = solved(matrix, held, (places - points).ravel())
-    return points + shift.reshape(-1, 2)
+    return points + shift.reshape(-1, dimension)
 
 
 def laplacian(points, cells, known, places):

@@ -52,8 +52,7 @@ def deform(
         list[str] | None,
         typer.Option(
             metavar="WHAT",
-            help="Let nodes of boundaries that are not moved slide along them as the mesh is smoothed: all, or a "
-            "marker's name. Repeatable.",
+            help="Let nodes of boundaries that are not moved follow along them: all, or a marker's name. Repeatable.",
         ),
     ] = None,
     feature_angle: Annotated[

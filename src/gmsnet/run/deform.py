@@ -82,7 +82,7 @@ def deform(
     threads: int | None = None,
     callback: Callable[[Sweep], bool | None] | None = None,
 ) -> DeformResult:
-    """Moves nodes of a planar mesh's boundary to new places; the nodes inside follow. Changes nothing but coordinates.
+    """Moves nodes of a mesh's boundary to new places; the nodes inside follow. Changes nothing but coordinates.
 
     No cell that is valid becomes inverted. At ``fraction`` 1 each node that is moved has the very coordinates asked
     for; else the mesh is that of the last valid step, and ``reason`` says what stood against the next one. All other
@@ -90,13 +90,14 @@ def deform(
     keep their shapes as they are carried along; where other cells have lost more than a fifth of their 1/q, the mesh is
     smoothed around them as by ``smooth``.
 
-    mesh: as for ``smooth``; first-order cells. displacement: one vector for all nodes that are moved, or one for each,
+    mesh: as for ``smooth``, in a plane or of volumes; first-order cells. displacement: one vector for all nodes that are moved, or one for each,
     in the order of ``nodes``: ids as given, those of a mask or a marker ascending. nodes: ids, a mask, a marker's name
     or a list of names; None: displacement has one row for each node of the mesh, and those that are not zero are moved.
     rotate: (nodes, degrees, (x, y)), or several of these: turns nodes counter-clockwise about a centre in the plane of
-    the mesh, before they are displaced; more than half a turn is told from this alone. places: new coordinates instead
-    of a displacement, in the same forms. The other options are those of
-    ``smooth``; slide: nodes of boundaries that are not moved may slide along them as the mesh is smoothed.
+    the mesh, before they are displaced; of a volume (nodes, degrees, (x, y, z), axis (3,)), counter-clockwise for who
+    looks against the axis. More than half a turn is told from this alone. places: new coordinates instead of a
+    displacement, in the same forms. The other options are those of ``smooth``; slide: nodes of boundaries that are not
+    moved follow along them, and slide as the mesh is smoothed.
 
     Raises InputError for what cannot be used, before anything is moved. KeyboardInterrupt: as for ``smooth``.
     """
@@ -151,4 +152,5 @@ def _check_fixed(mesh: Mesh, fixed: Any, prescribed: Prescribed) -> None:
 def _result(state: State, options: SmoothOptions, began: float) -> DeformResult:
     done, motion = result_of(state, options, began), state.motion or Motion(reason=state.stop_reason)
     known = {each.name: getattr(done, each.name) for each in fields(SmoothResult)}
+    known["compared"] = None  # the surface is elsewhere on purpose
     return DeformResult(**known, fraction=motion.fraction, steps=motion.steps, reason=motion.reason)

@@ -47,7 +47,7 @@ BETWEEN = 30  # sweeps after a step that is not the last
 CARRIED = "carried along, its shape kept"
 FARTHEST = 2.0**100  # from the origin, in units of the run: products of coordinates must not overflow
 FARTHER = 100.0  # times as far from the origin as any node was or is to be: systems were solved without an exact digit
-BYTES_PER_NODE = {2: 2500, 3: 3000}  # of factors and edges, measured
+BYTES_PER_NODE = {2: 2500, 3: 4700}  # of factors and edges, measured
 
 
 @dataclass(frozen=True, eq=False)
