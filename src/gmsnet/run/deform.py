@@ -90,9 +90,10 @@ def deform(
     keep their shapes as they are carried along; where other cells have lost more than a fifth of their 1/q, the mesh is
     smoothed around them as by ``smooth``.
 
-    mesh: as for ``smooth``, in a plane or of volumes; first-order cells. displacement: one vector for all nodes that are moved, or one for each,
-    in the order of ``nodes``: ids as given, those of a mask or a marker ascending. nodes: ids, a mask, a marker's name
-    or a list of names; None: displacement has one row for each node of the mesh, and those that are not zero are moved.
+    mesh: as for ``smooth``, in a plane or of volumes; first-order cells. displacement: one vector for all nodes that
+    are moved, or one for each, in the order of ``nodes``: ids as given, those of a mask or a marker ascending. nodes:
+    ids, a mask, a marker's name or a list of names; None: displacement has one row for each node of the mesh, and those
+    that are not zero are moved.
     rotate: (nodes, degrees, (x, y)), or several of these: turns nodes counter-clockwise about a centre in the plane of
     the mesh, before they are displaced; of a volume (nodes, degrees, (x, y, z), axis (3,)), counter-clockwise for who
     looks against the axis. More than half a turn is told from this alone. places: new coordinates instead of a
