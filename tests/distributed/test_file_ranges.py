@@ -63,7 +63,6 @@ def mixed() -> Mesh:
 
 
 def save_vtkhdf(mesh: Mesh, path: Path, kind: type = np.float64, **how: object) -> Path:
-    codes = {"line": 3, "triangle": 5, "quad": 9, "tetra": 10, "wedge": 13}
     with h5py.File(path, "w") as file:
         root = file.create_group("VTKHDF")
         root.attrs["Version"], root.attrs["Type"] = [1, 0], np.bytes_("UnstructuredGrid")
@@ -75,7 +74,46 @@ def save_vtkhdf(mesh: Mesh, path: Path, kind: type = np.float64, **how: object) 
         root.create_dataset("Points", data=points.astype(kind), **how)
         root.create_dataset("Connectivity", data=nodes)
         root.create_dataset("Offsets", data=np.concatenate([[0], np.cumsum(sizes)]))
-        root.create_dataset("Types", data=np.concatenate([np.full(len(b.nodes), codes[b.kind]) for b in mesh.cells]))
+        root.create_dataset("Types", data=np.concatenate([np.full(len(b.nodes), CODES[b.kind]) for b in mesh.cells]))
+    return path
+
+
+CODES = {"line": 3, "triangle": 5, "quad": 9, "tetra": 10, "hexahedron": 12, "wedge": 13, "pyramid": 14}
+
+
+def save_vtu(
+    mesh: Mesh, path: Path, kind: type = np.float64, order: str = "<", header: str = "u8", more: str = ""
+) -> Path:
+    """With raw appended arrays. more: XML of further arrays of the cells, whose numbers are those of the types."""
+    nodes = np.concatenate([block.nodes.ravel() for block in mesh.cells])
+    sizes = np.concatenate([np.full(len(block.nodes), block.nodes.shape[1]) for block in mesh.cells])
+    codes = np.concatenate([np.full(len(block.nodes), CODES[block.kind]) for block in mesh.cells])
+    points = np.pad(mesh.points, ((0, 0), (0, 3 - mesh.points.shape[1]))).astype(kind)
+    arrays = {
+        "connectivity": nodes.astype(np.int32), "offsets": np.cumsum(sizes).astype(np.int64),
+        "types": codes.astype(np.uint8), "Points": points, "more": codes.astype(np.uint8),
+    }  # fmt: skip
+    data, at = b"", {}
+    for name, values in arrays.items():
+        at[name] = len(data)
+        stored = values.astype(values.dtype.newbyteorder(order)).tobytes()
+        data += np.array([len(stored)], dtype=order + header).tobytes() + stored
+    real = f"Float{8 * np.dtype(kind).itemsize}"
+    text = f"""<?xml version="1.0"?>
+<VTKFile type="UnstructuredGrid" version="1.0" byte_order="{"LittleEndian" if order == "<" else "BigEndian"}"
+ header_type="UInt{8 * int(header[1])}"><UnstructuredGrid>
+<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(codes)}">
+{more.format(offset=at["more"])}
+<Points>
+<DataArray type="{real}" Name="Points" NumberOfComponents="3" format="appended" offset="{at["Points"]}"/>
+</Points>
+<Cells><DataArray type="Int32" Name="connectivity" format="appended" offset="{at["connectivity"]}"/>
+<DataArray type="Int64" Name="offsets" format="appended" offset="{at["offsets"]}"/>
+<DataArray type="UInt8" Name="types" format="appended" offset="{at["types"]}"/></Cells>
+</Piece></UnstructuredGrid>
+<AppendedData encoding="raw">
+_"""
+    path.write_bytes(text.encode() + data + b"\n</AppendedData>\n</VTKFile>\n")
     return path
 
 
@@ -88,6 +126,9 @@ SAVED = {
     **{form: lambda folder, form=form: save_ugrid(mixed(), folder / f"a.{form}.ugrid") for form in ugrid.FORMS},
     "b8, and more": lambda folder: _longer(save_ugrid(mixed(), folder / "a.b8.ugrid")),
     "faces": lambda folder: save_ugrid(_in_space(random_mesh(300, seed=1)), folder / "a.lb8.ugrid"),
+    "vtu": lambda folder: save_vtu(mixed(), folder / "a.vtu"),
+    "vtu, single": lambda folder: save_vtu(_in_runs(), folder / "a.vtu", np.float32, header="u4"),
+    "vtu, big-endian": lambda folder: save_vtu(random_volume(200, seed=1), folder / "a.vtu", order=">"),
     "vtkhdf": lambda folder: save_vtkhdf(random_volume(200, seed=1), folder / "a.vtkhdf"),
     "vtkhdf, single": lambda folder: save_vtkhdf(_in_runs(), folder / "a.vtkhdf", np.float32),
 }
@@ -115,7 +156,7 @@ def _in_runs() -> Mesh:
 
 
 def format_of(kind: str) -> str:
-    return "vtkhdf" if kind.startswith("vtkhdf") else "ugrid"
+    return next((key for key in ("vtkhdf", "vtu") if kind.startswith(key)), "ugrid")
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 3, 7])
@@ -135,7 +176,9 @@ def test_ranks_read_the_mesh_of_one_process(kind: str, ranks: int, tmp_path: Pat
 
 
 @pytest.mark.parametrize(("ranks", "method"), [(1, "barrier"), (2, "auto"), (3, "laplacian"), (5, "barrier")])
-@pytest.mark.parametrize("kind", ["lb8", "r4", "b8, and more", "faces", "vtkhdf", "vtkhdf, single"])
+@pytest.mark.parametrize(
+    "kind", ["lb8", "r4", "b8, and more", "faces", "vtu", "vtu, single", "vtu, big-endian", "vtkhdf", "vtkhdf, single"]
+)
 def test_the_bytes_of_a_serial_run(kind: str, ranks: int, method: str, tmp_path: Path) -> None:
     path = SAVED[kind](tmp_path)
     before, end = path.read_bytes(), path.name.removeprefix("a")
@@ -192,6 +235,45 @@ def test_fields_that_mean_more_are_for_the_reader_of_the_whole(name: str, tmp_pa
         rows = len(mesh.points) if name.startswith("Point") else sum(len(block.nodes) for block in mesh.cells)
         file["VTKHDF"].create_dataset(name, data=np.zeros(rows, dtype=np.int32))
     assert planned_format(str(path), "vtkhdf") == ""
+
+
+@pytest.mark.parametrize(
+    ("more", "shared"),
+    [
+        ("", "vtu"),
+        ('<CellData><DataArray type="UInt8" Name="heat" format="appended" offset="{offset}"/></CellData>', "vtu"),
+        ('<CellData><DataArray type="UInt8" Name="material" format="appended" offset="{offset}"/></CellData>', ""),
+        ('<CellData><DataArray type="UInt8" Name="vtkGhostType" format="appended" offset="{offset}"/></CellData>', ""),
+        ('<CellData><DataArray type="UInt8" Name="heat" format="appended" offset="3"/></CellData>', ""),
+        ('<CellData><DataArray type="UInt8" Name="heat" format="ascii">1 2 3</DataArray></CellData>', ""),
+        ("</Piece><Piece>", ""),
+    ],
+)
+def test_which_grids_of_vtu_are_shared(more: str, shared: str, tmp_path: Path) -> None:
+    path = save_vtu(random_volume(50, seed=1), tmp_path / "a.vtu", more=more)
+    assert planned_format(str(path), "vtu") == shared
+    path.write_bytes(path.read_bytes()[:-8])
+    assert planned_format(str(path), "vtu") == ""
+
+
+@pytest.mark.parametrize("how", ["zlib", "base64", "text"])
+def test_other_encodings_of_vtu_are_for_the_reader_of_the_whole(how: str, tmp_path: Path) -> None:
+    pyvista = pytest.importorskip("pyvista")
+    writer = pytest.importorskip("vtkmodules.vtkIOXML").vtkXMLUnstructuredGridWriter()
+    grid = pyvista.UnstructuredGrid({10: random_volume(50, seed=1).cells[0].nodes}, random_volume(50, seed=1).points)
+    writer.SetInputDataObject(grid)
+    writer.SetFileName(str(tmp_path / "a.vtu"))
+    writer.SetDataModeToAscii() if how == "text" else writer.SetDataModeToAppended()
+    writer.SetEncodeAppendedData(how == "base64")
+    if how != "zlib":
+        writer.SetCompressorTypeToNone()
+    assert writer.Write()
+    assert planned_format(str(tmp_path / "a.vtu"), "vtu") == ""
+    writer.SetDataModeToAppended()
+    writer.SetEncodeAppendedData(False)
+    writer.SetCompressorTypeToNone()
+    assert writer.Write()
+    assert planned_format(str(tmp_path / "a.vtu"), "vtu") == "vtu"
 
 
 def heard(ranks: int, path: Path, kind: str, options: SmoothOptions | None = None) -> list[str]:

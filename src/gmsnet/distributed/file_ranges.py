@@ -24,7 +24,7 @@ from gmsnet.io.pieces import Piece as Bytes
 from gmsnet.io.ranges import AT_ONCE, Plan, Ranges
 from gmsnet.io.stamps import Stamps
 
-PLANNED = ("ugrid", "vtkhdf")  # formats whose files can tell how their numbers lie
+PLANNED = ("ugrid", "vtkhdf", "vtu")  # formats whose files can tell how their numbers lie
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
 

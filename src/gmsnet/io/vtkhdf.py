@@ -5,33 +5,24 @@ Only the points are written again.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.cells.table import nodes_of
 from gmsnet.errors import FormatError
 from gmsnet.io import vtk_cells
-from gmsnet.io.cell_table import Kind
-from gmsnet.io.cells import MOST_BLOCKS
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
-from gmsnet.io.ranges import Plan, Ranges, Rows, Table
+from gmsnet.io.ranges import Plan, Ranges, Rows
 from gmsnet.io.stored import Part, coordinates
-from gmsnet.io.vtk_ghosts import LEVELS, TYPES
+from gmsnet.io.vtk_runs import means_more, tables_of
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.mesh.region_fields import names_a_region
-from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX
 
 name = "VTKHDF"
 suffixes: tuple[str, ...] = (".vtkhdf",)
-
-CODES = {*vtk_cells.KINDS} - {POLYGON, POLYLINE, POLYVERTEX}  # types of a certain number of nodes
-AT_ONCE = 1 << 20  # cells that are looked at together
 
 
 def read(files: Mapping[str, Data]) -> Parsed:
@@ -73,49 +64,17 @@ def plan(file: Ranges) -> Plan | None:
         count, cells = _only(root, "NumberOfPoints"), _only(root, "NumberOfCells")
         points, offsets, types, nodes = (root.need(key) for key in ("Points", "Offsets", "Types", "Connectivity"))
         names = [found.names() if (found := root.get(key)) is not None else [] for key in ("PointData", "CellData")]
-        special = "fixed" in names[0] or any(map(_means_more, names[1]))
+        special = "fixed" in names[0] or any(map(means_more, names[1]))
         special = special or any(each.is_elsewhere() for each in (points, offsets, types, nodes))
         begin, at = points.offset(), nodes.offset()
         whole = [each.shape() for each in (points, offsets, types, nodes)]
         if special or begin is None or at is None or whole[:3] != [(count, 3), (cells + 1,), (cells,)] or not cells:
             return None
-        tables, size = list[Table](), np.dtype(nodes.dtype()).itemsize
-        for first, last, kind, start in _runs(offsets, types, cells, whole[3][0]):
-            width = nodes_of(kind.name)
-            rows = Rows(at + start * size, last - first, width * size, nodes.dtype(), width)
-            tables.append(Table(kind.name, rows, 0, kind.order))
+        tables = tables_of(types.some, offsets.some, cells, whole[3][0], Rows(at, whole[3][0], 0, nodes.dtype()))
         real = points.dtype()
         if not tables or real[1:] not in ("f4", "f8") or nodes.dtype()[1] not in "iu":
             return None
         return Plan(Rows(begin, count, 3 * int(real[2:]), real, 3), [[table] for table in tables], real[1:] == "f4")
-
-
-def _means_more(name: str) -> bool:
-    """Whether cell data of this name are looked at by the reader."""
-    return names_a_region(name) or name in (TYPES, LEVELS)
-
-
-def _runs(offsets: Node, types: Node, cells: int, numbers: int) -> list[tuple[int, int, Kind, int]]:
-    """First and last cell, kind and first number of each run of cells of one kind; none where that cannot be told."""
-    runs, end = list[tuple[int, int, Kind, int]](), 0
-    for first in range(0, cells, AT_ONCE):
-        last = min(first + AT_ONCE, cells)
-        codes, ends = types.some(first, last), offsets.some(first, last + 1)
-        if ends[0] != end or not set(np.unique(codes).tolist()) <= CODES:
-            return []
-        cuts = [0, *(np.flatnonzero(np.diff(codes)) + 1).tolist(), last - first]
-        for begin, stop in itertools.pairwise(cuts):
-            kind = vtk_cells.KINDS[int(codes[begin])]
-            if (np.diff(ends[begin : stop + 1]) != nodes_of(kind.name)).any():
-                return []
-            if runs and runs[-1][2] == kind:
-                runs[-1] = (*runs[-1][:1], first + stop, *runs[-1][2:])
-            else:
-                runs.append((first + begin, first + stop, kind, int(ends[begin])))
-        end = int(ends[-1])
-        if len(runs) >= MOST_BLOCKS:
-            return []
-    return runs if end == numbers else []
 
 
 def _only(root: Node, key: str) -> int:

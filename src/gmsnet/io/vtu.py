@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io import convert, vtk_cells, vtk_ghosts
+from gmsnet.io import convert, vtk_cells, vtk_ghosts, vtu_ranges
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Lattice, Places
+from gmsnet.io.ranges import Plan, Ranges
 from gmsnet.io.splice import BinarySlots, EncodedSlots, Slots
 from gmsnet.io.vtu_arrays import Encoded
 from gmsnet.io.vtu_reader import TYPES, Reader, one_word
@@ -37,6 +38,11 @@ _IS_BLANK = np.isin(np.arange(256), list(b" \t\r\n"))
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
     return vtk_ghosts.held(facts(Reader(files[".vtu"])))
+
+
+def plan(file: Ranges) -> Plan | None:
+    """See ``vtu_ranges.plan``."""
+    return vtu_ranges.plan(file)
 
 
 def facts(reader: Reader) -> Parsed:
