@@ -249,6 +249,17 @@ def test_a_plane_of_constant_y():
     assert (result.points[:, [0, 2]] == flat.points[:, :2]).all()
 
 
+@pytest.mark.parametrize("size", [1.0, 1e-30])
+@pytest.mark.parametrize("far", [1e250, 1e300])
+def test_far_away_of_a_volume_is_told_and_nothing_breaks(size, far):
+    mesh = random_volume(60, seed=1, size=size)
+    for ids in ("top", np.flatnonzero(held_nodes(mesh))):
+        result = gmsnet.deform(mesh, (0.0, 0.0, far), ids)
+        assert result.after.inverted == 0
+        assert result.fraction < 0.01
+        assert result.reason
+
+
 def test_far_away_is_told_and_nothing_breaks(plate):
     result = gmsnet.deform(plate, (1e250, 0.0), "hole")
     assert result.fraction < 0.01

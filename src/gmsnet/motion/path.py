@@ -24,6 +24,7 @@ Flags = NDArray[np.bool_]
 Ints = NDArray[np.int32]
 Nodes = NDArray[np.integer[Any]]
 
+FAR = 2.0**300  # units of the run: a boundary that goes farther never comes there, and squares must not overflow
 RIGID = 1e-6  # of the size of a body: by no more does one that moves as a whole miss its places
 
 
@@ -65,12 +66,12 @@ class Path:
         """start: (N, D) ``near_points``. exponent: of the mesh. told: (N,) whose edges tell turns; None: all nodes."""
         memory = topology.memory
         moved, turn = prescribed.moved[memory], prescribed.turn[memory]
-        end = np.where(moved[:, None], np.ldexp(prescribed.places[memory], -exponent), start)
+        with np.errstate(over="ignore"):
+            end = np.where(moved[:, None], np.ldexp(prescribed.places[memory], -exponent), start)
         edges, rotations = outline(topology, moved), rotations_in(start.shape[1])
         edges = edges if told is None else edges[told[edges].all(axis=1)]
-        a, b = edges.T
-        _, sure = rotations.at_nodes(edges, start[b] - start[a], end[b] - end[a], len(start))
-        bodies = _bodies(start, end, turn, moved, edges, rotations)
+        _, sure = rotations.at_nodes(edges, _along(edges, start), _along(edges, end), len(start))
+        bodies = _bodies(start, np.clip(end, -FAR, FAR), turn, moved, edges, rotations)
         return cls(start, end, turn, bodies, edges, rotations, sure)
 
     def places(self, share: float) -> Floats:
@@ -85,12 +86,16 @@ class Path:
     def turns(self, share: float) -> Floats:
         """(N, k): by how much the boundary has turned at its nodes then; as asked for where it is not told."""
         places, asked = self.places(share), share * self.turn
-        a, b = self.edges.T
-        found, told = self.rotations.at_nodes(
-            self.edges, self.start[b] - self.start[a], places[b] - places[a], len(places)
-        )
+        old, new = (_along(self.edges, each) for each in (self.start, places))
+        found, told = self.rotations.at_nodes(self.edges, old, new, len(places))
         still = (places == self.start).all(axis=1)
         return _unwrapped(found, told, asked, self.edges, still, self.rotations)
+
+
+def _along(edges: Ints, points: Floats) -> Floats:
+    """(E, D) from the first to the second node of edges."""
+    points = np.clip(points, -FAR, FAR)
+    return np.asarray(points[edges[:, 1]] - points[edges[:, 0]])
 
 
 def outline(topology: Topology | Volume, moved: Flags) -> Ints:
