@@ -20,7 +20,7 @@ AT_NODE = (WEIGHTS[SQUARE, 0], WEIGHTS[SQUARE, 1], WEIGHTS[SQUARE, 2])
 AT_A = (WEIGHTS[SQUARE, 0], WEIGHTS[SQUARE, 2], WEIGHTS[SQUARE, 1])
 AT_B = (WEIGHTS[SQUARE, 2], WEIGHTS[SQUARE, 0], WEIGHTS[SQUARE, 1])
 ROUND = tuple(WEIGHTS[EQUILATERAL])
-MOST, OPEN = 2**31 - 1, 2**62  # parts of the number of a kind of star: its quads; whether each cell has its own nodes
+FEW = 2**16  # kinds of stars that there may be: so many have a table
 
 
 class Links(NamedTuple):
@@ -52,12 +52,28 @@ class Links(NamedTuple):
             first, faces.corner, orientation, faces.origin, chosen, both, triangles, quads, fan_start, fan, start,
             around,
         )  # fmt: skip
-        code = (both.astype(np.int64) * OPEN) | triangles.astype(np.int64) << 31 | quads
-        code = np.concatenate([[0], code])  # that of no cells is number 0
-        kinds, number = np.unique(code, return_inverse=True)
-        patterns = patterns_of([((kind & ~OPEN) >> 31, kind & MOST, kind >= OPEN) for kind in kinds.tolist()])
-        stars = Stars(start, around, number[1:].astype(np.int32), patterns)
+        kinds, number = kinds_of(triangles, quads, both)
+        stars = Stars(start, around, number, patterns_of(kinds))
         return cls(stars, None if faces.first is None else simplices_of(faces, orientation))
+
+
+def kinds_of(triangles: Ints, quads: Ints, both: Flags) -> tuple[list[tuple[int, int, bool]], Ints]:
+    """The kinds of stars that there are, in their order, that of no cells first; and (N,) the number of each star's.
+
+    A kind: how many triangles and how many quads, and whether each cell has nodes of its own in the star.
+    """
+    many = int(quads.max(initial=0)) + 1
+    apart = (int(triangles.max(initial=0)) + 1) * many
+    code = np.int64(many) * triangles + quads
+    code[both] += apart
+    if 2 * apart <= FEW:
+        there = np.bincount(code, minlength=1) > 0
+        there[0] = True
+        found, number = np.flatnonzero(there), (np.cumsum(there, dtype=np.int32) - np.int32(1)).take(code)
+    else:
+        found, where = np.unique(np.append(code, 0), return_inverse=True)
+        number = where[:-1].astype(np.int32)
+    return [(kind % apart // many, kind % many, kind >= apart) for kind in found.tolist()], number
 
 
 def simplices_of(faces: NearFaces, orientation: NDArray[np.int8]) -> Simplices:
@@ -69,6 +85,19 @@ def simplices_of(faces: NearFaces, orientation: NDArray[np.int8]) -> Simplices:
     cells = np.empty(count, dtype=np.int32)
     links.corner_simplices(faces.first, faces.corner, orientation, rows, shapes, cells)
     return Simplices(rows, np.ones(count, dtype=np.int8), shapes, cells)
+
+
+def taken_from(simplices: Simplices, rows: Ints) -> Simplices:
+    """``simplices.take(rows)`` of those of cells, all arrays at once."""
+    assert simplices.shapes is not None
+    assert simplices.cells is not None
+    count = len(rows)
+    taken = Simplices(
+        np.empty((count, 3), dtype=np.int32), np.empty(count, dtype=np.int8), np.empty(count, dtype=np.uint8),
+        np.empty(count, dtype=np.int32),
+    )  # fmt: skip
+    links.take(rows, *simplices, *taken)
+    return taken
 
 
 def patterns_of(kinds: list[tuple[int, int, bool]]) -> Patterns:

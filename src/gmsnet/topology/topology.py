@@ -17,14 +17,14 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.star import pattern as kernels_stars
 from gmsnet.kernels.star.block import Blocks
-from gmsnet.kernels.topology import connectivity, layout, patch
+from gmsnet.kernels.topology import connectivity, layout, links, patch
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
 from gmsnet.topology.connectivity import Connectivity
 from gmsnet.topology.fans import closed_fans
 from gmsnet.topology.held import MOST_NEIGHBOURS, known_marks, released, sorted_out
-from gmsnet.topology.links import Links
+from gmsnet.topology.links import Links, taken_from
 from gmsnet.topology.ordering import memory_order, planar_points, space_points, taken
 from gmsnet.topology.polygons import Faces, Offsets, check_size
 from gmsnet.topology.stars import Colouring, Flags, Ints, Stars
@@ -131,9 +131,9 @@ class Topology(Connectivity):
             )  # fmt: skip
         return topology, planar
 
-    def linked(self, links: Links) -> Topology:
+    def linked(self, given: Links) -> Topology:
         """The same, its stars and cells given by links instead of fans."""
-        stars, simplices = links
+        stars, simplices = given
         simplices = simplices or self.simplices
         return replace(
             self,
@@ -263,24 +263,20 @@ class Topology(Connectivity):
         simplices of the cells with a free node; ``simplices`` itself, where these are all."""
         if self.near_cells is None:
             return self.simplices
-        cells = np.zeros(int(self.near_cells.max(initial=-1)) + 1, dtype=bool)
-        cells[self.near_cells[self._with_a_free_node]] = True
-        kept = cells[self.near_cells]
-        return self.simplices if kept.all() else self.simplices.take(np.flatnonzero(kept))
+        return self._taken(links.rows_of_cells_with(self.near, self.near_cells, self.near_free))
 
     @cached_property
     def changeable(self) -> Simplices:
         """Those that have a free node."""
-        rows = self._with_a_free_node
-        if len(rows) == len(self.near):
-            return self.simplices
-        return self.simplices.take(rows)
+        return self._taken(connectivity.touching(self.near, self.near_free))
 
-    @cached_property
-    def _with_a_free_node(self) -> Ints:
-        """Their rows."""
-        rows: Ints = connectivity.touching(self.near, self.near_free)
-        return rows
+    def _taken(self, rows: Ints) -> Simplices:
+        """Some of the simplices; themselves, if all."""
+        simplices = self.simplices
+        if len(rows) == len(self.near):
+            return simplices
+        in_plane = isinstance(simplices, Simplices)  # those of a surface are others
+        return taken_from(simplices, rows) if in_plane and simplices.cells is not None else simplices.take(rows)
 
     @cached_property
     def links(self) -> kernels_stars.Stars:

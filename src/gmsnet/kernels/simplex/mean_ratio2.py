@@ -65,7 +65,7 @@ class Simplices(NamedTuple):
         """How many cells they belong to."""
         if self.cells is None:
             return len(self.rows)
-        return int(np.count_nonzero(np.diff(self.cells))) + (len(self.cells) > 0)
+        return int(np.count_nonzero(self.cells[1:] != self.cells[:-1])) + (len(self.cells) > 0)
 
     def take(self, rows: NDArray[np.integer[Any]]) -> Simplices:
         """Some of them."""

@@ -119,3 +119,30 @@ def corner_simplices(first, corner, orientation, rows, shapes, cells):
             shapes[found], cells[found] = EQUILATERAL if n == 3 else SQUARE, f
             found += 1
     return found
+
+
+@kernel
+def rows_of_cells_with(rows, cells, chosen):
+    """The places (int32, ascending) of all corner simplices of the cells that have a chosen node. chosen: (N,)."""
+    found = np.empty(len(rows), dtype=np.int32)
+    count = t = 0
+    while t < len(rows):
+        end, has = t, False
+        while end < len(rows) and cells[end] == cells[t]:
+            has |= chosen[rows[end, 0]] | chosen[rows[end, 1]] | chosen[rows[end, 2]]
+            end += 1
+        for k in range(t, end):
+            found[count] = k
+            count += has
+        t = end
+    return found[:count].copy()
+
+
+@kernel
+def take(taken, rows, orientation, shapes, cells, to_rows, to_orientation, to_shapes, to_cells):
+    """Writes some corner simplices, by their places ``taken``, one after the other."""
+    for k in range(len(taken)):
+        t = np.uint32(taken[k])
+        for corner in range(3):
+            to_rows[k, corner] = rows[t, corner]
+        to_orientation[k], to_shapes[k], to_cells[k] = orientation[t], shapes[t], cells[t]
