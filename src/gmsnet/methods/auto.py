@@ -244,9 +244,10 @@ class Auto(Smoother):
             self.slow = self._is_slow(field, executor, ahead, lasts) or (not goes_on and self._is_caught())
             goes_on = goes_on or self.slow
         target_reached = self.smoother.target_reached
-        self.looks = self.rounds % phase.often == 0 if goes_on else phase.looks or target_reached
         if isinstance(self.smoother, WorstFirst) and (self.creep is not None or self.phases in IN_SPACE):
             self._look_at_worst(self.smoother)
+        looks = phase.looks and not (phase.late and self.again >= 0)
+        self.looks = self.rounds % phase.often == 0 if goes_on else looks or target_reached
         if not goes_on:
             is_ideal = isinstance(self.smoother, WorstFirst) and self.smoother.least >= self.smoother.enough
             few = self.creep is not None and not self.whole and self.free <= EXACT

@@ -19,6 +19,7 @@ from gmsnet.topology.volume import Volume
 SMALL, LARGE_VOLUME = 5000, 50_000  # free nodes
 ALWAYS = 10**9  # sweeps
 RELAXATION = 1.6  # of the Newton steps
+LONGER = 1.8  # the same of quads, where long waves are left
 IDEAL = 0.99  # a least 1/q at which the worst cells have no turn, nor what follows
 
 
@@ -28,7 +29,8 @@ class Phase(NamedTuple):
     first: how many for the first time, if others. rounds: how often it is made at most. gain: what must be to come, in
     the mean of 1/q, for it to be made once more; least: what the last round must have gained for that. lasting: with
     less than this share of the gain before, no nodes creep: so gains fall where short waves are left, which sweeps even
-    out. looks: whether the mesh is measured after it. often: after so many rounds of it, too.
+    out. looks: whether the mesh is measured after it; late: not if the worst cells have another turn. often: after so
+    many rounds of it, too.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Phase(NamedTuple):
     lasting: float = 0.0
     looks: bool = True
     often: int = 4
+    late: bool = False
 
 
 def newton(relaxation: float = RELAXATION, *, means: int = 0) -> Barrier:
@@ -66,13 +69,16 @@ ABOVE = Phase("MetricLoss, above 1/q = 0.4", lambda: Newton("metric", floor=0.4)
 POLISH = Phase("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1, rounds=8, gain=0.0003)
 
 LARGE_PLAN = (NEWTON._replace(looks=False), WORST._replace(looks=False), MEAN)
+MEAN_OF_QUADS = MEAN._replace(
+    create=lambda: newton(LONGER), gain=0.0003, least=0.0002, lasting=math.inf, rounds=20, late=True
+)
 # Quads gain for longer, and what the mean takes back from the worst of them is worth another turn.
 QUADS_PLAN = (
-    NEWTON._replace(gain=0.0005, least=0.0005, lasting=0.8, looks=False),
+    NEWTON._replace(gain=0.001, least=0.001, lasting=0.8, looks=False, often=10),
     WORST._replace(create=lambda: worst_first(3, IDEAL), looks=False),
-    MEAN._replace(gain=0.0003, least=0.0002, lasting=math.inf, rounds=20, looks=False),
+    MEAN_OF_QUADS._replace(looks=False),
     WORST._replace(create=lambda: worst_first(6, IDEAL), looks=False),
-    MEAN._replace(gain=0.0003, least=0.0002, lasting=math.inf, rounds=20),
+    MEAN_OF_QUADS,
 )
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 # Of volumes; q there is the mean ratio to the power of 3/2.
