@@ -23,6 +23,7 @@ from support.damage import (
 )
 
 import gmsnet
+from gmsnet.cells.table import CELLS
 from gmsnet.errors import FormatError
 from gmsnet.io import abaqus
 from gmsnet.io.abaqus_types import WRITTEN, kind_of
@@ -263,7 +264,8 @@ def test_a_deck_without_a_mesh(data: bytes) -> None:
         ("S4R5", "quad"), ("S8R5", "quad8"), ("S9R5", "quad9"), ("STRI65", "triangle6"), ("SC8R", "hexahedron"),
         ("SC6R", "wedge"), ("B31H", "line"), ("B32", "line3"), ("SAX1", "line"), ("DC2D6", "triangle6"),
         ("C3D" + 8000 * "1", None),
-        ("C3D15V", None), ("C3D27", None), ("COH3D8", None), ("CIN3D8", None), ("U1", None), ("", None),
+        ("C3D27", "hexahedron27"), ("C3D27RH", "hexahedron27"),
+        ("C3D15V", None), ("COH3D8", None), ("CIN3D8", None), ("U1", None), ("", None),
     ],
 )  # fmt: skip
 def test_types_of_elements(type_: str, kind: str | None) -> None:
@@ -281,6 +283,63 @@ def test_an_unknown_type_is_held_and_named() -> None:
     assert cells_of(parsed, "abaqus:U1") == [[0, 1, 4], [0, 3]]
     assert unknown_cells(mesh_of(parsed)) == "2 abaqus:U1 cells"
     assert not gmsnet.smooth(mesh_of(parsed)).moved.any()
+
+
+# A cube of Gmsh 4.15 as it writes it: the middle of the cell stands before those of its faces.
+CUBE27 = b"""*NODE
+1, 0, 0, 1
+2, 0, 0, 0
+3, 0, 1, 1
+4, 0, 1, 0
+5, 1, 0, 1
+6, 1, 0, 0
+7, 1, 1, 1
+8, 1, 1, 0
+9, 0, 0, 0.5
+10, 0, 0.5, 1
+11, 0, 1, 0.5
+12, 0, 0.5, 0
+13, 1, 0, 0.5
+14, 1, 0.5, 1
+15, 1, 1, 0.5
+16, 1, 0.5, 0
+17, 0.5, 0, 0
+18, 0.5, 0, 1
+19, 0.5, 1, 0
+20, 0.5, 1, 1
+21, 0, 0.5, 0.5
+22, 1, 0.5, 0.5
+23, 0.5, 0, 0.5
+24, 0.5, 1, 0.5
+25, 0.5, 0.5, 0
+26, 0.5, 0.5, 1
+27, 0.5, 0.5, 0.5
+*ELEMENT, type=C3D27, ELSET=Volume1
+27, 3, 1, 2, 4, 7, 5, 6, 8, 10, 9, 12, 11, 14, 13, 16,
+15, 20, 18, 17, 19, 27, 21, 22, 26, 23, 25, 24
+"""
+
+
+def test_hexahedra_of_27_nodes_have_each_where_it_belongs() -> None:
+    parsed = read(abaqus, CUBE27)
+    (cell,) = parsed.points[cells_of(parsed, "hexahedron27")]
+    kind = CELLS["hexahedron27"]
+    for first, last, middle in kind.edges:
+        assert cell[middle].tolist() == ((cell[first] + cell[last]) / 2).tolist()
+    for facet in kind.facets:
+        assert cell[facet[8]].tolist() == cell[list(facet[:4])].mean(axis=0).tolist()
+    assert cell[26].tolist() == [0.5, 0.5, 0.5]
+    written = contents(abaqus.write(mesh_of(parsed)))[".inp"]
+    assert cells_of(read(abaqus, written), "hexahedron27") == cells_of(parsed, "hexahedron27")
+    assert b"".join(CUBE27.split()[-27:]) in b"".join(written.split())
+    check_splice(abaqus, CUBE27)
+
+
+def test_hexahedra_without_nodes_in_their_faces_are_held() -> None:
+    parsed = read(abaqus, CUBE27.replace(b", 21, 22, 26, 23, 25, 24", b""))
+    assert unknown_cells(mesh_of(parsed)) == "1 abaqus:C3D27 with fewer nodes cell"
+    with pytest.raises(FormatError, match="a record of ELEMENT has 4 numbers instead of 28"):
+        read(abaqus, CUBE27 + b"28, 1, 2, 3\n")
 
 
 def test_conversion_keeps_cells_and_names() -> None:

@@ -12,7 +12,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io.abaqus_deck import Deck, Section
 from gmsnet.io.abaqus_scopes import Scope, Scopes
 from gmsnet.io.abaqus_sets import Ints, Numbers
-from gmsnet.io.abaqus_types import kind_of
+from gmsnet.io.abaqus_types import LEAST, kind_of
 from gmsnet.io.cell_table import Kind
 from gmsnet.io.cells import joined
 from gmsnet.io.fields import short_in_abaqus
@@ -71,6 +71,8 @@ class Contents:
         if not told:
             deck.text.fail(section.at, "*ELEMENT without TYPE=")
         kind = kind_of(told)
+        if kind is not None and _leaves_out(deck, section, kind):
+            told, kind = f"{told} with fewer nodes", None
         if kind is not None:
             table = deck.records(section, 1 + nodes_of(kind.name))
             starts, sizes = table.reshape(-1), np.full(len(table), table.shape[1])
@@ -111,6 +113,14 @@ class Contents:
         kinds = {code: kind_of(told) or Kind(f"abaqus:{told}"[:32]) for told, code in codes.items()}
         nodes, all_codes, sizes = (joined([part[k] for part in parts]) for k in range(3))
         return Connectivity(kinds, all_codes, sizes, nodes)
+
+
+def _leaves_out(deck: Deck, section: Section, kind: Kind) -> bool:
+    """Whether some cells of a section lack nodes that their kind may lack."""
+    if kind.name not in LEAST:
+        return False
+    _, sizes = deck.continued_records(section)
+    return bool(((sizes > LEAST[kind.name]) & (sizes <= nodes_of(kind.name))).any())
 
 
 @dataclass(frozen=True)

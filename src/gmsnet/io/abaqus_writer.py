@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.io import convert
-from gmsnet.io.abaqus_types import WRITTEN
+from gmsnet.io.abaqus_types import WRITTEN, as_written
 from gmsnet.io.cells import distinct
 from gmsnet.io.document import Written
 from gmsnet.io.fields import of_abaqus
@@ -78,7 +78,7 @@ def _text(mesh: Mesh, points: NDArray[np.float64], names: dict[str, str]) -> Ite
             nodes = block.nodes[block.regions == region] + 1
             label = names[convert.marker_name(mesh, block.cell.dimension, region)]
             yield f"*ELEMENT, TYPE={WRITTEN[block.kind][flat]}, ELSET={label}\n".encode()
-            yield from _records(nodes if block.kind != "line3" else nodes[:, [0, 2, 1]], number)
+            yield from _records(as_written(block.kind, nodes), number)
             number += len(nodes)
     for block in mesh.cells:
         for region in distinct(block.regions) if block.kind == "vertex" else ():

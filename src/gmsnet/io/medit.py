@@ -18,6 +18,7 @@ from gmsnet.io import convert
 from gmsnet.io.cells import check_nodes, distinct, sealed
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.medit_orders import ORDERINGS, as_written, lattice, order_of
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Starts, Text
@@ -32,7 +33,8 @@ REFERENCE = "medit:ref"  # the point data that keeps the references of the verti
 KINDS = {
     "Edges": "line", "Triangles": "triangle", "Quadrilaterals": "quad", "Tetrahedra": "tetra",
     "Hexahedra": "hexahedron", "Prisms": "wedge", "Pyramids": "pyramid", "EdgesP2": "line3",
-    "TrianglesP2": "triangle6", "QuadrilateralsQ2": "quad9", "TetrahedraP2": "tetra10",
+    "TrianglesP2": "triangle6", "QuadrilateralsQ2": "quad9", "TetrahedraP2": "tetra10", "HexahedraQ2": "hexahedron27",
+    "PrismsP2": "wedge18", "PyramidsP2": "pyramid14",
 }  # fmt: skip
 # Nodes that must stay where they are become vertex cells: region and, as its name, the keyword.
 HELD = {"Corners": 1, "RequiredVertices": 2, "RequiredTriangles": 3, "RequiredQuadrilaterals": 4}
@@ -93,6 +95,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
     slots, references = TextSlots(none, none), np.empty(0, dtype=np.int64)
     points = np.empty((0, 2))
     entries: list[Entries] = []
+    told: dict[str, NDArray[np.int64]] = {}
     dimension = 0
     for key, at in stream.keywords():
         if key in seen:
@@ -120,6 +123,8 @@ def read(files: Mapping[str, Data]) -> Parsed:
             nodes = text.integers(rows[:, :width])
             nodes -= 1
             entries.append(Entries(key, rows[:, :width], nodes, text.integers(rows[:, width:]).reshape(-1)))
+        elif key in ORDERINGS:
+            told[ORDERINGS[key]] = _ordering(text, stream, key)
         elif key in SKIPPED or key in SKIPPED_VECTORS:
             width = SKIPPED.get(key, dimension)
             text.floats(stream.take(stream.count(key) * width))
@@ -130,19 +135,38 @@ def read(files: Mapping[str, Data]) -> Parsed:
     if "Vertices" not in seen:
         raise FormatError("Vertices are missing: the file is cut off or no Medit mesh")
 
-    cells, names = _cells(text, entries, len(points))
+    cells, names = _cells(text, entries, len(points), told)
     point_data = {REFERENCE: references} if references.any() else {}
     unread = [key for key in seen if key in (*SKIPPED, *SKIPPED_VECTORS, *SKIPPED_VALUES, "BoundingBox")]
     return Parsed(points, cells, slots, names, point_data, unread=unread)
 
 
-def _cells(text: Text, entries: list[Entries], count: int) -> tuple[list[CellBlock], dict[tuple[int, int], str]]:
-    """The cells, then the vertices that are held, with the names of these."""
+def _ordering(text: Text, stream: _Stream, key: str) -> NDArray[np.int64]:
+    """(nodes, axes) where the nodes of a kind of cell lie, in the order of the file."""
+    kind = KINDS[ORDERINGS[key]]
+    count, axes = lattice(ORDERINGS[key], kind).shape
+    if (found := stream.count("the nodes of a cell")) != count:
+        text.fail(int(stream.take(1)[0]), f"{key} lists {found} nodes, and these cells have {count}")
+    starts = stream.take(count * axes)
+    told = text.integers(starts).reshape(count, axes)
+    try:
+        order_of(ORDERINGS[key], kind, told)
+    except ValueError as error:
+        text.fail(int(starts[0]), f"{key}: {error}")
+    return told
+
+
+def _cells(
+    text: Text, entries: list[Entries], count: int, told: Mapping[str, NDArray[np.int64]]
+) -> tuple[list[CellBlock], dict[tuple[int, int], str]]:
+    """The cells, then the vertices that are held, with the names of these. ``told``: the orders that the file tells."""
     cells: list[CellBlock] = []
     names: dict[tuple[int, int], str] = {}
     for key, starts, nodes, references in entries:
         if key in KINDS:
             check_nodes(text, starts, nodes, count, base=1)
+            order = order_of(key, KINDS[key], told.get(key)) if key in ORDERINGS.values() else None
+            nodes = nodes if order is None else np.ascontiguousarray(nodes[:, order])
             cells.append(CellBlock(KINDS[key], sealed(nodes), sealed(references)))
     faces = {block.kind: block.nodes for block in cells}
     for key, starts, nodes, _ in entries:
@@ -185,7 +209,8 @@ def _sections(mesh: Mesh) -> tuple[_Sections, int]:
     lost = 0
     for block in mesh.cells:
         if block.kind != "vertex":
-            sections.setdefault(names[block.kind], []).append((block.nodes, block.regions))
+            key = names[block.kind]
+            sections.setdefault(key, []).append((as_written(key, block.nodes), block.regions))
             continue
         for region in distinct(block.regions):
             key = convert.marker_name(mesh, 0, region)
