@@ -81,8 +81,8 @@ def test_kinds_without_an_order_of_their_own_keep_that_of_the_table() -> None:
     ("ordering", "message"),
     [
         ("EdgesP2Ordering\n2\n0\n2\n", "EdgesP2Ordering lists 2 nodes, and these cells have 3"),
-        ("EdgesP2Ordering\n3\n0\n2\n2\n", "EdgesP2Ordering: it does not name each node of the cell once"),
-        ("EdgesP2Ordering\n3\n0\n2\n3\n", "EdgesP2Ordering: it does not name each node of the cell once"),
+        ("EdgesP2Ordering\n3\n0\n2\n2\n", "EdgesP2Ordering does not name each node of the cell once"),
+        ("EdgesP2Ordering\n3\n0\n2\n3\n", "EdgesP2Ordering does not name each node of the cell once"),
     ],
 )
 def test_orders_that_are_none(ordering: str, message: str) -> None:

@@ -151,8 +151,8 @@ def _ordering(text: Text, stream: _Stream, key: str) -> NDArray[np.int64]:
     told = text.integers(starts).reshape(count, axes)
     try:
         order_of(ORDERINGS[key], kind, told)
-    except ValueError as error:
-        text.fail(int(starts[0]), f"{key}: {error}")
+    except ValueError:
+        text.fail(int(starts[0]), f"{key} does not name each node of the cell once")
     return told
 
 

@@ -25,8 +25,8 @@ _CORNERS: dict[str, tuple[tuple[int, ...], ...]] = {
 }
 ORDERINGS = {f"{key}Ordering": key for key in _CORNERS}
 
-# The place in Medit's list of each of Mesh's nodes. Of the middles of a hexahedron's faces, Medit has that at the bottom
-# first, then that at the top, then those around.
+# The place in Medit's list of each of Mesh's nodes. It has the middle of a hexahedron's face at the bottom first, then
+# that at the top, then those around.
 _OWN = {"HexahedraQ2": (*range(20), 25, 23, 22, 24, 20, 21, 26)}
 
 
@@ -55,7 +55,7 @@ def order_of(key: str, kind: str, told: NDArray[np.int64] | None) -> NDArray[np.
         return None if own is None else np.array(own)
     ours = lattice(key, kind)
     if not np.array_equal(np.unique(told, axis=0), np.unique(ours, axis=0)) or len(told) != len(ours):
-        raise ValueError("it does not name each node of the cell once")
+        raise ValueError(key)
     order: NDArray[np.int64] = (told[None, :] == ours[:, None]).all(axis=2).argmax(axis=1)
     return order
 
