@@ -21,6 +21,8 @@ from typing import Any
 import numba
 from numba.core.runtime.nrt import rtsys
 
+from gmsnet.kernels.jit.library import loaded
+
 SOURCES = hashlib.sha256(
     b"".join(path.read_bytes() for path in sorted(Path(__file__).parents[1].rglob("*.py")))
 ).digest()  # of all kernels together
@@ -67,7 +69,7 @@ def make_trustworthy(cache: Any) -> None:
         lowering, SciPy's BLAS among them, 0.4 s. Compiling loads it itself; the runtime is all that cached code needs.
         """
         rtsys.initialize(context)
-        with cache._guard_against_spurious_io_errors():
+        with cache._guard_against_spurious_io_errors(), loaded(context):
             return cache._load_overload(signature, context)
 
     def save_if_there_is_room(signature: Any, result: Any) -> None:
