@@ -72,12 +72,12 @@ class Volume(Connectivity):
             rim[near] = np.bincount(wound.boundary.ravel(), minlength=nodes)[near]
         start = np.zeros(nodes + 2, dtype=np.int64)
         balls.count_stars(rows, marks, start)
-        spokes = np.empty((start[-1], 3), dtype=np.int32)
-        balls.list_stars(rows, wound.orientation, marks, start, spokes)
-        room = (3 * len(spokes) + int(rim.sum())) // 2 + nodes
+        corners = np.empty(start[-1], dtype=np.int32)
+        balls.list_stars(rows, marks, start, corners)
+        room = (3 * len(corners) + int(rim.sum())) // 2 + nodes
         ring_start, ring = np.empty(nodes + 1, dtype=np.int64), np.empty(room, dtype=np.int32)
-        local = np.empty((len(spokes), 3), dtype=np.uint8)
-        end = balls.rings(start, spokes, ring_start, ring, local, MOST)
+        local = np.empty((len(corners), 3), dtype=np.uint8)
+        end = balls.rings(rows, wound.orientation, start, corners, ring_start, ring, local, MOST)
         start, around = start[:-1], np.diff(ring_start)
         marks[(marks == 0) & (around == 0)] |= np.uint16(connectivity.HIGH_VALENCE)
         # The link of a node is a triangulated sphere, at the boundary a disk.

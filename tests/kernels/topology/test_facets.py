@@ -121,6 +121,12 @@ def test_marks_of_facets(seed, nodes, count, of):
     assert agrees == two_sides
 
 
+def spokes_of(cell, corner, turn):
+    """The other nodes of a cell in the order that the names of facets give them."""
+    a, b, c = cell[kernels.OPPOSITE[corner]].tolist()
+    return [a, b, c] if turn > 0 else [a, c, b]
+
+
 @some_cells
 @settings(max_examples=60)
 def test_stars_and_rings(seed, nodes, count, of):
@@ -131,15 +137,17 @@ def test_stars_and_rings(seed, nodes, count, of):
     marks = (rng.random(nodes) < 0.3).astype(np.uint16)
     start = np.zeros(nodes + 2, dtype=np.int64)
     balls.count_stars(cells, marks, start)
-    spokes = np.empty((start[-1], 3), dtype=np.int32)
-    balls.list_stars(cells, turn, marks, start, spokes)
+    corners = np.empty(start[-1], dtype=np.int32)
+    balls.list_stars(cells, marks, start, corners)
     most = int(rng.integers(3, 12))
-    ring_start, local = np.empty(nodes + 1, dtype=np.int64), np.empty((len(spokes), 3), dtype=np.uint8)
-    ring = np.empty(3 * len(spokes) + nodes, dtype=np.int32)
-    end = balls.rings(start, spokes, ring_start, ring, local, most)
+    ring_start, local = np.empty(nodes + 1, dtype=np.int64), np.empty((len(corners), 3), dtype=np.uint8)
+    ring = np.empty(3 * len(corners) + nodes, dtype=np.int32)
+    end = balls.rings(cells, turn, start, corners, ring_start, ring, local, most)
     assert end == ring_start[-1]
     for v in range(nodes):
-        rows = spokes[start[v] : start[v + 1]].tolist()
+        at = corners[start[v] : start[v + 1]]
+        assert (cells[at >> 2, at & 3] == v).all()
+        rows = [spokes_of(cells[t], k, turn[t]) for t, k in zip((at >> 2).tolist(), (at & 3).tolist(), strict=True)]
         own = [t for t, cell in enumerate(cells.tolist()) if v in cell and not marks[v]]
         assert [set(row) for row in rows] == [set(cells[t].tolist()) - {v} for t in own]
         for t, row in zip(own, rows, strict=True):

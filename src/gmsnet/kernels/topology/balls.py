@@ -22,30 +22,27 @@ def count_stars(rows, marks, start):
 
 
 @kernel
-def list_stars(rows, orientation, marks, start, spokes):
-    """Writes spokes (M, 3): of each cell at a node without a mark, its other nodes, of positive volume from the node.
+def list_stars(rows, marks, start, corners):
+    """Writes corners (M,), 4t + k of each cell t at a node without a mark that is its corner k.
 
     start: as ``count_stars`` leaves it; afterwards those of node v are start[v] … start[v + 1] − 1.
     """
     for t in range(len(rows)):
         for k in range(4):
-            v = rows[t, k]
-            if marks[v]:
-                continue
-            at = start[v + 1]
-            start[v + 1] = at + 1
-            a, b, c = rows[t, OPPOSITE[k, 0]], rows[t, OPPOSITE[k, 1]], rows[t, OPPOSITE[k, 2]]
-            if orientation[t] < 0:
-                b, c = c, b
-            spokes[at, 0], spokes[at, 1], spokes[at, 2] = a, b, c
+            v = np.uint64(rows[t, k])
+            if not marks[v]:
+                at = start[v + np.uint64(1)]
+                start[v + np.uint64(1)] = at + 1
+                corners[np.uint64(at)] = 4 * t + k
 
 
 @kernel
-def rings(start, spokes, ring_start, ring, local, most):
+def rings(rows, orientation, start, corners, ring_start, ring, local, most):
     """The nodes around each node, in the order in which its cells name them, and the spokes by their places there.
 
-    Writes ring_start (N + 1,), ring, with room for 3M/2 + N, and local (M, 3) uint8, which node of the ring each spoke
-    ends in. A star with more than ``most`` nodes has an empty ring. Returns how many nodes all rings have.
+    Writes ring_start (N + 1,), ring, with room for 3M/2 + N, and local (M, 3) uint8, in which nodes of the ring the
+    spokes of each cell end, of positive volume from the node. A star with more than ``most`` nodes has an empty ring.
+    Returns how many nodes all rings have.
     """
     nodes = len(start) - 2
     seen = np.full(nodes, -1, dtype=np.int64)  # 256·node | place in its ring
@@ -54,17 +51,21 @@ def rings(start, spokes, ring_start, ring, local, most):
         ring_start[v] = end
         count = 0
         for row in range(start[v], start[v + 1]):
+            corner = corners[np.uint64(row)]
+            t, k = np.uint64(corner >> 2), corner & 3
+            second = 1 if orientation[t] > 0 else 2
             for i in range(3):
-                other = spokes[row, i]
+                spoke = second if i == 1 else 3 - second if i == 2 else 0
+                other = np.uint64(rows[t, OPPOSITE[k, spoke]])
                 known = seen[other]
                 if known >> 8 != v or known < 0:
                     if count < most:
                         seen[other] = np.int64(v) << 8 | count
                         ring[end + count] = other
-                        local[row, i] = count
+                        local[np.uint64(row), i] = count
                     count += 1
                 else:
-                    local[row, i] = known & 255
+                    local[np.uint64(row), i] = known & 255
         end += count if count <= most else 0
     ring_start[nodes] = end
     return end
