@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.simplex.tetra_measures import COLUMNS, HIGH, LOW, cubed_ratios, per_tetrahedron
-from gmsnet.kernels.topology.connectivity import touching
+from gmsnet.kernels.simplex.tetra_measures import COLUMNS, HIGH, LOW, cubed_ratios, per_tetrahedron, renewed_ratios
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 
@@ -96,8 +95,13 @@ def renew(ratios: Floats, points: Floats, cells: Tetrahedra, nodes: Rows, execut
     moved = np.zeros(len(points))
     moved[nodes] = 1.0
     executor.exchange(moved)
-    rows = touching(cells.rows, moved > 0.0)
-    ratios[rows] = ratios_of(points, cells.take(rows), executor)
+    chosen = moved > 0.0
+
+    def look(first: int, last: int) -> None:
+        rows = first * LANES, min(last * LANES, len(ratios))
+        renewed_ratios(points, cells.rows, cells.orientation, cells.shapes, chosen, *rows, ratios)
+
+    executor.map(look, 0, -(-len(ratios) // LANES))
 
 
 def below(points: Floats, cells: Tetrahedra, measure: float, wide: float, executor: Executor = serial) -> Ranked:

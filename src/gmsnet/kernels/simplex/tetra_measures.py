@@ -156,6 +156,19 @@ def cubed_ratios(points, rows, orientation, shapes, first, last, out):
             out[t] = cubed_ratio(ax, ay, az, bx, by, bz, cx, cy, cz, weights, np.float64(orientation[t]))
 
 
+@kernel
+def renewed_ratios(points, rows, orientation, shapes, moved, first, last, out):
+    """The same of those of them that have a node which has moved. moved: (N,) bool."""
+    for t in range(first, last):
+        if (
+            moved[np.uint32(rows[t, 0])] | moved[np.uint32(rows[t, 1])] | moved[np.uint32(rows[t, 2])]
+            | moved[np.uint32(rows[t, 3])]
+        ):  # fmt: skip
+            ax, ay, az, bx, by, bz, cx, cy, cz = spokes_of(points, rows, t)
+            weights = weights_at(shapes, t)
+            out[t] = cubed_ratio(ax, ay, az, bx, by, bz, cx, cy, cz, weights, np.float64(orientation[t]))
+
+
 @inlined
 def cubed_ratio(ax, ay, az, bx, by, bz, cx, cy, cz, weights, sign):
     """The same of one."""
