@@ -61,3 +61,19 @@ def test_all_where_more_are_asked_for_and_inverted_cells_are_below_anything():
     inverted = cells._replace(orientation=-cells.orientation)
     assert len(dihedral.below(points, inverted, 0.1, 0.0).rows) == len(cells.rows)
     assert len(dihedral.below(points, cells, 80.0, 0.0).rows) == len(cells.rows)  # no tetrahedron is above 70.53°
+
+
+@pytest.mark.parametrize("few", [0, 1, 40, 400])
+def test_ratios_are_renewed_where_nodes_have_moved_and_nowhere_else(few):
+    rng = np.random.default_rng(few)
+    mesh = volumes.mesh_of(*volumes.cube(600, 2))
+    topology = Volume.of(mesh)
+    points, cells = space_points(mesh)[topology.memory], topology.changeable
+    ratios = dihedral.ratios_of(points, cells)
+    nodes = rng.permutation(len(points))[:few].astype(np.int32)
+    points[nodes, :3] += rng.normal(scale=0.02, size=(few, 3))
+    ratios[~np.isin(cells.rows, nodes).any(axis=1)] += 0.5
+    expected = dihedral.ratios_of(points, cells)
+    expected[~np.isin(cells.rows, nodes).any(axis=1)] += 0.5
+    dihedral.renew(ratios, points, cells, nodes)
+    assert ratios.tobytes() == expected.tobytes()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,18 +13,10 @@ from support import volumes
 import gmsnet
 import gmsnet.generate
 from gmsnet.methods.dihedral import Dihedral
-from gmsnet.run import dihedral_stage, mean_stage, stop
+from gmsnet.run import dihedral_stage, stop
 from gmsnet.topology.volume import Volume
 
 MESHES = os.environ.get("GMSNET_MESHES")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def nothing_after_it():
-    """The stage that follows, for the mean, is left out."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mean_stage, "GAIN", np.inf)
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -111,3 +104,20 @@ def test_nodes_that_slide_stay_on_their_faces(monkeypatch):
     assert (result.moved & on.any(axis=1)).any()
     assert corners.sum() > 8
     assert result.after.volume.sum() == pytest.approx(1, abs=1e-12)
+
+
+def test_the_floor_of_the_input_is_that_of_a_look_at_it(cube, monkeypatch):
+    """It is kept from the first sweep on; where it is not, all cells are looked at once more."""
+    exact, seen = gmsnet.smooth(cube), []
+    plain = dihedral_stage.floor_for_angles
+
+    def forgetful(state, *arguments):
+        assert state.floor is not None
+        assert state.floor_of is state.start
+        seen.append(plain(state, *arguments) == plain(replace(state, floor=None, floor_of=None), *arguments))
+        return plain(replace(state, floor=None, floor_of=None), *arguments)
+
+    monkeypatch.setattr(dihedral_stage, "floor_for_angles", forgetful)
+    assert gmsnet.smooth(cube).points.tobytes() == exact.points.tobytes()
+    assert seen
+    assert all(seen)

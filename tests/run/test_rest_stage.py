@@ -7,6 +7,7 @@ import pytest
 from support import volumes
 
 import gmsnet
+from gmsnet.methods import above
 from gmsnet.run import rest_stage, stop
 from gmsnet.topology.volume import Volume
 
@@ -24,9 +25,10 @@ def held(cube):
 
 
 def without(mesh, **options):
-    """The result without the stage."""
+    """The result without the stage, and without walls that look at the rest."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(rest_stage, "TIMES", 0)
+        patch.setattr(above, "APART", np.inf)
         return gmsnet.smooth(mesh, **options)
 
 
@@ -42,9 +44,9 @@ def test_bad_cells_behind_the_worst_become_fewer(cube, held):
     before, after = without(cube, fixed=held), gmsnet.smooth(cube, fixed=held)
     rows = own(cube, held)
     was, now = (result.after.shape[rows] for result in (before, after))
-    assert now.min() >= was.min() - 1e-12
+    assert now.min() >= was.min() - 1e-3  # as good as held nodes let it be
     assert (now < 0.3).sum() < 0.6 * (was < 0.3).sum()
-    assert (now < 0.35).sum() < 0.2 * (was < 0.35).sum()
+    assert (now < 0.25).sum() < 0.2 * (was < 0.25).sum()
     assert now.mean() > was.mean() - 0.01
     assert after.after.inverted == 0
     assert rest_stage.PHASE in {sweep.stage for sweep in after.history}
@@ -78,3 +80,10 @@ def test_sweeps_are_no_more_than_asked_for(cube, held):
     stopped = gmsnet.smooth(cube, fixed=held, callback=lambda sweep: sweep.stage == rest_stage.PHASE)
     assert stopped.stop_reason == stop.CALLBACK
     assert stopped.history[-1].stage == rest_stage.PHASE
+
+
+def test_a_look_at_some_cells_says_the_same_as_one_at_all(cube, monkeypatch):
+    whole, thrown = gmsnet.smooth(cube), gmsnet.smooth(cube, fixed=np.arange(300, 330))
+    monkeypatch.setattr(rest_stage, "_are_alike", lambda *_: False)
+    assert gmsnet.smooth(cube).points.tobytes() == whole.points.tobytes()
+    assert gmsnet.smooth(cube, fixed=np.arange(300, 330)).points.tobytes() == thrown.points.tobytes()

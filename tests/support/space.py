@@ -16,20 +16,20 @@ from support import volumes
 
 
 @numba.njit(error_model="numpy")
-def see(points, blocks, block, number, constants, step, floor, unit, grain):
+def see(points, blocks, block, number, constants, step, floor, unit, grain, wall=None, squarings=0):
     """The workspace after a block has been fetched and derived, and one step (3, LANES3) judged and certified."""
     workspace = workspace3_for(blocks.most, blocks.most_simplices)
     rows = np.int64(blocks.simplices[block])
     fetch3(points, blocks, block, workspace)
     derive(
         workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, number, constants, None,
-        workspace.kept, workspace.sums, None, None, None,
+        wall, squarings, workspace.kept, workspace.sums, None, None, None,
     )  # fmt: skip
     for k in range(3 * LANES3):
         workspace.step[k] = step[k]
     judge(
         workspace.kept, rows, blocks.cells, block, number, constants, None, workspace.step, floor, workspace.sums,
-        blocks.at[block], None, None, None,
+        blocks.at[block], wall, squarings, None, None, None,
     )  # fmt: skip
     certify3(workspace, unit, grain, None)
     return workspace

@@ -67,12 +67,12 @@ PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
 LARGE_GAIN = 0.008  # of meshes in space of more than LARGE_VOLUME free nodes
+LARGE_VOLUME_GAIN = 0.02  # of those of tetrahedra alone: with two turns they are at 98 % of what many reach
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS, EARLY = "whole mesh, worst cells", (3, 2), (2, 3)  # q⁸, q⁴
 GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
 EXACT = 20_000  # free nodes: up to so many, all nodes of such a mesh go to the minimum of Σq, which is near
-VOLUMES = (VOLUME_PLAN, LARGE_VOLUME_PLAN)  # where one round is enough before another turn of the worst cells
-IN_SPACE = (*VOLUMES, MIXED_PLAN, SURFACE_PLAN)
+IN_SPACE = (VOLUME_PLAN, LARGE_VOLUME_PLAN, MIXED_PLAN, SURFACE_PLAN)
 NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
 
 
@@ -116,8 +116,10 @@ class Auto(Smoother):
         self.again = -1  # the phase to go back to in the end, if there is one
 
     def _enter(self, phase: int, field: Field, executor: Executor) -> None:
-        if phase == len(self.phases) and self.again >= 0:
+        if self.again >= 0 and (phase == len(self.phases) or (phase and self.phases[phase - 1].between)):
             phase, self.again = self.again, -1
+        elif phase < len(self.phases) and self.phases[phase].between and self.again < 0:
+            phase += 1
         self.at, self.made, self.rounds, self.gained = phase, 0, 0, math.inf
         if phase == len(self.phases):
             gained = self.turns == 0 or self.least >= self.least_before + TURN_GAIN
@@ -137,7 +139,7 @@ class Auto(Smoother):
                 self.creep = Creep.of(field, executor)
             self.phases = self.phases or plan_for(field.topology, self.free)
             if self.phases in IN_SPACE and self.free > LARGE_VOLUME:
-                self.pass_gain = LARGE_GAIN
+                self.pass_gain = LARGE_VOLUME_GAIN if self.phases is LARGE_VOLUME_PLAN else LARGE_GAIN
             self._enter(0, field, executor)
         if self.at == len(self.phases):
             return (self._move_all if self.ideal else self._move_all_for_worst)(field, executor, test)
@@ -229,7 +231,7 @@ class Auto(Smoother):
         self.rounds += 1
         self.made = 0
         goes_on = False
-        if self.rounds < (1 if self.again >= 0 and self.phases in VOLUMES else phase.rounds):
+        if self.rounds < phase.rounds:
             mean, ahead, lasts = mean_shape(field, executor), 0.0, True
             if phase.first and self.rounds == 1:
                 goes_on = True

@@ -38,6 +38,7 @@ class Cycle(NamedTuple):
 
 
 CYCLES = (Cycle(0.001, 4, 3), Cycle(0.0005, 5, 4), Cycle(0.0003, 6, 6))
+LARGE_CYCLES = (Cycle(0.0004, 5, 5),)  # of large meshes, where the cycles above take a fifth of a whole call
 FEWEST = 12  # cells
 
 

@@ -34,6 +34,7 @@ class Floor:
     enough: int
     looks: int
     unhindered: int
+    first: float | None = None  # what the first look has found
 
     LOOKS, MOST_LOOKS, SHARE, FEWEST = 3, 12, 16, 64
     WATCHED = 64  # cells
@@ -78,6 +79,7 @@ class Floor:
             least = _least(points, simplices, blocks, precision, executor)
             floor = executor.minimum(float(least.min(initial=math.inf)))
         self.looks += 1
+        self.first = floor if self.first is None else self.first
         return floor
 
     def _watch(self, blocks: NDArray[np.int32]) -> None:

@@ -8,8 +8,10 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import ranking
+from gmsnet.kernels.methods.barrier3 import K3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.shell_measures import mean_shape_of_shell
+from gmsnet.measure.dihedral import ratios_of
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods.base import Field
 from gmsnet.parallel.executor import Executor
@@ -34,6 +36,17 @@ def mean_shape(field: Field, executor: Executor = serial) -> float:
     ranking.shapes_of(field.points, simplices, some, shape)
     shape = executor.in_order(executor.row_numbers(some), shape)
     return float(np.cumsum(shape)[-1] / len(shape)) if len(shape) else math.nan  # added up in their order
+
+
+def low_shape(field: Field, share: float, executor: Executor = serial) -> float:
+    """The η below which this share of the tetrahedra lies, of some, evenly taken; 0 if inverted ones are."""
+    simplices = field.topology.changeable
+    assert isinstance(simplices, Tetrahedra)
+    stride = max(1, executor.counted(np.ones(len(simplices.rows), dtype=bool)) // (SAMPLE * LANES))
+    some = executor.every(stride, len(simplices.rows))
+    ratios = executor.in_order(executor.row_numbers(some), ratios_of(field.points, simplices.take(some)))
+    count = math.ceil(share * len(ratios))
+    return float(K3 / np.partition(ratios, -count)[-count]) ** (1.0 / 3.0) if count else 0.0
 
 
 def to_come(before: float, gained: float) -> float:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from gmsnet.methods.above import Above
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Smoother
 from gmsnet.methods.optimize import Newton
@@ -30,7 +31,7 @@ class Phase(NamedTuple):
     the mean of 1/q, for it to be made once more; least: what the last round must have gained for that. lasting: with
     less than this share of the gain before, no nodes creep: so gains fall where short waves are left, which sweeps even
     out. looks: whether the mesh is measured after it; late: not if the worst cells have another turn. often: after so
-    many rounds of it, too.
+    many rounds of it, too. between: the worst cells have their next turn after it, and it is left out after their last.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Phase(NamedTuple):
     looks: bool = True
     often: int = 4
     late: bool = False
+    between: bool = False
 
 
 def newton(relaxation: float = RELAXATION, *, means: int = 0) -> Barrier:
@@ -82,12 +84,24 @@ QUADS_PLAN = (
 )
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 # Of volumes; q there is the mean ratio to the power of 3/2.
+ON_Q = Phase("Newton on q", lambda: Barrier("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False)
+IN_SPACE_WORST = Phase("worst first", WorstFirst, 1, looks=False)
+ROOM = Phase("room for the worst", lambda: Above(0.17, 3, 1.0), 1, looks=False, between=True)
 VOLUME_PLAN = (
-    Phase("Newton on q", lambda: Barrier("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False),
-    Phase("worst first", WorstFirst, 1, looks=False),
-    Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0002),
+    ON_Q,
+    IN_SPACE_WORST,
+    ROOM,
+    Phase("mean, worst kept", lambda: Above(0.0, 4, 0.05), 1, rounds=10, gain=0.0002, looks=False),
 )
-LARGE_VOLUME_PLAN = (*VOLUME_PLAN[:-1], VOLUME_PLAN[-1]._replace(gain=0.0005))
+LARGE_VOLUME_PLAN = (
+    ON_Q._replace(first=2, rounds=1),
+    Phase("Newton above a wall", lambda: Above(0.23, 2, 1.0), 1, looks=False),
+    IN_SPACE_WORST,
+    ROOM._replace(between=False),
+    IN_SPACE_WORST._replace(create=lambda: WorstFirst(share=0.5)),
+    ROOM,
+    VOLUME_PLAN[-1]._replace(gain=0.0015),
+)
 # Of surfaces; what high powers take from the mean comes back last.
 SURFACE_PLAN = (
     NEWTON._replace(looks=False),
@@ -97,7 +111,12 @@ SURFACE_PLAN = (
 
 
 # Of other volumes, grids among which have an ideal mesh.
-MIXED_PLAN = (*LARGE_VOLUME_PLAN, Phase("Newton on q, in float64", ToTheEnd, 1))
+MIXED_PLAN = (
+    ON_Q,
+    IN_SPACE_WORST,
+    Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0005),
+    Phase("Newton on q, in float64", ToTheEnd, 1),
+)
 
 
 def plan_for(topology: Topology | Volume, free: int) -> Sequence[Phase]:

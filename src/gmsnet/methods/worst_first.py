@@ -62,8 +62,8 @@ GAIN = 1e-4  # in the minimum 1/q: less is none
 class WorstFirst(Smoother):
     """See the module. at_once: how many cycles a sweep makes; a ranking of all cells costs more than a late cycle.
 
-    enough: a minimum 1/q with which no cycle is made. least: the minimum 1/q after the last sweep. gained: what the
-    last cycle of it has brought.
+    enough: a minimum 1/q with which no cycle is made. share: of volumes, so many times as many cells. least: the
+    minimum 1/q after the last sweep. gained: what the last cycle of it has brought.
     """
 
     gained: float
@@ -79,8 +79,10 @@ class WorstFirst(Smoother):
     least = gained = -math.inf
     shared_out = True
 
-    def __init__(self, cycles: tuple[Cycle, ...] = CYCLES, at_once: int = 1, enough: float = math.inf) -> None:
-        self.cycles, self.at_once, self.enough = cycles, at_once, enough
+    def __init__(
+        self, cycles: tuple[Cycle, ...] = CYCLES, at_once: int = 1, enough: float = math.inf, share: float = 1.0
+    ) -> None:
+        self.cycles, self.at_once, self.enough, self.share = cycles, at_once, enough, share
         self.converged = False
         self.cells: NDArray[np.int32] | None = None
         self.next = 0
@@ -133,7 +135,7 @@ class WorstFirst(Smoother):
         return *figures, tally
 
     def _in_space(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
-        inner = WorstInSpace()
+        inner = WorstInSpace(self.share)
         tally = inner.sweep(field, executor, test)
         self.least, self.gained, self.converged = inner.least, inner.gained, inner.gained < GAIN
         return tally

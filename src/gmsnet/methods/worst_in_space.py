@@ -27,12 +27,18 @@ MORE, FEWEST, LEAST = 2.0, 225_000.0, 12  # FEWEST: times the share
 
 
 class WorstInSpace(Smoother):
-    """One sweep is all CYCLES. least: the minimum η after the last one; gained: what it has brought."""
+    """One sweep is all CYCLES, of so many ``times`` as many cells.
+
+    least: the minimum η after the last one; gained: what it has brought.
+    """
 
     gained: float
     least: float
 
     least = gained = -math.inf
+
+    def __init__(self, times: float = 1.0) -> None:
+        self.times = times
 
     def sweep(self, field: Field, executor: Executor, test: object) -> Tally:
         """See Smoother."""
@@ -44,7 +50,7 @@ class WorstInSpace(Smoother):
         before = after = _most(ratios, executor)
         every = executor.counted(np.ones(len(ratios), dtype=bool))
         for share, number, sweeps in CYCLES:
-            nodes = np.unique(cells.rows[executor.lowest_rows(-ratios, how_many(share, every))])
+            nodes = np.unique(cells.rows[executor.lowest_rows(-ratios, how_many(self.times * share, every))])
             nodes = nodes[topology.near_free[nodes]]
             stars = topology.stars_of(nodes.astype(np.int64))
             power = Power3.of(number, min(after / K3, 1e30))

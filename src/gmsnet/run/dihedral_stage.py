@@ -1,4 +1,4 @@
-"""The last stage of ``auto`` on volumes: the smallest dihedral angles, for which a little of the least η may go."""
+"""The last stage of ``auto`` on tetrahedra: the smallest dihedral angles, for which a little of the least η may go."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from gmsnet.measure.dihedral import REGULAR, Floats
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.methods.auto import Auto
 from gmsnet.methods.base import Field, Tally
-from gmsnet.methods.dihedral import Dihedral
+from gmsnet.methods.dihedral import CYCLES, LARGE_CYCLES, Dihedral
 from gmsnet.methods.floor import Floor
+from gmsnet.methods.phases import LARGE_VOLUME
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 from gmsnet.run.options import SmoothOptions
@@ -45,7 +46,8 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
     field = Field(state.points.copy(), topology, state.precision, level, constraint=state.constraint)
     if isinstance(state.constraint, Surface):
         locate3(state.constraint, field.points)
-    best, taken, smoother = state.points, totals, Dihedral()
+    large = executor.total(np.array(len(topology.free))) > LARGE_VOLUME
+    best, taken, smoother = state.points, totals, Dihedral(LARGE_CYCLES if large else CYCLES)
     tally: Tally = np.zeros(3, dtype=np.int64)
     for spent in SPENT if totals.shape_min >= ROOM else SPENT[:1]:
         smoother.floor = floor_for_angles(state, level, 1.0 / (1.0 / totals.shape_min + spent), outer)
@@ -106,7 +108,10 @@ def _sweeps(state: State) -> int:
 def floor_for_angles(state: State, level: int, shape: float, executor: Executor) -> float:
     """c of D/S^(3/2) for an η, or for the level of the guard to hold from the untangled input on, if that is more."""
     start, floor = state.start if state.untangled is None else state.untangled, floor_of(shape)
-    return floor if level == VALID else max(floor, Floor().of(start, state.topology, state.precision, executor))
+    if level == VALID:
+        return floor
+    known = state.floor if state.floor_of is start else None
+    return max(floor, Floor().of(start, state.topology, state.precision, executor) if known is None else known)
 
 
 def floor_of(shape: float) -> float:

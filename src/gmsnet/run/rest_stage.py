@@ -13,6 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods.barrier3 import K3
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.kernels.star.surface import Surface, locate3
 from gmsnet.measure.dihedral import ratios_of
@@ -35,6 +38,7 @@ SHARE, FEWEST = 0.005, 12  # of the cells: the worst of the rest, which are to b
 # In 1/η: by so much the worst cells of a mesh are apart, those of the rest are alike, and are set aside at a time.
 APART, ALIKE, STEP = 1.3, 1.1, 1.25
 ROUNDS, TIMES = 16, 3
+SOME, ROUNDED = 8, 1.0 + 1e-9  # one in so many blocks of cells is looked at first; for the rounding of an η
 GAIN = 0.005  # in the least η of the rest: with less the mesh stays as it was
 
 
@@ -83,6 +87,8 @@ def _set_aside(state: State, level: int, executor: Executor) -> Volume | None:
         locate3(state.constraint, points)
     outer = executor.of(topology)
     cells, rest, alike = topology.changeable, None, ALIKE if state.rest else APART
+    if state.rest is None and state.totals is not None and _are_alike(points, cells, state.totals, outer):
+        return None
     aside = np.isinf(ratios_of(points, cells, outer))
     if outer.counted(aside):  # with inverted cells in the mesh, sweeps keep nothing of the others
         alike = 0.0
@@ -106,6 +112,17 @@ def _set_aside(state: State, level: int, executor: Executor) -> Volume | None:
         field = Field(points, rest, state.precision, level, constraint=state.constraint)
         WorstInSpace().sweep(field, executor.of(rest), lambda: False)
     return rest
+
+
+def _are_alike(points: Floats, cells: Tetrahedra, totals: Totals, executor: Executor) -> bool:
+    """Is it certain from some of the cells that the worst are many alike? Most often these are enough."""
+    if totals.uncertain:
+        return False
+    every = executor.counted(np.ones(len(cells.rows), dtype=bool))
+    limit = ROUNDED * K3 / (APART * totals.shape_min) ** 3
+    some = executor.every(SOME, len(cells.rows), LANES)
+    beyond = np.count_nonzero(ratios_of(points, cells.take(some), executor) >= limit)
+    return int(executor.total(np.array(beyond))) >= min(max(FEWEST, math.ceil(SHARE * every)), every)
 
 
 def _limit(ratios: Floats, alike: float, executor: Executor) -> float:

@@ -130,7 +130,8 @@ class State:
     and of the result. interruption: what ends the smoothing before its end. final:
     once the mesh is written back to the order of the input; start, points and shapes are then empty, lest the result
     needs more memory than the stages. motion: of a boundary that moves (``deform_stage``). rest: of a volume, with the
-    nodes of cells held behind which others could become better (``rest_stage``).
+    nodes of cells held behind which others could become better (``rest_stage``). floor: what the guard kept of the
+    worst cell of the points ``floor_of``, where that is known (methods/floor.py).
     """
 
     mesh: Mesh
@@ -159,6 +160,8 @@ class State:
     metric: Metric | None = None
     conformity: tuple[Conformity, ...] = ()
     rest: Volume | None = None
+    floor: float | None = None
+    floor_of: Floats | None = None
 
     @property
     def topology(self) -> Topology | Volume:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from itertools import permutations
 
@@ -123,6 +124,38 @@ def test_gradient_and_hessian_are_those_of_steps_along_the_imaginary_axis(p, see
     np.testing.assert_allclose(hessian, columns, rtol=1e-7, atol=1e-9 * np.abs(hessian).max())
     if p >= 1:  # convex
         assert np.linalg.eigvalsh(hessian).min() > -1e-9 * np.abs(hessian).max()
+
+
+@pytest.mark.parametrize(("steep", "weight"), [(12.0, 1.0), (24.0, 0.3), (48.0, 0.05)])
+@given(seed=seeds)
+@settings(max_examples=25)
+def test_gradient_of_the_mean_with_a_wall(steep, weight, seed):
+    """As of powers; the Hessian is that of a power p of q, which is 3/16 where the wall is far and P at the wall."""
+    ends, walled = spokes(seed), as_written(kernels.walled)
+    v = np.random.default_rng(seed).uniform(-0.01, 0.01, 3) * np.abs(ends).min()
+    assume(measured(*(ends - v).ravel().tolist())[0] > 1e-6 * np.prod(np.linalg.norm(ends, axis=1)))
+
+    def q_of(v):
+        kept = measured(*(ends - v).ravel().tolist())
+        return (kept[1] ** 1.5 / kept[0] / math.sqrt(K3)) ** (2 / 3)
+
+    at_wall = q_of(v)
+
+    def found(v):
+        ratio = q_of(v) ** 1.5
+        return walled(ratio, weight * (q_of(v) / at_wall) ** steep, steep)
+
+    f, part, two_p, m, mixed, squared, first = found(v)
+    double, lengths, wx, wy, wz, sx, sy, sz = measured(*(ends - v).ravel().tolist())
+    x, y, z, *_ = derivatives(part, two_p / lengths, m / double, wx, wy, wz, sx, sy, sz, mixed, squared)
+    slopes = [found(v + 1j * 1e-30 * axis)[0].imag / 1e-30 for axis in np.eye(3)]
+    np.testing.assert_allclose([-x, -y, -z], slopes, rtol=1e-8, atol=1e-12 * np.abs(slopes).max())
+    p = two_p / 2
+    assert f == pytest.approx(at_wall**1.5 / (1 + at_wall**1.5) + weight)
+    assert (m, mixed, squared, part * p) == pytest.approx((2 * p / 3, 0.5 * (1 + 1.5 / p), 1 - 1 / p, first))
+    assert 3 / 16 < p < steep
+    assert walled(2.0, 0.0, steep)[2] == pytest.approx(3 / 8)
+    assert walled(2.0, 1e6, steep)[2] == pytest.approx(2 * steep, rel=1e-5)
 
 
 @pytest.mark.parametrize("number", range(-1, 6))

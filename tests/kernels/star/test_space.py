@@ -15,6 +15,7 @@ from gmsnet.kernels.star.space import AFTER, KEPT, LEAST, MARGIN
 from gmsnet.kernels.star.space_blocks import LANES3
 
 measured, derivatives, moved = map(as_written, (mean_ratio3.measured, mean_ratio3.derivatives, mean_ratio3.moved))
+walled = as_written(mean_ratio3.walled)
 NUMBERS = range(-1, 6)
 # Nodes around each star: stars of one block differ in their number of simplices, and lanes are left over.
 some_rings = st.lists(st.integers(4, 24), min_size=1, max_size=LANES3)
@@ -41,6 +42,22 @@ def twin(local, power, number):
         f = ratio if number < 0 else ratio ** (2.0 * 2.0**number)
         found = derivatives(f, two_p / lengths, m / double, wx, wy, wz, sx, sy, sz, mixed, squared)
         terms.append([f, *found, f / lengths])
+    absolute = np.abs(terms).sum(axis=0)
+    absolute[1:4], absolute[4:10] = absolute[1:4].max(), absolute[4:10].max()
+    return np.sum(terms, axis=0), absolute
+
+
+def twin_with_wall(local, shape, squarings, weight):
+    """The same of the mean with a wall at an η."""
+    terms = []
+    for row in local:
+        double, lengths, wx, wy, wz, sx, sy, sz = measured(*row.tolist())
+        q = (lengths**1.5 / double / K3**0.5) ** (2 / 3)
+        f, part, two_p, m, mixed, squared, even = walled(
+            q**1.5, weight * (q * shape) ** (3.0 * 2.0**squarings), 3.0 * 2.0**squarings
+        )  # fmt: skip
+        found = derivatives(part, two_p / lengths, m / double, wx, wy, wz, sx, sy, sz, mixed, squared)
+        terms.append([f, *found, even / lengths])
     absolute = np.abs(terms).sum(axis=0)
     absolute[1:4], absolute[4:10] = absolute[1:4].max(), absolute[4:10].max()
     return np.sum(terms, axis=0), absolute
@@ -82,6 +99,31 @@ def test_sums_of_a_star_and_after_a_step(number, seed, rings):
         if there[:, 0].min() > 1e-3 and number < 3:
             after, _ = twin(local - np.tile(step[:, lane], 3), power, number)
             assert sums[AFTER] == pytest.approx(after[0], rel=1e-2)
+
+
+@pytest.mark.parametrize(("squarings", "weight", "times"), [(2, 1.0, 2.0), (3, 1.0, 1.2), (4, 0.05, 1.0)])
+@given(seed=st.integers(0, 2**32 - 1), rings=some_rings)
+@settings(max_examples=12)
+def test_sums_of_a_star_with_a_wall_and_after_a_step(squarings, weight, times, seed, rings):
+    """Lanes that have fewer simplices than others get no share of those that they do not have."""
+    rng = np.random.default_rng(seed)
+    points, topology = stars(rng, rings, off=0.2)
+    ratios = np.empty(len(topology.near))
+    cubed_ratios(points, topology.near, topology.near_orientation, None, 0, len(ratios), ratios)
+    shape = times * (K3 / ratios.max()) ** (1 / 3)
+    power, blocks = Power3.above(shape, squarings, weight), topology.stars.blocks
+    step = rng.normal(scale=0.02, size=(3, LANES3)).astype(np.float32)
+    for block, lane, _ in lanes(topology):
+        of_power = power.number, power.constants
+        work = see(points, blocks, block, *of_power, step.ravel(), 0.0, 2.0**-53, 0.0, power.wall, squarings)
+        sums = work.sums.reshape(-1, LANES3)[:, lane].astype(float)
+        local = local_of(points, topology, block, lane, work.inverse[lane])
+        expected, absolute = twin_with_wall(local, shape, squarings, weight)
+        assert (np.abs(sums[:LEAST] - expected) <= 1e-4 * 2.0**squarings * absolute).all()
+        there = np.array([moved(*measured(*row.tolist()), *step[:, lane].tolist()) for row in local])
+        if there[:, 0].min() > 1e-3:
+            after, _ = twin_with_wall(local - np.tile(step[:, lane], 3), shape, squarings, weight)
+            assert sums[AFTER] == pytest.approx(after[0], rel=1e-2 * 2.0**squarings)
 
 
 def test_what_is_kept_is_w_d_s_and_the_squared_edges():

@@ -28,7 +28,8 @@ FLAT = 1e-5  # of F: a node with less to gain stays, for float32 does not tell i
 class Power3(NamedTuple):
     """number: k of p = 3·2^k. constants: see kernels.star.space. isotropic: 2p·3. ratio: 1 + 1/m.
 
-    trials: of a step, each half as long as the one before.
+    trials: of a step, each half as long as the one before. wall: of the objective of ``mean_ratio3.walled`` in the
+    place of a power, 1/√K3, q_w^(−3), P and its weight, or None; squarings: k of P = 3·2^k.
     """
 
     number: int
@@ -36,6 +37,14 @@ class Power3(NamedTuple):
     isotropic: float
     ratio: float
     trials: int = TRIALS
+    wall: NDArray[np.float32] | None = None
+    squarings: int = 0
+
+    @classmethod
+    def above(cls, shape: float, squarings: int, weight: float) -> Power3:
+        """The mean of η with a wall at an η, which is a term of this weight for a cell there."""
+        wall = np.array((1.0 / math.sqrt(K3), shape**3, 3.0 * 2.0**squarings, weight), dtype=np.float32)
+        return cls.of(-1)._replace(isotropic=6.0, ratio=1.0, wall=wall, squarings=squarings)
 
     @classmethod
     def of(cls, number: int, worst: float = 1.0, trials: int = TRIALS) -> Power3:

@@ -197,6 +197,23 @@ def derivatives(f, of_s, of_w, wx, wy, wz, sx, sy, sz, mixed, squared):
 
 
 @inlined
+def walled(ratio, wall, steep):
+    """f = x/(1 + x) + g and five numbers for ``derivatives``, from x = q^(3/2) and g = w·(q/q_w)^P, P = steep.
+
+    f + g depends on ln q alone. With u = −∇ ln q its gradient is −f₁·u, and its Hessian f₂·uuᵀ + f₁·∇² ln q, as of a
+    power p = f₂/f₁ of q that is f₁/p large. f₁ = df/d ln q; f₂ is that of g, and 3/16 of what x/(1 + x) has in f₁, for
+    its own is negative. Returns f, f₁/p, 2p, m = 2p/3, ½(1 + 1/m), 1 − 1/p, and f₁ for the part along I.
+    """
+    share = 1.0 / (ratio + 1.0)
+    f = ratio * share
+    plain, far = f * share * 1.5, wall * steep
+    first, second = plain + far, plain * 0.1875 + far * steep
+    inverse = 1.0 / (first * second)
+    p, of_p = second * second * inverse, first * first * inverse
+    return f + wall, first * of_p, p * 2.0, p * (2.0 / 3.0), of_p * 0.75 + 0.5, of_p * -1.0 + 1.0, first
+
+
+@inlined
 def moved(double, lengths, wx, wy, wz, sx, sy, sz, tx, ty, tz):
     """D and S once the vertex has made the step t."""
     after = double - ((tx * wx + ty * wy) + tz * wz)

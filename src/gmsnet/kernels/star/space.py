@@ -8,6 +8,7 @@ free node; each lane reads the three rows of a simplex of its own. What follows 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from llvmlite import ir
@@ -77,6 +78,33 @@ def value_of(builder: Any, lengths: Vector, inverse: Vector, power: Any, constan
     return Vector(builder, builder.load(place)), high
 
 
+class _Wall:
+    """The objective of ``mean_ratio3.walled``: its constants, those of a Power3, and how often it is squared."""
+
+    def __init__(self, context: Any, builder: Any, kind: Any, constants: Any, squarings: Any) -> None:
+        base = vectors.data_of(context, builder, kind, constants)
+        self.builder, self.squarings = builder, squarings
+        self.root, self.scale, self.steep, self.weight = (
+            broadcast(builder, builder.load(builder.gep(base, [index(k)]))) for k in range(4)
+        )
+
+    @classmethod
+    def of(cls, context: Any, builder: Any, kind: Any, constants: Any, squarings: Any) -> _Wall | None:
+        return None if isinstance(kind, types.NoneType) else cls(context, builder, kind, constants, squarings)
+
+    def around(self, lengths: Vector, inverse: Vector, on: Any) -> tuple[Sequence[Vector], Vector]:
+        """What ``walled`` returns, and S^(3/2). inverse: 1/D."""
+        builder, high = self.builder, lengths * vectors.root(lengths)
+        ratio = (high * inverse * self.root).where(on, 1.0)
+        place = cgutils.alloca_once(builder, vectors.REALS)
+        builder.store(((ratio * ratio) * self.scale).value, place)
+        with cgutils.for_range(builder, self.squarings):
+            g = Vector(builder, builder.load(place)).above(LEAST_ROOT)
+            builder.store((g * g).value, place)
+        wall = Vector(builder, builder.load(place)) * self.weight
+        return as_written(mean_ratio3.walled)(ratio, wall, self.steep), high
+
+
 def _softness(context: Any, builder: Any, kind: Any, soft: Any) -> Vector | None:
     """ε² of all lanes."""
     if isinstance(kind, types.NoneType):
@@ -143,30 +171,32 @@ class _Rows:
 @intrinsic
 def derive(
     _context: Any, local: Any, spoke: Any, at: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any,
-    soft: Any, kept: Any, sums: Any, role: Any, present: Any, weights: Any,
+    soft: Any, wall: Any, squarings: Any, kept: Any, sums: Any, role: Any, present: Any, weights: Any,
 ) -> Any:  # fmt: skip
     """Writes what is kept of each simplex, and the sums VALUE to LEAST over them.
 
     local: as ``relate`` leaves it. spoke: from ``at`` on, so many rows; count: those of each lane, from block·LANES3
     on. power: k, constants: (SQUARED + 1,) float32, those named above. soft: (LANES3,) ε of each lane, over the cube of
     its size, or None: in f, D is then χ(D) = (D + √(ε² + D²))/2, which is positive for any D (Garanzha et al.:
-    Foldover-free maps in 50 lines of code, 2021), and the Hessian is that without the term of χ''. role, present,
-    weights: those of a Mixture, or None.
+    Foldover-free maps in 50 lines of code, 2021), and the Hessian is that without the term of χ''. wall, squarings:
+    those of a Power3; with a wall the objective is that of ``mean_ratio3.walled``. role, present, weights: those of a
+    Mixture, or None.
     """
     signature = types.void(
-        local, spoke, types.int64, types.int64, count, types.int64, types.int64, constants, soft, kept, sums, role,
-        present, weights,
+        local, spoke, types.int64, types.int64, count, types.int64, types.int64, constants, soft, wall, types.int64,
+        kept, sums, role, present, weights,
     )  # fmt: skip
     measured, derivatives = as_written(mean_ratio3.measured), as_written(mean_ratio3.derivatives)
     measured_by = as_written(mean_ratio3.measured_by)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 1, 4, 7, 9, 10)}
+        data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 1, 4, 7, 11, 12)}
+        barrier = _Wall.of(context, builder, signature.args[9], *arguments[9:11])
         softness = _softness(context, builder, signature.args[8], arguments[8])
         constants = _constants(builder, data[7])
         first = builder.mul(arguments[5], index(LANES3))
         counts = vectors.load(builder, data[4], first, vectors.NUMBERS)
-        lay = _Rows(context, builder, signature.args[11:], arguments[11:], counts, arguments[2])
+        lay = _Rows(context, builder, signature.args[13:], arguments[13:], counts, arguments[2])
         four = ir.VectorType(REAL, 4)
         found = [Sum(builder, FAR_ABOVE if k == LEAST else 0.0) for k in range(LEAST + 1)]
         with cgutils.for_range(builder, arguments[3]) as loop:
@@ -189,21 +219,23 @@ def derive(
             wx, wy, wz = wx.where(on, 0.0), wy.where(on, 0.0), wz.where(on, 0.0)
             to = builder.mul(loop.index, index(KEPT * LANES3))
             for k, row in enumerate((wx, wy, wz, double, sx, sy, sz, lengths)):
-                vectors.store(builder, data[9], builder.add(to, index(k * LANES3)), row.value)
+                vectors.store(builder, data[11], builder.add(to, index(k * LANES3)), row.value)
             inverse, of_d = _inverses(double, softness)
             of_s = 1.0 / lengths
-            f, _ = value_of(builder, lengths, inverse, arguments[6], constants)
-            f = f.where(on, 0.0)
-            terms = derivatives(
-                f, of_s * constants[TWO_P], of_d * constants[M], wx, wy, wz, sx, sy, sz, constants[MIXED],
-                constants[SQUARED],
-            )  # fmt: skip
-            even = f * of_s * lay.weight(loop.index, 7, 8)[0] if lay.mixed else f * of_s
+            if barrier is None:
+                f, _ = value_of(builder, lengths, inverse, arguments[6], constants)
+                f = even = part = f.where(on, 0.0)
+                two_p, m, mixed, squared = constants[TWO_P:]
+            else:
+                (f, part, two_p, m, mixed, squared, even), _ = barrier.around(lengths, inverse, on)
+                f, part, even = f.where(on, 0.0), part.where(on, 0.0), even.where(on, 0.0)
+            terms = derivatives(part, of_s * two_p, of_d * m, wx, wy, wz, sx, sy, sz, mixed, squared)
+            even = even * of_s * lay.weight(loop.index, 7, 8)[0] if lay.mixed else even * of_s
             for k, term in enumerate((f, *terms, even)):
                 found[k].add(term)
             found[LEAST].lower(double)
         for k, total in enumerate(found):
-            vectors.store(builder, data[10], index(k * LANES3), total.get(builder).value)
+            vectors.store(builder, data[12], index(k * LANES3), total.get(builder).value)
         return context.get_dummy_value()
 
     return signature, generate
@@ -212,15 +244,15 @@ def derive(
 @intrinsic
 def judge(
     _context: Any, kept: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any, soft: Any, step: Any,
-    floor: Any, sums: Any, at: Any, role: Any, present: Any, weights: Any,
+    floor: Any, sums: Any, at: Any, wall: Any, squarings: Any, role: Any, present: Any, weights: Any,
 ) -> Any:  # fmt: skip
     """Writes the sums AFTER and MARGIN after a step (3·LANES3,), [axis][lane].
 
-    floor: c, of D/S^(3/2). soft, at, role, present, weights: as in ``derive``.
+    floor: c, of D/S^(3/2). soft, at, wall, squarings, role, present, weights: as in ``derive``.
     """
     signature = types.void(
         kept, types.int64, count, types.int64, types.int64, constants, soft, step, types.float32, sums, types.int64,
-        role, present, weights,
+        wall, types.int64, role, present, weights,
     )  # fmt: skip
     moved, moved_by = as_written(mean_ratio3.moved), as_written(mean_ratio3.moved_by)
 
@@ -229,7 +261,8 @@ def judge(
         softness = _softness(context, builder, signature.args[6], arguments[6])
         constants = _constants(builder, data[5])
         counts = vectors.load(builder, data[2], builder.mul(arguments[3], index(LANES3)), vectors.NUMBERS)
-        lay = _Rows(context, builder, signature.args[11:], arguments[11:], counts, arguments[10])
+        lay = _Rows(context, builder, signature.args[13:], arguments[13:], counts, arguments[10])
+        barrier = _Wall.of(context, builder, signature.args[11], *arguments[11:13])
         way = [Vector(builder, vectors.load(builder, data[7], index(k * LANES3))) for k in range(3)]
         floor = broadcast(builder, arguments[8])
         after, margin = Sum(builder, 0.0), Sum(builder, FAR_ABOVE)
@@ -243,7 +276,11 @@ def judge(
             else:
                 double, lengths = moved(w[3], w[7], *w[:3], *w[4:7], *way)
             on = lay.lanes(loop.index)
-            f, high = value_of(builder, lengths, _inverses(double, softness)[0], arguments[4], constants)
+            inverse = _inverses(double, softness)[0]
+            if barrier is None:
+                f, high = value_of(builder, lengths, inverse, arguments[4], constants)
+            else:
+                (f, *_), high = barrier.around(lengths, inverse, on)
             after.add(f.where(on, 0.0))
             margin.lower((double - high * floor).where(on, FAR_ABOVE))
         vectors.store(builder, data[9], index(AFTER * LANES3), after.get(builder).value)

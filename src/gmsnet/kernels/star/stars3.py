@@ -101,12 +101,13 @@ def _derive(mixture, blocks, block, power, soft, workspace):
     if mixture is None:
         derive(
             workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
-            soft, workspace.kept, workspace.sums, None, None, None,
+            soft, power.wall, power.squarings, workspace.kept, workspace.sums, None, None, None,
         )  # fmt: skip
     else:
         derive(
             workspace.local, blocks.spoke, blocks.at[block], rows, blocks.cells, block, power.number, power.constants,
-            soft, workspace.kept, workspace.sums, mixture.role, mixture.present, mixture.weights,
+            soft, power.wall, power.squarings, workspace.kept, workspace.sums, mixture.role, mixture.present,
+            mixture.weights,
         )  # fmt: skip
 
 
@@ -123,12 +124,12 @@ def _judge(mixture, blocks, block, power, soft, floor, workspace):
     if mixture is None:
         judge(
             workspace.kept, rows, blocks.cells, block, power.number, power.constants, soft, workspace.step, floor,
-            workspace.sums, at, None, None, None,
+            workspace.sums, at, power.wall, power.squarings, None, None, None,
         )  # fmt: skip
     else:
         judge(
             workspace.kept, rows, blocks.cells, block, power.number, power.constants, soft, workspace.step, floor,
-            workspace.sums, at, mixture.role, mixture.present, mixture.weights,
+            workspace.sums, at, power.wall, power.squarings, mixture.role, mixture.present, mixture.weights,
         )  # fmt: skip
 
 
