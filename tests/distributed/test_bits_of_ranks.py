@@ -105,18 +105,6 @@ def test_what_is_not_shared_out_is_done_by_the_first_rank(method):
     assert told.notes[-1] == f"ranks: the first one smoothed all {len(mesh.points):,} nodes, for {told.gathered}"
 
 
-def test_tangles_are_gathered_and_mended():
-    mesh = MESHES["triangles"]
-    points = mesh.points.copy()
-    inner = np.flatnonzero(((mesh.points > 0.2) & (mesh.points < 0.8)).all(axis=1))[:40]
-    points[inner] += 0.1 * np.random.default_rng(5).normal(size=(len(inner), 2))
-    options = SmoothOptions(method="barrier", max_sweeps=5, threads=1)
-    tangled = replace(mesh, points=points)
-    rng = np.random.default_rng(6)
-    told = same(tangled, options, parts_at_random(tangled, 2, rng, "strips"), 2)
-    assert told.gathered == "inverted cells are mended one after the other"
-
-
 def test_a_hexahedron_that_is_inverted_between_its_corners_is_mended_by_the_first_rank():
     rng, base = np.random.default_rng(4), block(3, 3, 3)
     while True:

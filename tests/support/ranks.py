@@ -49,6 +49,7 @@ def same(mesh, options, parts, ranks, fixed=None):
     points, results = spread(mesh, options, parts, ranks, fixed)
     assert points.tobytes() == serial.points.tobytes()
     told = results[0]
+    assert told.notes[: len(serial.notes)] == serial.notes
     assert repr(told.after) == repr(serial.after.totals)
     assert told.stop_reason == serial.stop_reason
     assert [sweep.moved for sweep in told.history] == [sweep.moved for sweep in serial.history]

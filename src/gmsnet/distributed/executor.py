@@ -147,7 +147,12 @@ class Ranks:
 
     def gathered(self, field: Field, rows: NDArray[np.int32] | None) -> Field | None:
         """See Executor."""
-        self.loan = gathered_field(self.part, field, rows)
+        free, active = field.topology.near_free, None
+        if rows is not None:
+            active = np.zeros(len(free), dtype=bool)
+            active[field.topology.changeable.rows[rows]] = True
+            active &= free
+        self.loan = gathered_field(self.part, field, active)
         return self.loan.field
 
     def restricted(self, topology: Topology | Volume, active: NDArray[np.bool_]) -> Topology | Volume:

@@ -46,6 +46,17 @@ def gathered(piece: Piece, comm: Any, known: Whole | None = None) -> Whole | Non
     return Whole(Mesh(points, tuple(blocks), single=piece.single), ids, fixed)
 
 
+def brought(whole: Whole | None, values: NDArray[Any], piece: Piece, comm: Any) -> NDArray[Any] | None:
+    """Values (n, …) at the nodes of each piece, in the order of the whole mesh, where that is; None elsewhere."""
+    came = comm.gather((piece.ids, values))
+    if came is None or whole is None:
+        return None
+    found = np.empty((len(whole.ids), *values.shape[1:]), dtype=values.dtype)
+    for ids, some in came:
+        found[np.searchsorted(whole.ids, ids)] = some
+    return found
+
+
 def scattered(whole: Whole | None, values: NDArray[Any] | None, piece: Piece, comm: Any) -> NDArray[Any]:
     """Values (N, …) at the nodes of the whole mesh, which the first rank has, at those of each piece."""
     wanted = comm.gather(piece.ids)

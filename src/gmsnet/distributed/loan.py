@@ -13,18 +13,22 @@ from numpy.typing import NDArray
 
 from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Ids
+from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.base import Field
-from gmsnet.topology.topology import Topology
+from gmsnet.topology.solids import KINDS
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+PLANAR = "triangle", "quad"
+
 
 class Parcel(NamedTuple):
-    """Nodes and cells of one rank. ids: (n,). places: (n, dim) in the input, by which they are ordered. points: (n, 2)
-    as they are. moves: (n,) bool, which are free. cells: for each block, nodes by their ids and the numbers of cells.
+    """Nodes and cells of one rank. ids: (n,). places: (n, dim) in the input, by which they are ordered. points: as they
+    are, (n, 2), of volumes (n, 4). moves: (n,) bool, which are free. cells: for each block, nodes by their ids and the
+    numbers of cells.
     """
 
     ids: Ids
@@ -61,7 +65,7 @@ class Loan(NamedTuple):
         return part.topology.places[np.searchsorted(part.around.nodes.ids, self.ids)]
 
     def give_back(self, part: Part, points: Floats) -> None:
-        """The points of the gathered field go to the ranks. points: (n, 2) of a rank, in memory order."""
+        """The points of the gathered field go to the ranks. points: (n, …) of a rank, in memory order."""
         parcels: list[Floats] | None = None
         if self.field is not None and self.all is not None and self.sent is not None:
             found = np.empty_like(self.field.points)
@@ -72,9 +76,12 @@ class Loan(NamedTuple):
             points[:, axis] = part.halo.spread(points[:, axis])
 
 
-def gathered_field(part: Part, field: Field, rows: NDArray[np.int32] | None) -> Loan:
-    """See Executor.gathered. All ranks call it; the mesh is in a plane."""
-    parcel = _parcel(part, field, rows)
+def gathered_field(part: Part, field: Field, active: Flags | None) -> Loan:
+    """What is smoothed, with all cells at the active nodes of all ranks, which alone are free. All ranks call it.
+
+    active: (N,) by places in memory, of the nodes that are free here; None for the whole mesh.
+    """
+    parcel = _parcel(part, field, active)
     came = part.comm.gather(parcel)
     if came is None:
         return Loan(parcel.ids)
@@ -94,7 +101,7 @@ def gathered_field(part: Part, field: Field, rows: NDArray[np.int32] | None) -> 
     mesh = Mesh(places, tuple(blocks), single=whole.single).as_part(
         whole.plane, (whole.has_volumes, whole.has_quads), whole.exponent, whole.box
     )
-    topology = Topology.of(mesh, ~moves)
+    topology = connectivity_of(mesh, ~moves)
     points = points[topology.memory]
     return Loan(parcel.ids, Field(points, topology, field.precision, field.level), ids, [each.ids for each in came])
 
@@ -102,23 +109,18 @@ def gathered_field(part: Part, field: Field, rows: NDArray[np.int32] | None) -> 
 def _faces(part: Part) -> list[tuple[int, str]]:
     """Which blocks have cells that move, and their kinds."""
     kinds = enumerate(block.kind for block in part.around.blocks)
-    return [(k, kind) for k, kind in kinds if kind in ("triangle", "quad")]
+    return [(k, kind) for k, kind in kinds if kind in (KINDS if part.mesh.has_volumes else PLANAR)]
 
 
-def _parcel(part: Part, field: Field, rows: NDArray[np.int32] | None) -> Parcel:
-    """What this rank brings: all cells at the nodes that it moves; without rows, its own."""
+def _parcel(part: Part, field: Field, active: Flags | None) -> Parcel:
+    """What this rank brings: all cells at the active nodes; of the whole mesh, its own."""
     topology, ids = field.topology, part.around.nodes.ids
-    free, active = topology.near_free, topology.near_free
-    if rows is not None:
-        active = np.zeros(len(free), dtype=bool)
-        active[topology.changeable.rows[rows]] = True
-        active &= free
     moves = np.zeros(len(ids), dtype=bool)
-    moves[topology.memory] = active
+    moves[topology.memory] = topology.near_free if active is None else active
     used, cells = moves.copy(), []
     for k, _ in _faces(part):
         block, nodes = part.around.blocks[k], part.mesh.cells[k].nodes
-        chosen = part.around.own[k] if rows is None else moves[nodes].any(axis=1)
+        chosen = part.around.own[k] if active is None else moves[nodes].any(axis=1)
         used[nodes[chosen]] = True
         cells.append((block.nodes[chosen], block.numbers[chosen]))
     by_id = np.empty_like(field.points)

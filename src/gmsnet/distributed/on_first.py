@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -10,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.agreement import raise_everywhere
-from gmsnet.distributed.gathered import Whole, gathered, scattered
+from gmsnet.distributed.gathered import Whole, brought, gathered, scattered
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.result import RankResult
 from gmsnet.errors import GmsnetError
 from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.display import amount
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.protection import protected, protected_volume
 from gmsnet.run.api import smooth_with
 from gmsnet.run.options import SmoothOptions
@@ -24,29 +26,46 @@ from gmsnet.run.stop import INTERRUPTED
 from gmsnet.topology.ordering import near_points
 from gmsnet.topology.volume import Volume
 
+Floats = NDArray[np.float64]
+
 
 class Intent(NamedTuple):
     """What of the mesh is there on purpose. layers: (n,) of the piece, held. walls: whether some are refined."""
 
-    layers: NDArray[np.bool_] | None
-    walls: bool
-    notes: list[str]
+    layers: NDArray[np.bool_] | None = None
+    walls: bool = False
+    notes: Sequence[str] = ()
 
 
-def intent_of(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | None) -> Intent:
-    """What is there on purpose, told by the first rank of the whole mesh. known: see ``gathered``."""
+def intent_of(
+    piece: Piece, options: SmoothOptions, comm: Any, known: Whole | None, mended: Floats | None, *, firm: bool
+) -> Intent:  # fmt: skip
+    """What is there on purpose, told by the first rank of the whole mesh. known: see ``gathered``.
+
+    mended: (n, 2), of volumes (n, 4), of the piece as ``near_points``, where no cell is inverted any more. firm: as of
+    ``protected``.
+    """
     whole, layers, told = gathered(piece, comm, known), None, None
+    now = None if mended is None else brought(whole, mended, piece, comm)
     if whole is not None:
         topology = connectivity_of(whole.mesh, whole.fixed)
-        near = near_points(whole.mesh, topology)
+        near = near_points(whole.mesh, topology) if now is None else now[topology.memory]
         if isinstance(topology, Volume):
-            found = protected_volume(topology, options.preserved, options.fix_layers, near, firm=False)
+            found = protected_volume(topology, options.preserved, options.fix_layers, near, firm=firm)
         else:
-            found = protected(whole.mesh, topology, options.preserved, options.fix_layers, near)
+            mesh = whole.mesh if now is None else whole.mesh.with_points(_written(whole.mesh, now))
+            found = protected(mesh, topology, options.preserved, options.fix_layers, near, firm=firm)
         layers = np.zeros(len(whole.ids), dtype=bool) if found.layers is None else found.layers
         told = found.walls is not None, found.notes
     walls, notes = comm.bcast(told)
     return Intent(scattered(whole, layers, piece, comm), walls, notes)
+
+
+def _written(mesh: Mesh, near: Floats) -> Floats:
+    """The points (N, dim) of a mesh in a plane that ``planar_points`` (N, 2) are of."""
+    points = mesh.points.copy()
+    points[:, list(mesh.plane or ())] = np.ldexp(near, mesh.exponent)
+    return points
 
 
 def smoothed_on_first(

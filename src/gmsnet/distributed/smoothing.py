@@ -15,14 +15,14 @@ from gmsnet.distributed.executor import Ranks
 from gmsnet.distributed.gathered import Whole
 from gmsnet.distributed.ghosts import surrounded
 from gmsnet.distributed.intent import may_be_meant
+from gmsnet.distributed.mending import Mended, inverted_in, mended
 from gmsnet.distributed.on_first import Intent, intent_of, smoothed_on_first
 from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.stages import swept
-from gmsnet.kernels.topology.connectivity import MISMATCHED, NON_ORIENTABLE, ZERO_AREA
+from gmsnet.distributed.winding import Winding
 from gmsnet.kernels.topology.write_back import put_back
-from gmsnet.measure.report import measure
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.methods import Smoother
 from gmsnet.methods.base import CELLS
@@ -30,19 +30,16 @@ from gmsnet.preserve.protection import LAYER
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import factors_of, rank_by
 from gmsnet.run.sweep import Sweep
-from gmsnet.topology.held import REASONS, reasons_in_space
-from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.solids import KINDS
 from gmsnet.topology.topology import Topology
-from gmsnet.topology.volume import MOST, Volume
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 Callback = Callable[[Sweep], bool | None]
 
+REFINED = "the mesh is refined towards walls"
 SHARED = (*CELLS, *KINDS, "line", "vertex")  # the kinds of cells that sweeps over ranks know
-
-UNREAD = NON_ORIENTABLE, ZERO_AREA, MISMATCHED  # what is told of whole parts of a mesh, or of facets of far cells
 
 
 def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | None = None) -> RankResult:
@@ -59,13 +56,10 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
     part = Part.of(around, comm, piece.single)
     try:
         before = totals_of(part.points, part.simplices, Ranks(part))
-        why, intent = _not_plain(part, before), Intent(None, False, [])
-        if not why and options.preserved != "none" and may_be_meant(part):
-            intent = intent_of(piece, options, comm, known)
-            why = "the mesh is refined towards walls" if intent.walls else ""
-        if why:
-            return smoothed_on_first(piece, options, comm, why, began, known)
-        return _shared(piece, part, smoother, options, intent, before, began)
+        ready = _ready(piece, part, options, before, known)
+        if ready.why:
+            return smoothed_on_first(piece, options, comm, ready.why, began, known)
+        return _shared(piece, part, smoother, options, ready, before, began)
     finally:
         part.halo.free()
 
@@ -92,35 +86,75 @@ def _not_plain(part: Part, before: Totals | None) -> str:
         return "surfaces in space are not shared out"
     if before is None:
         return "no cell can be smoothed"
-    reasons = reasons_in_space(MOST) if isinstance(topology, Volume) else REASONS
-    orientation = topology.orientation if isinstance(topology, MixedVolume) else topology.near_orientation
-    unread = any(reasons[mark] in topology.held for mark in UNREAD if mark in reasons)
-    signs = np.array([np.count_nonzero(orientation > 0), np.count_nonzero(orientation < 0), unread])
-    forth, back, unread = comm.allreduce(signs).tolist()
-    if unread:
+    winding = Winding(*comm.allreduce(np.array(Winding.of(topology))).tolist())
+    if winding.unread:
         return "parts of the mesh, or facets that do not match, have to be seen whole"
-    if forth and back:
-        return "cells are wound in both directions"
-    if before.uncertain and comm.allreduce(measure(part.mesh, topology, part.points).inverted):
-        return "inverted cells are mended one after the other"
-    return ""
+    return "" if winding.alike else "cells are wound in both directions"
+
+
+class _Ready(NamedTuple):
+    """What comes before the sweeps. why: they cannot be shared out, "" if they can. mended: inverted cells, if any."""
+
+    why: str
+    intent: Intent = Intent()
+    mended: Mended | None = None
+
+
+def _ready(
+    piece: Piece, part: Part, options: SmoothOptions, before: Totals | None, known: Whole | None
+) -> _Ready:  # fmt: skip
+    why = _not_plain(part, before)
+    if why or before is None:
+        return _Ready(why)
+    inverted = inverted_in(part) if before.uncertain else 0
+    intent = _intent(piece, part, options, known, None, firm=inverted > 0)
+    if not inverted or intent.walls:
+        return _Ready(REFINED if intent.walls else "", intent)
+    if not options.untangle:
+        return _Ready("inverted cells are to stay as they are")
+    done = mended(part, _held_by(intent, piece, part), inverted)
+    if done is None:
+        return _Ready("inverted cells could not be mended with what lies around them")
+    intent = _intent(piece, part, options, known, done.points, firm=False)
+    return _Ready(REFINED if intent.walls else "", intent, done)
+
+
+def _intent(
+    piece: Piece, part: Part, options: SmoothOptions, known: Whole | None, points: Floats | None, *, firm: bool
+) -> Intent:  # fmt: skip
+    """What is there on purpose. points: see Mended, where inverted cells were mended; None as they are."""
+    wanted = options.preserved != "none" or options.fix_layers
+    if not wanted or not may_be_meant(part, part.points if points is None else points):
+        return Intent()
+    now = None
+    if points is not None:
+        at = part.topology.places[np.searchsorted(part.around.nodes.ids, piece.ids)]
+        now = points[at]
+    return intent_of(piece, options, part.comm, known, now, firm=firm)
+
+
+def _held_by(intent: Intent, piece: Piece, part: Part) -> Topology | Volume:
+    """The connectivity of a part with the nodes of layers held."""
+    topology, ids = part.topology, part.around.nodes.ids
+    if intent.layers is None:
+        return topology
+    layers = np.zeros(len(ids), dtype=np.float64)
+    layers[np.searchsorted(ids, piece.ids)] = intent.layers
+    return topology.holding(part.halo.spread(layers[topology.memory])[topology.places] > 0.0, LAYER)
 
 
 def _shared(
-    piece: Piece, part: Part, smoother: Smoother, options: SmoothOptions, intent: Intent, before: Totals | None,
+    piece: Piece, part: Part, smoother: Smoother, options: SmoothOptions, ready: _Ready, before: Totals | None,
     began: float,
 ) -> RankResult:  # fmt: skip
-    topology, ids = part.topology, part.around.nodes.ids
-    at = np.searchsorted(ids, piece.ids)
-    if intent.layers is not None:
-        layers = np.zeros(len(ids), dtype=np.float64)
-        layers[at] = intent.layers
-        topology = topology.holding(part.halo.spread(layers[topology.memory])[topology.places] > 0.0, LAYER)
-    topology, numbers = part.ready(topology)
+    at = np.searchsorted(part.around.nodes.ids, piece.ids)
+    intent, done = ready.intent, ready.mended
+    topology, numbers = part.ready(_held_by(intent, piece, part))
     executor = Ranks(part, numbers)
     options = replace(options, callback=_answered(part.comm, options.callback))
-    state = swept(part, topology, smoother, options, executor)
-    points, moved, after = _written(part, state.points, options, before, executor)
+    state = swept(part, topology, smoother, options, executor, done)
+    judged = _Judged(0 if done is None else done.cells, before)
+    points, moved, after = _written(part, state.points, options, judged, executor)
     return RankResult(
         points=points[at],
         moved=moved[at],
@@ -129,7 +163,7 @@ def _shared(
         sweeps=state.history[-1].index if state.history else 0,
         stop_reason=state.stop_reason,
         history=[*state.history],
-        notes=intent.notes,
+        notes=[*intent.notes, *([] if done is None else [done.note])],
         held=_held(part, topology),
         nodes=int(part.comm.allreduce(int(part.moves.sum()))),
         cells=sum(part.around.sizes),
@@ -180,7 +214,7 @@ class _Judged(NamedTuple):
 
 
 def _written(
-    part: Part, best: Floats, options: SmoothOptions, before: Totals | None, executor: Ranks
+    part: Part, best: Floats, options: SmoothOptions, before: _Judged, executor: Ranks
 ) -> tuple[Floats, NDArray[np.bool_], Totals | None]:
     """The best mesh by global ids; that of the input if it is the better one as it is written."""
     mesh, topology = part.mesh, part.topology
@@ -194,6 +228,6 @@ def _written(
     near = taken(planar_points(written) if mesh.plane else space_points(written), topology.memory)
     after = totals_of(near, part.simplices, executor)
     rank, inverted = rank_by(options.best_by), 0 if after is None else after.inverted
-    if rank(_Judged(inverted, after)) <= rank(_Judged(0, before)):
+    if rank(_Judged(inverted, after)) <= rank(before):
         return points, moved, after
-    return mesh.points, np.zeros_like(moved), before
+    return mesh.points, np.zeros_like(moved), before.totals

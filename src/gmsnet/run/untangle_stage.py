@@ -87,12 +87,18 @@ def _untangled(state: State, executor: Executor) -> State:
 
 def _noted(state: State, done: Untangled, topology: Topology | Volume) -> State:
     """The state with what untangling has made, and what there is to say about it."""
-    steps = ", ".join(f"{step.name} ({step.sweeps})" for step in done.steps) or "nothing to try"
-    left = f"{done.after:,} of {done.before:,} inverted cells are left" if done.after else f"all {done.before:,} mended"
-    note = f"untangling: {left}; {steps}{f'; {done.why}' if done.why else ''}"
     cells = topology.cells_of(np.array([cell.row for cell in done.unmended], dtype=np.intp)).tolist()
     reasons = {index: cell.reason for index, cell in zip(cells, done.unmended, strict=True)}
-    return replace(state, points=done.points, totals=None, untangling=(*state.untangling, note), reasons=reasons)
+    return replace(
+        state, points=done.points, totals=None, untangling=(*state.untangling, note_of(done)), reasons=reasons
+    )
+
+
+def note_of(done: Untangled) -> str:
+    """What to say of it."""
+    steps = ", ".join(f"{step.name} ({step.sweeps})" for step in done.steps) or "nothing to try"
+    left = f"{done.after:,} of {done.before:,} inverted cells are left" if done.after else f"all {done.before:,} mended"
+    return f"untangling: {left}; {steps}{f'; {done.why}' if done.why else ''}"
 
 
 def beside(reasons: Reasons, topology: Topology | Volume) -> NDArray[np.bool_]:

@@ -10,6 +10,7 @@ from gmsnet.untangle.escalation import escalate
 from gmsnet.untangle.guarded import what_is_left
 from gmsnet.untangle.newton import polish
 from gmsnet.untangle.patch import Floats
+from gmsnet.untangle.reach import Reach
 from gmsnet.untangle.reasons import freeze, reasons
 from gmsnet.untangle.result import ALL, NOTHING, PART, StillInverted, Untangled, UntanglingStep
 from gmsnet.untangle.state import UntanglingState
@@ -21,11 +22,14 @@ __all__ = ["ALL", "NOTHING", "PART", "StillInverted", "Untangled", "UntanglingSt
 ROUNDS = 2  # after the first, nodes of cells that cannot be untangled stand still, for the sake of those beside them
 
 
-def untangle(points: Floats, topology: Topology, precision: Precision) -> Untangled:
+def untangle(
+    points: Floats, topology: Topology, precision: Precision, reach: Reach | None = None
+) -> Untangled:  # fmt: skip
     """Moves free nodes until no cell is inverted, or as few as can be; held nodes and what is far off keep their bits.
 
     points: (N, 2) float64 by places in memory (``planar_points(mesh)[topology.memory]``); not changed. topology: of the
-    mesh. precision: how exactly coordinates are known once they are written (kernels.star.guard).
+    mesh. precision: how exactly coordinates are known once they are written (kernels.star.guard). reach: of which mesh
+    this is a part, if it is not the whole. Raises BeyondReachError where the part does not suffice.
 
     A cell is inverted if one of its corners is not positive. It counts as untangled once it is certified: all its
     corners are positive as they will be written. No cell that was positive is not so
@@ -33,7 +37,7 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
     from the arguments alone.
     """
     topology = topology.with_rings_of_free_nodes()
-    tangle = UntanglingState(points, topology, precision)
+    tangle = UntanglingState(points, topology, precision, reach)
     before = len(first_rows(topology, tangle.was_bad))
     if not before:
         return Untangled(tangle.points, 0, 0, ALL, "", (), ())
@@ -53,6 +57,7 @@ def untangle(points: Floats, topology: Topology, precision: Precision) -> Untang
         steps += restore(tangle), polish(tangle)
     after = 0
     if tangle.left:  # else all are certified that have moved or were not positive
+        tangle.reach.need_all()
         inverted = exact_signs(tangle.points, topology.near, topology.near_orientation) <= 0
         after = len(first_rows(topology, whole_cells(topology, inverted)))
     sweeps = sum(step.sweeps for step in steps)

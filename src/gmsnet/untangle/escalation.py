@@ -10,7 +10,7 @@ from gmsnet.untangle.guarded import worst_nodes
 from gmsnet.untangle.harmonic import harmonic
 from gmsnet.untangle.lbfgs import whole
 from gmsnet.untangle.newton import keep_gains, newton
-from gmsnet.untangle.patch import Patch, in_order
+from gmsnet.untangle.patch import Patch
 from gmsnet.untangle.reasons import freeze_hopeless
 from gmsnet.untangle.result import UntanglingStep
 from gmsnet.untangle.state import UntanglingState
@@ -36,14 +36,14 @@ def escalate(tangle: UntanglingState) -> Iterator[UntanglingStep]:
     tried: Patch | None = None
     for rings in RINGS:
         patch = tangle.around(rings)
-        if patch.count > MOST * len(tangle.topology.free):
+        if patch.count > MOST * tangle.reach.free:
             patch = tangle.around(RINGS[-1])
         if not patch.count or (tried and np.array_equal(patch.every, tried.every)):
             break
         if tried and rings == RINGS[-1] and patch.count > LEAP * tried.count:
             break  # what so large a patch could not mend is not untangled by one of all nodes either
         tried = patch
-        last = patch.count == len(tangle.topology.free)
+        last = patch.count == tangle.reach.free
         where = "all nodes" if last else "all rings" if rings == RINGS[-1] else f"{rings} rings"
         yield from mend(tangle, patch, where, LAST_PATIENCE if last else PATIENCE)
         if tangle.left < left:
@@ -60,7 +60,7 @@ def bad_stars(tangle: UntanglingState) -> UntanglingStep:
     visited = chosen.copy()
     sweeps = 0
     while sweeps < LAPLACIAN_SWEEPS and chosen.any():
-        tangle.average(in_order(tangle.topology, chosen), WEIGHING if sweeps < MEDIANS else 0)
+        tangle.average(tangle.in_order(chosen), WEIGHING if sweeps < MEDIANS else 0)
         chosen = tangle.bad_among(chosen)
         visited |= chosen
         sweeps += 1

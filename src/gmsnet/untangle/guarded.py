@@ -10,7 +10,7 @@ import numpy as np
 
 from gmsnet.kernels.untangle import barrier
 from gmsnet.untangle.newton import AVERAGING, closing, keep_gains, sweep
-from gmsnet.untangle.patch import Ints, Patch, in_order
+from gmsnet.untangle.patch import Ints, Patch
 from gmsnet.untangle.result import UntanglingStep
 from gmsnet.untangle.state import UntanglingState
 
@@ -20,8 +20,8 @@ LAST_SWEEPS, RINGS = 30, 2
 
 def worst_nodes(tangle: UntanglingState) -> UntanglingStep:
     """The nodes with bad cells, the worst first, each only if its star is still bad when its turn comes."""
-    nodes = tangle.worst_first(in_order(tangle.topology, tangle.bad_nodes()))
-    if len(nodes) > FEW_NODES * len(tangle.topology.free):
+    nodes = tangle.worst_first(tangle.in_order(tangle.bad_nodes()))
+    if len(nodes) > FEW_NODES * tangle.reach.free:
         return UntanglingStep("barrier, guarded, worst first", 0, 0, tangle.left)
     return guarded(tangle, nodes, FIRST_SWEEPS, barrier.MENDING, "barrier, guarded, worst first")
 

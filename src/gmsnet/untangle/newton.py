@@ -10,7 +10,7 @@ from gmsnet.kernels.simplex.mean_ratio2 import TWO_SQRT3
 from gmsnet.kernels.untangle import barrier
 from gmsnet.kernels.untangle import cells as kernels
 from gmsnet.untangle.cells import most_of_cells
-from gmsnet.untangle.patch import Flags, Floats, Patch, free_nodes_of, in_order
+from gmsnet.untangle.patch import Flags, Floats, Patch, free_nodes_of
 from gmsnet.untangle.result import UntanglingStep
 from gmsnet.untangle.state import UntanglingState
 
@@ -67,7 +67,7 @@ def polish(tangle: UntanglingState) -> UntanglingStep:
     """A few Newton sweeps on the stars of slivers that untangling has left; certified stars stay so."""
     slivers, topology = np.empty(len(tangle.bad), dtype=bool), tangle.topology
     kernels.find_slivers(tangle.points, tangle.before, topology.simplices, SLIVER / TWO_SQRT3, slivers)
-    patch = Patch.of(topology, in_order(topology, free_nodes_of(topology, slivers)))
+    patch = Patch.of(topology, tangle.in_order(free_nodes_of(topology, slivers)))
     points = tangle.points[patch.every]
     scale = barrier.local_area(points, patch.cells, AVERAGING)
     epsilon = np.full(patch.count, LEAST_EPSILON)
@@ -80,7 +80,7 @@ def polish(tangle: UntanglingState) -> UntanglingStep:
 def keep_gains(tangle: UntanglingState, before: Floats, bad: Flags) -> None:
     """Pieces that have moved since some points (N, 2), without fewer cells being bad than were then, go back there."""
     topology = tangle.topology
-    patch = Patch.of(topology, in_order(topology, (tangle.points != before).any(axis=1)))
+    patch = Patch.of(topology, tangle.in_order((tangle.points != before).any(axis=1)))
     piece = np.full(len(tangle.points), -1, dtype=np.int32)
     piece[patch.nodes] = patch.part
     rows = np.flatnonzero(bad | tangle.bad)

@@ -60,6 +60,7 @@ def freeze_hopeless(tangle: UntanglingState, points: Floats, bad: Flags) -> bool
     """Freezes the free nodes of what no patch can mend, however large: the bad cells (of some points) with a reason of
     FOR_GOOD, and the few that hang together with them. Are there new ones?
     """
+    tangle.reach.need_all()  # a boundary that crosses itself may be far off
     rows = reasons(tangle.topology, points, bad, 0)
     known = np.array([row.reason in FOR_GOOD for row in rows])
     if not known.any():
@@ -78,6 +79,7 @@ def freeze_hopeless(tangle: UntanglingState, points: Floats, bad: Flags) -> bool
 
 def freeze(tangle: UntanglingState) -> bool:
     """Freezes the free nodes of bad cells with such a reason; are there any, and bad cells without one?"""
+    tangle.reach.need_all()
     topology = tangle.topology
     rows = [row.row for row in reasons(topology, tangle.points, tangle.bad, 0) if row.reason in FOR_GOOD]
     tangle.frozen = free_among(topology, corners_of(topology, np.array(rows, dtype=np.intp)).nodes)

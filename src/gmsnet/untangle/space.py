@@ -19,6 +19,7 @@ from gmsnet.kernels.untangle.space import find_bad, find_bad_inside, soften
 from gmsnet.measure.volumes import exact_signs3
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume
+from gmsnet.untangle.reach import Reach
 from gmsnet.untangle.result import ALL, HELD, NOTHING, PART, StillInverted, Untangled, UntanglingStep
 
 Floats = NDArray[np.float64]
@@ -35,7 +36,8 @@ HARMONIC, ITERATIONS = 1e-6, 2000
 class Attempt:
     """A mesh on its way.
 
-    points: as they are now; start: as they were. bad, inverted, ratio: of each cell, see ``find_bad``.
+    points: as they are now; start: as they were. bad, inverted, ratio: of each cell, see ``find_bad``. reach: of which
+    mesh this is a part.
     """
 
     start: Floats
@@ -48,10 +50,13 @@ class Attempt:
     ratio: NDArray[np.float64]
     left: int
     was: NDArray[np.float64]
+    reach: Reach
 
-    def __init__(self, points: Floats, topology: Volume, precision: Precision, executor: Executor) -> None:
+    def __init__(
+        self, points: Floats, topology: Volume, precision: Precision, executor: Executor, reach: Reach | None = None
+    ) -> None:  # fmt: skip
         self.start, self.points, self.topology, self.precision = points, points.copy(), topology, precision
-        self.executor = executor
+        self.executor, self.reach = executor, reach or Reach.whole(topology)
         count = len(topology.near)
         self.bad, self.inverted = np.empty((2, count), dtype=bool)
         self.ratio = np.empty(count)
@@ -79,6 +84,7 @@ class Attempt:
             chosen[near[rows_at(near, chosen)]] = True
             if np.count_nonzero(chosen) == before:
                 break
+        self.reach.choose(chosen & free)
         return np.flatnonzero(chosen & free)
 
     def sweeps(self, rings: int, most: int) -> UntanglingStep:
@@ -112,6 +118,7 @@ class Attempt:
 
         Conjugate gradients on the Laplacian of the edges, with the held nodes as they are.
         """
+        self.reach.need_all()
         topology = self.topology
         free = np.flatnonzero(topology.near_free)
         number = np.full(len(self.points), -1)
@@ -218,13 +225,14 @@ def _take_best(attempt: Attempt, places: list[Floats]) -> list[UntanglingStep]:
 
 
 def untangle_volume(
-    points: Floats, topology: Volume, precision: Precision, executor: Executor, before: int
+    points: Floats, topology: Volume, precision: Precision, executor: Executor, before: int, reach: Reach | None = None
 ) -> Untangled:
     """Moves free nodes until no cell is inverted, or as few as can be; held nodes and what is far off keep their bits.
 
-    points: (N, 4) by places in memory; not changed. before: how many are inverted. As ``untangle`` of cells in a plane.
+    points: (N, 4) by places in memory; not changed. before: how many are inverted. reach: as ``untangle`` of cells in a
+    plane.
     """
-    attempt, places = Attempt(points, topology, precision, executor), list[Floats]()
+    attempt, places = Attempt(points, topology, precision, executor, reach), list[Floats]()
     steps: list[UntanglingStep] = []
     for rounds, (rings, most) in enumerate(zip(RINGS, SWEEPS, strict=True)):
         if not attempt.left or (rounds == EARLY and attempt.left > MANY * len(topology.near)):

@@ -12,6 +12,7 @@ from gmsnet.measure.signs import exact_signs
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.cells import first_rows, whole_cells
 from gmsnet.untangle.patch import Flags, Floats, Ints, Patch, free_nodes_of, in_order
+from gmsnet.untangle.reach import Reach
 
 
 class UntanglingState:
@@ -19,7 +20,8 @@ class UntanglingState:
 
     bad: (T,) the rows of ``Topology.near`` of the cells that are to be untangled: not certified
     (kernels.untangle.cells), and inverted at first (was_bad) or with a node that has moved. left: how many cells.
-    frozen: (N,) free nodes that stand still all the same. work: iterations of L-BFGS so far, times nodes.
+    frozen: (N,) free nodes that stand still all the same. work: iterations of L-BFGS so far, times nodes. reach: of
+    which mesh this is a part.
     """
 
     before: Floats
@@ -30,9 +32,11 @@ class UntanglingState:
     bad: Flags
     frozen: Flags
     left: int
+    reach: Reach
 
-    def __init__(self, points: Floats, topology: Topology, precision: Precision) -> None:
+    def __init__(self, points: Floats, topology: Topology, precision: Precision, reach: Reach | None = None) -> None:
         self.before, self.topology, self.precision = points, topology, precision
+        self.reach = reach or Reach.whole(topology)
         self.points = points.copy()
         self.was_bad = whole_cells(topology, exact_signs(points, topology.near, topology.near_orientation) <= 0)
         self.bad = np.empty(len(topology.near), dtype=bool)
@@ -101,7 +105,12 @@ class UntanglingState:
         chosen = self.bad_nodes()
         untangling.grow(chosen, self.topology.near_start, self.topology.near_ring, rings)
         chosen &= ~self.frozen
-        return Patch.of(self.topology, in_order(self.topology, chosen))
+        return Patch.of(self.topology, self.in_order(chosen))
+
+    def in_order(self, chosen: Flags) -> Ints:
+        """The places in memory of the chosen free nodes (N, bool) in the order in which they are visited."""
+        self.reach.choose(chosen)
+        return in_order(self.topology, chosen)
 
     def rounded(self, points: Floats) -> Floats:
         """As they will be kept."""

@@ -13,7 +13,7 @@ import numpy as np
 from gmsnet.kernels.simplex.mean_ratio2 import TWO_SQRT3
 from gmsnet.kernels.untangle import cells, untangling
 from gmsnet.untangle.newton import keep_gains
-from gmsnet.untangle.patch import Flags, free_nodes_of, in_order
+from gmsnet.untangle.patch import Flags, free_nodes_of
 from gmsnet.untangle.result import UntanglingStep
 from gmsnet.untangle.state import UntanglingState
 
@@ -65,7 +65,7 @@ def put_back(tangle: UntanglingState, nodes: Flags) -> None:
 def restore(tangle: UntanglingState) -> UntanglingStep:
     """Nodes that need not be elsewhere go back to their very bits: what was made thin on purpose stays as it was."""
     topology, precision = tangle.topology, tangle.precision
-    nodes = in_order(topology, moved(tangle))
+    nodes = tangle.in_order(moved(tangle))
     sweeps = 0
     for _ in range(BACK_SWEEPS):
         sweeps += 1
