@@ -39,7 +39,7 @@ def test_the_airfoil_of_the_real_meshes(real_meshes):
     assert last.released
     assert len(history) == len(PLAN)
     inside = kept[topology.memory]
-    zone = with_rings(kept, topology)[topology.memory]
+    zone = with_rings(kept, topology, serial)[topology.memory]
     assert (best[~zone] == start[~zone]).all()
     ratio = doubles(best, topology.near) / doubles(start, topology.near)
     cells = inside[topology.near].all(axis=1)

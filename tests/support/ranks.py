@@ -49,12 +49,17 @@ def same(mesh, options, parts, ranks, fixed=None):
     points, results = spread(mesh, options, parts, ranks, fixed)
     assert points.tobytes() == serial.points.tobytes()
     told = results[0]
-    assert told.notes[: len(serial.notes)] == serial.notes
+    assert _of_stages(told.notes) == _of_stages(serial.notes)
     assert repr(told.after) == repr(serial.after.totals)
     assert told.stop_reason == serial.stop_reason
     assert [sweep.moved for sweep in told.history] == [sweep.moved for sweep in serial.history]
     assert told.held == {reason: len(ids) for reason, ids in serial.held.items()}
     return told
+
+
+def _of_stages(notes):
+    """What is said of inverted cells and of walls."""
+    return [note for note in notes if note.startswith(("untangling", "the mesh is refined"))]
 
 
 def _figures(result):

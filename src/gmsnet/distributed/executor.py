@@ -158,9 +158,14 @@ class Ranks:
     def restricted(self, topology: Topology | Volume, active: NDArray[np.bool_]) -> Topology | Volume:
         """See Executor."""
         active = active & topology.near_free
-        inner, numbers = self.part.ready(
-            replace(topology, near_free=active, free=np.sort(topology.memory[np.flatnonzero(active)]))
-        )
+        return self._ready(replace(topology, near_free=active, free=np.sort(topology.memory[np.flatnonzero(active)])))
+
+    def holding(self, topology: Topology | Volume, nodes: NDArray[np.bool_], reason: str) -> Topology | Volume:
+        """See Executor."""
+        return self._ready(topology.holding(nodes, reason))
+
+    def _ready(self, topology: Topology | Volume) -> Topology | Volume:
+        inner, numbers = self.part.ready(topology)
         self.known[inner] = Ranks(self.part, numbers, self.inner)
         return inner
 

@@ -18,7 +18,8 @@ from gmsnet.errors import GmsnetError
 from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.preserve.protection import protected, protected_volume
+from gmsnet.methods.banded import Kept
+from gmsnet.preserve.protection import WALL, Protection, protected, protected_volume, wall_note
 from gmsnet.run.api import smooth_with
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.result import SmoothResult
@@ -30,10 +31,14 @@ Floats = NDArray[np.float64]
 
 
 class Intent(NamedTuple):
-    """What of the mesh is there on purpose. layers: (n,) of the piece, held. walls: whether some are refined."""
+    """What of the mesh is there on purpose. layers: (n,) of the piece, held. walls: of the piece, as of Protection.
+
+    of_walls: what to say of the nodes near these, where they are held and where they move.
+    """
 
     layers: NDArray[np.bool_] | None = None
-    walls: bool = False
+    walls: Kept | None = None
+    of_walls: tuple[str, ...] = ()
     notes: Sequence[str] = ()
 
 
@@ -45,7 +50,7 @@ def intent_of(
     mended: (n, 2), of volumes (n, 4), of the piece as ``near_points``, where no cell is inverted any more. firm: as of
     ``protected``.
     """
-    whole, layers, told = gathered(piece, comm, known), None, None
+    whole, layers, kept, told = gathered(piece, comm, known), None, None, None
     now = None if mended is None else brought(whole, mended, piece, comm)
     if whole is not None:
         topology = connectivity_of(whole.mesh, whole.fixed)
@@ -56,9 +61,22 @@ def intent_of(
             mesh = whole.mesh if now is None else whole.mesh.with_points(_written(whole.mesh, now))
             found = protected(mesh, topology, options.preserved, options.fix_layers, near, firm=firm)
         layers = np.zeros(len(whole.ids), dtype=bool) if found.layers is None else found.layers
-        told = found.walls is not None, found.notes
-    walls, notes = comm.bcast(told)
-    return Intent(scattered(whole, layers, piece, comm), walls, notes)
+        kept = None if found.walls is None else np.column_stack(found.walls)
+        told = _of_walls(found), found.notes
+    of_walls, notes = comm.bcast(told)
+    layers = scattered(whole, layers, piece, comm)
+    if not of_walls:
+        return Intent(layers, notes=notes)
+    nodes, blend, room = scattered(whole, kept, piece, comm).T
+    return Intent(layers, Kept(nodes > 0.0, blend, room), of_walls, notes)
+
+
+def _of_walls(found: Protection) -> tuple[str, ...]:
+    """As of Intent."""
+    if found.walls is None:
+        return ()
+    count = len(found.topology.held.get(WALL, ()))
+    return wall_note(found.walls, count, moved=False), wall_note(found.walls, count, moved=True)
 
 
 def _written(mesh: Mesh, near: Floats) -> Floats:

@@ -20,13 +20,14 @@ from gmsnet.distributed.on_first import Intent, intent_of, smoothed_on_first
 from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.result import RankResult
-from gmsnet.distributed.stages import swept
+from gmsnet.distributed.stages import Meant, swept
 from gmsnet.distributed.winding import Winding
 from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.methods import Smoother
+from gmsnet.methods.banded import Kept
 from gmsnet.methods.base import CELLS
-from gmsnet.preserve.protection import LAYER
+from gmsnet.preserve.protection import LAYER, WALL
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import factors_of, rank_by
 from gmsnet.run.sweep import Sweep
@@ -38,7 +39,6 @@ from gmsnet.topology.volume import Volume
 Floats = NDArray[np.float64]
 Callback = Callable[[Sweep], bool | None]
 
-REFINED = "the mesh is refined towards walls"
 SHARED = (*CELLS, *KINDS, "line", "vertex")  # the kinds of cells that sweeps over ranks know
 
 
@@ -108,15 +108,14 @@ def _ready(
         return _Ready(why)
     inverted = inverted_in(part) if before.uncertain else 0
     intent = _intent(piece, part, options, known, None, firm=inverted > 0)
-    if not inverted or intent.walls:
-        return _Ready(REFINED if intent.walls else "", intent)
+    if not inverted:
+        return _Ready("", intent)
     if not options.untangle:
         return _Ready("inverted cells are to stay as they are")
-    done = mended(part, _held_by(intent, piece, part), inverted)
+    done = mended(part, _meant(intent, piece, part).held, inverted)
     if done is None:
         return _Ready("inverted cells could not be mended with what lies around them")
-    intent = _intent(piece, part, options, known, done.points, firm=False)
-    return _Ready(REFINED if intent.walls else "", intent, done)
+    return _Ready("", _intent(piece, part, options, known, done.points, firm=False), done)
 
 
 def _intent(
@@ -133,14 +132,23 @@ def _intent(
     return intent_of(piece, options, part.comm, known, now, firm=firm)
 
 
-def _held_by(intent: Intent, piece: Piece, part: Part) -> Topology | Volume:
-    """The connectivity of a part with the nodes of layers held."""
+def _meant(intent: Intent, piece: Piece, part: Part) -> Meant:
+    """The connectivity of a part with the nodes held that are there on purpose."""
     topology, ids = part.topology, part.around.nodes.ids
-    if intent.layers is None:
-        return topology
-    layers = np.zeros(len(ids), dtype=np.float64)
-    layers[np.searchsorted(ids, piece.ids)] = intent.layers
-    return topology.holding(part.halo.spread(layers[topology.memory])[topology.places] > 0.0, LAYER)
+
+    def on_part(values: NDArray[Any]) -> Floats:
+        """(n,) by id of the part, of those at the nodes of the piece."""
+        found = np.zeros(len(ids))
+        found[np.searchsorted(ids, piece.ids)] = values
+        return np.asarray(part.halo.spread(found[topology.memory])[topology.places])
+
+    if intent.layers is not None:
+        topology = topology.holding(on_part(intent.layers) > 0.0, LAYER)
+    if intent.walls is None:
+        return Meant(topology, topology)
+    nodes, blend, room = (on_part(values) for values in intent.walls)
+    walls = Kept(nodes > 0.0, blend, room)
+    return Meant(topology, topology.holding(walls.nodes, WALL), walls)
 
 
 def _shared(
@@ -149,12 +157,10 @@ def _shared(
 ) -> RankResult:  # fmt: skip
     at = np.searchsorted(part.around.nodes.ids, piece.ids)
     intent, done = ready.intent, ready.mended
-    topology, numbers = part.ready(_held_by(intent, piece, part))
-    executor = Ranks(part, numbers)
     options = replace(options, callback=_answered(part.comm, options.callback))
-    state = swept(part, topology, smoother, options, executor, done)
+    state = swept(part, _meant(intent, piece, part), smoother, options, done)
     judged = _Judged(0 if done is None else done.cells, before)
-    points, moved, after = _written(part, state.points, options, judged, executor)
+    points, moved, after = _written(part, state.points, options, judged)
     return RankResult(
         points=points[at],
         moved=moved[at],
@@ -163,8 +169,8 @@ def _shared(
         sweeps=state.history[-1].index if state.history else 0,
         stop_reason=state.stop_reason,
         history=[*state.history],
-        notes=[*intent.notes, *([] if done is None else [done.note])],
-        held=_held(part, topology),
+        notes=[*intent.notes, *intent.of_walls[state.released :][:1], *([] if done is None else [done.note])],
+        held=_held(part, state.protection.base),
         nodes=int(part.comm.allreduce(int(part.moves.sum()))),
         cells=sum(part.around.sizes),
         gathered="",
@@ -214,7 +220,7 @@ class _Judged(NamedTuple):
 
 
 def _written(
-    part: Part, best: Floats, options: SmoothOptions, before: _Judged, executor: Ranks
+    part: Part, best: Floats, options: SmoothOptions, before: _Judged
 ) -> tuple[Floats, NDArray[np.bool_], Totals | None]:
     """The best mesh by global ids; that of the input if it is the better one as it is written."""
     mesh, topology = part.mesh, part.topology
@@ -226,7 +232,7 @@ def _written(
         mesh.plane, (mesh.has_volumes, mesh.has_quads), mesh.exponent, mesh.box
     )
     near = taken(planar_points(written) if mesh.plane else space_points(written), topology.memory)
-    after = totals_of(near, part.simplices, executor)
+    after = totals_of(near, part.simplices, Ranks(part))
     rank, inverted = rank_by(options.best_by), 0 if after is None else after.inverted
     if rank(_Judged(inverted, after)) <= rank(before):
         return points, moved, after

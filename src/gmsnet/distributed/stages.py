@@ -1,4 +1,4 @@
-"""The stages of a serial run that ranks have in common: sweeps, and in space those for angles and the mean."""
+"""The stages of a serial run that ranks have in common: sweeps; in space those for angles and the mean; near walls."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from gmsnet.distributed.mending import Mended
 from gmsnet.distributed.part import Part
 from gmsnet.measure.report import QualityReport
 from gmsnet.methods import Smoother
+from gmsnet.methods.banded import Kept
 from gmsnet.preserve.protection import Protection
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.stages import carry_out_all
 from gmsnet.run.state import State
+from gmsnet.run.wall_stage import improve_near_walls
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -26,15 +28,38 @@ class _Input(NamedTuple):
     inverted: int
 
 
-def swept(
-    part: Part, topology: Topology | Volume, smoother: Smoother, options: SmoothOptions, executor: Ranks,
-    mended: Mended | None,
-) -> State:  # fmt: skip
-    """The state after them, points in memory order. topology: of ``Part.ready``. mended: where some were inverted."""
+class Meant(NamedTuple):
+    """The connectivity of a part, with the nodes held that are there on purpose.
+
+    outer: those of layers alone. held: those near walls, too. walls: by id of the part, as of Protection.
+    """
+
+    outer: Topology | Volume
+    held: Topology | Volume
+    walls: Kept | None = None
+
+
+def swept(part: Part, meant: Meant, smoother: Smoother, options: SmoothOptions, mended: Mended | None) -> State:
+    """The state after them, points in memory order. mended: where some cells were inverted.
+
+    ``base`` of its protection has the nodes held that are held at the end.
+    """
+    executor, topology = _ready(part, meant.held)
     nothing, before = np.empty(0, dtype=np.float32), cast(QualityReport, _Input(0 if mended is None else mended.cells))
     state = State(
         part.mesh, lambda points: points, smoother, before, Protection(topology, []), part.points, part.points, nothing
     )
     if mended is not None:
         state = replace(state, points=mended.points, untangled=mended.points)
-    return carry_out_all(state, options, executor)
+    state = carry_out_all(state, options, executor)
+    if meant.walls is None or state.interruption is not None:
+        return state
+    executor, topology = _ready(part, meant.outer)
+    walled = replace(state, protection=Protection(topology, [], walls=meant.walls))
+    last = carry_out_all(walled, options, executor, [improve_near_walls])
+    return last if last.released else state
+
+
+def _ready(part: Part, topology: Topology | Volume) -> tuple[Ranks, Topology | Volume]:
+    found, numbers = part.ready(topology)
+    return Ranks(part, numbers), found

@@ -74,7 +74,6 @@ class Banded(StarSmoother):
     converged: bool
 
     stops_when_idle = False
-    shared_out = False
 
     def __init__(self, start: NDArray[np.float64], kept: Kept) -> None:
         self.start, self.kept = start, kept
@@ -85,7 +84,7 @@ class Banded(StarSmoother):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         if field.planar is not self.topology:
-            self._begin(field.planar)
+            self._begin(field.planar, executor)
         self.at += 1
         self.inverse = max(least_shape(field, executor), 0.0)
         tally = np.zeros(3, dtype=np.int64)
@@ -94,13 +93,14 @@ class Banded(StarSmoother):
         self.converged = self.at + 1 == len(PLAN)
         return tally
 
-    def _begin(self, topology: Topology) -> None:
+    def _begin(self, topology: Topology, executor: Executor) -> None:
         self.topology, blocks = topology, topology.stars.blocks
         assert isinstance(blocks, Blocks)
         first, count = places_of(blocks)
         self.bands = bands.Bands(first, np.empty(count), np.empty(count))
         log_mean, (nodes, blend, room) = np.empty(len(self.start)), self.kept
         bands.mean_areas(self.start, topology.near, log_mean)
+        executor.exchange(log_mean)
         bands.limit(self.start, nodes, BAND, log_mean, blend, room, blocks, self.bands)
 
     def visit(

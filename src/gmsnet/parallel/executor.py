@@ -97,8 +97,12 @@ class Executor(Protocol):
         """A topology in which the active nodes (N,) by places in memory alone are free, of those that are free here."""
         ...
 
+    def holding(self, topology: Any, nodes: NDArray[np.bool_], reason: str) -> Any:
+        """The topology with more nodes held, (N,) bool by id, for this reason."""
+        ...
+
     def of(self, topology: Any) -> Executor:
-        """The executor for what was ``restricted``, and for others this one."""
+        """The executor for what was ``restricted`` or made by ``holding``, and for others this one."""
         ...
 
     def lent(self, values: NDArray[np.float64]) -> NDArray[np.float64]:

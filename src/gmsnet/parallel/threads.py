@@ -91,6 +91,10 @@ class Process:
         """See Executor."""
         return topology.restricted(active)
 
+    def holding(self, topology: Any, nodes: NDArray[np.bool_], reason: str) -> Any:
+        """See Executor."""
+        return topology.holding(nodes, reason)
+
     def lent(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """See Executor."""
         return values

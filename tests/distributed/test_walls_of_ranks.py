@@ -1,0 +1,66 @@
+"""Cells near walls that a mesh is refined towards keep their areas over ranks, with the bits of the serial run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gmsnet
+from gmsnet.generate import Curve, disturb, good_mesh
+
+pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+
+from support.ranks import parts_at_random, same
+
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.wall_stage import PHASE
+from gmsnet.topology.topology import Topology
+
+WALL = "refined near a wall"
+
+
+def plate(amount):
+    """With a hole that it is refined towards, its free nodes thrown."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 150)
+    hole = Curve(0.3 * np.column_stack([np.cos(turn), np.sin(turn)]), "hole")
+    side = 1.2 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
+    found = good_mesh([[Curve(side, "side")], [hole]], lambda x: 0.01 + 0.25 * np.abs(np.linalg.norm(x, axis=1) - 0.3))
+    return disturb(found, Topology.of(found).free, amount, seed=0) if amount else found
+
+
+@pytest.mark.parametrize("how", ["interleaved", "strips", "lonely"])
+@pytest.mark.parametrize("amount", [0.0, 0.2])
+def test_the_stage_near_walls_is_shared_out(amount, how):
+    mesh = plate(amount)
+    told = same(mesh, SmoothOptions(threads=1), parts_at_random(mesh, 3, np.random.default_rng(1), how), 3)
+    assert told.gathered == ""
+    assert PHASE in [sweep.stage for sweep in told.history]
+    assert WALL not in told.held
+
+
+def test_the_nodes_stay_where_the_sweeps_did_not_end_of_themselves():
+    mesh, options = plate(0.2), SmoothOptions(method="barrier", max_sweeps=2, threads=1)
+    told = same(mesh, options, parts_at_random(mesh, 2, np.random.default_rng(2), "strips"), 2)
+    assert told.gathered == ""
+    assert told.held[WALL] > 100
+
+
+def test_bands_are_those_of_the_mended_mesh():
+    mesh = plate(0.1)
+    points = mesh.points.copy()
+    away = np.flatnonzero(abs(np.linalg.norm(points - 0.7, axis=1)) < 0.2)
+    points[away[:2]] += 0.3
+    mesh = replace(mesh, points=points)
+    assert gmsnet.quality(mesh).inverted
+    told = same(mesh, SmoothOptions(threads=1), parts_at_random(mesh, 3, np.random.default_rng(3), "strips"), 3)
+    assert told.gathered == ""
+    assert PHASE in [sweep.stage for sweep in told.history]
+
+
+def test_the_airfoil_of_the_real_meshes(real_meshes):
+    mesh = gmsnet.read(real_meshes / "mesh_NACA0012_inv.su2")
+    told = same(mesh, SmoothOptions(threads=1), parts_at_random(mesh, 3, np.random.default_rng(4), "strips"), 3)
+    assert told.gathered == ""
+    assert any("refined towards its walls" in note for note in told.notes)
