@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from gmsnet.cells.table import CELLS
 from gmsnet.constraints.features import dot, lengths_of
 from gmsnet.constraints.outline import Flags, Longs, line_cells, mark_sets
+from gmsnet.kernels.whole import edges as kernels
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.held import SMOOTHED
 from gmsnet.topology.solids import WoundSolids, halved
@@ -95,19 +96,17 @@ def _marks(mesh: Mesh, rows: Longs, still: Flags, *, halves: bool) -> tuple[Long
 
 def edge_lengths(facets: Facets, points: Floats, mesh: Mesh) -> Floats:
     """(N,) the mean length of the edges of cells at each node of the facets, those inside of volumes among them."""
-    nodes = len(points)
     if facets.closed:
-        at = np.zeros(nodes, dtype=bool)
+        at = np.zeros(len(points), dtype=bool)
         at[facets.rows] = True
         pairs = _edges_of_volumes(mesh, at)
     else:
-        real = np.ones((len(facets.rows), 3), dtype=bool)  # of the edge from corner k to the next one
-        quads = facets.halves // 2
-        real[len(real) - 2 * quads : len(real) - quads, 2] = real[len(real) - quads :, 0] = False
-        pairs = np.stack([facets.rows, np.roll(facets.rows, -1, axis=1)], axis=2)[real]
-    low, high = np.divmod(np.unique(pairs.min(axis=1) * nodes + pairs.max(axis=1)), nodes)
-    length, ends = lengths_of(points[high] - points[low]), np.concatenate([low, high])
-    lengths: Floats = np.bincount(ends, np.tile(length, 2), nodes) / np.maximum(np.bincount(ends, minlength=nodes), 1)
+        half, whole = facets.halves // 2, facets.rows[: len(facets.rows) - facets.halves]
+        first, second = facets.rows[len(whole) : len(whole) + half], facets.rows[len(whole) + half :]
+        sides = whole[:, [0, 1]], whole[:, [1, 2]], whole[:, [2, 0]]
+        pairs = np.concatenate([*sides, first[:, :2], first[:, 1:], second[:, 1:], second[:, [2, 0]]])
+    lengths: Floats = np.zeros(len(points))
+    kernels.mean_edges(pairs, points, lengths)
     return lengths
 
 

@@ -69,9 +69,10 @@ class OnGeometry:
                 f"the places that geometry.project gives for {named(entity)} turn {len(turned):,} pieces of its facets "
                 "over: take a geometry that lies nearer to the mesh, or leave this patch out of slide"
             )
-        facet = np.full(len(points), NOTHING, dtype=np.int64)
-        facet[rows] = 4 * np.arange(len(rows))[:, None] + np.arange(3)
-        return Skin(places[finer], normals[finer], _beside(finer), facet)
+        at = np.full(len(points), NOTHING, dtype=np.int64)
+        at[rows] = 4 * np.arange(len(rows))[:, None] + np.arange(3)
+        facet = np.column_stack([finer, _beside(finer)]).astype(np.int32)
+        return Skin(np.column_stack([places, normals]), facet, at)
 
     def chain(self, patches: Patches, curve: int, p: Floats) -> tuple[Floats, Floats]:
         """Places (2K − 1, 3) for a chain of K points and the middles between, its ends as they are, and tangents."""

@@ -11,9 +11,9 @@ from gmsnet.constraints.features import COLLINEAR, dot, rounding_of
 from gmsnet.constraints.on_geometry import PER_EDGE, OnGeometry
 from gmsnet.constraints.outline import Flags, Longs
 from gmsnet.constraints.patches import NOTHING, Patches
-from gmsnet.constraints.smooth_patches import controls_of, handles, skin_of, summed
+from gmsnet.constraints.smooth_patches import Vertices, handles, skin_of, summed
 from gmsnet.kernels.star.pieces import NOWHERE
-from gmsnet.kernels.star.surface import CONTROLS, CURVE, CURVED, FLAT, LINE, Surface
+from gmsnet.kernels.star.surface import CURVE, CURVED, FLAT, LINE, Surface
 from gmsnet.kernels.whole import skin as kernels
 from gmsnet.topology.polygons import Ints
 
@@ -32,14 +32,14 @@ class Rows(NamedTuple):
 def surface_of(
     patches: Patches, points: Floats, memory: Ints, single: bool, limit: Floats | None = None,
     geometry: OnGeometry | None = None, folds: bool = True,
-    normals: Floats | None = None, bound: float | None = None,
+    vertices: Vertices | None = None, bound: float | None = None,
 ) -> Surface | None:  # fmt: skip
     """The constraint for kernels, with the nodes where they are; None where none slides.
 
     points: (N, 3) by node ids. memory: (N,) node ids in memory order. limit: (N,) how far each may go from the facets
     or edges; None: as far as the cubics are. geometry: the true shape of what is not plane or straight. folds: the
-    facets around nodes are listed, so that none turns over. normals: see ``normals_of``, where they are known. bound:
-    how far any place on a facet may be.
+    facets around nodes are listed, so that none turns over. vertices: see ``vertices_of``, where they are known.
+    bound: how far any place on a facet may be.
     """
     slides = patches.slides | patches.curves.slides
     if not slides.any():
@@ -53,8 +53,8 @@ def surface_of(
     found = [Rows(inner[level], FLAT, number[level], np.zeros(level.sum(), dtype=np.int64))]
     curved = inner[~level]
     kept = np.isin(patches.patch, patches.patch[facet[curved]])
-    skin = skin_of(patches, points, kept, normals) if geometry is None else geometry.skin(patches, points, kept)
-    found.append(Rows(curved, CURVED, np.zeros(len(curved), dtype=np.int64), skin.facet[curved]))
+    skin = skin_of(patches, points, kept, vertices) if geometry is None else geometry.skin(patches, points, kept)
+    found.append(Rows(curved, CURVED, np.zeros(len(curved), dtype=np.int64), skin.at[curved]))
     lines, line_frame, pieces, before, after = _along_curves(patches, points, len(frame[0]), geometry)
     found += lines
 
@@ -65,9 +65,7 @@ def surface_of(
     origin, direction, same = (np.concatenate(parts) for parts in zip(frame, line_frame, strict=True))
     return Surface(
         row[memory], kind[order].astype(np.int8), of[order].astype(np.int32), place[order].astype(np.int32),
-        origin, direction, same, skin.corner, skin.normal, skin.beside.astype(np.int32),
-        controls_of(skin.corner, skin.normal) if len(skin.corner) else np.empty((0, CONTROLS, 3)),
-        pieces, before, after, bool(single),
+        origin, direction, same, skin.vertex, skin.facet, pieces, before, after, bool(single),
         np.full(len(nodes), np.inf) if limit is None else limit[nodes[order]],
         *_around(patches.rows if folds else patches.rows[:0], patches.unit, row, memory),
         bound,

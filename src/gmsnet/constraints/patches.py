@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets
-from gmsnet.constraints.features import COLLINEAR, SLACK, Curves, curves_along, dot, lengths_of, rounding_of
+from gmsnet.constraints.features import COLLINEAR, SLACK, Curves, curves_along, lengths_of, rounding_of
 from gmsnet.constraints.needles import free_edges
 from gmsnet.constraints.outline import Flags, Longs, Outline, edge_keys
+from gmsnet.kernels.whole import facets as kernels
 
 Floats = NDArray[np.float64]
 NOTHING = -1
@@ -48,19 +49,15 @@ def patches_of(
     no area, where it belongs to one facet or more than two, and where there is a line cell.
     """
     rows, nodes = facets.rows, len(points)
-    normal = np.cross(points[rows[:, 1]] - points[rows[:, 0]], points[rows[:, 2]] - points[rows[:, 0]])
-    area = lengths_of(normal)
-    unit = np.divide(normal, area[:, None], out=np.zeros_like(normal), where=area[:, None] > 0.0)
-    keys = edge_keys(rows, np.roll(rows, -1, axis=1), nodes).ravel()
-    order = np.argsort(keys, kind="stable")
-    begins = np.diff(keys[order], prepend=-1) != 0
-    first = np.flatnonzero(begins)
-    found, count = keys[order[first]], np.diff(first, append=len(keys))
-    two = count == 2
-    one, other = order[first], order[first + two]  # numbers 3f + k; the same one where there is no other
-    f, g = one // 3, other // 3
+    normal, unit, area = np.empty((len(rows), 3)), np.empty((len(rows), 3)), np.empty(len(rows))
+    kernels.facet_normals(points, rows, normal, area, unit)
+    found, count, one, other = np.empty((4, rows.size), dtype=np.int64)
+    edges = kernels.list_edges(rows, nodes, found, count, one, other)
+    found, count, one, other = found[:edges], count[:edges], one[:edges], other[:edges]
+    two, f, g = count == 2, one // 3, other // 3
     turning, size = _of_cells(facets, normal, unit, area)
-    cosine = dot(turning[f], turning[g])
+    cosine = np.empty(edges)
+    kernels.cosines(turning, one, other, cosine)
     smooth = two & (size[f] > 0.0) & (size[g] > 0.0) & (facets.label[f] == facets.label[g])
     least = math.cos(math.radians(feature_angle)) + SLACK
     gentle = smooth & (cosine >= least)
@@ -73,12 +70,10 @@ def patches_of(
     line_keys = edge_keys(facets.lines[:, 0], facets.lines[:, 1], nodes)
     smooth &= ~np.isin(found, line_keys)
 
-    beside, flat = np.full(len(keys), NOTHING, dtype=np.int64), np.zeros(len(keys), dtype=bool)
-    beside[one[smooth]], beside[other[smooth]] = g[smooth], f[smooth]
-    beyond = points[rows[g, (other + 2) % 3]] - points[rows[f, 0]]
-    away = abs(dot(beyond, unit[f]))
-    level = smooth & (away <= COLLINEAR * lengths_of(beyond) + rounding_of(points, single)) & (cosine > 0.0)
-    flat[one[level]] = flat[other[level]] = True
+    beside, flat = np.full(rows.size, NOTHING, dtype=np.int64), np.zeros(rows.size, dtype=bool)
+    kernels.find_level(
+        points, rows, unit, one, other, smooth, cosine, COLLINEAR, rounding_of(points, single), beside, flat
+    )
 
     sharp = np.flatnonzero(~smooth)
     still = facets.still.copy()
@@ -112,15 +107,8 @@ def _of_cells(facets: Facets, normal: Floats, unit: Floats, area: Floats) -> tup
 def linked(beside: Longs, chosen: Flags | None = None) -> Longs:
     """(F,) the number of the part of each facet, of those that are joined across their edges; chosen: (F, 3) which."""
     joins = beside != NOTHING if chosen is None else chosen
-    if not joins.any():
-        return np.arange(len(beside), dtype=np.int64)
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components  # loads what few runs need
-
-    one, _ = np.nonzero(joins)
-    shape = (len(beside), len(beside))
-    graph = coo_array((np.ones(len(one), dtype=np.int8), (one, beside[joins])), shape=shape)
-    part: Longs = connected_components(graph, directed=False)[1].astype(np.int64)
+    part = np.full(len(beside), NOTHING, dtype=np.int64)
+    kernels.link(beside, joins, np.empty(len(beside), dtype=np.int64), part)
     return part
 
 

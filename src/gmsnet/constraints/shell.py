@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets, surface_itself
-from gmsnet.constraints.features import dot, lengths_of, may_slide
+from gmsnet.constraints.features import lengths_of, may_slide
 from gmsnet.constraints.outline import Flags
 from gmsnet.constraints.patches import Patches, patches_of
+from gmsnet.constraints.smooth_patches import Vertices
+from gmsnet.kernels.whole import facets as kernels
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import space_points
 from gmsnet.topology.topology import Topology
@@ -40,18 +42,16 @@ def patches_of_surface(
     return facets, replace(patches, curves=replace(patches.curves, slides=along))
 
 
-def sides_of(mesh: Mesh, topology: Topology, patches: Patches, normals: Floats) -> NDArray[np.float32]:
-    """(S, 3) the vector n of each row of ``topology.near`` (kernels.star.shell). normals: see ``normals_of``.
+def sides_of(mesh: Mesh, topology: Topology, patches: Patches, vertices: Vertices) -> NDArray[np.float32]:
+    """(S, 3) the vector n of each row of ``topology.near`` (kernels.star.shell). vertices: see ``vertices_of``.
 
     Of a triangle, the mean of the reference's normals at its corners, or its own normal where the two are on different
     sides; of a quad the normal of its diagonals.
     """
     points = space_points(mesh)[:, :3]
     triangles = len(topology.triangles)
-    own = patches.unit[:triangles]
-    smooth = _unit(normals[:triangles].sum(axis=1))
-    alike = dot(own, smooth)
-    of_triangles = np.where(((alike > 0.0) | ~own.any(axis=1))[:, None], smooth, own)
+    of_triangles = np.empty((triangles, 3))
+    kernels.mean_sides(patches.unit, vertices.own, vertices.table, of_triangles)
     quads = points[topology.quads]
     of_quads = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1]) * topology.quad_orientation[:, None]
     sides = np.zeros((len(topology.face_cell), 3))

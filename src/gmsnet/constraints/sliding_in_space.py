@@ -17,6 +17,7 @@ from gmsnet.constraints.on_surface import surface_of
 from gmsnet.constraints.options import FEATURE_ANGLE
 from gmsnet.constraints.outline import Flags
 from gmsnet.constraints.patches import Patches, patches_of
+from gmsnet.constraints.smooth_patches import Vertices
 from gmsnet.kernels.star.chords import CLOSER
 from gmsnet.kernels.star.off_surface import farthest
 from gmsnet.kernels.star.surface import Surface
@@ -48,12 +49,12 @@ class SurfaceSliding:
     @classmethod
     def of(
         cls, mesh: Mesh, facets: Facets, patches: Patches, memory: Ints, free: Ints, tolerance: float = math.inf,
-        geometry: Geometry | None = None, normals: Floats | None = None, hausdorff: float | None = None,
+        geometry: Geometry | None = None, vertices: Vertices | None = None, hausdorff: float | None = None,
     ) -> SurfaceSliding:  # fmt: skip
         """Of a mesh and the patches of its boundary; memory, free: of its topology.
 
         tolerance: how far from the facets nodes may go, over the mean length of their edges. geometry: their
-        true shape, which is asked once. normals: see ``surface_of``. hausdorff: how far facets may go from them, over
+        true shape, which is asked once. vertices: see ``surface_of``. hausdorff: how far facets may go from them, over
         the diagonal of the box around all.
         """
         points = space_points(mesh)[:, :3].copy()
@@ -68,7 +69,7 @@ class SurfaceSliding:
         on = None if geometry is None else OnGeometry(geometry, facets, mesh.exponent)
         constraint = None
         if nodes.any():
-            constraint = surface_of(patches, points, memory, mesh.single, limit, on, facets.closed, normals, bound)
+            constraint = surface_of(patches, points, memory, mesh.single, limit, on, facets.closed, vertices, bound)
         return cls(facets, patches, points, mesh.exponent, memory, nodes, constraint)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:

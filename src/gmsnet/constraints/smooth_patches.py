@@ -13,61 +13,93 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.features import dot
-from gmsnet.constraints.outline import Longs
+from gmsnet.constraints.outline import Flags, Longs
 from gmsnet.constraints.patches import NOTHING, Patches, linked
-from gmsnet.kernels.star.surface import CONTROLS
-from gmsnet.kernels.whole import jets
+from gmsnet.kernels.whole import facets, jet_lanes, jets
 from gmsnet.kernels.whole import skin as kernels
+from gmsnet.topology.polygons import Ints
 
 Floats = NDArray[np.float64]
 
 
+class Vertices(NamedTuple):
+    """The nodes of facets, those of several patches one by one in each. own: (F, 3) int32, the vertex at each corner.
+    table: (V, 6) points and the unit normals of the surface there."""
+
+    own: Ints
+    table: Floats
+
+    @property
+    def normals(self) -> Floats:
+        """(F, 3, 3) the unit normal at each corner of each facet."""
+        return self.table[self.own, 3:]
+
+
 class Skin(NamedTuple):
-    """The facets over which cubics stand: corner (F, 3, 3), normal (F, 3, 3) there; beside (F, 3), the facet across the
-    edge from corner k to k + 1, else NOTHING; facet (N,), one at each node by id, else NOTHING."""
+    """The facets over which cubics stand: vertex (V, 6), facet (F, 6) int32 (kernels.star.surface.Surface); at (N,),
+    one facet at each node by id, else NOTHING."""
 
-    corner: Floats
-    normal: Floats
-    beside: Longs
-    facet: Longs
+    vertex: Floats
+    facet: Ints
+    at: Longs
 
 
-def skin_of(patches: Patches, points: Floats, kept: NDArray[np.bool_], normals: Floats | None = None) -> Skin:
-    """The facets of the input that are kept (F,). normals: as ``normals_of`` finds them, where they are known."""
-    normals = normals_of(patches, points) if normals is None else normals
+def skin_of(patches: Patches, points: Floats, kept: Flags, vertices: Vertices | None = None) -> Skin:
+    """The facets of the input that are kept (F,). vertices: as ``vertices_of`` finds them, where they are known."""
+    vertices = vertices_of(patches, points) if vertices is None else vertices
+    at = np.full(len(points), NOTHING, dtype=np.int64)
+    if kept.all():
+        at[patches.rows] = np.arange(len(kept))[:, None]
+        return Skin(vertices.table, np.column_stack([vertices.own, patches.beside.astype(np.int32)]), at)
     fewer = np.where(kept, np.cumsum(kept) - 1, NOTHING)
-    facet = np.full(len(points), NOTHING, dtype=np.int64)
-    facet[patches.rows[kept]] = fewer[kept, None]
+    at[patches.rows[kept]] = fewer[kept, None]
     beside = patches.beside[kept]
     over = np.where(beside == NOTHING, NOTHING, fewer[beside])
-    return Skin(points[patches.rows[kept]], normals[kept], over, facet)
+    return Skin(vertices.table, np.column_stack([vertices.own[kept], over.astype(np.int32)]), at)
 
 
-def normals_of(patches: Patches, points: Floats) -> Floats:
-    """(F, 3, 3) the unit normal of the surface at each corner of each facet.
+def vertices_of(patches: Patches, points: Floats) -> Vertices:
+    """The nodes of facets with the normals of the surface there.
 
     At a node, that is the mean of the normals of its facets in the patch, weighted so that it is exact on a sphere
-    (Max: Weights for computing vertex normals from facet normals, 1999). At nodes of plane parts it is theirs.
+    (Max: Weights for computing vertex normals from facet normals, 1999), and then that of a cubic through two rings
+    (kernels.whole.jets). At nodes of plane parts it is theirs.
     """
     rows, nodes = patches.rows, len(points)
-    owner, numbers = np.empty(rows.shape, dtype=np.int64), np.full(rows.size + nodes, NOTHING, dtype=np.int64)
+    owner, numbers = np.empty(rows.shape, dtype=np.int32), np.full(rows.size + nodes, NOTHING, dtype=np.int64)
     count = kernels.number_corners(rows, patches.patch, nodes, numbers, numbers.copy(), owner)  # nodes in each patch
     total = np.zeros((count, 3))
-    kernels.add_normals(points[rows], patches.unit, patches.area, owner, total)
+    kernels.add_normals(points, rows, patches.unit, patches.area, owner, total)
     plane, parts = _planes(patches, owner, count)
     total[plane != NOTHING] = parts[plane[plane != NOTHING]]
     length = np.sqrt(dot(total, total))
     unit = np.divide(total, length[:, None], out=np.zeros_like(total), where=length[:, None] > 0.0)
-    place = np.zeros((count, 3))
-    place[owner] = points[rows]
-    start, facets = np.zeros(count + 2, dtype=np.int64), np.empty(rows.size, dtype=np.int32)
-    jets.list_facets(owner, start, facets)
-    jets.fit_normals(place, owner, start, facets, (plane == NOTHING) & (length > 0.0), unit)
-    normals: Floats = unit[owner]
-    return normals
+    table = np.zeros((count, 6))
+    table[owner, :3] = points[rows]
+    fit_normals(table, owner, (plane == NOTHING) & (length > 0.0), unit)
+    table[:, 3:] = unit
+    return Vertices(owner, table)
 
 
-def _planes(patches: Patches, owner: Longs, count: int) -> tuple[Longs, Floats]:
+def fit_normals(place: Floats, own: Ints, chosen: Flags, normal: Floats) -> None:
+    """Makes the unit normals (V, 3) of chosen vertices anew: kernels.whole.jets. place: (V, 3 or more). own: (F, 3)."""
+    count = len(normal)
+    start, at = np.zeros(count + 2, dtype=np.int64), np.empty(own.size, dtype=np.int32)
+    jets.list_facets(own, start, at)
+    first, around = np.empty(count + 1, dtype=np.int64), np.empty(2 * own.size, dtype=np.int32)
+    jet_lanes.list_neighbours(own, start, at, first, around)
+    before, wanted = normal.copy(), np.flatnonzero(chosen)
+    few = np.zeros(count, dtype=bool)
+    for _ in range(2):
+        again, left = np.empty_like(wanted), np.empty_like(wanted)
+        more, fewer = jet_lanes.fit_in_lanes(place, first, around, wanted, before, normal, again, left)
+        few[left[:fewer]] = True
+        wanted = again[:more]
+    normal[few] = before[few]
+    jets.fit_normals(place, own, start, at, few, normal)
+
+
+def _planes(patches: Patches, owner: Ints, count: int) -> tuple[Longs, Floats]:
     """The plane of each owner that lies in a plane part, else NOTHING; the normals of the parts.
 
     A part is what facets in one plane make up that have a node all of whose facets are in it: the two triangles of a
@@ -75,25 +107,14 @@ def _planes(patches: Patches, owner: Longs, count: int) -> tuple[Longs, Floats]:
     """
     part = linked(patches.beside, patches.flat)
     normals = summed(part, patches.unit * patches.area[:, None], int(part.max(initial=-1)) + 1)
-    low, high = np.full(count, len(part)), np.full(count, NOTHING)
-    np.minimum.at(low, owner, part[:, None])
-    np.maximum.at(high, owner, part[:, None])
-    inner = (low == high)[owner].any(axis=1)  # facets with such a node
     plane = np.full(count, NOTHING, dtype=np.int64)
-    plane[owner[inner]] = part[inner, None]
+    facets.find_planes(owner, part, np.empty_like(plane), np.empty_like(plane), plane)
     return plane, normals
 
 
 def summed(owner: Longs, vectors: Floats, count: int) -> Floats:
     """(count, 3) the sums of vectors (K, 3) by their owners (K,), in their order."""
     return np.stack([np.bincount(owner, vectors[:, axis], count) for axis in range(3)], axis=1)
-
-
-def controls_of(corner: Floats, normals: Floats) -> Floats:
-    """(F, CONTROLS, 3) the inner control points of the cubics (kernels.star.surface) over facets (F, 3, 3)."""
-    made = np.empty((len(corner), CONTROLS, 3))
-    kernels.write_controls(np.ascontiguousarray(corner), np.ascontiguousarray(normals), made)
-    return made
 
 
 def across(edge: Floats, normal: Floats) -> Floats:

@@ -13,7 +13,7 @@ from gmsnet.constraints.options import FEATURE_ANGLE
 from gmsnet.constraints.patches import NOTHING
 from gmsnet.constraints.shapes import lengths, units
 from gmsnet.constraints.shell import patches_of_surface, sides_of
-from gmsnet.constraints.smooth_patches import normals_of
+from gmsnet.constraints.smooth_patches import vertices_of
 from gmsnet.measure.palette import AFTER, BEFORE, INVERTED
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.mesh.mesh import Mesh, measured
@@ -113,8 +113,8 @@ def _sheets(meshes: Sequence[Mesh]) -> list[Sheet]:
     facets, patches = patches_of_surface(
         first, topology, (), FEATURE_ANGLE, np.zeros(len(first.points), dtype=np.bool_)
     )
-    normals = normals_of(patches, space_points(first)[:, :3])
-    shell = Shell.made(topology, sides_of(first, topology, patches, normals))
+    vertices = vertices_of(patches, space_points(first)[:, :3])
+    shell = Shell.made(topology, sides_of(first, topology, patches, vertices))
     own = [block for block in first.cells if measured(first, block)]
     width = max(block.corners for block in own)
     corners = np.concatenate([block.nodes[:, np.minimum(np.arange(width), block.corners - 1)] for block in own])

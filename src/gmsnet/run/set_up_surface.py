@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gmsnet.constraints.options import check_slide
 from gmsnet.constraints.shell import FEATURE, patches_of_surface, sides_of
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
-from gmsnet.constraints.smooth_patches import normals_of
+from gmsnet.constraints.smooth_patches import vertices_of
 from gmsnet.measure.report import measure
 from gmsnet.mesh.mesh import Mesh, unmeasured, unmoved_faces
 from gmsnet.methods import Smoother
@@ -37,8 +37,8 @@ def first_of_surface(
     slides = patches.slides | patches.curves.slides
     if (patches.curves.slides & ~_flagged(topology.free, len(slides))).any():
         topology, start = Topology.and_points(given, asked, options.thread_count, patches.curves.slides)
-    normals = normals_of(patches, space_points(given)[:, :3])
-    shell = Shell.made(topology, sides_of(given, topology, patches, normals)).holding(~slides, FEATURE)
+    vertices = vertices_of(patches, space_points(given)[:, :3])
+    shell = Shell.made(topology, sides_of(given, topology, patches, vertices)).holding(~slides, FEATURE)
     sliding = SurfaceSliding.of(
         given,
         facets,
@@ -47,7 +47,7 @@ def first_of_surface(
         shell.free,
         options.distance,
         options.geometry,
-        normals,
+        vertices,
         options.hausdorff,
     )
     others = unmeasured(given)

@@ -13,6 +13,7 @@ from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
 from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.kernels.topology import connectivity
+from gmsnet.kernels.whole.jets import list_facets
 from gmsnet.topology.stars import Flags, Ints, Stars
 from gmsnet.topology.topology import Topology
 
@@ -38,10 +39,8 @@ class Shell(Topology):
             count = np.where(degree > 0, np.diff(stars.patterns.first)[stars.pattern], 0)
         first = np.zeros(len(degree) + 1, dtype=np.int64)
         np.cumsum(count, out=first[1:])
-        begin = np.zeros(len(degree) + 1, dtype=np.int64)
-        corners = topology.near.ravel()
-        np.cumsum(np.bincount(corners, minlength=len(degree)), out=begin[1:])
-        of_node = (np.argsort(corners, kind="stable") // 3).astype(np.int32)
+        begin, of_node = np.zeros(len(degree) + 2, dtype=np.int64), np.empty(topology.near.size, dtype=np.int32)
+        list_facets(topology.near, begin, of_node)
         out = np.empty((first[-1], 3), dtype=np.float32)
         missing = kernels.list_sides(
             topology.near, topology.near_orientation, side, stars.start, stars.around, stars.pattern, stars.patterns,
@@ -98,7 +97,9 @@ class Shell(Topology):
         planar = self.in_blocks()
         blocks = planar.blocks
         assert isinstance(blocks, Blocks)
-        return Stars(ShellBlocks(blocks, self.stars_of(blocks.centre)), planar.first)
+        sides = np.empty(3 * len(blocks.rings), dtype=np.float32)
+        kernels.arrange_sides(blocks, self.first, self.star_side, sides)
+        return Stars(ShellBlocks(blocks, self.stars_of(blocks.centre), sides), planar.first)
 
     @cached_property
     def stars(self) -> Stars:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from math import factorial
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.surfaces import constraint, cylinder, sphere, turned
 
+from gmsnet.constraints.smooth_patches import across, handles
 from gmsnet.kernels.jit.compile import kernel
+from gmsnet.kernels.star.cubics import over_facet, walk
 from gmsnet.kernels.star.off_surface import farthest
 from gmsnet.kernels.star.pieces import follow_curve
 from gmsnet.kernels.star.surface import (
@@ -21,7 +24,6 @@ from gmsnet.kernels.star.surface import (
     directions_at,
     locate3,
     snap3,
-    walk,
 )
 
 
@@ -30,6 +32,11 @@ def snap_all(surface, rows, wanted, places):
     """Where the nodes of rows (K,) go that would go to wanted (K, 3); into places (K, 3)."""
     for i in range(len(rows)):
         places[i, 0], places[i, 1], places[i, 2], _ = snap3(surface, rows[i], wanted[i, 0], wanted[i, 1], wanted[i, 2])
+
+
+def corners(surface):
+    """(F, 3, 3) the points of its facets."""
+    return surface.vertex[surface.facet[:, :3], :3]
 
 
 def on_segments(p, a, b):
@@ -65,10 +72,10 @@ def test_a_walk_ends_at_the_nearest_facet(seed, count):
             * rng.uniform(*((0.97, 1.06) if count == 40 else (1.0, 1.005)))
         )
         begin = rng.choice(np.flatnonzero(np.isin(rows, rows[f]).any(axis=1)))
-        g, *shares = walk(surface.corner, surface.beside, int(begin), *place)
+        g, *shares = walk(surface.vertex, surface.facet, int(begin), *place)
         assert min(shares) >= 0.0
         assert sum(shares) == pytest.approx(1.0, abs=1e-15)
-        away, least = np.linalg.norm(shares @ surface.corner[g] - place), from_facets(place, points[rows]).min()
+        away, least = np.linalg.norm(shares @ corners(surface)[g] - place), from_facets(place, points[rows]).min()
         assert away >= least - 1e-13
         assert away <= 1.5 * least + 1e-13  # far outside of a peak, the foot on one of its ridges counts
         if count > 40:
@@ -80,8 +87,8 @@ def test_a_walk_stops_at_the_rim():
     patches, surface = constraint(points, rows)
     side = int(patches.patch[0])
     for z, wanted in ((-1.0, 0.0), (3.0, 2.0)):
-        g, *shares = walk(surface.corner, surface.beside, 0, 0.999, 0.01, z)
-        assert (np.array(shares) @ surface.corner[g])[2] == wanted
+        g, *shares = walk(surface.vertex, surface.facet, 0, 0.999, 0.01, z)
+        assert (np.array(shares) @ corners(surface)[g])[2] == wanted
         x, y, height, _ = snap3(surface, surface.row[30], 0.999, 0.01, z)
         assert height == wanted
         assert np.hypot(x, y) == pytest.approx(1.0, abs=1e-4)
@@ -99,7 +106,7 @@ def test_nodes_are_where_they_are(seed, single):
     for node in np.flatnonzero(surface.row >= 0):
         row = surface.row[node]
         if surface.kind[row] == CURVED:
-            for f in np.flatnonzero((surface.corner == points[node]).all(axis=2).any(axis=1)):
+            for f in np.flatnonzero((corners(surface) == points[node]).all(axis=2).any(axis=1)):
                 surface.place[row] = f
                 assert snap3(surface, row, *points[node])[:3] == tuple(points[node])
         elif surface.kind[row] == CURVE:
@@ -205,6 +212,33 @@ def test_neighbouring_facets_agree_along_their_edge():
             assert np.abs(np.subtract(*places)).max() < 1e-15
 
 
+def test_places_are_those_of_cubics_with_the_handles_of_arcs():
+    """Against the control points of each facet, by NumPy."""
+    points, rows = sphere(60, 5)
+    rng = np.random.default_rng(1)
+    normals = points + rng.normal(size=points.shape) * 0.1
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    vertex, facet = np.column_stack([points, normals]), np.column_stack([rows, rows]).astype(np.int32)
+    for f, (p, n) in enumerate(zip(points[rows], normals[rows], strict=True)):
+        a, b, c = share = rng.dirichlet([1.0, 1.0, 1.0])
+        control, edges = {(k, k, k): p[k] for k in range(3)}, []
+        for k in range(3):
+            for j in ((k + 1) % 3, (k + 2) % 3):
+                edge = (p[j] - p[k])[None]
+                edges.append(p[k] + handles(edge, across(edge, n[k][None]))[0])
+                control[tuple(sorted((k, k, j)))] = edges[-1]
+        middle = np.mean(edges, axis=0)
+        control[0, 1, 2] = middle + 0.5 * (middle - p.mean(axis=0))
+        wanted = sum(
+            factorial(3) / np.prod([factorial(i.count(k)) for k in range(3)]) * np.prod(share[list(i)]) * at
+            for i, at in control.items()
+        )
+        assert np.array(over_facet(vertex, facet, np.inf, f, a, b, c)) == pytest.approx(wanted, abs=1e-14)
+        flat, limit = share @ p, 0.3 * np.linalg.norm(wanted - share @ p)
+        near = np.array(over_facet(vertex, facet, limit, f, a, b, c))
+        assert near == pytest.approx(flat + 0.3 * (wanted - flat), abs=1e-14)
+
+
 def test_directions():
     points, rows = sphere(400)
     _, surface = constraint(points, rows)
@@ -255,9 +289,9 @@ def test_kernels_over_all_nodes():
     for node in nodes[curved[surface.row[nodes]]]:
         place = surface.place[surface.row[node]]
         if surface.kind[surface.row[node]] == CURVED:
-            corners = surface.corner[place]
-            sides = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
-            truth.append(from_facets(moved[node], surface.corner).min() / sides.mean())
+            facet = corners(surface)[place]
+            sides = np.linalg.norm(facet - np.roll(facet, 1, axis=0), axis=1)
+            truth.append(from_facets(moved[node], corners(surface)).min() / sides.mean())
         else:
             a, b = surface.piece[place][[0, 3]]
             truth.append(on_segments(moved[node], a[None], b[None])[0] / np.linalg.norm(b - a))

@@ -7,7 +7,7 @@ import pytest
 
 from gmsnet.constraints.facets import surface_itself
 from gmsnet.constraints.patches import patches_of
-from gmsnet.constraints.smooth_patches import normals_of
+from gmsnet.constraints.smooth_patches import fit_normals, vertices_of
 from gmsnet.generate import cylinder, disturb_on, organic_surface, sphere_surface, torus_surface
 from gmsnet.kernels.whole import jets, skin
 from gmsnet.measure.report import connectivity_of
@@ -24,7 +24,7 @@ def rough(points, own):
     normal = np.cross(points[own[:, 1]] - points[own[:, 0]], points[own[:, 2]] - points[own[:, 0]])
     area = np.linalg.norm(normal, axis=1)
     total = np.zeros_like(points)
-    skin.add_normals(points[own], normal / area[:, None], area, own, total)
+    skin.add_normals(points, own, normal / area[:, None], area, own, total)
     return total / np.linalg.norm(total, axis=1)[:, None]
 
 
@@ -105,6 +105,36 @@ def test_uneven_nodes_cost_little():
         assert after.max() < before.max()
 
 
+@pytest.mark.parametrize("amount", [0.3, 0.6])
+def test_in_lanes_they_are_the_same(amount):
+    """Where nodes are thrown far their frames turn, and two rings do not always tell enough."""
+    for make in (torus_surface, organic_surface):
+        points, own, _ = surface(make, 1500, amount)
+        expected, found = fitted(points, own), rough(points, own)
+        fit_normals(points, own.astype(np.int32), np.ones(len(points), dtype=bool), found)
+        assert degrees(found, expected).max() < 1e-5
+        chosen = np.arange(len(points)) % 3 == 0
+        before = rough(points, own)
+        fit_normals(points, own.astype(np.int32), chosen, before)
+        assert np.array_equal(before[chosen], found[chosen])
+        assert np.array_equal(before[~chosen], rough(points, own)[~chosen])
+
+
+def test_in_lanes_rims_hubs_and_nodes_in_one_place_do_no_harm():
+    rng = np.random.default_rng(2)
+    points = np.vstack([np.zeros((1, 3)), rng.normal(size=(90, 3))])
+    points[7] = points[8] = points[9]
+    k = np.arange(1, 91)
+    own = np.stack([np.zeros(90, dtype=np.int64), k, k % 90 + 1], axis=1)
+    own = np.vstack([own, [[4, 5, 6], [7, 8, 9], [1, 1, 2]]])
+    start = np.tile([0.0, 0.0, 1.0], (91, 1))
+    expected, found = start.copy(), start.copy()
+    jets.fit_normals(points, own, *listed(own, 91), np.ones(91, dtype=bool), expected)
+    fit_normals(points, own.astype(np.int32), np.ones(91, dtype=bool), found)
+    assert np.allclose(found, expected, atol=1e-7)
+    assert np.allclose(np.linalg.norm(found, axis=1), 1.0)
+
+
 def test_what_is_not_chosen_stays():
     points, own, _ = surface(torus_surface, 600)
     chosen = np.arange(len(points)) % 2 == 0
@@ -145,7 +175,7 @@ def test_planes_keep_their_normals_and_patches_end_at_sharp_edges():
     topology = connectivity_of(mesh)
     facets = surface_itself(mesh, topology)
     patches = patches_of(facets, mesh.points, 30.0, False, np.ones(len(mesh.points), dtype=bool))
-    normals = normals_of(patches, mesh.points)
+    normals = vertices_of(patches, mesh.points).normals
     faces, regions = list(shaped.faces.values()), mesh.cells[0].regions
     for number, face in enumerate(faces, start=1):
         rows = regions == number

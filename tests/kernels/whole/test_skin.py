@@ -1,10 +1,9 @@
-"""Normals, handles and extents of a skin against NumPy's, bit for bit."""
+"""Normals and extents of a skin against NumPy's, bit for bit."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from gmsnet.constraints.smooth_patches import across, controls_of, handles
 from gmsnet.kernels.whole import skin
 
 
@@ -33,7 +32,7 @@ def test_normals_are_summed_as_they_stand():
     rng = np.random.default_rng(2)
     unit, area, corner = rng.normal(size=(70, 3)), rng.uniform(size=70), points[rows]
     total, expected = np.zeros((40, 3)), np.zeros((40, 3))
-    skin.add_normals(corner, unit, area, rows, total)
+    skin.add_normals(points, rows, unit, area, rows, total)
     for k in range(3):
         for f, row in enumerate(rows):
             a, b = corner[f, (k + 1) % 3] - corner[f, k], corner[f, (k + 2) % 3] - corner[f, k]
@@ -41,20 +40,6 @@ def test_normals_are_summed_as_they_stand():
             weight = square[0] * square[1]
             expected[row[k]] += unit[f] * (area[f] / weight if weight else 0.0)
     assert np.array_equal(total, expected)
-
-
-def test_controls_are_those_of_arcs():
-    points, rows, _ = facets(3)
-    normals = np.random.default_rng(4).normal(size=(70, 3, 3))
-    normals /= np.linalg.norm(normals, axis=2)[..., None]
-    corner, made = points[rows], controls_of(points[rows], normals)
-    for k in range(3):
-        j = (k + 1) % 3
-        edge = corner[:, j] - corner[:, k]
-        assert np.array_equal(made[:, 2 * k], corner[:, k] + handles(edge, across(edge, normals[:, k])))
-        assert np.array_equal(made[:, 2 * k + 1], corner[:, j] - handles(edge, across(edge, normals[:, j])))
-    edges, middle = made[:, :6].mean(axis=1), corner.mean(axis=1)
-    assert np.array_equal(made[:, 6], edges + 0.5 * (edges - middle))
 
 
 def test_extents_and_distances_of_patches():

@@ -18,8 +18,9 @@ from gmsnet.kernels.jit.compile import LANES, kernel, part
 from gmsnet.kernels.methods.shell import MOST, improve
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.certificate import COARSE, WIDER
+from gmsnet.kernels.star.landing import ask_for_facets, land, landing_place
 from gmsnet.kernels.star.shell import LEAN, crossed, square
-from gmsnet.kernels.star.surface import CURVED, land_curved, land_on, on_curves
+from gmsnet.kernels.star.surface import on_curves
 
 FLAT = 300.0  # mean Q of a star: beyond, float32 does not tell enough
 VALUE, GX, GY, GZ, XX, YY, ZZ, XY, XZ, YZ, ISO, SX, SY, SZ, LEAST, AFTER, MARGIN, LEANS = range(18)
@@ -48,17 +49,6 @@ def relate(points, blocks, block, n, centre, inverse, wide, local):
         for k in range(at, at + 3 * LANES, LANES):
             for lane in range(LANES):
                 wide[lane] = max(wide[lane], abs(local[k + lane]))
-
-
-@part
-def take_sides(stars, blocks, block, n, sides):
-    """The vectors n of the simplices of a block, [simplex][axis][lane]."""
-    first, side, nodes = stars.first, stars.side, blocks.centre
-    for lane in range(LANES):
-        at = first[nodes[block * LANES + lane]]
-        for k in range(n):
-            for axis in range(3):
-                sides[(3 * k + axis) * LANES + lane] = side[at + k, axis]
 
 
 @part
@@ -150,34 +140,6 @@ def to_mean(local, n, stretch, step):
 
 
 @part
-def land(surface, blocks, block, centre, inverse, done, step, target, normal, place):
-    """Where the nodes that are not done come to lie, and the steps that lead there."""
-    rows, kinds, places, limits, single = surface.row, surface.kind, surface.place, surface.limit, surface.single
-    corner, beside, control, normals = surface.corner, surface.beside, surface.control, surface.normal
-    nodes, first = blocks.centre, block * LANES
-    for lane in range(LANES):
-        row = np.int64(rows[nodes[first + lane]])
-        if done[lane] or row < 0 or on_curves(kinds[row]):
-            continue
-        dx, dy, dz = np.float64(step[lane]), np.float64(step[LANES + lane]), np.float64(step[2 * LANES + lane])
-        if not np.isfinite(dx + dy + dz):
-            dx = dy = dz = 0.0
-        size = 1.0 / inverse[lane]
-        x, y, z = centre[lane] + size * dx, centre[LANES + lane] + size * dy, centre[2 * LANES + lane] + size * dz
-        if kinds[row] == CURVED:
-            x, y, z, place[lane], u, v, w = land_curved(
-                corner, beside, control, normals, limits[row], single, np.int64(places[row]), x, y, z
-            )
-        else:
-            x, y, z, place[lane], u, v, w = land_on(surface, row, x, y, z)
-        target[lane], target[LANES + lane], target[2 * LANES + lane] = x, y, z
-        normal[lane], normal[LANES + lane], normal[2 * LANES + lane] = u, v, w
-        step[lane] = (x - centre[lane]) * inverse[lane]
-        step[LANES + lane] = (y - centre[LANES + lane]) * inverse[lane]
-        step[2 * LANES + lane] = (z - centre[2 * LANES + lane]) * inverse[lane]
-
-
-@part
 def judge(local, sides, n, step, normal, floor, sums):
     """F, the least of D − φL and c·n, and of how little simplices lean, after the step."""
     real = np.float32
@@ -230,20 +192,20 @@ def settle(points, surface, blocks, block, unit, grain, most, centre, inverse, w
 
 
 @kernel
-def sweep_lanes(points, blocks, stars, first, last, guard, relaxation, stretch, tally):
+def sweep_lanes(points, blocks, stars, all_sides, first, last, guard, relaxation, stretch, tally):
     """Visits the blocks first…last (of one colour) once, on Σq. See kernels.methods.shell.sweep."""
     most = blocks.most
-    local, sides = np.empty(3 * most * LANES, dtype=np.float32), np.empty(3 * most * LANES, dtype=np.float32)
+    local, landing = np.empty(3 * most * LANES, dtype=np.float32), landing_place()
     sums, step = np.empty(SUMS * LANES, dtype=np.float32), np.empty(3 * LANES, dtype=np.float32)
-    normal, wide = np.empty(3 * LANES, dtype=np.float32), np.empty(LANES, dtype=np.float32)
-    centre, inverse, target = np.empty(3 * LANES), np.empty(LANES), np.empty(3 * LANES)
-    place, done = np.empty(LANES, dtype=np.int64), np.empty(LANES, dtype=np.bool_)
+    wide, done = np.empty(LANES, dtype=np.float32), np.empty(LANES, dtype=np.bool_)
+    centre, inverse = np.empty(3 * LANES), np.empty(LANES)
     star, floors, work = np.empty(3 * stars.most), np.empty(stars.most + 1), np.empty(24)
     surface, floor = guard.constraint, max(guard.floor, 0.0)
     for block in range(first, last):
         n = np.int64(blocks.degree[block])
+        ask_for_facets(surface, blocks, block + 1, last)
         relate(points, blocks, block, n, centre, inverse, wide, local)
-        take_sides(stars, blocks, block, n, sides)
+        sides = all_sides[3 * blocks.offset[block] :]
         derive(local, sides, n, sums)
         for lane in range(LANES):
             done[lane] = False
@@ -252,11 +214,11 @@ def sweep_lanes(points, blocks, stars, first, last, guard, relaxation, stretch, 
                 to_mean(local, n, stretch, step)
             else:
                 propose(sums, relaxation, step)
-            land(surface, blocks, block, centre, inverse, done, step, target, normal, place)
-            judge(local, sides, n, step, normal, floor, sums)
+            land(surface, blocks, block, centre, inverse, done, step, landing)
+            judge(local, sides, n, step, landing.normal, floor, sums)
             settle(
                 points, surface, blocks, block, guard.unit, guard.grain, np.float32(FLAT * n), centre, inverse, wide,
-                step, target, place, sums, done, tally,
+                step, landing.target, landing.place, sums, done, tally,
             )  # fmt: skip
         for lane in range(blocks.filled[block]):
             if not done[lane]:

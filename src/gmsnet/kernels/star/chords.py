@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from gmsnet.kernels.jit.compile import inlined, part
+from gmsnet.kernels.star.cubics import on_facet, walk
 from gmsnet.kernels.star.pattern import count_of, pair_of
-from gmsnet.kernels.star.surface import CURVED, walk
+from gmsnet.kernels.star.surface import CURVED
 
 # Barycentric coordinates on a facet: of the node that moves, and of the two others.
 PLACES = np.array([[3, 0, 3], [3, 3, 0], [2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
@@ -36,7 +37,7 @@ def off_plane(px, py, pz, ux, uy, uz, vx, vy, vz):
 
 
 @part
-def off_reference(corner, beside, f, x, y, z, ax, ay, az, bx, by, bz):
+def off_reference(vertex, facet, f, x, y, z, ax, ay, az, bx, by, bz):
     """The largest squared distance of these places on a facet from the reference, by walks from its facet f on; and of
     the corners of the facets there from this one."""
     most = 0.0
@@ -44,17 +45,14 @@ def off_reference(corner, beside, f, x, y, z, ax, ay, az, bx, by, bz):
     for k in range(len(PLACES)):
         p, q, r = PLACES[k, 0], PLACES[k, 1], PLACES[k, 2]
         sx, sy, sz = p * x + q * ax + r * bx, p * y + q * ay + r * by, p * z + q * az + r * bz
-        f, a, b, c = walk(corner, beside, f, sx, sy, sz)
-        dx = a * corner[f, 0, 0] + b * corner[f, 1, 0] + c * corner[f, 2, 0] - sx
-        dy = a * corner[f, 0, 1] + b * corner[f, 1, 1] + c * corner[f, 2, 1] - sy
-        dz = a * corner[f, 0, 2] + b * corner[f, 1, 2] + c * corner[f, 2, 2] - sz
+        f, a, b, c = walk(vertex, facet, f, sx, sy, sz)
+        dx, dy, dz = on_facet(vertex, facet, f, a, b, c)
+        dx, dy, dz = dx - sx, dy - sy, dz - sz
         most = max(most, dx * dx + dy * dy + dz * dz)
         for j in range(len(BACK)):
             p, q, r = BACK[j, 0], BACK[j, 1], BACK[j, 2]
-            px = p * corner[f, 0, 0] + q * corner[f, 1, 0] + r * corner[f, 2, 0] - x
-            py = p * corner[f, 0, 1] + q * corner[f, 1, 1] + r * corner[f, 2, 1] - y
-            pz = p * corner[f, 0, 2] + q * corner[f, 1, 2] + r * corner[f, 2, 2] - z
-            most = max(most, off_plane(px, py, pz, ux, uy, uz, vx, vy, vz))
+            px, py, pz = on_facet(vertex, facet, f, p, q, r)
+            most = max(most, off_plane(px - x, py - y, pz - z, ux, uy, uz, vx, vy, vz))
     return most
 
 
@@ -68,14 +66,14 @@ def near(bound, surface, row, star, n, pattern, place, x, y, z, was):
         return True
     if surface.kind[row] != CURVED:
         return True
-    corner, beside, here = surface.corner, surface.beside, np.int64(surface.place[row])
+    vertex, facet, here = surface.vertex, surface.facet, np.int64(surface.place[row])
     for k in range(count_of(pattern, n)):
         i, j = pair_of(pattern, n, k)
         ax, ay, az = star[3 * i], star[3 * i + 1], star[3 * i + 2]
         bx, by, bz = star[3 * j], star[3 * j + 1], star[3 * j + 2]
-        off = off_reference(corner, beside, place, x, y, z, ax, ay, az, bx, by, bz)
+        off = off_reference(vertex, facet, place, x, y, z, ax, ay, az, bx, by, bz)
         if off > bound * bound:
-            before = off_reference(corner, beside, here, was[0], was[1], was[2], ax, ay, az, bx, by, bz)
+            before = off_reference(vertex, facet, here, was[0], was[1], was[2], ax, ay, az, bx, by, bz)
             if not off < before:
                 return False
     return True

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from gmsnet.kernels.jit.compile import inlined, part
+from gmsnet.kernels.star.cubics import normal_on, walk
 from gmsnet.kernels.star.space_blocks import LANES3
-from gmsnet.kernels.star.surface import CURVED, normal_on, walk
+from gmsnet.kernels.star.surface import CURVED
 
 LEAST_COSINE = 0.1  # between a facet's normal and that of the surface at its middle: 84°
 
@@ -33,8 +34,8 @@ def side_of_facet(surface, row, place, e, points, x, y, z):
     nx, ny, nz = surface.own[e, 0], surface.own[e, 1], surface.own[e, 2]
     if surface.kind[row] == CURVED:
         mx, my, mz = points[i, 0] + points[j, 0], points[i, 1] + points[j, 1], points[i, 2] + points[j, 2]
-        f, a, b, c = walk(surface.corner, surface.beside, place, (x + mx) / 3.0, (y + my) / 3.0, (z + mz) / 3.0)
-        nx, ny, nz = normal_on(surface.normal, f, a, b, c)
+        f, a, b, c = walk(surface.vertex, surface.facet, place, (x + mx) / 3.0, (y + my) / 3.0, (z + mz) / 3.0)
+        nx, ny, nz = normal_on(surface.vertex, surface.facet, f, a, b, c)
     return cosine_of(points, i, j, x, y, z, nx, ny, nz)
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
+from gmsnet.kernels.star.cubics import corners_of, on_facet, walk
 from gmsnet.kernels.star.pieces import follow_curve
-from gmsnet.kernels.star.surface import CURVE, CURVED, walk
+from gmsnet.kernels.star.surface import CURVE, CURVED
 
 
 @inlined
@@ -16,22 +17,18 @@ def distance(ax, ay, az, bx, by, bz):
 
 
 @inlined
-def edge_length(corner, f, k):
-    """Of the edge of facet f from corner k to the next one."""
-    j = (k + 1) % 3
-    return distance(
-        corner[f, k, 0], corner[f, k, 1], corner[f, k, 2], corner[f, j, 0], corner[f, j, 1], corner[f, j, 2]
-    )
+def edge_length(vertex, i, j):
+    """Of the edge from vertex i to j."""
+    return distance(vertex[i, 0], vertex[i, 1], vertex[i, 2], vertex[j, 0], vertex[j, 1], vertex[j, 2])
 
 
 @part
-def off_facet(corner, beside, place, x, y, z):
+def off_facet(vertex, facet, place, x, y, z):
     """The distance of a point from the facet nearest to it, from ``place`` on, over the mean length of its edges."""
-    f, a, b, c = walk(corner, beside, place, x, y, z)
-    px = a * corner[f, 0, 0] + b * corner[f, 1, 0] + c * corner[f, 2, 0]
-    py = a * corner[f, 0, 1] + b * corner[f, 1, 1] + c * corner[f, 2, 1]
-    pz = a * corner[f, 0, 2] + b * corner[f, 1, 2] + c * corner[f, 2, 2]
-    whole = (edge_length(corner, f, 0) + edge_length(corner, f, 1)) + edge_length(corner, f, 2)
+    f, a, b, c = walk(vertex, facet, place, x, y, z)
+    px, py, pz = on_facet(vertex, facet, f, a, b, c)
+    i, j, k = corners_of(facet, f)
+    whole = (edge_length(vertex, i, j) + edge_length(vertex, j, k)) + edge_length(vertex, k, i)
     return 3.0 * distance(px, py, pz, x, y, z) / whole
 
 
@@ -52,7 +49,7 @@ def farthest(surface, points, moved):
     points: (N, 3 or 4). Nodes on planes and lines are on them. No place that is kept changes.
     """
     most, rows, kinds, places = 0.0, surface.row, surface.kind, surface.place
-    corner, beside = surface.corner, surface.beside
+    vertex, facet = surface.vertex, surface.facet
     piece, before, after = surface.piece, surface.before, surface.after
     for node in range(len(rows)):
         row = rows[node]
@@ -60,7 +57,7 @@ def farthest(surface, points, moved):
             continue
         x, y, z = points[node, 0], points[node, 1], points[node, 2]
         if kinds[row] == CURVED:
-            most = max(most, off_facet(corner, beside, places[row], x, y, z))
+            most = max(most, off_facet(vertex, facet, places[row], x, y, z))
         elif kinds[row] == CURVE:
             most = max(most, off_edge(piece, before, after, places[row], x, y, z))
     return most

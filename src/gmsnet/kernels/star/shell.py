@@ -58,10 +58,12 @@ class ShellStars(NamedTuple):
 
 
 class ShellBlocks(NamedTuple):
-    """The stars of a surface of triangles in blocks of LANES, and the same by node."""
+    """The stars of a surface of triangles in blocks of LANES, and the same by node. sides: their sides, those of a
+    block from 3 times its offset on, [simplex][axis][lane]."""
 
     blocks: Blocks
     stars: ShellStars
+    sides: NDArray[np.float32]
 
 
 @inlined

@@ -154,3 +154,15 @@ def side_of(simplices, t, points):
     ax, ay, az, bx, by, bz = spokes_of(points, simplices.rows, t, simplices.orientation[t] > 0)
     cx, cy, cz = crossed(ax, ay, az, bx, by, bz)
     return (cx * simplices.side[t, 0] + cy * simplices.side[t, 1]) + cz * simplices.side[t, 2]
+
+
+@kernel
+def arrange_sides(blocks, first, side, out):
+    """Writes the sides of the stars in blocks: see shell.ShellBlocks."""
+    for block in range(len(blocks.degree)):
+        begin = 3 * blocks.offset[block]
+        for lane in range(LANES):
+            at = first[blocks.centre[block * LANES + lane]]
+            for k in range(blocks.degree[block]):
+                for axis in range(3):
+                    out[begin + (3 * k + axis) * LANES + lane] = side[at + k, axis]

@@ -1,15 +1,11 @@
-"""What a surface in space is like at the corners of its facets, all at once: numbers, normals, handles and extents.
+"""What a surface in space is like at the corners of its facets, all at once: numbers, normals and extents.
 
 Sums are taken corner after corner: first over the corners 0 of all facets, then over the corners 1, and so on.
 """
 
 from __future__ import annotations
 
-import math
-
 from gmsnet.kernels.jit.compile import inlined, kernel
-
-EDGE_CONTROLS = 6  # of a cubic over a facet; the one in its middle follows
 
 
 @kernel
@@ -41,59 +37,22 @@ def dot3(ax, ay, az, bx, by, bz):
 
 
 @kernel
-def add_normals(corner, unit, area, own, total):
+def add_normals(points, rows, unit, area, own, total):
     """Adds each facet's normal at its corners, times area/(a²b²) of the edges a and b there, to ``total`` (numbers, 3).
 
-    corner: (F, 3, 3). unit: (F, 3). area: (F,). own: (F, 3) numbers.
+    rows: (F, 3) nodes. unit: (F, 3). area: (F,). own: (F, 3) numbers.
     """
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
-        for f in range(len(corner)):
-            x, y, z = corner[f, k, 0], corner[f, k, 1], corner[f, k, 2]
-            ax, ay, az = corner[f, i, 0] - x, corner[f, i, 1] - y, corner[f, i, 2] - z
-            bx, by, bz = corner[f, j, 0] - x, corner[f, j, 1] - y, corner[f, j, 2] - z
+        for f in range(len(rows)):
+            p, q, r = rows[f, k], rows[f, i], rows[f, j]
+            x, y, z = points[p, 0], points[p, 1], points[p, 2]
+            ax, ay, az = points[q, 0] - x, points[q, 1] - y, points[q, 2] - z
+            bx, by, bz = points[r, 0] - x, points[r, 1] - y, points[r, 2] - z
             weight = dot3(ax, ay, az, ax, ay, az) * dot3(bx, by, bz, bx, by, bz)
             share = area[f] / weight if weight > 0.0 else 0.0
             for axis in range(3):
                 total[own[f, k], axis] += unit[f, axis] * share
-
-
-@inlined
-def handle(ex, ey, ez, nx, ny, nz):
-    """The handle of a cubic over an edge at its end with the unit normal n: that of an arc."""
-    across = dot3(ex, ey, ez, nx, ny, nz)
-    tx, ty, tz = ex - across * nx, ey - across * ny, ez - across * nz
-    length, size = math.sqrt(dot3(ex, ey, ez, ex, ey, ez)), math.sqrt(dot3(tx, ty, tz, tx, ty, tz))
-    if size > 0.0:
-        tx, ty, tz = tx / size, ty / size, tz / size
-    else:
-        tx = ty = tz = 0.0
-    cosine = dot3(tx, ty, tz, ex, ey, ez) / length if length > 0.0 else 1.0
-    reach = 2.0 * length / (3.0 * (1.0 + max(cosine, 0.0)))
-    return tx * reach, ty * reach, tz * reach
-
-
-@kernel
-def write_controls(corner, normal, made):
-    """Writes the inner control points (F, 7, 3) of cubics over facets: corner, normal (F, 3, 3)."""
-    for f in range(len(corner)):
-        for k in range(3):
-            j = (k + 1) % 3
-            ex, ey, ez = (
-                corner[f, j, 0] - corner[f, k, 0], corner[f, j, 1] - corner[f, k, 1], corner[f, j, 2] - corner[f, k, 2]
-            )  # fmt: skip
-            hx, hy, hz = handle(ex, ey, ez, normal[f, k, 0], normal[f, k, 1], normal[f, k, 2])
-            gx, gy, gz = handle(ex, ey, ez, normal[f, j, 0], normal[f, j, 1], normal[f, j, 2])
-            made[f, 2 * k, 0], made[f, 2 * k + 1, 0] = corner[f, k, 0] + hx, corner[f, j, 0] - gx
-            made[f, 2 * k, 1], made[f, 2 * k + 1, 1] = corner[f, k, 1] + hy, corner[f, j, 1] - gy
-            made[f, 2 * k, 2], made[f, 2 * k + 1, 2] = corner[f, k, 2] + hz, corner[f, j, 2] - gz
-        for axis in range(3):
-            edges = made[f, 0, axis]
-            for k in range(1, EDGE_CONTROLS):
-                edges += made[f, k, axis]
-            edges /= EDGE_CONTROLS
-            middle = ((corner[f, 0, axis] + corner[f, 1, axis]) + corner[f, 2, axis]) / 3.0
-            made[f, EDGE_CONTROLS, axis] = edges + 0.5 * (edges - middle)
 
 
 @kernel
