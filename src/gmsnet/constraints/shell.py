@@ -52,6 +52,8 @@ def sides_of(mesh: Mesh, topology: Topology, patches: Patches, vertices: Vertice
     triangles = len(topology.triangles)
     of_triangles = np.empty((triangles, 3))
     kernels.mean_sides(patches.unit, vertices.own, vertices.table, of_triangles)
+    if np.array_equal(topology.face_cell, topology.cell):
+        return of_triangles.astype(np.float32)[topology.near_origin]
     quads = points[topology.quads]
     of_quads = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1]) * topology.quad_orientation[:, None]
     sides = np.zeros((len(topology.face_cell), 3))

@@ -75,7 +75,9 @@ def vertices_of(patches: Patches, points: Floats) -> Vertices:
     length = np.sqrt(dot(total, total))
     unit = np.divide(total, length[:, None], out=np.zeros_like(total), where=length[:, None] > 0.0)
     table = np.zeros((count, 6))
-    table[owner, :3] = points[rows]
+    table[:nodes, :3] = points
+    more = owner >= nodes
+    table[owner[more], :3] = points[rows[more]]
     fit_normals(table, owner, (plane == NOTHING) & (length > 0.0), unit)
     table[:, 3:] = unit
     return Vertices(owner, table)

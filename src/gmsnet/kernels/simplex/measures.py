@@ -136,42 +136,60 @@ def grids(count: int) -> tuple[float, float]:
     return 384.0 * workspace, 1.5 * 2.0**-45 * workspace * workspace
 
 
-@kernel
-def summarise(points, triangles, orientation, first, last, coarse, fine, shapes):
-    """The figures (FIGURES,) named above over the blocks first…last of LANES triangles. coarse, fine: their ``grids``.
+@inlined
+def take_in_space(px, py, pz, qx, qy, qz, sign, work, lane):
+    """What ``figures`` asks of a triangle in space with the edges p and q from its first corner, into a lane."""
+    rx, ry, rz = qx - px, qy - py, qz - pz
+    nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
+    work[lane] = sign * math.sqrt((nx * nx + ny * ny) + nz * nz)
+    work[LANES + lane] = px * qx + py * qy + pz * qz
+    work[2 * LANES + lane] = -(px * rx + py * ry + pz * rz)
+    work[3 * LANES + lane] = qx * rx + qy * ry + qz * rz
+    work[4 * LANES + lane] = px * px + py * py + pz * pz
+    work[5 * LANES + lane] = qx * qx + qy * qy + qz * qz
+    work[6 * LANES + lane] = rx * rx + ry * ry + rz * rz
 
-    The sums of all blocks follow from those of parts exactly, so they do not depend on how the blocks are shared out,
-    nor on the order of the triangles, or of a triangle's corners but for the rounding of its own measures. shapes: (T,)
-    float32, for 1/q of each triangle, or (0,).
-    """
-    work = np.empty(ROOM)
+
+@inlined
+def figures_in_space(work, lane):
+    """The figures of that triangle."""
+    return figures(
+        work[lane], work[LANES + lane], work[2 * LANES + lane], work[3 * LANES + lane],
+        work[4 * LANES + lane], work[5 * LANES + lane], work[6 * LANES + lane],
+    )  # fmt: skip
+
+
+@part
+def begin(work):
+    """Totals of no triangle, in a workspace."""
     for k in range(ROOM):
         work[k] = 0.0
     for lane in range(LANES):
         work[TOTALS + (EXTREME + LOW) * LANES + lane] = np.inf
         work[TOTALS + (EXTREME + SHAPE) * LANES + lane] = np.inf
         work[TOTALS + (EXTREME + ASPECT) * LANES + lane] = np.inf
-    for start in range(first * LANES, min(last * LANES, len(triangles)), LANES):
-        count = min(LANES, len(triangles) - start)
-        gather(points, triangles, orientation, start, count, work)
-        for lane in range(count):
-            low, high, shape, aspect, error_bound = planar_figures(work, lane)
-            at = TOTALS + lane
-            add(work, at + LOW * LANES, low, coarse, fine)
-            add(work, at + HIGH * LANES, high, coarse, fine)
-            add(work, at + SHAPE * LANES, shape, coarse, fine)
-            add(work, at + ASPECT * LANES, aspect, coarse, fine)
-            k = at + EXTREME * LANES
-            work[k + LOW * LANES] = min(work[k + LOW * LANES], low)
-            work[k + HIGH * LANES] = max(work[k + HIGH * LANES], high)
-            work[k + SHAPE * LANES] = min(work[k + SHAPE * LANES], shape)
-            work[k + ASPECT * LANES] = min(work[k + ASPECT * LANES], aspect)
-            work[at + INVERTED * LANES] += 1.0 if shape <= 0.0 else 0.0
-            work[at + UNCERTAIN * LANES] += 1.0 if error_bound else 0.0
-            work[lane] = shape  # its edges are not needed any more
-        if len(shapes):
-            for lane in range(count):
-                shapes[start + lane] = work[lane]
+
+
+@inlined
+def count_in(work, lane, low, high, shape, aspect, uncertain, coarse, fine):
+    """Adds the figures of the triangle in a lane to its totals."""
+    at = TOTALS + lane
+    add(work, at + LOW * LANES, low, coarse, fine)
+    add(work, at + HIGH * LANES, high, coarse, fine)
+    add(work, at + SHAPE * LANES, shape, coarse, fine)
+    add(work, at + ASPECT * LANES, aspect, coarse, fine)
+    k = at + EXTREME * LANES
+    work[k + LOW * LANES] = min(work[k + LOW * LANES], low)
+    work[k + HIGH * LANES] = max(work[k + HIGH * LANES], high)
+    work[k + SHAPE * LANES] = min(work[k + SHAPE * LANES], shape)
+    work[k + ASPECT * LANES] = min(work[k + ASPECT * LANES], aspect)
+    work[at + INVERTED * LANES] += 1.0 if shape <= 0.0 else 0.0
+    work[at + UNCERTAIN * LANES] += 1.0 if uncertain else 0.0
+
+
+@part
+def total(work):
+    """The totals of all lanes together, (FIGURES,)."""
     out = np.empty(FIGURES)
     for figure in range(FIGURES):
         value = work[TOTALS + figure * LANES]
@@ -185,6 +203,29 @@ def summarise(points, triangles, orientation, first, last, coarse, fine, shapes)
                 value += other
         out[figure] = value
     return out
+
+
+@kernel
+def summarise(points, triangles, orientation, first, last, coarse, fine, shapes):
+    """The figures (FIGURES,) named above over the blocks first…last of LANES triangles. coarse, fine: their ``grids``.
+
+    The sums of all blocks follow from those of parts exactly, so they do not depend on how the blocks are shared out,
+    nor on the order of the triangles, or of a triangle's corners but for the rounding of its own measures. shapes: (T,)
+    float32, for 1/q of each triangle, or (0,).
+    """
+    work = np.empty(ROOM)
+    begin(work)
+    for start in range(first * LANES, min(last * LANES, len(triangles)), LANES):
+        count = min(LANES, len(triangles) - start)
+        gather(points, triangles, orientation, start, count, work)
+        for lane in range(count):
+            low, high, shape, aspect, error_bound = planar_figures(work, lane)
+            count_in(work, lane, low, high, shape, aspect, error_bound, coarse, fine)
+            work[lane] = shape  # its edges are not needed any more
+        if len(shapes):
+            for lane in range(count):
+                shapes[start + lane] = work[lane]
+    return total(work)
 
 
 @kernel
@@ -208,15 +249,22 @@ def per_cell(points, triangles, orientation, columns):
 @kernel
 def per_surface_cell(points, triangles, columns):
     """The same for triangles in space (points N×3), unsigned: a surface has no orientation of its own."""
-    for t in range(len(triangles)):
-        a, b, c = points[triangles[t, 0]], points[triangles[t, 1]], points[triangles[t, 2]]
-        px, py, pz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        qx, qy, qz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-        rx, ry, rz = c[0] - b[0], c[1] - b[1], c[2] - b[2]
-        nx, ny, nz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
-        low, high, shape, aspect = figures(
-            math.sqrt(nx * nx + ny * ny + nz * nz),
-            px * qx + py * qy + pz * qz, -(px * rx + py * ry + pz * rz), qx * rx + qy * ry + qz * rz,
-            px * px + py * py + pz * pz, qx * qx + qy * qy + qz * qz, rx * rx + ry * ry + rz * rz,
-        )  # fmt: skip
-        columns[LOW, t], columns[HIGH, t], columns[SHAPE, t], columns[ASPECT, t] = low, high, shape, aspect
+    work = np.empty(ROOM)
+    for start in range(0, len(triangles), LANES):
+        count = min(LANES, len(triangles) - start)
+        for lane in range(count):
+            t = start + lane
+            a, b, c = np.uint32(triangles[t, 0]), np.uint32(triangles[t, 1]), np.uint32(triangles[t, 2])
+            x, y, z = points[a, 0], points[a, 1], points[a, 2]
+            take_in_space(
+                points[b, 0] - x, points[b, 1] - y, points[b, 2] - z,
+                points[c, 0] - x, points[c, 1] - y, points[c, 2] - z, 1.0, work, lane,
+            )  # fmt: skip
+        for lane in range(count):
+            low, high, shape, aspect = figures_in_space(work, lane)
+            at = TOTALS + lane
+            work[at + LOW * LANES], work[at + HIGH * LANES] = low, high
+            work[at + SHAPE * LANES], work[at + ASPECT * LANES] = shape, aspect
+        for column in range(4):
+            for lane in range(count):
+                columns[column, start + lane] = work[TOTALS + column * LANES + lane]

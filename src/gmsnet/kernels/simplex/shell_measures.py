@@ -58,29 +58,20 @@ def shell_shapes_of(points, simplices, chosen, shape):
 @kernel
 def summarise_shell(points, simplices, first, last, coarse, fine):
     """As measures.summarise, of the triangles in the blocks first…last of LANES."""
-    out = np.zeros(triangles.FIGURES)
-    low_at, high_at = triangles.EXTREME + triangles.LOW, triangles.EXTREME + triangles.HIGH
-    shape_at, aspect_at = triangles.EXTREME + triangles.SHAPE, triangles.EXTREME + triangles.ASPECT
-    out[low_at] = out[shape_at] = out[aspect_at] = np.inf
-    for t in range(first * LANES, min(last * LANES, len(simplices.rows))):
-        px, py, pz, qx, qy, qz = spokes_of(points, simplices.rows, t, simplices.orientation[t] > 0)
-        rx, ry, rz = qx - px, qy - py, qz - pz
-        cx, cy, cz = crossed(px, py, pz, qx, qy, qz)
-        double = math.sqrt(square(cx, cy, cz))
-        shows = (cx * simplices.side[t, 0] + cy * simplices.side[t, 1]) + cz * simplices.side[t, 2] > 0.0
-        low, high, shape, aspect = triangles.figures(
-            double if shows else -double, px * qx + py * qy + pz * qz, -(px * rx + py * ry + pz * rz),
-            qx * rx + qy * ry + qz * rz, square(px, py, pz), square(qx, qy, qz), square(rx, ry, rz),
-        )  # fmt: skip
-        for k, value in enumerate((low, high, shape, aspect)):
-            part = (value + coarse) - coarse
-            out[k] += part
-            out[triangles.FINE + k] += ((value - part) + fine) - fine
-        out[low_at], out[high_at] = min(out[low_at], low), max(out[high_at], high)
-        out[shape_at], out[aspect_at] = min(out[shape_at], shape), min(out[aspect_at], aspect)
-        out[triangles.INVERTED] += 1.0 if shape <= 0.0 else 0.0
-        out[triangles.UNCERTAIN] += 1.0 if shape <= 0.0 else 0.0
-    return out
+    work = np.empty(triangles.ROOM)
+    triangles.begin(work)
+    for start in range(first * LANES, min(last * LANES, len(simplices.rows)), LANES):
+        count = min(LANES, len(simplices.rows) - start)
+        for lane in range(count):
+            t = start + lane
+            px, py, pz, qx, qy, qz = spokes_of(points, simplices.rows, t, simplices.orientation[t] > 0)
+            cx, cy, cz = crossed(px, py, pz, qx, qy, qz)
+            shows = (cx * simplices.side[t, 0] + cy * simplices.side[t, 1]) + cz * simplices.side[t, 2] > 0.0
+            triangles.take_in_space(px, py, pz, qx, qy, qz, 1.0 if shows else -1.0, work, lane)
+        for lane in range(count):
+            low, high, shape, aspect = triangles.figures_in_space(work, lane)
+            triangles.count_in(work, lane, low, high, shape, aspect, shape <= 0.0, coarse, fine)
+    return triangles.total(work)
 
 
 @kernel

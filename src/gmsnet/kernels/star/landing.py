@@ -56,11 +56,20 @@ def ask_for_facets(surface, blocks, block, last):
 
 
 @inlined
+def take_corner(vertex, v, corner, at):
+    """A vertex to a place of a lane."""
+    x, y, z, p, q, r = vertex[v, 0], vertex[v, 1], vertex[v, 2], vertex[v, 3], vertex[v, 4], vertex[v, 5]
+    corner[at], corner[at + LANES], corner[at + 2 * LANES] = x, y, z
+    corner[at + 3 * LANES], corner[at + 4 * LANES], corner[at + 5 * LANES] = p, q, r
+
+
+@inlined
 def take_corners(vertex, facet, f, corner, lane):
     """The vertices of facet f into a lane."""
-    for k, v in enumerate(corners_of(facet, f)):
-        for axis in range(COORDINATES):
-            corner[(COORDINATES * k + axis) * LANES + lane] = vertex[v, axis]
+    i, j, k = corners_of(facet, np.uint32(f))
+    take_corner(vertex, i, corner, lane)
+    take_corner(vertex, j, corner, lane + COORDINATES * LANES)
+    take_corner(vertex, k, corner, lane + 2 * COORDINATES * LANES)
 
 
 @part

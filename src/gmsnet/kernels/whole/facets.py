@@ -105,6 +105,8 @@ def find_level(points, rows, unit, one, other, smooth, cosine, share, rounding, 
             points[beyond, 2] - points[at, 2],
         )
         away = abs((x * unit[f, 0] + y * unit[f, 1]) + z * unit[f, 2])
+        if away > share * (abs(x) + abs(y) + abs(z)) * 2.0 + rounding:  # most edges
+            continue
         if cosine[e] > 0.0 and away <= share * length_of(x, y, z) + rounding:
             flat[one[e]] = flat[other[e]] = True
 
