@@ -107,6 +107,32 @@ def test_a_surface_that_stays_and_one_that_is_moved():
     assert surface_change(Compared(rows, mesh.points, fold)).normal > 90
 
 
+def test_what_a_sphere_encloses_hangs_on_how_even_its_facets_are():
+    """docs/surfaces.md: less than the ball by √3/6R·ΣA²q, and by no less than Fejes Tóth's bound."""
+
+    def missing(points, rows):
+        """Of the unit ball, by the facets and by the formula."""
+        a, b, c = points[rows].transpose(1, 0, 2)
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+        squares = sum((edge**2).sum(axis=1) for edge in (b - a, c - b, a - c))
+        volume = abs(np.einsum("ij,ij->i", a, np.cross(b, c)).sum()) / 6
+        return 4 * np.pi / 3 - volume, np.sqrt(3) / 6 * (area**2 * squares / (4 * np.sqrt(3) * area)).sum()
+
+    mesh = disturb_on(sphere_surface(1500), 0.3, seed=1).mesh
+    radius, rows = np.linalg.norm(mesh.points, axis=1).mean(), mesh.cells[0].nodes
+    result = gmsnet.smooth(mesh)
+    n = len(mesh.points)
+    omega = np.pi * n / (6 * (n - 2))
+    bound = 4 * np.pi / 3 - (n - 2) / 6 / np.tan(omega) * (3 - 1 / np.tan(omega) ** 2)
+    before, after = (missing(points / radius, rows) for points in (mesh.points, result.mesh.points))
+    for found, formula in (before, after):
+        assert found == pytest.approx(formula, rel=0.01)
+        assert found > bound
+    assert after[0] < 1.05 * bound
+    assert before[0] > 1.15 * bound
+    assert result.surface_change.volume == pytest.approx((before[0] - after[0]) / (4 * np.pi / 3 - before[0]), rel=1e-6)
+
+
 def test_results_tell_of_the_boundary_that_slid():
     mesh = disturb_on(ball_volume(300), 0.2, seed=1).mesh
     result = gmsnet.smooth(mesh, slide=True)
