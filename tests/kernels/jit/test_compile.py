@@ -9,7 +9,8 @@ import pytest
 from numba.core import event
 from numba.core.runtime import _nrt_python, rtsys
 
-from gmsnet.kernels.jit.compile import KERNEL, KNOWN, Part, inlined, options, part
+from gmsnet.kernels.jit.cache import KNOWN
+from gmsnet.kernels.jit.compile import KERNEL, Part, inlined, options, part
 
 
 @part

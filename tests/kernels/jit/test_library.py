@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import nullcontext
+
+from gmsnet.kernels.jit import cache
 
 SOURCE = """
 from gmsnet.kernels.jit.compile import kernel
@@ -46,3 +49,8 @@ def test_only_new_code_that_calls_what_was_loaded_parses_it(tmp_path):
     assert said(3, more=False) == ["6", "True True", " True", "0"]
     assert said(3, more=True) == ["6", "True True", "9 False", "0"]
     assert said(3, more=True) == ["6", "True True", "9 True", "0"]  # both from the disk
+
+
+def test_a_numba_that_is_not_known_loads_as_it_does(monkeypatch):
+    monkeypatch.setattr(cache, "KNOWN", (0, 1))
+    assert isinstance(cache.loading(None), nullcontext)

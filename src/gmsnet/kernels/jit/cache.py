@@ -21,13 +21,21 @@ from typing import Any
 import numba
 from numba.core.runtime.nrt import rtsys
 
-from gmsnet.kernels.jit.library import loaded
-
+KNOWN = (0, 68)  # the last version of Numba of which it is known that kernels.jit.compilers and .library fit it
 SOURCES = hashlib.sha256(
     b"".join(path.read_bytes() for path in sorted(Path(__file__).parents[1].rglob("*.py")))
 ).digest()  # of all kernels together
 VERSION = pickle.dumps(numba.__version__, protocol=-1)  # with which an index begins
 SIZE = 16  # bytes of a hash
+
+
+def loading(context: Any) -> contextlib.AbstractContextManager[None]:
+    """How code is loaded from the disk: by Numba alone where it may work otherwise inside. context: of its target."""
+    if numba.version_info.short > KNOWN:
+        return contextlib.nullcontext()
+    from gmsnet.kernels.jit.library import loaded
+
+    return loaded(context)
 
 
 def make_trustworthy(cache: Any) -> None:
@@ -69,7 +77,7 @@ def make_trustworthy(cache: Any) -> None:
         lowering, SciPy's BLAS among them, 0.4 s. Compiling loads it itself; the runtime is all that cached code needs.
         """
         rtsys.initialize(context)
-        with cache._guard_against_spurious_io_errors(), loaded(context):
+        with cache._guard_against_spurious_io_errors(), loading(context):
             return cache._load_overload(signature, context)
 
     def save_if_there_is_room(signature: Any, result: Any) -> None:

@@ -33,9 +33,8 @@ if getattr(numba.config, "DISABLE_JIT", 0):
 
 from numba.extending import typeof_impl
 
-from gmsnet.kernels.jit.cache import make_trustworthy
+from gmsnet.kernels.jit.cache import KNOWN, make_trustworthy
 
-KNOWN = (0, 68)  # the last version of Numba of which it is known that kernels.jit.compilers fits it
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 LANES = 64  # stars or triangles that go through the processor in SIMD lanes
 

@@ -1,6 +1,6 @@
 """How Numba compiles kernels and their parts, less what neither needs: a tenth of the time.
 
-This rests on how Numba works inside, the same from 0.60 to 0.68; see ``KNOWN`` in kernels.jit.compile.
+This rests on how Numba works inside, the same from 0.60 to 0.68; see ``KNOWN`` in kernels.jit.cache.
 """
 
 from __future__ import annotations
