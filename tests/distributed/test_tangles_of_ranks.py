@@ -102,13 +102,11 @@ def test_the_default_with_all_that_is_meant():
 
 
 def test_what_cannot_be_mended_is_listed_by_the_first_rank():
-    mesh = gmsnet.random_mesh(300, seed=3)
-    points = mesh.points.copy()
-    corner = np.flatnonzero((points == 0.0).all(axis=1))
-    points[corner] = 0.6
-    mesh = replace(mesh, points=points)
+    mesh = tangled(gmsnet.random_mesh(300, seed=3), np.random.default_rng(1), 3, 2.0, (0.1, 0.4))
+    assert gmsnet.quality(mesh).inverted
+    fixed = mesh.points.max(axis=1) < 0.9
     options = SmoothOptions(method="barrier", max_sweeps=3, preserve="none", threads=1)
-    told = same(mesh, options, compact(mesh, 2), 2)
+    told = same(mesh, options, compact(mesh, 2), 2, fixed)
     assert told.gathered == "inverted cells could not be mended with what lies around them"
     assert told.after.inverted
 
