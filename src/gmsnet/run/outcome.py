@@ -53,7 +53,8 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
     if claimed and len(options.target.missed_in(final.after)):
         state = state.ended(NO_PROGRESS if state.history else NOTHING_TO_MOVE)
     nothing = np.empty((0, 2))
-    return replace(state, start=nothing, points=nothing, shapes=np.empty(0, dtype=np.float32), final=final)
+    shapes = np.empty(0, dtype=np.float32)
+    return replace(state, start=nothing, points=nothing, shapes=shapes, floor_of=None, final=final)
 
 
 def result_of(state: State, options: SmoothOptions, began: float) -> SmoothResult:

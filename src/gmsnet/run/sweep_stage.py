@@ -101,8 +101,8 @@ def _sweep_all(state: State, options: SmoothOptions, executor: Executor) -> Stat
     run = Run(state.run_start(options.best_by), state.smoother, options, executor)
     stop_reason = run.to_the_end()
     totals = None if state.metric is not None else run.best_score.totals  # those are in the metric
-    floor = run.field.floor.first  # of the topology's cells: at the level of stars there is none
-    state = replace(
-        state, points=run.best, totals=totals, history=tuple(run.history), floor=floor, floor_of=state.points
-    )
-    return state.ended(stop_reason, run.interruption)
+    swept = replace(state, points=run.best, totals=totals, history=tuple(run.history))
+    if isinstance(state.topology, Volume):  # elsewhere nobody asks, and the points would be kept for nothing
+        floor = run.field.floor.first  # of the topology's cells: at the level of stars there is none
+        swept = replace(swept, floor=floor, floor_of=state.points)
+    return swept.ended(stop_reason, run.interruption)
