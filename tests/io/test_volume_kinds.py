@@ -19,11 +19,11 @@ VOLUMES = tuple(kind.name for kind in CELLS.values() if kind.dimension == 3 and 
 HOLDS = {
     "su2": LINEAR,
     "ugrid": LINEAR,
-    "medit": (*LINEAR, "tetra10"),
+    "medit": (*LINEAR, "tetra10", "hexahedron27", "wedge18", "pyramid14"),
     "gmsh": VOLUMES,
     "vtk": tuple(kind for kind in VOLUMES if kind != "pyramid14"),
     "vtu": tuple(kind for kind in VOLUMES if kind != "pyramid14"),
-    "abaqus": (*LINEAR, "tetra10", "hexahedron20", "wedge15", "pyramid13"),
+    "abaqus": (*LINEAR, "tetra10", "hexahedron20", "hexahedron27", "wedge15", "pyramid13"),
     "nastran": (*LINEAR, "tetra10", "hexahedron20", "wedge15", "pyramid13"),
 }
 PYRAMID = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 1)])
@@ -150,7 +150,8 @@ def test_meshio_reads_the_same_cells(key, tmp_path):
               "nastran": ".bdf", "ugrid": ".ugrid"}[key]  # fmt: skip
     # meshio knows none of these kinds in the format, takes VTK's wedges for inside out, and the order of Gmsh's
     # wedges of 18 and pyramids of 14 nodes for its own; VTK and Gmsh themselves are asked above.
-    unread = {"medit": ("tetra10",), "abaqus": ("pyramid",), "vtk": ("wedge", "wedge18"), "vtu": ("wedge", "wedge18"),
+    unread = {"medit": ("tetra10", "hexahedron27", "wedge18", "pyramid14"), "abaqus": ("pyramid", "hexahedron27"),
+              "vtk": ("wedge", "wedge18"), "vtu": ("wedge", "wedge18"),
               "gmsh": ("wedge18", "pyramid14")}.get(key, ())  # fmt: skip
     known = [kind for kind in topological_dimension if kind not in unread]
     kinds = [kind for kind in HOLDS[key] if kind in known]
