@@ -19,6 +19,7 @@ and no area in the first two rows by more than 10 %, after smoothing with the de
 sides of a ratio of ASPECT or more.
 
 Each mesh follows from the seed and its number, and is told as what makes it; ``--only`` takes some by their numbers.
+Each has a line as soon as it is done, so that a run which is cut off leaves what it found.
 """
 
 from __future__ import annotations
@@ -219,7 +220,8 @@ def quality(options):
     rows = {}
     for number, (kind, text) in enumerate(plan(options.meshes, options.seed)):
         if not options.only or number in options.only:
-            rows[number] = {"kind": kind, "text": text, **study(made(text))}
+            row = rows[number] = {"kind": kind, "text": text, **study(made(text))}
+            print(f"{number:4} {kind}: {in_short(row)}", flush=True)
     skipped = [row for row in rows.values() if row.get("skipped")]
     good = {number: row for number, row in rows.items() if not row.get("skipped")}
     print(f"\n{'':17}{'':>7}{'':>8}{'default falls short by':^25}{'none falls short by':^22}{'held by':>9}")
@@ -237,6 +239,14 @@ def quality(options):
             print(f"    {name:10} score {each['score']:8.4f}  least {each['least']:7.4f}  mean {each['mean']:7.4f}  "
                   f"{each['invalid']} invalid  {remark(name, each)}")  # fmt: skip
     return rows
+
+
+def in_short(row):
+    """How far both calls fall short, in one line."""
+    if row.get("skipped"):
+        return "has inverted cells to begin with"
+    each = (f"{name} {row[name]['short']['mean']:.4f} {row[name]['short']['least']:.4f}" for name in LESS)
+    return f"falls short by {', '.join(each)}" + ("" if row["passed"] else "  FAIL")
 
 
 def remark(name, row):
@@ -339,9 +349,12 @@ def layers(options):
         result = gmsnet.smooth(mesh, threads=1)
         row = {"invalid before": result.before.inverted, "invalid": result.after.inverted, **told(mesh, result)}
         without[number] = {"kind": kind, "text": text, "what": "tangled" if tangle else "as it is", **row}
+        print(f"{number:4} no layers, {kind}: {row['held']:.1%} held, {row['invalid']} inverted", flush=True)
     for number, (text, *rest) in enumerate(layered_plan(options.meshes, options.seed)):
         if not options.only or number in options.only:
-            having[number] = {"text": text, "what": rest[-1], **layered(text, *rest, number)}
+            row = having[number] = {"text": text, "what": rest[-1], **layered(text, *rest, number)}
+            print(f"{number:4} layers, {rest[-1]}: {row['held']:.1%} held, spacings by {row['spacing']:.1%}, "
+                  f"areas {row['area']:.1%}, {row['invalid']} inverted", flush=True)  # fmt: skip
     confusion(without, having)
     return {"without": without, "with": having}
 
