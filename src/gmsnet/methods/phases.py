@@ -72,15 +72,15 @@ POLISH = Phase("MetricLoss, worst kept", lambda: Newton("metric", floor=0.0), 1,
 
 LARGE_PLAN = (NEWTON._replace(looks=False), WORST._replace(looks=False), MEAN)
 MEAN_OF_QUADS = MEAN._replace(
-    create=lambda: newton(LONGER), gain=0.0003, least=0.0002, lasting=math.inf, rounds=20, late=True
+    create=lambda: newton(LONGER), gain=0.0003, least=0.0002, lasting=math.inf, rounds=20, often=20, late=True
 )
 # Quads gain for longer, and what the mean takes back from the worst of them is worth another turn.
 QUADS_PLAN = (
-    NEWTON._replace(gain=0.001, least=0.001, lasting=0.8, looks=False, often=10),
+    NEWTON._replace(gain=0.0008, least=0.0008, lasting=0.8, looks=False, often=10),
     WORST._replace(create=lambda: worst_first(3, IDEAL), looks=False),
     MEAN_OF_QUADS._replace(looks=False),
     WORST._replace(create=lambda: worst_first(6, IDEAL), looks=False),
-    MEAN_OF_QUADS,
+    MEAN_OF_QUADS._replace(gain=0.0002, least=0.0001),
 )
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 # Of volumes; q there is the mean ratio to the power of 3/2.
