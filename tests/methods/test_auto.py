@@ -48,6 +48,13 @@ def test_quads_are_measured_once_though_the_worst_cells_have_several_turns():
     assert run.best is run.field.points
 
 
+def test_phases_of_quads_do_not_end_by_the_noise_of_a_sample():
+    """Whole-mesh L-BFGS comes to 0.8945 in the mean (benchmarks/quads.py); too few corners watched left 0.8892."""
+    after = gmsnet.smooth(random_quad_mesh(10_000, seed=11)).after
+    assert after.inverted == 0
+    assert after.shape.mean() >= 0.8945 - 0.005
+
+
 @pytest.mark.parametrize(("nodes", "plan"), [(SMALL - 500, SMALL_PLAN), (SMALL + 500, LARGE_PLAN)])
 def test_the_size_of_the_mesh_says_how_much_is_made_of_it(nodes, plan):
     result = gmsnet.smooth(gmsnet.random_mesh(nodes, seed=1))

@@ -17,37 +17,38 @@ from gmsnet.methods.base import Field
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 from gmsnet.topology.shell import Shell
-from gmsnet.topology.topology import Topology
 
 SAMPLE = 32  # blocks of cells
-OF_QUADS = 256  # blocks of corners of quads and mixed cells, which gain less a sweep: fewer do not show it
+OF_QUADS = 256  # blocks of corners of planar quads and mixed cells, which gain less a sweep: fewer do not show it
 
 
 def mean_shape(field: Field, executor: Executor = serial) -> float:
     """The mean of 1/q over some of the cells, evenly taken."""
     simplices = field.topology.changeable
-    planar_cells = isinstance(field.topology, Topology) and field.topology.near_shapes is not None
-    blocks = OF_QUADS if planar_cells else SAMPLE
-    stride = max(1, executor.counted(np.ones(len(simplices.rows), dtype=bool)) // (blocks * LANES))
     if isinstance(simplices, Tetrahedra):
-        taken = simplices.take(executor.every(stride, len(simplices.rows)))
+        taken = simplices.take(executor.every(_stride(len(simplices.rows), executor), len(simplices.rows)))
         totals = totals_of(field.points, taken, executor)
         return math.nan if totals is None else totals.shape_mean
     if isinstance(field.topology, Shell):
-        return float(mean_shape_of_shell(field.points, simplices, stride))
-    some = executor.every(stride, len(simplices.rows), LANES)
+        return float(mean_shape_of_shell(field.points, simplices, _stride(len(simplices.rows), executor)))
+    blocks = SAMPLE if field.planar.near_shapes is None else OF_QUADS
+    some = executor.every(_stride(len(simplices.rows), executor, blocks), len(simplices.rows), LANES)
     shape = np.empty(len(some))
     ranking.shapes_of(field.points, simplices, some, shape)
     shape = executor.in_order(executor.row_numbers(some), shape)
     return float(np.cumsum(shape)[-1] / len(shape)) if len(shape) else math.nan  # added up in their order
 
 
+def _stride(rows: int, executor: Executor, blocks: int = SAMPLE) -> int:
+    """The distance between the rows that are taken, so that they fill so many blocks. rows: of this rank."""
+    return max(1, executor.counted(np.ones(rows, dtype=bool)) // (blocks * LANES))
+
+
 def low_shape(field: Field, share: float, executor: Executor = serial) -> float:
     """The η below which this share of the tetrahedra lies, of some, evenly taken; 0 if inverted ones are."""
     simplices = field.topology.changeable
     assert isinstance(simplices, Tetrahedra)
-    stride = max(1, executor.counted(np.ones(len(simplices.rows), dtype=bool)) // (SAMPLE * LANES))
-    some = executor.every(stride, len(simplices.rows))
+    some = executor.every(_stride(len(simplices.rows), executor), len(simplices.rows))
     ratios = executor.in_order(executor.row_numbers(some), ratios_of(field.points, simplices.take(some)))
     count = math.ceil(share * len(ratios))
     return float(K3 / np.partition(ratios, -count)[-count]) ** (1.0 / 3.0) if count else 0.0
