@@ -12,6 +12,8 @@ from support.hell import hellish
 import gmsnet
 from gmsnet.generate import Front, disturb, good_mesh, hybrid_mesh, random_mesh, random_quad_mesh, structured_mesh
 from gmsnet.generate.curves import Curve
+from gmsnet.methods import adapt
+from gmsnet.methods.metric_sum import Problem
 from gmsnet.run.stop import NO_PROGRESS
 from gmsnet.topology.topology import Topology
 
@@ -201,3 +203,49 @@ def test_they_slide_on_arcs_too():
     assert radius.max() / before.max() - 1.0 < 1e-6
     assert 1.0 - radius.min() / before.min() < 1e-6
     conforms(slid, 0.0, 0.5)
+
+
+@pytest.fixture
+def swept(monkeypatch):
+    """Single nodes move first in small meshes, too. How often they were asked."""
+    calls, whole = [], Problem.swept
+
+    def counted(problem, points):
+        assert problem.sliders is None
+        calls.append(len(problem.moved))
+        return whole(problem, points)
+
+    monkeypatch.setattr(adapt, "LARGE", 0)
+    monkeypatch.setattr(Problem, "swept", counted)
+    return calls
+
+
+MIXED = hybrid_mesh(400, seed=1)
+SWEPT = [
+    (random_mesh(900, seed=1), {"preserve": "metric"}),
+    (random_mesh(900, seed=2), {"size": lambda points: np.full(len(points), 0.04)}),
+    (disturb(MIXED, Topology.of(MIXED).free, 0.4, seed=1), {"preserve": "metric"}),
+]
+
+
+@pytest.mark.parametrize(("mesh", "options"), SWEPT)
+def test_single_nodes_move_first_where_the_mesh_is_near_to_its_metric(mesh, options, swept, monkeypatch):
+    first = gmsnet.smooth(mesh, **options)
+    assert len(swept) > 2
+    least = [first.conformity.before.least, *(sweep.min_shape for sweep in first.history)]
+    assert (np.diff(least) >= 0).all()
+    monkeypatch.setattr(adapt, "LARGE", len(mesh.points))
+    swept.clear()
+    plain = gmsnet.smooth(mesh, **options)
+    assert not swept
+    (_, one), (_, other) = first.conformity, plain.conformity
+    assert one.mean > other.mean - 1e-3
+    assert one.mean + one.least > other.mean + other.least - 1e-3
+    assert not first.after.inverted
+
+
+def test_they_do_not_where_nodes_have_far_to_go_or_slide(swept, thrown):
+    gmsnet.smooth(random_mesh(300, seed=1), size=length)  # ten times as long at the right
+    gmsnet.smooth(thrown, metric=FRONT.metric)  # near already
+    gmsnet.smooth(random_mesh(300, seed=1), preserve="metric", slide=True)
+    assert not swept

@@ -1,10 +1,8 @@
 """Towards a metric: all free nodes at once go to where the cells are those of the metric, in shape and in size.
 
-The sum over the corner simplices of E, the symmetric Dirichlet energy of each against the unit simplex of the metric
-(kernels/metric/quality.py), is minimised by conjugate gradients with multigrid (methods/conjugate.py). What depends on
-the place of the nodes through the metric is part of the gradient (Dobrev, Knupp, Kolev, Mittal, Tomov: The
-target-matrix optimization paradigm for high-order meshes, SIAM Journal on Scientific Computing 41, 2019; Huang,
-Russell: Adaptive moving mesh methods, Springer 2011). Between two rounds a metric that is a function is asked anew.
+A sum over the corner simplices (methods/metric_sum.py) is minimised by conjugate gradients with multigrid
+(methods/conjugate.py). Large meshes whose cells are near to the metric come to most of it by sweeps over single nodes
+before. Between two rounds a metric that is a function is asked anew.
 
 The rounds: ΣE until it no longer falls; then a power of E for the worst cells, and ΣE again with a barrier that keeps
 what these have gained, as long as that pays.
@@ -13,26 +11,18 @@ what these have gained, as long as that pays.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.metric import places
-from gmsnet.kernels.metric.places import Background
-from gmsnet.kernels.metric.quality import energy, qualities
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import VALID
-from gmsnet.kernels.untangle.cells import find_bad
-from gmsnet.kernels.whole import graph, steps
-from gmsnet.kernels.whole.graph import Matrix
+from gmsnet.kernels.whole import steps
 from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.methods.conjugate import minimise
-from gmsnet.methods.multigrid import Multigrid
-from gmsnet.methods.sliders import Sliders
-from gmsnet.metric.conformity import cell_qualities, oriented
+from gmsnet.methods.metric_sum import Problem
+from gmsnet.metric.conformity import cell_qualities
 from gmsnet.metric.field import Metric
-from gmsnet.metric.tensors import tensors_of
 from gmsnet.parallel.executor import Executor
 
 Floats = NDArray[np.float64]
@@ -46,112 +36,8 @@ PASSES, PASS_GAIN = 4, 0.002  # over the worst cells; what one must gain in the 
 DOUBLINGS = 3  # E⁸
 TRADE = 1.0  # what the least 1/E must gain for what it costs in the mean, most of which comes back
 BELOW = 0.99  # times the least 1/E: where the barrier stands that keeps it
+NEAR, CLOSE, LARGE = 0.5, 0.75, 5000  # of the mean of 1/E, and of free nodes: so single nodes move first
 REPAIRS = 4  # times at most is a round made that lowers the least 1/E
-
-
-@dataclass(eq=False)
-class Problem:
-    """ΣE, or Σ(E/top)^p, p = 2^doublings, as a function of the places of some nodes. See ``conjugate.Sum``.
-
-    table: (S, 3) weights of edges, None where all are 1. number: (N,) the rows of the nodes that move, −1 of others.
-    sliders: those of them that slide.
-    background: the metric between nodes; start: (N,) where each node was in it. logs, slopes: of the metric at the
-    nodes. floor: of 1/E, 0 for none. least: the least 1/E of these simplices at first; no point below it is accepted.
-    """
-
-    cells: NDArray[np.int32]
-    table: Floats | None
-    moved: NDArray[np.intp]
-    number: NDArray[np.int32]
-    matrix: Matrix
-    background: Background
-    start: NDArray[np.int32]
-    logs: Floats
-    slopes: Floats
-    floor: float = 0.0
-    doublings: int = 0
-    top: float = 1.0
-    sliders: Sliders | None = None
-
-    @classmethod
-    def of(cls, field: Field, metric: Metric, free: NDArray[np.bool_]) -> Problem:
-        """Of the nodes (N,) that are free and have no simplex that is not certified positive."""
-        simplices, free = field.planar.changeable, free.copy()
-        precision, count = field.precision, len(simplices.rows)
-        bad, every = np.empty(count, dtype=bool), np.ones(count, dtype=bool)
-        if find_bad(field.points, field.points, simplices, every, precision.unit, precision.grain, bad):
-            free[simplices.rows[bad]] = False
-        cells, table = oriented(simplices)
-        good = free[cells].any(axis=1)
-        cells, table = cells[good], None if table is None else table[good]
-        moved = np.flatnonzero(free)
-        number = np.full(len(free), -1, dtype=np.int32)
-        number[moved] = np.arange(len(moved), dtype=np.int32)
-        start, column = graph.neighbours(cells, table, number, len(moved))
-        matrix = Matrix(start, column, np.empty(len(column)), np.empty(len(moved)))
-        background = metric.background(field.points)
-        logs, slopes = np.empty((len(free), 3)), np.empty((len(free), 3, 2))
-        problem = cls(cells, table, moved, number, matrix, background, metric.first.copy(), logs, slopes)
-        places.evaluate(background, field.points, problem.start, logs, slopes)
-        slopes[~free] = 0.0
-        problem.sliders = Sliders.of(field, free)
-        return problem
-
-    def look(self, points: Floats) -> None:
-        """Takes the metric from where the nodes are now."""
-        logs, slopes = np.empty((len(self.moved), 3)), np.empty((len(self.moved), 3, 2))
-        start = self.start[self.moved]
-        places.evaluate(self.background, points[self.moved], start, logs, slopes)
-        self.start[self.moved], self.logs[self.moved], self.slopes[self.moved] = start, logs, slopes
-
-    def least(self, points: Floats) -> float:
-        """The least 1/E of these simplices."""
-        self.look(points)
-        values = np.empty(len(self.cells))
-        qualities(points, self.cells, self.table, self.logs, values)
-        return float(values.min(initial=1.0))
-
-    def value(self, points: Floats, gradient: Floats) -> float:
-        """See ``conjugate.Sum``."""
-        total = self._value(points, gradient)[0]
-        if self.sliders is not None:
-            self.sliders.along(gradient, self.sliders.nodes)
-        return total
-
-    def _value(self, points: Floats, gradient: Floats) -> tuple[float, Floats]:
-        share = np.empty(len(self.cells))
-        self.look(points)
-        total: float = energy(
-            points,
-            self.cells,
-            self.table,
-            self.logs,
-            self.slopes,
-            self.floor,
-            self.doublings,
-            self.top,
-            gradient,
-            share,
-        )
-        return total, share
-
-    def inverse(self, points: Floats) -> Callable[[Floats], Floats]:
-        """Multigrid on the Laplacian of the mesh in the metric, each node in the frame of its own tensor."""
-        _, share = self._value(points, np.empty_like(points))
-        table = np.repeat(share[:, None], 3, axis=1) if self.table is None else share[:, None] * self.table
-        graph.assemble(points, self.cells, table, self.number, True, self.matrix)
-        cycle = Multigrid(self.matrix)
-        a, b, c = tensors_of(self.logs[self.moved] * np.array([0.0, -0.5, -0.5])).T
-
-        def apply(residual: Floats) -> Floats:
-            x, y = residual.T
-            inner = cycle(np.column_stack([a * x + b * y, b * x + c * y]))
-            x, y = inner.T
-            found = np.column_stack([a * x + b * y, b * x + c * y])
-            return found if sliders is None else sliders.along(found, self.number[sliders.nodes])
-
-        sliders = self.sliders
-        return apply
 
 
 class Adapt(Smoother):
@@ -165,6 +51,7 @@ class Adapt(Smoother):
     passes: int
     slide: bool
     gained: float
+    near: bool | None
     step: Callable[[Field], int]
     converged: bool
 
@@ -174,6 +61,7 @@ class Adapt(Smoother):
     def __init__(self, metric: Metric) -> None:
         self.metric = metric
         self.rounds, self.passes, self.gained, self.slide = 0, 0, 0.0, False
+        self.near = None
         self.step = self._even
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
@@ -186,6 +74,9 @@ class Adapt(Smoother):
         """A round of ΣE."""
         self.phase = PHASE
         before = self._standing(field.points, field)
+        if self.near is None:  # where nodes have far to go, sweeps lead to other minima, which may be worse
+            large = np.count_nonzero(field.planar.near_free) > LARGE
+            self.near = bool(large and field.constraint is None and NEAR <= before[1] <= CLOSE)
         moved = self._round(field, before, floor=0.0)
         self.rounds += 1
         gained = self._standing(field.points, field)[1] - before[1]
@@ -205,20 +96,29 @@ class Adapt(Smoother):
         )
 
     def _worst(self, field: Field) -> int:
-        """A round of a power of E, for the worst cells: taken for what they gain, if the others do not lose more."""
+        """A round of a power of E, for the worst cells: taken for what they gain, if the others do not lose more.
+
+        Where single nodes move first it is judged with the round that keeps the worst cells.
+        """
         self.phase = WORST_PHASE
         before = self._standing(field.points, field)
         moved, problem = 0, Problem.of(field, self.metric, self._free(field))
         least = problem.least(field.points)
         if len(problem.moved) and least > 0.0:
             problem.doublings, problem.top = DOUBLINGS, 1.0 / least
-            found = field.written(minimise(problem, field.points, SETTLED))
+            start = problem.swept(field.points) if self.near else field.points
+            found = field.written(minimise(problem, start, SETTLED))
             after = self._standing(found, field)
-            if self._certified(found, field) and TRADE * (before[1] - after[1]) < after[0] - before[0]:
-                moved, self.gained = self._take(found, field), after[0] - before[0]
+            if self.near and after[0] > before[0]:
+                problem.doublings, problem.floor = 0, BELOW * problem.least(found)
+                found = field.written(minimise(problem, problem.swept(found), SETTLED))
+                after = self._standing(found, field)
+            gained, lost = after[0] - before[0], before[1] - after[1]
+            if self._certified(found, field) and gained >= 0.0 and TRADE * lost < gained:
+                moved, self.gained = self._take(found, field), gained
         self.passes += 1
-        self.step = self._kept
-        self.converged = not moved
+        self.step = self._worst if self.near else self._kept
+        self.converged = not moved or (self.near is True and self._settled())
         return moved
 
     def _kept(self, field: Field) -> int:
@@ -226,8 +126,12 @@ class Adapt(Smoother):
         self.phase = KEPT_PHASE
         moved = self._round(field, self._standing(field.points, field), floor=BELOW)
         self.step = self._worst
-        self.converged = self.passes == PASSES or self.gained < PASS_GAIN
+        self.converged = self._settled()
         return moved
+
+    def _settled(self) -> bool:
+        """Is another pass over the worst cells not worth it?"""
+        return self.passes == PASSES or self.gained < PASS_GAIN
 
     def _round(self, field: Field, before: tuple[float, float], floor: float) -> int:
         """Minimises ΣE with a barrier at a share ``floor`` of the least 1/E; how many nodes move."""
@@ -237,7 +141,8 @@ class Adapt(Smoother):
             if not len(problem.moved):
                 return 0
             problem.floor = floor * max(0.0, problem.least(field.points))
-            found = field.written(minimise(problem, field.points, SETTLED))
+            start = problem.swept(field.points) if self.near else field.points
+            found = field.written(minimise(problem, start, SETTLED))
             if not self._certified(found, field):
                 return 0
             if field.level == VALID or self._standing(found, field)[0] >= before[0]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.jit.compile import inlined, kernel, part
 
 OUTSIDE = -1e-9  # a barycentric coordinate: so far beyond an edge is rounding
 
@@ -79,6 +79,24 @@ def locate(background, start, x, y):
     return nearest
 
 
+@inlined
+def found_at(background, t, x, y, logs, slopes, n):
+    """Writes row n of the logarithms and of their slopes at a place in triangle t, or at the nearest place of it."""
+    p = background.points
+    one, two, three = barycentric(background, t, x, y)
+    one, two, three = max(one, 0.0), max(two, 0.0), max(three, 0.0)
+    inverse = 1.0 / (one + two + three)
+    i, j, k = background.triangles[t, 0], background.triangles[t, 1], background.triangles[t, 2]
+    ax, ay, bx, by = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1], p[k, 0] - p[i, 0], p[k, 1] - p[i, 1]
+    area = 1.0 / (ax * by - ay * bx)
+    for c in range(3):
+        at, to_j, to_k = background.logs[i, c], background.logs[j, c], background.logs[k, c]
+        logs[n, c] = (one * at + two * to_j + three * to_k) * inverse
+        to_j, to_k = to_j - at, to_k - at
+        slopes[n, c, 0] = (to_j * by - to_k * ay) * area
+        slopes[n, c, 1] = (to_k * ax - to_j * bx) * area
+
+
 @kernel
 def evaluate(background, places, start, logs, slopes):
     """The logarithms (n, 3) at places (n, 2), and their slopes (n, 3, 2) there.
@@ -86,23 +104,19 @@ def evaluate(background, places, start, logs, slopes):
     start: (n,) a triangle to look in first; it is written: where each place was found. Where it is negative, there is
     no metric, and the answer is 0. Beyond the boundary the value is that of the nearest place of a triangle.
     """
-    p = background.points
     for n in range(len(places)):
         if start[n] < 0:
             logs[n, :] = 0.0
             slopes[n, :, :] = 0.0
             continue
-        t = locate(background, start[n], places[n, 0], places[n, 1])
-        start[n] = t
-        one, two, three = barycentric(background, t, places[n, 0], places[n, 1])
-        one, two, three = max(one, 0.0), max(two, 0.0), max(three, 0.0)
-        inverse = 1.0 / (one + two + three)
-        i, j, k = background.triangles[t, 0], background.triangles[t, 1], background.triangles[t, 2]
-        ax, ay, bx, by = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1], p[k, 0] - p[i, 0], p[k, 1] - p[i, 1]
-        area = 1.0 / (ax * by - ay * bx)
-        for c in range(3):
-            at, to_j, to_k = background.logs[i, c], background.logs[j, c], background.logs[k, c]
-            logs[n, c] = (one * at + two * to_j + three * to_k) * inverse
-            to_j, to_k = to_j - at, to_k - at
-            slopes[n, c, 0] = (to_j * by - to_k * ay) * area
-            slopes[n, c, 1] = (to_k * ax - to_j * bx) * area
+        start[n] = locate(background, start[n], places[n, 0], places[n, 1])
+        found_at(background, start[n], places[n, 0], places[n, 1], logs, slopes, n)
+
+
+@kernel
+def evaluate_some(background, points, nodes, start, logs, slopes):
+    """The same for some nodes (k,) of all points (N, 2), each with a triangle to look in first: their rows of start,
+    logs and slopes are written."""
+    for n in nodes:
+        start[n] = locate(background, start[n], points[n, 0], points[n, 1])
+        found_at(background, start[n], points[n, 0], points[n, 1], logs, slopes, n)
