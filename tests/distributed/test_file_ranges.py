@@ -326,16 +326,28 @@ def test_a_file_that_others_change_is_not_overwritten(tmp_path: Path, monkeypatc
     assert saved(tmp_path) == {path.name: before[::-1]}
 
 
-@pytest.mark.parametrize("rank", [0, 1])
-def test_a_failure_of_one_rank_leaves_the_file(rank: int, tmp_path: Path, monkeypatch) -> None:
+@pytest.mark.parametrize("window", [7, 1000])
+def test_the_first_rank_asks_for_few_nodes_at_a_time(window: int, tmp_path: Path, monkeypatch) -> None:
+    path, shared = save_vtkhdf(mixed(), tmp_path / "a.vtkhdf"), tmp_path / "shared.vtkhdf"
+    gmsnet.write(gmsnet.smooth(gmsnet.read(path), "barrier", max_sweeps=4).mesh, tmp_path / "serial.vtkhdf")
+    monkeypatch.setattr(file_ranges, "AT_ONCE", 240)
+    monkeypatch.setattr(file_ranges, "WINDOW", window)
+    options = SmoothOptions(method="barrier", max_sweeps=4, threads=1)
+    together(3, lambda comm: smooth_file(FileTask(str(path), str(shared), "vtkhdf", options), comm))
+    assert shared.read_bytes() == (tmp_path / "serial.vtkhdf").read_bytes() != path.read_bytes()
+
+
+@pytest.mark.parametrize("begin", [0, 20])
+def test_a_failure_leaves_the_file(begin: int, tmp_path: Path, monkeypatch) -> None:
     path = save_ugrid(mixed(), tmp_path / "a.lb8.ugrid")
-    before, rows = saved(tmp_path), file_ranges.FileRanges._rows
+    before, spliced = saved(tmp_path), file_ranges.FileRanges._spliced
 
-    def broken(self, begin, end, ids, new):
-        if (begin and rank) or (not begin and not rank):
+    def broken(self, column, first, last, moved):
+        if first >= begin:
             raise InputError("the disk is broken")
-        return rows(self, begin, end, ids, new)
+        return spliced(self, column, first, last, moved)
 
-    monkeypatch.setattr(file_ranges.FileRanges, "_rows", broken)
+    monkeypatch.setattr(file_ranges, "AT_ONCE", 240)
+    monkeypatch.setattr(file_ranges.FileRanges, "_spliced", broken)
     assert heard(3, path, "ugrid")[0] == "the disk is broken"
     assert saved(tmp_path) == before

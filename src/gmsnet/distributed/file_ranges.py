@@ -1,6 +1,6 @@
 """One binary file that ranks share: each reads some of its cells, and none holds the whole.
 
-The first rank writes. It copies the file, and asks for the coordinates of some rows at a time the rank that has them.
+The first rank writes. It copies the file, and asks for moved nodes, some at a time, the rank that keeps their rows.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,21 +21,20 @@ from gmsnet.errors import FormatError, GmsnetError, InputError
 from gmsnet.io.atomic import replace_files
 from gmsnet.io.formats import FORMATS
 from gmsnet.io.pieces import Piece as Bytes
-from gmsnet.io.ranges import AT_ONCE, Plan, Ranges
+from gmsnet.io.ranges import AT_ONCE, Column, Plan, Ranges
 from gmsnet.io.stamps import Stamps
 
 PLANNED = ("ugrid", "vtkhdf", "vtu")  # formats whose files can tell how their numbers lie
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
+Value = TypeVar("Value")
+WINDOW = 1 << 17  # nodes that the first rank asks for at a time
 
 
 def plan_of(file: Ranges, format: str) -> Plan | None:
     """How the numbers of a file lie; None where only a reader of the whole can tell. Raises FormatError."""
     plan: Callable[[Ranges], Plan | None] = cast(Any, FORMATS[format].load()).plan
-    try:
-        return plan(file)
-    except FormatError as error:
-        raise FormatError(f"{file.path}: {error}") from None
+    return _said(file, lambda: plan(file))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,23 +52,18 @@ class FileRanges:
 
         Raises InputError, on all ranks, where it cannot be written; then nothing is.
         """
-        ids, new = self._brought(points, comm)
+        moved = Moved(comm, self.rows, *self._brought(points, comm))
         wrong = ""
         if comm.rank == 0:
             try:
                 stamps = Stamps.of([(self.file.path, None, self.file.stamp)])
-                replace_files({target: self._contents(ids, new, comm)}, stamps)
+                replace_files({target: self._contents(moved)}, stamps)
             except GmsnetError as error:
                 wrong = str(error)
             finally:
-                for rank in range(1, comm.size):
-                    comm.send(None, rank)
+                moved.end()
         else:
-            while (asked := comm.recv(source=0)) is not None:
-                try:
-                    comm.send((self._rows(asked[0], asked[1], ids, new), ""), 0)
-                except GmsnetError as error:
-                    comm.send((b"", str(error)), 0)
+            moved.serve()
         raise_everywhere(comm, wrong)
 
     def _brought(self, points: Floats, comm: Any) -> tuple[Ids, Floats]:
@@ -81,40 +75,72 @@ class FileRanges:
         ids, first = np.unique(np.concatenate([each for each, _ in came]), return_index=True)
         return ids, np.concatenate([each for _, each in came])[first]
 
-    def _contents(self, ids: Ids, new: Floats, comm: Any) -> Iterator[Bytes]:
+    def _contents(self, moved: Moved) -> Iterator[Bytes]:
         """The file, on the first rank."""
-        table = self.plan.points
-        step = max(1, AT_ONCE // table.stride)
-        yield from self._copied(0, table.start)
-        for rank in range(comm.size):
-            for begin in range(int(self.rows[rank]), int(self.rows[rank + 1]), step):
-                end = min(begin + step, int(self.rows[rank + 1]))
-                if rank == 0:
-                    yield self._rows(begin, end, ids, new)
-                    continue
-                comm.send((begin, end), rank)
-                found, wrong = comm.recv(source=rank)
-                if wrong:
-                    raise InputError(wrong)
-                yield found
-        yield from self._copied(table.start + table.rows * table.stride, self.file.size)
+        at = 0
+        for column in sorted(self.plan.points, key=lambda each: each.rows.start):
+            rows = column.rows
+            yield from self._copied(at, rows.start)
+            step = max(1, AT_ONCE // rows.stride)
+            for begin in range(0, rows.rows, step):
+                yield self._spliced(column, begin, min(begin + step, rows.rows), moved)
+            at = rows.end
+        yield from self._copied(at, self.file.size)
         self.file.check()
 
     def _copied(self, begin: int, end: int) -> Iterator[Bytes]:
         for at in range(begin, end, AT_ONCE):
             yield bytes(self.file.read(at, min(AT_ONCE, end - at)))
 
-    def _rows(self, begin: int, end: int, ids: Ids, new: Floats) -> bytes:
+    def _spliced(self, column: Column, begin: int, end: int, moved: Moved) -> bytes:
         """The bytes of some rows of coordinates, those of moved nodes in their new places."""
-        table = self.plan.points
-        data = self.file.read(table.start + begin * table.stride, (end - begin) * table.stride)
-        size = np.dtype(table.dtype).itemsize
-        values = np.ndarray((end - begin, table.width), table.dtype, data, 0, (table.stride, size))
-        first, last = np.searchsorted(ids, [begin, end])
-        here, places = ids[first:last] - begin, new[first:last]
-        old = values[here].astype(np.float64)
-        values[here] = np.where(places != old, places, old)
+        rows, first, axis = column
+        start = rows.start + begin * rows.stride
+        data = self.file.read(start, min(rows.start + end * rows.stride, rows.end) - start)
+        values = rows.in_bytes(data, end - begin)
+        for ids, places in moved.between(first + begin, first + end):
+            here, new = ids - first - begin, places[:, axis : axis + rows.width]
+            old = values[here].astype(np.float64)
+            values[here] = np.where(new != old, new, old)
         return bytes(data)
+
+
+class Moved:
+    """The nodes that have moved, ascending, and where they are: each rank has those of the rows that it keeps."""
+
+    def __init__(self, comm: Any, rows: Ids, ids: Ids, points: Floats) -> None:
+        self._comm, self._rows, self._own = comm, rows, (ids, points)
+        self._known: tuple[int, int, Ids, Floats] = (0, 0, ids[:0], points[:0])  # nodes from, to, which were asked for
+
+    def between(self, begin: int, end: int) -> Iterator[tuple[Ids, Floats]]:
+        """On the first rank, while the others serve: those of a range of nodes, in parts."""
+        while begin < end:
+            if not self._known[0] <= begin < self._known[1]:
+                home = int(np.searchsorted(self._rows, begin, side="right")) - 1
+                stop = min(begin + WINDOW, int(self._rows[home + 1]))
+                self._known = (begin, stop, *self._of(home, begin, stop))
+            _, stop, ids, points = self._known
+            first, last = np.searchsorted(ids, [begin, end])
+            yield ids[first:last], points[first:last]
+            begin = stop
+
+    def _of(self, rank: int, begin: int, end: int) -> tuple[Ids, Floats]:
+        if rank == self._comm.rank:
+            first, last = np.searchsorted(self._own[0], [begin, end])
+            return self._own[0][first:last], self._own[1][first:last]
+        self._comm.send((begin, end), rank)
+        found: tuple[Ids, Floats] = self._comm.recv(source=rank)
+        return found
+
+    def serve(self) -> None:
+        """Answers the first rank until it ends."""
+        while (asked := self._comm.recv(source=0)) is not None:
+            self._comm.send(self._of(self._comm.rank, *asked), 0)
+
+    def end(self) -> None:
+        """Lets the other ranks go on."""
+        for rank in range(1, self._comm.size):
+            self._comm.send(None, rank)
 
 
 def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
@@ -125,9 +151,10 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     file = everywhere(comm, lambda: Ranges(name))
     agreed(comm, (file.stamp.size, file.stamp.modified), f"{name}: the file")
     plan = comm.bcast(everywhere(comm, lambda: plan_of(file, format) if comm.rank == 0 else None))
-    rows = np.array([plan.points.rows * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
-    read = everywhere(comm, lambda: _blocks(file, plan, comm))
-    mine = everywhere(comm, lambda: _points(file, plan, int(rows[comm.rank]), int(rows[comm.rank + 1])))
+    rows = np.array([plan.nodes * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
+    first, last = rows[comm.rank : comm.rank + 2].tolist()
+    read = everywhere(comm, lambda: _said(file, lambda: _blocks(file, plan, comm)))
+    mine = everywhere(comm, lambda: _said(file, lambda: plan.places(file, first, last)))
     ids, points, _ = _asked(comm, rows, mine, _ids_of([block.nodes[:, 0] for block in read]))
     blocks = _shared_out(comm, read, ids, points)
     ids, points, lonely = _asked(comm, rows, mine, _ids_of([block.nodes for block in blocks]))
@@ -141,24 +168,20 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
 
 
 def _blocks(file: Ranges, plan: Plan, comm: Any) -> list[Cells]:
+    return [
+        Cells(tables[0].kind, *plan.cells(file, block, comm.rank, comm.size))
+        for block, tables in enumerate(plan.blocks)
+    ]
+
+
+def _said(file: Ranges, make: Callable[[], Value]) -> Value:
+    """What is made of a file, with its name in front of what is wrong."""
     try:
-        return [
-            Cells(tables[0].kind, *plan.cells(file, block, comm.rank, comm.size))
-            for block, tables in enumerate(plan.blocks)
-        ]
+        return make()
     except FormatError as error:
         raise FormatError(f"{file.path}: {error}") from None
     except MemoryError:
         raise InputError(f"{file.path}: there is not enough memory for this mesh") from None
-
-
-def _points(file: Ranges, plan: Plan, first: int, last: int) -> Floats:
-    found = plan.points.of(file, first, last).astype(np.float64)
-    if not np.isfinite(found).all():
-        row = first + int(np.argmin(np.isfinite(found).all(axis=1)))
-        raise FormatError(f"{file.path}: byte {plan.points.start + row * plan.points.stride}: a coordinate of node "
-                          f"{row} (counted from 0) is not finite")  # fmt: skip
-    return found
 
 
 def _ids_of(nodes: Sequence[Ids]) -> Ids:

@@ -81,13 +81,35 @@ class Rows:
     dtype: str
     width: int = 1
 
+    @property
+    def size(self) -> int:
+        """Bytes of the numbers of a row."""
+        return self.width * np.dtype(self.dtype).itemsize
+
+    @property
+    def end(self) -> int:
+        """The byte behind the last row."""
+        return self.start + ((self.rows - 1) * self.stride + self.size if self.rows else 0)
+
     def of(self, file: Ranges, first: int, last: int) -> NDArray[np.generic]:
         """(last − first, width) the numbers of some rows."""
-        count, size = last - first, np.dtype(self.dtype).itemsize
-        if count <= 0:
+        if last <= first:
             return np.empty((0, self.width), dtype=self.dtype)
-        data = file.read(self.start + first * self.stride, (count - 1) * self.stride + self.width * size)
-        return np.ndarray((count, self.width), self.dtype, data, 0, (self.stride, size))
+        count = last - first
+        return self.in_bytes(file.read(self.start + first * self.stride, (count - 1) * self.stride + self.size), count)
+
+    def in_bytes(self, data: bytearray, count: int) -> NDArray[np.generic]:
+        """(count, width) the numbers of rows, the first of which begins with ``data``, in its memory."""
+        return np.ndarray((count, self.width), self.dtype, data, 0, (self.stride, self.size // self.width))
+
+
+class Column(NamedTuple):
+    """Coordinates of nodes that follow each other. first: the node of the first row. axis: of the first number of a
+    row, those of the next axes follow it."""
+
+    rows: Rows
+    first: int = 0
+    axis: int = 0
 
 
 class Table(NamedTuple):
@@ -104,37 +126,61 @@ class Table(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """points: the coordinates, three to a row. blocks: of the mesh, each of one table or several of one kind. single:
-    see Mesh."""
+    """points: the coordinates of all nodes, in the order of the file. blocks: of the mesh, each of one table or several
+    of one kind. single: see Mesh."""
 
-    points: Rows
+    points: Sequence[Column]
     blocks: Sequence[Sequence[Table]]
     single: bool
+
+    @property
+    def nodes(self) -> int:
+        """How many there are."""
+        return max(column.first + column.rows.rows for column in self.points)
+
+    def places(self, file: Ranges, first: int, last: int) -> NDArray[np.float64]:
+        """(last − first, axes) the points of some nodes. Raises FormatError where one is not finite."""
+        found = np.zeros((last - first, max(column.axis + column.rows.width for column in self.points)))
+        for rows, start, axis in self.points:
+            begin, end = max(first - start, 0), min(last - start, rows.rows)
+            if begin >= end:
+                continue
+            some = rows.of(file, begin, end)
+            if not np.isfinite(some).all():
+                row = begin + int(np.argmin(np.isfinite(some).all(axis=1)))
+                raise FormatError(f"byte {rows.start + row * rows.stride}: a coordinate of node {start + row} (counted "
+                                  "from 0) is not finite")  # fmt: skip
+            found[start + begin - first : start + end - first, axis : axis + rows.width] = some
+        return found
 
     def cells(self, file: Ranges, block: int, rank: int, ranks: int) -> tuple[NDArray[np.int64], ...]:
         """Nodes (n, k), regions (n,) and numbers (n,) of the cells of a block that are the share of one of so many.
 
         Raises FormatError where a cell names a node that is not there.
         """
-        nodes, regions, numbers, before = [], [], [], 0
-        for table in self.blocks[block]:
-            first, last = (table.nodes.rows * part // ranks for part in (rank, rank + 1))
-            listed = table.nodes.of(file, first, last).astype(np.int64) - table.base
-            self._check(listed, table, first)
-            nodes.append(listed if table.order is None else listed[:, table.order])
-            own = None if table.regions is None else table.regions.of(file, first, last)
-            alike = np.full(last - first, table.region, dtype=np.int64)
-            regions.append(alike if own is None else own[:, 0].astype(np.int64))
-            numbers.append(before + np.arange(first, last))
+        tables = self.blocks[block]
+        total = sum(table.nodes.rows for table in tables)
+        first, last = (total * part // ranks for part in (rank, rank + 1))
+        nodes, regions, before = [np.empty((0, tables[0].nodes.width), dtype=np.int64)], [np.empty(0, np.int64)], 0
+        for table in tables:
+            begin, end = max(first - before, 0), min(last - before, table.nodes.rows)
             before += table.nodes.rows
-        return np.concatenate(nodes), np.concatenate(regions), np.concatenate(numbers)
+            if begin >= end:
+                continue
+            listed = table.nodes.of(file, begin, end).astype(np.int64) - table.base
+            self._check(listed, table, begin)
+            nodes.append(listed if table.order is None else listed[:, table.order])
+            own = None if table.regions is None else table.regions.of(file, begin, end)
+            alike = np.full(end - begin, table.region, dtype=np.int64)
+            regions.append(alike if own is None else own[:, 0].astype(np.int64))
+        return np.concatenate(nodes), np.concatenate(regions), np.arange(first, last)
 
     def _check(self, nodes: NDArray[np.int64], table: Table, first: int) -> None:
-        wrong = ((nodes < 0) | (nodes >= self.points.rows)).any(axis=1)
+        wrong = ((nodes < 0) | (nodes >= self.nodes)).any(axis=1)
         if wrong.any():
             row = int(np.argmax(wrong))
-            node = nodes[row][(nodes[row] < 0) | (nodes[row] >= self.points.rows)][0]
+            node = nodes[row][(nodes[row] < 0) | (nodes[row] >= self.nodes)][0]
             raise FormatError(
                 f"byte {table.nodes.start + (first + row) * table.nodes.stride}: a cell names the node {node}, but the "
-                f"nodes are 0 to {self.points.rows - 1} (counted from 0)"
+                f"nodes are 0 to {self.nodes - 1} (counted from 0)"
             )

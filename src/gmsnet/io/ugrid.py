@@ -23,7 +23,7 @@ from gmsnet.io.cells import distinct, sealed
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
-from gmsnet.io.ranges import Plan, Ranges, Rows, Table
+from gmsnet.io.ranges import Column, Plan, Ranges, Rows, Table
 from gmsnet.io.text import Text
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 from gmsnet.mesh.cell_block import CellBlock
@@ -123,7 +123,7 @@ def plan(file: Ranges) -> Plan | None:
     for k in range(FACES):
         tables[k] = tables[k]._replace(regions=Rows(surfaces, counts[1 + k], 4, whole))
         surfaces += 4 * counts[1 + k]
-    return Plan(points, [[table] for table in tables if table.nodes.rows], form.real == 4)
+    return Plan([Column(points)], [[table] for table in tables if table.nodes.rows], form.real == 4)
 
 
 def form_of(data: Data, size: int | None = None) -> str:

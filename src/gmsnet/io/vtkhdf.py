@@ -16,7 +16,7 @@ from gmsnet.io import vtk_cells
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
-from gmsnet.io.ranges import Plan, Ranges, Rows
+from gmsnet.io.ranges import Column, Plan, Ranges, Rows
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.io.vtk_runs import means_more, tables_of
 from gmsnet.mesh.mesh import Mesh
@@ -74,7 +74,8 @@ def plan(file: Ranges) -> Plan | None:
         real = points.dtype()
         if not tables or real[1:] not in ("f4", "f8") or nodes.dtype()[1] not in "iu":
             return None
-        return Plan(Rows(begin, count, 3 * int(real[2:]), real, 3), [[table] for table in tables], real[1:] == "f4")
+        place = Rows(begin, count, 3 * int(real[2:]), real, 3)
+        return Plan([Column(place)], [[table] for table in tables], real[1:] == "f4")
 
 
 def _only(root: Node, key: str) -> int:

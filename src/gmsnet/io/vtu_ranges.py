@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.io.ranges import Plan, Ranges, Rows
+from gmsnet.io.ranges import Column, Plan, Ranges, Rows
 from gmsnet.io.vtk_runs import means_more, tables_of
 from gmsnet.io.vtu_reader import TYPES, Reader
 from gmsnet.io.vtu_xml import DataArray
@@ -69,7 +69,8 @@ def plan(file: Ranges) -> Plan | None:
     if not tables:
         return None
     size = int(at.dtype[2:])
-    return Plan(Rows(at.begin, points, 3 * size, at.dtype, 3), [[table] for table in tables], size == 4)
+    column = Column(Rows(at.begin, points, 3 * size, at.dtype, 3))
+    return Plan([column], [[table] for table in tables], size == 4)
 
 
 def _arrays(file: Ranges, reader: Reader, begin: int, end: int) -> dict[tuple[int, int], Array] | None:
