@@ -35,7 +35,7 @@ SEAMS: dict[ModuleType, dict[str, int]] = {
     cells: {"MOST_BLOCKS": 3},
     places: {"MOST_LATTICES": 3},
     text: {"MOST_ROWS": 2},
-    gmsh_sections: {"_TOGETHER": 8},
+    gmsh_sections: {"_TOGETHER": 8, "_ALIKE": 2},
     stl: {"_TOGETHER": 2},
     splice: {"ROWS": 2, "_PIECE": 128},
 }

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -17,6 +17,7 @@ from gmsnet.distributed.agreement import agreed, everywhere, raise_everywhere
 from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.partition import along_curve
 from gmsnet.distributed.piece import Cells, Piece
+from gmsnet.distributed.tags import nodes_of
 from gmsnet.errors import FormatError, GmsnetError, InputError
 from gmsnet.io.atomic import replace_files
 from gmsnet.io.formats import FORMATS
@@ -24,7 +25,7 @@ from gmsnet.io.pieces import Piece as Bytes
 from gmsnet.io.ranges import AT_ONCE, Column, Plan, Ranges
 from gmsnet.io.stamps import Stamps
 
-PLANNED = ("ugrid", "vtkhdf", "vtu")  # formats whose files can tell how their numbers lie
+PLANNED = ("gmsh", "ugrid", "vtkhdf", "vtu")  # formats whose files can tell how their numbers lie
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
 Value = TypeVar("Value")
@@ -150,10 +151,12 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     """
     file = everywhere(comm, lambda: Ranges(name))
     agreed(comm, (file.stamp.size, file.stamp.modified), f"{name}: the file")
-    plan = comm.bcast(everywhere(comm, lambda: plan_of(file, format) if comm.rank == 0 else None))
+    plan = comm.bcast(everywhere(comm, lambda: _planned(file, format) if comm.rank == 0 else None))
     rows = np.array([plan.nodes * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
     first, last = rows[comm.rank : comm.rank + 2].tolist()
     read = everywhere(comm, lambda: _said(file, lambda: _blocks(file, plan, comm)))
+    if plan.tags:
+        read = _renumbered(comm, file, plan, read, first, last)
     mine = everywhere(comm, lambda: _said(file, lambda: plan.places(file, first, last)))
     ids, points, _ = _asked(comm, rows, mine, _ids_of([block.nodes[:, 0] for block in read]))
     blocks = _shared_out(comm, read, ids, points)
@@ -167,11 +170,40 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     return FileRanges(file, plan, piece, rows)
 
 
+def _planned(file: Ranges, format: str) -> Plan:
+    found = plan_of(file, format)
+    if found is None:
+        raise InputError(f"{file.path}: ranks cannot share this file")
+    return found
+
+
 def _blocks(file: Ranges, plan: Plan, comm: Any) -> list[Cells]:
     return [
         Cells(tables[0].kind, *plan.cells(file, block, comm.rank, comm.size))
         for block, tables in enumerate(plan.blocks)
     ]
+
+
+def _renumbered(comm: Any, file: Ranges, plan: Plan, read: Sequence[Cells], first: int, last: int) -> list[Cells]:
+    """Cells by nodes, of cells by tags. first, last: the nodes whose tags this rank reads."""
+    tags = everywhere(comm, lambda: _said(file, lambda: plan.tags_of(file, first, last)))
+    named = _ids_of([block.nodes for block in read])
+    nodes, twice = nodes_of(comm, tags, first, plan.nodes, named)
+
+    def checked() -> list[Cells]:
+        if len(twice):
+            node = int(twice.min())
+            tag = int(plan.tags_of(file, node, node + 1)[0])
+            raise FormatError(f"byte {plan.byte_of_tag(node)}: the node {tag} is given twice")
+        found = [replace(block, nodes=nodes[np.searchsorted(named, block.nodes)]) for block in read]
+        for number, (block, old) in enumerate(zip(found, read, strict=True)):
+            if (block.nodes < 0).any():
+                row, column = np.argwhere(block.nodes < 0)[0].tolist()
+                raise FormatError(f"byte {plan.byte_of_cell(number, int(block.numbers[row]))}: a cell names the node "
+                                  f"{old.nodes[row, column]}, which the file has not")  # fmt: skip
+        return found
+
+    return everywhere(comm, lambda: _said(file, checked))
 
 
 def _said(file: Ranges, make: Callable[[], Value]) -> Value:

@@ -7,7 +7,6 @@ nodes, elements and physical groups are kept as they are.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
@@ -15,16 +14,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io import convert, vtk_ghosts
+from gmsnet.io import convert, gmsh_ranges, vtk_ghosts
 from gmsnet.io import gmsh_sections as sections
 from gmsnet.io.cell_table import table_blocks
 from gmsnet.io.cells import counted, distinct, first_repeated, places_of
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.gmsh_entities import ghost_marks, merge_groups, read_entities, without_interfaces
+from gmsnet.io.gmsh_cursor import Cursor, opened, show
+from gmsnet.io.gmsh_entities import (
+    ghost_marks,
+    group_numbers,
+    merge_groups,
+    read_entities,
+    read_names,
+    without_interfaces,
+)
 from gmsnet.io.gmsh_periodic import nodes_of_images, read_images
-from gmsnet.io.gmsh_sections import KINDS, Contents, Cursor, Elements, Nodes
+from gmsnet.io.gmsh_sections import KINDS, Contents, Elements, Nodes
 from gmsnet.io.pieces import Piece, Pieces
+from gmsnet.io.ranges import Plan, Ranges
 from gmsnet.io.text import quoted
 from gmsnet.mesh.mesh import Mesh
 
@@ -32,10 +40,6 @@ name = "Gmsh"
 suffixes: tuple[str, ...] = (".msh",)
 
 CODES = {kind.name: code for code, kind in KINDS.items()}
-_HEAD = re.compile(rb"\s*\$MeshFormat\s+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*(?:\r\n?|\n)")
-MOST_TAG = 2**31
-_BEGIN = 4096  # bytes, white space and what an old file begins with
-_NAME = re.compile(rb'\s*([0-3])\s+(-?\d{1,18})\s+"([^"\r\n]*)"')
 
 
 def read(files: Mapping[str, Data]) -> Parsed:
@@ -54,7 +58,7 @@ class Facts(NamedTuple):
 
 def facts(data: Data) -> Facts:
     """The facts of a file. Raises the errors of ``read``."""
-    source, old = _open(data)
+    source, old = opened(data)
     found, seen = Contents(), set[bytes]()
     while title := source.word():
         here = source.at - len(title)
@@ -77,36 +81,12 @@ def facts(data: Data) -> Facts:
 _READERS = (b"$PhysicalNames", b"$Entities", b"$PartitionedEntities", b"$Nodes", b"$Elements")
 
 
-def _open(data: Data) -> tuple[Cursor, bool]:
-    """The file behind its first section, and whether its version is 2.2."""
-    head = _HEAD.match(data)
-    if head is None and not data[:_BEGIN].lstrip().startswith(b"$NOD"):
-        raise FormatError("line 1: not a Gmsh file: it must start with $MeshFormat, the version, 0 or 1, and 8")
-    version = head[1].decode("latin-1") if head else "1"
-    if head is None or version not in ("2.2", "4.1"):
-        mend = "convert it with 'gmsh OLD.msh -save -format msh41 -o NEW.msh'"
-        raise FormatError(f"Gmsh's format {version[:24]!r} is not supported, 2.2 and 4.1 are: {mend}")
-    if head[2] not in (b"0", b"1") or head[3] != b"8":
-        raise FormatError("$MeshFormat must say 0 (text) or 1 (binary) and the size 8 of its numbers")
-    at, order = head.end(), ""
-    if head[2] == b"1":
-        one, at = data[at : at + 4], at + 4
-        order = {b"\1\0\0\0": "<", b"\0\0\0\1": ">"}.get(one, "")
-        if not order:
-            raise FormatError(f"byte {at - 4}: the number 1 must follow, which tells the byte order")
-    source = Cursor(data, at, order)
-    here = source.at
-    if source.word() != b"$EndMeshFormat":
-        source.fail(here, "expected $EndMeshFormat")
-    return source, version == "2.2"
-
-
 def _section(source: Cursor, title: bytes, found: Contents, old: bool) -> None:
     """Reads on to the end of the section that has begun."""
     if title == b"ParametricNodes":
         source.fail(source.at, "$ParametricNodes are not supported: save the mesh without parametric coordinates")
     if title == b"PhysicalNames":
-        _physical_names(source, found)
+        read_names(source, found)
     elif title == b"Periodic":
         words = source.words(title, as_text=old)
         found.images = np.concatenate([found.images, read_images(words, old)])
@@ -115,14 +95,9 @@ def _section(source: Cursor, title: bytes, found: Contents, old: bool) -> None:
     elif title not in (b"Entities", b"PartitionedEntities", b"Nodes", b"Elements") or (old and b"Entities" in title):
         source.skip_section(title)
         if title != b"Comments":
-            found.others[f"${sections.show(title)}"] = None
+            found.others[f"${show(title)}"] = None
     else:
-        count = 0
-        if old and source.order:  # the count is text, and binary numbers follow
-            here, text = source.at, source.word()
-            if not re.fullmatch(rb"\d{1,18}", text):
-                source.fail(here, f"a count was expected, found {quoted(text)}")
-            count = int(text)
+        count = source.count() if old and source.order else 0  # in a text, and binary numbers follow
         words = source.words(title)
         if old and not source.order:
             (count,) = sections.counts(words, 1)
@@ -133,25 +108,6 @@ def _section(source: Cursor, title: bytes, found: Contents, old: bool) -> None:
         else:
             read_entities(words, title == b"PartitionedEntities", found)
         source.close(title, words)
-
-
-def _physical_names(source: Cursor, found: Contents) -> None:
-    here, text = source.at, source.word()
-    if not re.fullmatch(rb"\d{1,18}", text):
-        source.fail(here, f"a count was expected, found {quoted(text)}")
-    for _ in range(int(text)):
-        match = _NAME.match(source.data, source.at)
-        if match is None:
-            source.fail(source.at, 'expected a physical name: dimension, number, "name"')
-        source.at = match.end()
-        try:
-            called = match[3].decode("utf-8")
-        except UnicodeDecodeError:
-            called = match[3].decode("latin-1")
-        found.names[int(match[1]), int(match[2])] = called
-    here = source.at
-    if source.word() != b"$EndPhysicalNames":
-        source.fail(here, "$PhysicalNames does not end where its count says")
 
 
 def _assemble(found: Contents, nodes: Nodes, elements: Elements) -> Parsed:
@@ -165,7 +121,7 @@ def _assemble(found: Contents, nodes: Nodes, elements: Elements) -> Parsed:
     names = merge_groups(found, elements)
     regions = elements.physical
     if regions is None:
-        regions = _regions(found, elements, names)
+        regions = group_numbers(found, elements, names)
     unread = _unread(found, nodes, elements, regions)
     kept, between = without_interfaces(found, elements)
     codes, sizes = elements.codes, elements.sizes
@@ -198,24 +154,9 @@ def _unread(found: Contents, nodes: Nodes, elements: Elements, regions: NDArray[
     return unread
 
 
-def _regions(found: Contents, elements: Elements, names: dict[tuple[int, int], str]) -> NDArray[np.int64]:
-    """The physical tag of each element of version 4.1; each combination of several gets a number and a name."""
-    assert elements.entity is not None
-    assert elements.number is not None
-    entities, which = np.unique(elements.entity, axis=0, return_inverse=True)
-    groups = [found.physical.get((dim, tag), ()) for dim, tag in entities.tolist()]
-    tags = [abs(tag) for group in found.physical.values() for tag in group] + [abs(tag) for _, tag in names]
-    combined = sorted({group for group in groups if len(group) > 1})
-    last = max(tags, default=0)
-    if combined and last >= MOST_TAG:
-        raise FormatError(f"the physical tag {last} is larger than those that Gmsh has, of 32 bits")
-    number = {group: 1 + last + k for k, group in enumerate(combined)}
-    for (dim, _), group in zip(entities.tolist(), groups, strict=True):
-        if group in number:
-            parts = [names.get((dim, abs(tag)), str(tag)) for tag in group]
-            names[dim, number[group]] = " + ".join(parts)
-    numbers = [number.get(group, group[0] if group else 0) for group in groups]
-    return np.repeat(np.array(numbers, dtype=np.int64)[which.reshape(-1)], elements.number)
+def plan(file: Ranges) -> Plan | None:
+    """See ``gmsh_ranges.plan``."""
+    return gmsh_ranges.plan(file)
 
 
 def write(mesh: Mesh) -> Written:

@@ -13,14 +13,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS
+from gmsnet.errors import FormatError
 from gmsnet.io import gmsh_sections as sections
+from gmsnet.io.gmsh_cursor import Cursor
 from gmsnet.io.gmsh_sections import KINDS, SIZES, Contents, Elements
 from gmsnet.io.vtk_ghosts import DUPLICATE, TYPES
 from gmsnet.io.words import Words
 
 # What Gmsh calls the part of a physical group in a partition, or between several.
-_PART = re.compile(r"_part\{(\d+(?:,\d+)*)\}_physical\{(\d{1,18})\}_dim\{[0-3]\}")
+PART = re.compile(r"_part\{(\d+(?:,\d+)*)\}_physical\{(\d{1,18})\}_dim\{[0-3]\}")
+MOST_TAG = 2**31
+_NAME = re.compile(rb'\s*([0-3])\s+(-?\d{1,18})\s+"([^"\r\n]*)"')
 _DIMENSIONS = np.array([CELLS[KINDS[code].name].dimension if code in KINDS else 3 for code in range(len(SIZES))])
+
+
+def read_names(source: Cursor, found: Contents) -> None:
+    """The section ``$PhysicalNames``, a text in all files."""
+    for _ in range(source.count()):
+        match = _NAME.match(source.data, source.at)
+        if match is None:
+            source.fail(source.at, 'expected a physical name: dimension, number, "name"')
+        source.at = match.end()
+        try:
+            called = match[3].decode("utf-8")
+        except UnicodeDecodeError:
+            called = match[3].decode("latin-1")
+        found.names[int(match[1]), int(match[2])] = called
+    here = source.at
+    if source.word() != b"$EndPhysicalNames":
+        source.fail(here, "$PhysicalNames does not end where its count says")
 
 
 def read_entities(words: Words, partitioned: bool, found: Contents) -> None:
@@ -45,7 +66,7 @@ def merge_groups(found: Contents, elements: Elements) -> dict[tuple[int, int], s
 
     What is between partitions belongs to no group.
     """
-    parts = {key: match for key, name in found.names.items() if (match := _PART.fullmatch(name))}
+    parts = {key: match for key, name in found.names.items() if (match := PART.fullmatch(name))}
     if not parts:
         return dict(found.names)
     whole = {key: 0 if "," in match[1] and key[0] < 2 else int(match[2]) for key, match in parts.items()}
@@ -89,3 +110,23 @@ def ghost_marks(found: Contents, elements: Elements) -> dict[str, NDArray[np.uin
     copies = np.isin(elements.entity[:, 1], list(found.ghosts))
     copies &= [(dim, tag) not in found.physical for dim, tag in elements.entity.tolist()]
     return {TYPES: np.repeat(copies, elements.number).astype(np.uint8) * DUPLICATE} if copies.any() else {}
+
+
+def group_numbers(found: Contents, elements: Elements, names: dict[tuple[int, int], str]) -> NDArray[np.int64]:
+    """The physical tag of each element of version 4.1; each combination of several gets a number and a name."""
+    assert elements.entity is not None
+    assert elements.number is not None
+    entities, which = np.unique(elements.entity, axis=0, return_inverse=True)
+    groups = [found.physical.get((dim, tag), ()) for dim, tag in entities.tolist()]
+    tags = [abs(tag) for group in found.physical.values() for tag in group] + [abs(tag) for _, tag in names]
+    combined = sorted({group for group in groups if len(group) > 1})
+    last = max(tags, default=0)
+    if combined and last >= MOST_TAG:
+        raise FormatError(f"the physical tag {last} is larger than those that Gmsh has, of 32 bits")
+    number = {group: 1 + last + k for k, group in enumerate(combined)}
+    for (dim, _), group in zip(entities.tolist(), groups, strict=True):
+        if group in number:
+            parts = [names.get((dim, abs(tag)), str(tag)) for tag in group]
+            names[dim, number[group]] = " + ".join(parts)
+    numbers = [number.get(group, group[0] if group else 0) for group in groups]
+    return np.repeat(np.array(numbers, dtype=np.int64)[which.reshape(-1)], elements.number)

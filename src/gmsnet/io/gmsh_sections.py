@@ -6,8 +6,7 @@ one is; the numbers within the blocks are only addressed, and read all at once a
 
 from __future__ import annotations
 
-import re
-import struct
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NoReturn
 
@@ -17,11 +16,9 @@ from numpy.typing import NDArray
 from gmsnet.cells.table import nodes_of
 from gmsnet.io.cell_table import Kind
 from gmsnet.io.cells import joined
-from gmsnet.io.contents import Data
 from gmsnet.io.places import Addresses, Lattice, Places, chained, lists, pick, shifted
 from gmsnet.io.splice import Slots
-from gmsnet.io.text import Text, fail, quoted
-from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
+from gmsnet.io.words import ByteWords, Words
 from gmsnet.kernels.text import text as kernels
 
 _HEX20 = (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)
@@ -40,6 +37,7 @@ SIZES = np.array([nodes_of(KINDS[code].name) if code in KINDS else 0 for code in
 
 PARTITIONED = 4  # tags of an element in version 2.2: group, entity, number of partitions, partitions
 _TOGETHER = 1 << 20  # numbers of elements that are looked at together
+_ALIKE = 1 << 16  # heads of elements, likewise
 
 
 @dataclass
@@ -97,64 +95,6 @@ class Contents:
     others: dict[str, None] = field(default_factory=dict)
 
 
-class Cursor:
-    """A Gmsh file. at: the byte that reading goes on from; order: of a binary file, empty for a text."""
-
-    data: Data
-    at: int
-    order: str
-
-    def __init__(self, data: Data, at: int, order: str) -> None:
-        self.data, self.at, self.order = data, at, order
-
-    def fail(self, offset: int, message: str) -> NoReturn:
-        """Raises FormatError with the line, in a binary file the byte, in front."""
-        if self.order:
-            fail_at(offset, message)
-        fail(self.data, offset, message)
-
-    def word(self) -> bytes:
-        """The next word, and behind it the one line end that binary data follow. Nothing: the end of the file."""
-        match = re.compile(rb"\s*(\S*)(?:[ \t]*(?:\r\n?|\n))?").match(self.data, self.at)
-        assert match is not None  # the pattern fits everywhere
-        self.at = match.end()
-        return match[1]
-
-    def skip_section(self, title: bytes) -> None:
-        """Goes behind the end of a section that is not read."""
-        found = self.data.find(b"$End" + title, self.at)
-        if found < 0:
-            self.fail(self.at, f"$End{show(title)} is missing: the file is cut off")
-        self.at = found + len(title) + 4
-
-    def words(self, title: bytes, as_text: bool = False) -> Words:
-        """The numbers of the section that begins here. as_text: it is a text in binary files, too."""
-        if self.order and not as_text:
-            return ByteWords(self.data, self.order, self.at)
-        stop = self.data.find(b"$End" + title, self.at)
-        if stop < 0:
-            self.fail(len(self.data), f"$End{show(title)} is missing: the file is cut off")
-        text = Text(self.data, stop=stop)
-        starts, _ = text.tokens(self.at)
-        self.at = stop
-        return TextWords(text, starts)
-
-    def close(self, title: bytes, words: Words) -> None:
-        """The section must end where its counts say."""
-        if isinstance(words, ByteWords):
-            self.at = words.at
-        elif words.at < words.end:
-            words.fail(words.at, f"${show(title)} goes on where its counts say that it ends")
-        here = self.at
-        if self.word() != b"$End" + title:
-            self.fail(here, f"${show(title)} does not end where its counts say")
-
-
-def show(title: bytes) -> str:
-    """The name of a section for a message, whatever bytes it has."""
-    return quoted(title)[1:-1]
-
-
 def ints(words: Words, count: int, kind: str = "i4") -> list[int]:
     """The next integers."""
     found: list[int] = words.values(words.take(count, kind), kind).tolist()
@@ -181,18 +121,30 @@ def skip(words: Words, *numbers: tuple[int, str]) -> int:
 
 
 def nodes_old(words: Words, count: int) -> Nodes:
-    """Nodes of version 2.2: rows of a tag and three coordinates."""
+    """Nodes of version 2.2."""
+    tags, at = node_rows(words, count)
+    return _nodes(words, Places(tags), "i4", Places(at))
+
+
+def node_rows(words: Words, count: int) -> tuple[Lattice, Lattice]:
+    """Where the tags and the coordinates of version 2.2 stand: rows of both."""
     start, tag, unit = skip(words, (count, "i4"), (3 * count, "f8")), words.size("i4"), words.size("f8")
     row = tag + 3 * unit
-    at = Places(Lattice(start, count, row, (tag, tag + unit, tag + 2 * unit)))
-    return _nodes(words, Places(Lattice(start, count, row)), "i4", at)
+    return Lattice(start, count, row), Lattice(start, count, row, (tag, tag + unit, tag + 2 * unit))
 
 
 def nodes_new(words: Words) -> Nodes:
-    """Nodes of version 4.1: blocks of tags and then of coordinates, which u, v, w may follow."""
+    """Nodes of version 4.1."""
+    tags, points = node_blocks(words)
+    return _nodes(words, Places(*tags), "u8", Places(*points))
+
+
+def node_blocks(words: Words) -> tuple[list[Lattice], list[Lattice]]:
+    """Where the tags and the coordinates of version 4.1 stand: blocks of tags, then of coordinates, which u, v, w may
+    follow."""
     blocks, total, _, _ = counts(words, 4)
     tag, unit = words.size("u8"), words.size("f8")
-    tags, points = [], []
+    tags, points = list[Lattice](), list[Lattice]()
     for _ in range(blocks):
         dimension, _, parametric = ints(words, 3)
         if not 0 <= dimension <= 3 or parametric not in (0, 1):
@@ -203,7 +155,7 @@ def nodes_new(words: Words) -> Nodes:
         points.append(Lattice(skip(words, (count * width, "f8")), count, width * unit, (0, unit, 2 * unit)))
     if (found := sum(lattice.rows for lattice in tags)) != total:
         words.fail(words.at, f"$Nodes announces {total} nodes, but its blocks have {found}")
-    return _nodes(words, Places(*tags), "u8", Places(*points))
+    return tags, points
 
 
 def _nodes(words: Words, tags_at: Places, kind: str, at: Places) -> Nodes:
@@ -212,10 +164,23 @@ def _nodes(words: Words, tags_at: Places, kind: str, at: Places) -> Nodes:
 
 
 def elements_new(words: Words) -> Elements:
-    """Elements of version 4.1: blocks of one entity and type, rows of a tag and the nodes."""
+    """Elements of version 4.1."""
+    heads, places = element_blocks(words)
+    at_nodes, number = Places(*places), heads[:, 3]
+    nodes = words.values(at_nodes, "u8")
+    return Elements(
+        np.repeat(heads[:, 2].astype(np.int8), number), nodes, at_nodes, words, entity=heads[:, :2], number=number
+    )
+
+
+def element_blocks(words: Words) -> tuple[NDArray[np.int64], list[Lattice]]:
+    """Blocks of version 4.1, each of one entity and type: rows of a tag and the nodes.
+
+    Returns (blocks, 4) the dimension and tag of the entity, type and number of elements, and where the nodes stand.
+    """
     blocks, total, _, _ = counts(words, 4)
     unit = words.size("u8")
-    heads, places = [], []
+    heads, places = [], list[Lattice]()
     for _ in range(blocks):
         at = words.at
         dimension, tag, code = ints(words, 3)
@@ -224,13 +189,10 @@ def elements_new(words: Words) -> Elements:
         start = skip(words, (count * (1 + size), "u8"))
         heads.append((dimension, tag, code, count))
         places.append(Lattice(start, count, (1 + size) * unit, tuple(unit * k for k in range(1, 1 + size))))
-    dimensions, tags, codes, number = np.array(heads, dtype=np.int64).reshape(-1, 4).T
-    if number.sum() != total:
-        words.fail(words.at, f"$Elements announces {total} elements, but its blocks have {number.sum()}")
-    at_nodes = Places(*places)
-    nodes = words.values(at_nodes, "u8")
-    entity = np.stack([dimensions, tags], axis=1)
-    return Elements(np.repeat(codes.astype(np.int8), number), nodes, at_nodes, words, entity=entity, number=number)
+    found = np.array(heads, dtype=np.int64).reshape(-1, 4)
+    if found[:, 3].sum() != total:
+        words.fail(words.at, f"$Elements announces {total} elements, but its blocks have {found[:, 3].sum()}")
+    return found, places
 
 
 def elements_old(words: Words, total: int) -> Elements:
@@ -274,28 +236,51 @@ def _blame(words: Words, values: NDArray[np.int64], found: int, total: int) -> N
 
 
 def _elements_of_bytes(words: ByteWords, total: int) -> Elements:
-    """Elements of version 2.2 in a binary file: blocks with one type and number of tags have a head each."""
-    head, codes, physical, places, done = struct.Struct(words.order + "3i"), [], [], [], 0
-    parted: list[NDArray[np.bool_]] = []
-    while done < total:
-        at = skip(words, (3, "i4"))
-        code, count, tags = head.unpack_from(words.data, at)
-        size = node_count(words, at, code)
-        if count <= 0 or tags < 0 or done + count > total:
-            words.fail(at, f"a block of {count} elements with {tags} tags each cannot be right")
-        row = 4 * (1 + tags + size)
-        start = skip(words, (count * row // 4, "i4"))
-        codes.append(np.full(count, code, dtype=np.int8))
-        physical.append(words.values(Places(Lattice(start + 4, count if tags else 0, row)), "i4"))
-        physical.append(np.zeros(0 if tags else count, dtype=np.int64))
-        parted.append(np.full(count, tags >= PARTITIONED))
-        places.append(Lattice(start, count, row, tuple(4 * (1 + tags + k) for k in range(size))))
-        done += count
+    """Elements of version 2.2 in a binary file."""
+    codes, physical, parted, places = [], [], [], []
+    for code, tags, rows in element_runs(words, total):
+        number, size = rows.rows, node_count(words, rows.start, code)
+        codes.append(np.full(number, code, dtype=np.int8))
+        physical.append(words.values(Places(Lattice(rows.start + 4, number if tags else 0, rows.stride)), "i4"))
+        physical.append(np.zeros(0 if tags else number, dtype=np.int64))
+        parted.append(np.full(number, tags >= PARTITIONED))
+        columns = tuple(4 * (1 + tags + k) for k in range(size))
+        places.append(Lattice(rows.start, number, rows.stride, columns))
     at_nodes = Places(*places)
     return Elements(
         joined(codes, np.int8), words.values(at_nodes, "i4"), at_nodes, words,
         physical=joined(physical), partitioned=joined(parted, np.bool_),
     )  # fmt: skip
+
+
+def element_runs(words: ByteWords, total: int) -> Iterator[tuple[int, int, Lattice]]:
+    """Elements of version 2.2 in a binary file, each a tag, the tags of its groups and its nodes: runs of them with
+    their type, how many tags of groups they have, and where their own tags stand.
+
+    Blocks of elements have a head each: type, number of elements, number of tags. Gmsh makes each element a block.
+    """
+    done, most = 0, 1
+    while done < total:
+        at = words.at
+        code, count, tags = ints(words, 3)
+        size = node_count(words, at, code)
+        if count <= 0 or tags < 0 or done + count > total:
+            words.fail(at, f"a block of {count} elements with {tags} tags each cannot be right")
+        row = 4 * (1 + tags + size)
+        start = skip(words, (count * row // 4, "i4"))
+        if count > 1:
+            done += count
+            yield code, tags, Lattice(start, count, row)
+            continue
+        run, room = 1, min(most, total - done, (words.end - at) // (12 + row))
+        if room > 1:
+            heads = words.values(Places(Lattice(at, room, 12 + row, (0, 4, 8))), "i4").reshape(room, 3)
+            alike = (heads == (code, 1, tags)).all(axis=1)
+            run = room if alike.all() else int(np.argmin(alike))
+            skip(words, ((run - 1) * (12 + row) // 4, "i4"))
+        most = min(2 * most, _ALIKE) if run == room else 2 * run  # as many as before are looked at, in the end
+        done += run
+        yield code, tags, Lattice(start, run, 12 + row)
 
 
 def node_count(words: Words, at: int, code: int) -> int:

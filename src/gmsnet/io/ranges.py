@@ -7,6 +7,7 @@ a plan is the mesh that the format's reader makes of the whole file.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.atomic import reason
+from gmsnet.io.cells import MOST_BLOCKS
 from gmsnet.io.contents import refuse_unless_regular
 from gmsnet.io.stamps import Stamp
 
@@ -127,11 +129,12 @@ class Table(NamedTuple):
 @dataclass(frozen=True)
 class Plan:
     """points: the coordinates of all nodes, in the order of the file. blocks: of the mesh, each of one table or several
-    of one kind. single: see Mesh."""
+    of one kind. single: see Mesh. tags: those of all nodes, where cells name these by tags; see ``tags_of``."""
 
     points: Sequence[Column]
     blocks: Sequence[Sequence[Table]]
     single: bool
+    tags: Sequence[Rows] = ()
 
     @property
     def nodes(self) -> int:
@@ -153,34 +156,66 @@ class Plan:
             found[start + begin - first : start + end - first, axis : axis + rows.width] = some
         return found
 
+    def tags_of(self, file: Ranges, first: int, last: int) -> NDArray[np.int64]:
+        """(last − first,) the tags of some nodes."""
+        parts, before = [np.empty(0, dtype=np.int64)], 0
+        for rows in self.tags:
+            parts.append(rows.of(file, max(first - before, 0), min(last - before, rows.rows))[:, 0].astype(np.int64))
+            before += rows.rows
+        return np.concatenate(parts)
+
+    def byte_of_tag(self, node: int) -> int:
+        """Where the tag of a node stands."""
+        for rows in self.tags:
+            if node < rows.rows:
+                return rows.start + node * rows.stride
+            node -= rows.rows
+        raise IndexError(node)
+
+    def byte_of_cell(self, block: int, number: int) -> int:
+        """Where the nodes of a cell of a block stand."""
+        for table in self.blocks[block]:
+            if number < table.nodes.rows:
+                return table.nodes.start + number * table.nodes.stride
+            number -= table.nodes.rows
+        raise IndexError(number)
+
     def cells(self, file: Ranges, block: int, rank: int, ranks: int) -> tuple[NDArray[np.int64], ...]:
         """Nodes (n, k), regions (n,) and numbers (n,) of the cells of a block that are the share of one of so many.
 
-        Raises FormatError where a cell names a node that is not there.
+        Nodes are told by their tags where they have any. Raises FormatError where a cell names one that is not there.
         """
         tables = self.blocks[block]
-        total = sum(table.nodes.rows for table in tables)
+        total, before = sum(table.nodes.rows for table in tables), 0
         first, last = (total * part // ranks for part in (rank, rank + 1))
-        nodes, regions, before = [np.empty((0, tables[0].nodes.width), dtype=np.int64)], [np.empty(0, np.int64)], 0
+        nodes, regions = [np.empty((0, tables[0].nodes.width), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
         for table in tables:
             begin, end = max(first - before, 0), min(last - before, table.nodes.rows)
+            if begin < end:
+                listed = table.nodes.of(file, begin, end).astype(np.int64) - table.base
+                if not self.tags:
+                    self._check(listed, block, before + begin)
+                nodes.append(listed if table.order is None else listed[:, table.order])
+                own = None if table.regions is None else table.regions.of(file, begin, end)
+                alike = np.full(end - begin, table.region, dtype=np.int64)
+                regions.append(alike if own is None else own[:, 0].astype(np.int64))
             before += table.nodes.rows
-            if begin >= end:
-                continue
-            listed = table.nodes.of(file, begin, end).astype(np.int64) - table.base
-            self._check(listed, table, begin)
-            nodes.append(listed if table.order is None else listed[:, table.order])
-            own = None if table.regions is None else table.regions.of(file, begin, end)
-            alike = np.full(end - begin, table.region, dtype=np.int64)
-            regions.append(alike if own is None else own[:, 0].astype(np.int64))
         return np.concatenate(nodes), np.concatenate(regions), np.arange(first, last)
 
-    def _check(self, nodes: NDArray[np.int64], table: Table, first: int) -> None:
-        wrong = ((nodes < 0) | (nodes >= self.nodes)).any(axis=1)
+    def _check(self, nodes: NDArray[np.int64], block: int, first: int) -> None:
+        wrong = (nodes < 0) | (nodes >= self.nodes)
         if wrong.any():
-            row = int(np.argmax(wrong))
-            node = nodes[row][(nodes[row] < 0) | (nodes[row] >= self.nodes)][0]
+            row = int(np.argmax(wrong.any(axis=1)))
             raise FormatError(
-                f"byte {table.nodes.start + (first + row) * table.nodes.stride}: a cell names the node {node}, but the "
-                f"nodes are 0 to {self.nodes - 1} (counted from 0)"
+                f"byte {self.byte_of_cell(block, first + row)}: a cell names the node {nodes[row][wrong[row]][0]}, but "
+                f"the nodes are 0 to {self.nodes - 1} (counted from 0)"
             )
+
+
+def blocks_of(tables: Sequence[Table]) -> list[list[Table]]:
+    """Tables of cells in the order of a file, as blocks that a reader makes of them (see ``cells.cell_blocks``)."""
+    filled = [table for table in tables if table.nodes.rows]
+    runs = [list(run) for _, run in itertools.groupby(filled, key=lambda table: table.kind)]
+    if len(runs) <= MOST_BLOCKS:
+        return runs
+    return [[table for table in filled if table.kind == kind] for kind in dict.fromkeys(each.kind for each in filled)]
