@@ -20,6 +20,7 @@ from gmsnet.generate import random_mesh, random_volume, recombine
 from gmsnet.io import ugrid
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.selection import held_by_data
 from gmsnet.run.options import SmoothOptions
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
@@ -166,6 +167,8 @@ def assert_read_alike(path: Path, format: str, ranks: int) -> None:
     assert whole.ids.tolist() == list(range(len(mesh.points)))
     assert whole.mesh.points.tobytes() == mesh.points.tobytes()
     assert whole.mesh.single == mesh.single
+    held = held_by_data(mesh.point_data["fixed"]).tolist() if "fixed" in mesh.point_data else [False] * len(whole.ids)
+    assert whole.fixed.tolist() == held
     assert [block.kind for block in whole.mesh.cells] == [block.kind for block in mesh.cells]
     for mine, block in zip(whole.mesh.cells, mesh.cells, strict=True):
         assert mine.nodes.tolist() == block.nodes.tolist()
@@ -233,14 +236,26 @@ def test_which_files_are_shared(tmp_path: Path) -> None:
     assert shared_format(str(tmp_path / "none.lb8.ugrid"), str(tmp_path / "b.lb8.ugrid")) == ""
 
 
-@pytest.mark.parametrize("name", ["PointData/fixed", "CellData/material", "CellData/vtkGhostType"])
-def test_fields_that_mean_more_are_for_the_reader_of_the_whole(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "kind", "shared"),
+    [
+        ("PointData/fixed", np.float64, "vtkhdf"),
+        ("CellData/material", np.int32, "vtkhdf"),
+        ("CellData/material", np.float32, ""),
+        ("CellData/vtkGhostType", np.uint8, ""),
+    ],
+)
+def test_fields_that_mean_more(name: str, kind: type, shared: str, tmp_path: Path) -> None:
+    """Those that only a reader of them all understands are for such a one."""
     mesh = random_mesh(50, seed=1)
     path = save_vtkhdf(mesh, tmp_path / "a.vtkhdf")
-    assert planned_format(str(path), "vtkhdf") == "vtkhdf"
+    rows = len(mesh.points) if name.startswith("Point") else sum(len(block.nodes) for block in mesh.cells)
     with h5py.File(path, "a") as file:
-        rows = len(mesh.points) if name.startswith("Point") else sum(len(block.nodes) for block in mesh.cells)
-        file["VTKHDF"].create_dataset(name, data=np.zeros(rows, dtype=np.int32))
+        file["VTKHDF"].create_dataset(name, data=np.zeros(rows, dtype=kind))
+    assert planned_format(str(path), "vtkhdf") == shared
+    with h5py.File(path, "a") as file:
+        del file["VTKHDF"][name]
+        file["VTKHDF"].create_dataset(name, data=np.zeros(rows + 1, dtype=kind))
     assert planned_format(str(path), "vtkhdf") == ""
 
 
@@ -249,7 +264,7 @@ def test_fields_that_mean_more_are_for_the_reader_of_the_whole(name: str, tmp_pa
     [
         ("", "vtu"),
         ('<CellData><DataArray type="UInt8" Name="heat" format="appended" offset="{offset}"/></CellData>', "vtu"),
-        ('<CellData><DataArray type="UInt8" Name="material" format="appended" offset="{offset}"/></CellData>', ""),
+        ('<CellData><DataArray type="UInt8" Name="material" format="appended" offset="{offset}"/></CellData>', "vtu"),
         ('<CellData><DataArray type="UInt8" Name="vtkGhostType" format="appended" offset="{offset}"/></CellData>', ""),
         ('<CellData><DataArray type="UInt8" Name="heat" format="appended" offset="3"/></CellData>', ""),
         ('<CellData><DataArray type="UInt8" Name="heat" format="ascii">1 2 3</DataArray></CellData>', ""),

@@ -25,7 +25,7 @@ from gmsnet.io.pieces import Piece as Bytes
 from gmsnet.io.ranges import AT_ONCE, Column, Plan, Ranges
 from gmsnet.io.stamps import Stamps
 
-PLANNED = ("gmsh", "ugrid", "vtkhdf", "vtu")  # formats whose files can tell how their numbers lie
+PLANNED = ("gmsh", "ugrid", "vtk", "vtkhdf", "vtu")  # formats whose files can tell how their numbers lie
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
 Value = TypeVar("Value")
@@ -164,9 +164,12 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     ids = np.concatenate([ids, np.flatnonzero(lonely) + rows[comm.rank]])
     order = np.argsort(ids)
     ids, points = ids[order], np.concatenate([points, mine[lonely]])[order]
+    fixed = np.zeros(len(ids), dtype=bool)
+    if plan.fixed is not None:
+        held = everywhere(comm, lambda: _said(file, lambda: plan.fixed.of(file, first, last) != 0))
+        fixed = _asked(comm, rows, held.any(axis=1, keepdims=True).astype(np.float64), ids)[1][:, 0] != 0
     everywhere(comm, file.check)
-    none = np.zeros(len(ids), dtype=bool)
-    piece = everywhere(comm, lambda: Piece(ids, points, none, tuple(blocks), plan.single))
+    piece = everywhere(comm, lambda: Piece(ids, points, fixed, tuple(blocks), plan.single))
     return FileRanges(file, plan, piece, rows)
 
 

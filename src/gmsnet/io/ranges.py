@@ -116,7 +116,7 @@ class Column(NamedTuple):
 
 class Table(NamedTuple):
     """Cells of one kind. nodes: of each, counted from ``base``. order: see Kind. region: of all of them, where
-    ``regions`` does not tell that of each."""
+    ``regions`` does not tell that of each. counts: numbers of nodes that the file tells of each, if it does."""
 
     kind: str
     nodes: Rows
@@ -124,17 +124,20 @@ class Table(NamedTuple):
     order: tuple[int, ...] | None = None
     region: int = 0
     regions: Rows | None = None
+    counts: Rows | None = None
 
 
 @dataclass(frozen=True)
 class Plan:
     """points: the coordinates of all nodes, in the order of the file. blocks: of the mesh, each of one table or several
-    of one kind. single: see Mesh. tags: those of all nodes, where cells name these by tags; see ``tags_of``."""
+    of one kind. single: see Mesh. tags: those of all nodes, where cells name these by tags. fixed: numbers of all
+    nodes; those that are not 0 are to be held."""
 
     points: Sequence[Column]
     blocks: Sequence[Sequence[Table]]
     single: bool
     tags: Sequence[Rows] = ()
+    fixed: Rows | None = None
 
     @property
     def nodes(self) -> int:
@@ -183,7 +186,8 @@ class Plan:
     def cells(self, file: Ranges, block: int, rank: int, ranks: int) -> tuple[NDArray[np.int64], ...]:
         """Nodes (n, k), regions (n,) and numbers (n,) of the cells of a block that are the share of one of so many.
 
-        Nodes are told by their tags where they have any. Raises FormatError where a cell names one that is not there.
+        Nodes are told by their tags where they have any. Raises FormatError where a cell names one that is not there,
+        and where it has another number of nodes than its kind.
         """
         tables = self.blocks[block]
         total, before = sum(table.nodes.rows for table in tables), 0
@@ -192,6 +196,7 @@ class Plan:
         for table in tables:
             begin, end = max(first - before, 0), min(last - before, table.nodes.rows)
             if begin < end:
+                self._check_counts(file, table, begin, end)
                 listed = table.nodes.of(file, begin, end).astype(np.int64) - table.base
                 if not self.tags:
                     self._check(listed, block, before + begin)
@@ -201,6 +206,15 @@ class Plan:
                 regions.append(alike if own is None else own[:, 0].astype(np.int64))
             before += table.nodes.rows
         return np.concatenate(nodes), np.concatenate(regions), np.arange(first, last)
+
+    def _check_counts(self, file: Ranges, table: Table, first: int, last: int) -> None:
+        if table.counts is None:
+            return
+        counts, width = table.counts.of(file, first, last)[:, 0], table.nodes.width
+        if (counts != width).any():
+            row = int(np.argmax(counts != width))
+            raise FormatError(f"byte {table.counts.start + (first + row) * table.counts.stride}: a {table.kind} with "
+                              f"{counts[row]} nodes instead of {width}")  # fmt: skip
 
     def _check(self, nodes: NDArray[np.int64], block: int, first: int) -> None:
         wrong = (nodes < 0) | (nodes >= self.nodes)

@@ -6,7 +6,6 @@ nodes has its length in front; since version 5 there are two arrays, OFFSETS and
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NoReturn
@@ -16,14 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io import convert, vtk_cells
+from gmsnet.io import convert, vtk_cells, vtk_ranges
 from gmsnet.io.cells import joined
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Addresses, Lattice, Places, lists, pick
+from gmsnet.io.ranges import Plan, Ranges
 from gmsnet.io.vtk_fields import attribute, field_arrays, keyword
-from gmsnet.io.vtk_stream import TYPES, Array, Line, Stream, word_of
+from gmsnet.io.vtk_stream import TYPES, Array, Line, Stream, opened, word_of
 from gmsnet.kernels.text import text as kernels
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX
@@ -36,11 +36,6 @@ TYPE_NAMES = {kind: called for called, kind in TYPES.items() if called not in ("
     "i8": "long",
     "u8": "unsigned_long",
 }
-_HEAD = re.compile(
-    rb"#\s*vtk\s+DataFile\s+Version\s+(\d+)\.\d+[^\r\n]*(?:\r\n?|\n)"
-    rb"[^\r\n]*(?:\r\n?|\n)\s*(ASCII|BINARY)[ \t]*(?:\r\n?|\n)",
-    re.IGNORECASE,
-)
 
 
 @dataclass(frozen=True)
@@ -70,23 +65,11 @@ class Contents:
 
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
-    data = files[".vtk"]
-    head = _HEAD.match(data)
-    if head is None:
-        raise FormatError("line 1: not a legacy VTK file: it must start with '# vtk DataFile Version', a title and "
-                          "ASCII or BINARY")  # fmt: skip
-    stream = Stream(data, head.end(), head[2].upper() == b"BINARY")
-    line = stream.line()
-    if line.key != "DATASET":
-        stream.fail(line.start, "expected DATASET")
-    (dataset,) = stream.expect(line, "DATASET type")
-    if dataset.upper() not in ("UNSTRUCTURED_GRID", "POLYDATA"):
-        stream.fail(line.start, f"a DATASET of type {word_of(dataset)} is not supported: "
-                                "write it as an UNSTRUCTURED_GRID")  # fmt: skip
+    stream, polygonal = opened(files[".vtk"])
     found = Contents()
     while (line := stream.line()).words:
         _section(stream, line, found)
-    return _assemble(stream, found, dataset.upper() == "POLYDATA")
+    return _assemble(stream, found, polygonal)
 
 
 def _section(stream: Stream, line: Line, found: Contents) -> None:
@@ -197,6 +180,11 @@ def _assemble(stream: Stream, found: Contents, polygonal: bool) -> Parsed:
         blame,
         found.others,
     )
+
+
+def plan(file: Ranges) -> Plan | None:
+    """See ``vtk_ranges.plan``."""
+    return vtk_ranges.plan(file)
 
 
 def write(mesh: Mesh) -> Written:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from numpy.typing import NDArray
 
 from gmsnet.io.vtk_stream import Line, Stream, field_name, word_of
 from gmsnet.io.words import typed
+
+Take = Callable[[Stream, Line, int, int, str], Any]  # of an array of so many rows, numbers in each, and type
 
 ATTRIBUTES = {  # keyword: how its line goes on, components
     "VECTORS": ("VECTORS name type", 3),
@@ -28,11 +31,14 @@ def keyword(stream: Stream, key: str) -> Line:
     return line
 
 
-def attribute(stream: Stream, line: Line, count: int, others: list[str]) -> list[tuple[str, NDArray[Any]]]:
-    """The arrays of an attribute that begins with a line, of ``count`` rows; others: see ``field_arrays``."""
+def attribute(
+    stream: Stream, line: Line, count: int, others: list[str], take: Take | None = None
+) -> list[tuple[str, Any]]:
+    """The arrays of an attribute that begins with a line, of ``count`` rows; others, take: see ``field_arrays``."""
+    take = take or _values
     key = line.key
     if key == "FIELD":
-        return field_arrays(stream, line, count, others)
+        return field_arrays(stream, line, count, others, take)
     if key == "LOOKUP_TABLE":  # colours, which are not kept
         called, text = stream.expect(line, "LOOKUP_TABLE name size")
         size = stream.count(line, text)
@@ -56,15 +62,17 @@ def attribute(stream: Stream, line: Line, count: int, others: list[str]) -> list
         called, kind = stream.expect(line, usage)
     else:
         stream.fail(line.start, f"unknown keyword {word_of(line.words[0])}")
-    return [(field_name(called), _values(stream, line, count, width, kind))]
+    return [(field_name(called), take(stream, line, count, width, kind))]
 
 
-def field_arrays(stream: Stream, line: Line, rows: int | None, others: list[str]) -> list[tuple[str, NDArray[Any]]]:
+def field_arrays(
+    stream: Stream, line: Line, rows: int | None, others: list[str], take: Take | None = None
+) -> list[tuple[str, Any]]:
     """The arrays of a FIELD, which must have ``rows`` rows (None: any number, and they are not kept).
 
-    others: takes the words for those that are not kept.
+    others: takes the words for those that are not kept. take: what makes something else than the values of an array.
     """
-    found = []
+    take, found = take or _values, []
     for _ in range(stream.count(line, stream.expect(line, "FIELD name arrays")[1])):
         head = stream.line()
         if head.key == "NULL_ARRAY":
@@ -77,10 +85,10 @@ def field_arrays(stream: Stream, line: Line, rows: int | None, others: list[str]
             stream.skip_strings(width * length)
             others.append(f"the texts {field_name(called)!r}")
         elif rows is None:
-            _values(stream, head, length, width, kind)
+            take(stream, head, length, width, kind)
             others.append(f"the field {field_name(called)!r} of the whole grid")
         else:
-            found.append((field_name(called), _values(stream, head, length, width, kind)))
+            found.append((field_name(called), take(stream, head, length, width, kind)))
     return found
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,49 +14,90 @@ from gmsnet.cells.table import nodes_of
 from gmsnet.io import vtk_cells
 from gmsnet.io.cell_table import Kind
 from gmsnet.io.cells import MOST_BLOCKS
-from gmsnet.io.ranges import Rows, Table
+from gmsnet.io.ranges import Ranges, Rows, Table
 from gmsnet.io.vtk_ghosts import LEVELS, TYPES
-from gmsnet.mesh.region_fields import names_a_region
+from gmsnet.mesh.region_fields import NUMBERED, names_a_region
 from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX
 
 Some = Callable[[int, int], NDArray[Any]]
 
 CODES = {*vtk_cells.KINDS} - {POLYGON, POLYLINE, POLYVERTEX}  # types of a certain number of nodes
+SIZES = np.array([nodes_of(vtk_cells.KINDS[code].name) if code in CODES else 0 for code in range(max(CODES) + 1)])
 AT_ONCE = 1 << 20  # cells that are looked at together
 
 
-def means_more(name: str) -> bool:
-    """Whether cell data of this name are looked at by readers."""
-    return names_a_region(name) or name in (TYPES, LEVELS)
+class Field(NamedTuple):
+    """Data of cells or points. rows: where these stand; None where they are in no such rows."""
+
+    name: str
+    rows: Rows | None
 
 
-def tables_of(types: Some, offsets: Some, cells: int, numbers: int, nodes: Rows) -> list[Table]:
+class Told(NamedTuple):
+    """regions: of cells; fixed: of nodes, those that are not 0 are held. None where the file has no such numbers."""
+
+    regions: Rows | None
+    fixed: Rows | None
+
+
+def told_by(file: Ranges, points: Iterable[Field], cells: Iterable[Field], counts: tuple[int, int]) -> Told | None:
+    """What the data of points and cells tell, of which there are so many. None where only a reader of them all can tell
+    (see ``region_fields.regions_of``), and where they mark copies of cells of others."""
+    held = [field.rows for field in points if field.name == "fixed"][-1:]
+    cells = list(cells)
+    found = [field.rows for field in cells if names_a_region(field.name)]
+    if any(rows is None or rows.rows != counts[0] for rows in held):
+        return None
+    if any(rows is None or rows.rows != counts[1] for rows in found) or any(f.name in (TYPES, LEVELS) for f in cells):
+        return None
+    single = [rows for rows in found if rows is not None and rows.width == 1]
+    if len(single) > 1 or any(rows.dtype[1] not in "iu" or _may_number(file, rows) for rows in single):
+        return None
+    return Told(single[0] if single else None, held[0] if held else None)
+
+
+def _may_number(file: Ranges, rows: Rows) -> bool:
+    """Whether each of many cells may have a value of its own, as the first ones have."""
+    return rows.rows >= NUMBERED and len(np.unique(rows.of(file, 0, NUMBERED))) == NUMBERED
+
+
+def tables_of(
+    types: Some, cells: int, numbers: int, nodes: Rows, offsets: Some | None = None, regions: Rows | None = None
+) -> list[Table]:
     """A table for each run of cells of one kind; none where that cannot be told.
 
-    types, offsets: some of VTK's types of the cells, and of where the nodes of each begin, with the end of the last one
-    (cells + 1 in all). numbers: of nodes in all cells. nodes: where these lie.
+    types: some of VTK's types of the cells. numbers: of nodes in all cells. nodes: where these lie. offsets: some of
+    where the nodes of each cell begin, with the end of the last one (cells + 1 in all); without, each cell has its
+    number of nodes in front, which counts as one of them. regions: of the cells.
     """
-    tables, size = list[Table](), np.dtype(nodes.dtype).itemsize
+    tables, size, lead = list[Table](), np.dtype(nodes.dtype).itemsize, int(offsets is None)
     for first, last, kind, start in _runs(types, offsets, cells, numbers):
         width = nodes_of(kind.name)
-        rows = Rows(nodes.start + start * size, last - first, width * size, nodes.dtype, width)
-        tables.append(Table(kind.name, rows, 0, kind.order))
+        begin, stride = nodes.start + start * size, (width + lead) * size
+        rows = Rows(begin + lead * size, last - first, stride, nodes.dtype, width)
+        counts = Rows(begin, last - first, stride, nodes.dtype) if lead else None
+        own = regions
+        if regions is not None:
+            own = replace(regions, start=regions.start + first * regions.stride, rows=last - first)
+        tables.append(Table(kind.name, rows, 0, kind.order, 0, own, counts))
     return tables
 
 
-def _runs(types: Some, offsets: Some, cells: int, numbers: int) -> list[tuple[int, int, Kind, int]]:
+def _runs(types: Some, offsets: Some | None, cells: int, numbers: int) -> list[tuple[int, int, Kind, int]]:
     """First and last cell, kind and first number of each run of cells of one kind; none where that cannot be told."""
     runs, end = list[tuple[int, int, Kind, int]](), 0
     for first in range(0, cells, AT_ONCE):
         last = min(first + AT_ONCE, cells)
-        codes, ends = types(first, last), offsets(first, last + 1)
-        if ends[0] != end or not set(np.unique(codes).tolist()) <= CODES:
+        codes = types(first, last)
+        if not set(np.unique(codes).tolist()) <= CODES:
+            return []
+        sizes = SIZES[codes] + (offsets is None)
+        ends = end + np.append(0, np.cumsum(sizes))
+        if offsets is not None and (offsets(first, last + 1) != ends).any():
             return []
         cuts = [0, *(np.flatnonzero(np.diff(codes)) + 1).tolist(), last - first]
         for begin, stop in itertools.pairwise(cuts):
             kind = vtk_cells.KINDS[int(codes[begin])]
-            if (np.diff(ends[begin : stop + 1]) != nodes_of(kind.name)).any():
-                return []
             if runs and runs[-1][2] == kind:
                 runs[-1] = (*runs[-1][:1], first + stop, *runs[-1][2:])
             else:

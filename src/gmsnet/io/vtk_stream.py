@@ -10,6 +10,7 @@ from urllib.parse import unquote_to_bytes
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
 from gmsnet.io.places import Places
 from gmsnet.io.text import Text, fail, quoted
@@ -20,6 +21,13 @@ TYPES = {
     "unsigned_int": "u4", "int": "i4", "unsigned_long": "u8", "long": "i8", "float": "f4", "double": "f8",
     "vtkidtype": "i4", "vtktypeint64": "i8", "vtktypeuint64": "u8",
 }  # fmt: skip
+
+_HEAD = re.compile(
+    rb"#\s*vtk\s+DataFile\s+Version\s+(\d+)\.\d+[^\r\n]*(?:\r\n?|\n)"
+    rb"[^\r\n]*(?:\r\n?|\n)\s*(ASCII|BINARY)[ \t]*(?:\r\n?|\n)",
+    re.IGNORECASE,
+)
+
 
 _LINE = re.compile(rb"\s*([^\r\n]*)(?:\r\n?|\n)?")
 _BLANK_LINE = re.compile(rb"(?:\r\n?|\n)[ \t]*(?:\r\n?|\n)")
@@ -108,7 +116,7 @@ class Stream:
             known = ", ".join(TYPES)
             self.fail(line.start, f"unknown type of numbers {word_of(type_name)}: known are {known}")
         if self.binary:
-            source: Words = (raw := ByteWords(self.data, ">", self.at))
+            source: Words = (raw := self.bytes())
             addresses = source.take(count, kind)
             self.at = raw.at
         else:
@@ -117,6 +125,10 @@ class Stream:
             source = TextWords(text, starts)
             addresses = source.take(count, kind)
         return Array(source, addresses, kind)
+
+    def bytes(self) -> ByteWords:
+        """The binary numbers from here on."""
+        return ByteWords(self.data, ">", self.at)
 
     def bits(self, count: int) -> NDArray[np.uint8]:
         """Numbers of the type ``bit``: 0 and 1 in a text, eight to a byte in a binary file."""
@@ -132,14 +144,17 @@ class Stream:
             if self.at >= len(self.data):
                 self.fail(self.at, "expected more strings, the file ends")
             if self.binary:
-                size = 8 >> (self.data[self.at] >> 6)
-                length = int.from_bytes(self.data[self.at : self.at + size], "big") & ((1 << (8 * size - 2)) - 1)
-                self.at += size + length
+                self.at += self.length_of_string()
                 if self.at > len(self.data):
                     self.fail(len(self.data), "a string goes beyond the end of the file")
             else:
                 end = self.data.find(b"\n", self.at)
                 self.at = end + 1 if end >= 0 else len(self.data)
+
+    def length_of_string(self) -> int:
+        """Of one in a binary file that begins here, with its length in front."""
+        size = 8 >> (self.data[self.at] >> 6)
+        return size + (int.from_bytes(self.data[self.at : self.at + size], "big") & ((1 << (8 * size - 2)) - 1))
 
 
 def word_of(text: str) -> str:
@@ -154,3 +169,20 @@ def field_name(text: str) -> str:
         return raw.decode("utf-8")
     except UnicodeDecodeError:
         return raw.decode("latin-1")
+
+
+def opened(data: Data) -> tuple[Stream, bool]:
+    """What follows the head of a file, and whether this is polygonal data, or else an unstructured grid."""
+    head = _HEAD.match(data)
+    if head is None:
+        raise FormatError("line 1: not a legacy VTK file: it must start with '# vtk DataFile Version', a title and "
+                          "ASCII or BINARY")  # fmt: skip
+    stream = Stream(data, head.end(), head[2].upper() == b"BINARY")
+    line = stream.line()
+    if line.key != "DATASET":
+        stream.fail(line.start, "expected DATASET")
+    (dataset,) = stream.expect(line, "DATASET type")
+    if dataset.upper() not in ("UNSTRUCTURED_GRID", "POLYDATA"):
+        stream.fail(line.start, f"a DATASET of type {word_of(dataset)} is not supported: "
+                                "write it as an UNSTRUCTURED_GRID")  # fmt: skip
+    return stream, dataset.upper() == "POLYDATA"

@@ -18,7 +18,7 @@ from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
 from gmsnet.io.ranges import Column, Plan, Ranges, Rows
 from gmsnet.io.stored import Part, coordinates
-from gmsnet.io.vtk_runs import means_more, tables_of
+from gmsnet.io.vtk_runs import Field, tables_of, told_by
 from gmsnet.mesh.mesh import Mesh
 
 name = "VTKHDF"
@@ -55,27 +55,42 @@ def read(files: Mapping[str, Data]) -> Parsed:
 
 
 def plan(file: Ranges) -> Plan | None:
-    """How the numbers of a file lie; None where they are compressed or in chunks, and of grids with regions, ghost
-    cells or held nodes, with cells of no certain number of nodes, or whose types alternate often."""
+    """How the numbers of a file lie; None where they are compressed or in chunks, and of grids with ghost cells, with
+    regions by several fields, with cells of no certain number of nodes, or whose types alternate often."""
     with File.opened(file.path) as opened:
         root = opened.root.need("VTKHDF")
         if root.attribute("Type") != "UnstructuredGrid" or root.get("Steps") is not None:
             return None
         count, cells = _only(root, "NumberOfPoints"), _only(root, "NumberOfCells")
         points, offsets, types, nodes = (root.need(key) for key in ("Points", "Offsets", "Types", "Connectivity"))
-        names = [found.names() if (found := root.get(key)) is not None else [] for key in ("PointData", "CellData")]
-        special = "fixed" in names[0] or any(map(means_more, names[1]))
-        special = special or any(each.is_elsewhere() for each in (points, offsets, types, nodes))
+        fields = [_in_rows(root.get(key)) for key in ("PointData", "CellData")]
+        elsewhere = any(each.is_elsewhere() for each in (points, offsets, types, nodes))
         begin, at = points.offset(), nodes.offset()
         whole = [each.shape() for each in (points, offsets, types, nodes)]
-        if special or begin is None or at is None or whole[:3] != [(count, 3), (cells + 1,), (cells,)] or not cells:
+        if elsewhere or begin is None or at is None or whole[:3] != [(count, 3), (cells + 1,), (cells,)] or not cells:
             return None
-        tables = tables_of(types.some, offsets.some, cells, whole[3][0], Rows(at, whole[3][0], 0, nodes.dtype()))
+        told = told_by(file, fields[0], fields[1], (count, cells))
         real = points.dtype()
-        if not tables or real[1:] not in ("f4", "f8") or nodes.dtype()[1] not in "iu":
+        if told is None or real[1:] not in ("f4", "f8") or nodes.dtype()[1] not in "iu":
             return None
+        listed = Rows(at, whole[3][0], 0, nodes.dtype())
+        tables = tables_of(types.some, cells, whole[3][0], listed, offsets.some, told.regions)
         place = Rows(begin, count, 3 * int(real[2:]), real, 3)
-        return Plan([Column(place)], [[table] for table in tables], real[1:] == "f4")
+        blocks = [[table] for table in tables]
+        return Plan([Column(place)], blocks, real[1:] == "f4", fixed=told.fixed) if tables else None
+
+
+def _in_rows(group: Node | None) -> list[Field]:
+    """The data of points or cells, and where they stand."""
+    found = []
+    for node in group.members() if group is not None else ():
+        if node.is_data and node.numeric():
+            begin, shape = node.offset(), node.shape()
+            width = 1 if len(shape) == 1 else shape[-1]
+            size = int(node.dtype()[2:]) * width
+            there = begin is not None and len(shape) in (1, 2) and not node.is_elsewhere()
+            found.append(Field(node.name, Rows(begin or 0, shape[0], size, node.dtype(), width) if there else None))
+    return found
 
 
 def _only(root: Node, key: str) -> int:

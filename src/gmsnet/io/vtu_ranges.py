@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 import re
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.io.ranges import Column, Plan, Ranges, Rows
-from gmsnet.io.vtk_runs import means_more, tables_of
+from gmsnet.io.vtk_runs import Field, tables_of, told_by
 from gmsnet.io.vtu_reader import TYPES, Reader
 from gmsnet.io.vtu_xml import DataArray
 
 MOST = 1 << 20  # bytes before the appended data, of files that are planned; others have thousands of arrays
 END = b"</AppendedData></VTKFile>"
 _BEGIN, _TAIL = re.compile(rb"<AppendedData[^>]*>\s*_"), re.compile(rb"</AppendedData\s*>\s*</VTKFile\s*>\s*\Z")
-
-
-class Array(NamedTuple):
-    """Numbers that are appended. begin: the first byte, length: how many there are."""
-
-    begin: int
-    length: int
-    dtype: str
-
-    def some(self, file: Ranges, first: int, last: int) -> NDArray[Any]:
-        """Some of them."""
-        size = np.dtype(self.dtype).itemsize
-        return np.frombuffer(file.read(self.begin + first * size, (last - first) * size), dtype=self.dtype)
 
 
 def plan(file: Ranges) -> Plan | None:
@@ -47,35 +36,43 @@ def plan(file: Ranges) -> Plan | None:
     arrays = _arrays(file, reader, found.end(), file.size - len(tail) + ending.start())
     if arrays is None or not cells:
         return None
-    names = {key: [a.attributes.get("Name", "") for a in reader.section(key)] for key in ("PointData", "CellData")}
+    fields = {key: [_field(arrays, each, reader) for each in reader.section(key)] for key in ("PointData", "CellData")}
     place, listed = reader.section("Points"), {a.attributes.get("Name", ""): a for a in reader.section("Cells")}
-    if "fixed" in names["PointData"] or any(map(means_more, names["CellData"])) or len(place) != 1:
-        return None
-    if not {"connectivity", "offsets", "types"} <= listed.keys() or reader.width(place[0], 3) != 3:
+    if len(place) != 1 or not {"connectivity", "offsets", "types"} <= listed.keys() or reader.width(place[0], 3) != 3:
         return None
     at = arrays[place[0].tag]
     nodes, ends, types = (arrays[listed[key].tag] for key in ("connectivity", "offsets", "types"))
     whole = all(array.dtype[1] in "iu" for array in (nodes, ends, types)) and at.dtype[1:] in ("f4", "f8")
-    if not whole or (at.length, ends.length, types.length) != (3 * points, cells, cells):
+    told = told_by(file, fields["PointData"], fields["CellData"], (points, cells))
+    if told is None or not whole or (at.rows, ends.rows, types.rows) != (3 * points, cells, cells):
         return None
 
     def offsets(first: int, last: int) -> NDArray[Any]:
         """With the beginning of the first cell, which the file has not."""
-        found = ends.some(file, max(first - 1, 0), last - 1).astype(np.int64)
+        found = ends.of(file, max(first - 1, 0), last - 1)[:, 0].astype(np.int64)
         return found if first else np.append(0, found)
 
-    rows = Rows(nodes.begin, nodes.length, 0, nodes.dtype)
-    tables = tables_of(lambda first, last: types.some(file, first, last), offsets, cells, nodes.length, rows)
+    def some(first: int, last: int) -> NDArray[Any]:
+        return types.of(file, first, last)[:, 0]
+
+    tables = tables_of(some, cells, nodes.rows, nodes, offsets, told.regions)
     if not tables:
         return None
     size = int(at.dtype[2:])
-    column = Column(Rows(at.begin, points, 3 * size, at.dtype, 3))
-    return Plan([column], [[table] for table in tables], size == 4)
+    column = Column(Rows(at.start, points, 3 * size, at.dtype, 3))
+    return Plan([column], [[table] for table in tables], size == 4, fixed=told.fixed)
 
 
-def _arrays(file: Ranges, reader: Reader, begin: int, end: int) -> dict[tuple[int, int], Array] | None:
+def _field(arrays: Mapping[tuple[int, int], Rows], array: DataArray, reader: Reader) -> Field:
+    rows, width = arrays.get(array.tag), reader.width(array, 1)
+    if rows is not None and width > 1:
+        rows = replace(rows, rows=rows.rows // width, stride=rows.stride * width, width=width)
+    return Field(array.attributes.get("Name", ""), rows)
+
+
+def _arrays(file: Ranges, reader: Reader, begin: int, end: int) -> dict[tuple[int, int], Rows] | None:
     """All arrays, by their tags; None where one is not appended, or lies over others, or over the end."""
-    width, found, spans = np.dtype(reader.header).itemsize, dict[tuple[int, int], Array](), list[tuple[int, int]]()
+    width, found, spans = np.dtype(reader.header).itemsize, dict[tuple[int, int], Rows](), list[tuple[int, int]]()
     for array in reader.document.arrays:
         kind = TYPES.get(array.attributes.get("type", ""))
         if array.offset is None or begin + array.offset[0] + width > end:
@@ -84,7 +81,7 @@ def _arrays(file: Ranges, reader: Reader, begin: int, end: int) -> dict[tuple[in
         size = int(np.frombuffer(file.read(first - width, width), dtype=reader.header)[0])
         spans.append((first - width, first + size))
         if kind is not None:
-            found[array.tag] = Array(first, size // int(kind[1:]), reader.order + kind)
+            found[array.tag] = Rows(first, size // int(kind[1:]), int(kind[1:]), reader.order + kind)
         elif _is_needed(array):
             return None
     spans = sorted(spans)
