@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.commit3 import judge_curved_solids, refused, straight_signs3
 from gmsnet.kernels.curved.descend3 import improve_nodes3, straighten3, untangling_sweep3
+from gmsnet.kernels.curved.raise3 import raise_nodes3
 from gmsnet.kernels.curved.stars3 import NO_FOLLOWER, CurvedSolids, put_all
 from gmsnet.kernels.star.guard import Guard, Precision, plain_guard
 from gmsnet.measure.solid import exact_signs_of
@@ -122,6 +123,16 @@ class SolidCells(NamedTuple):
         near = np.zeros(len(self.points) + 1, dtype=bool)
         near[self.mesh.cells[quality < low]] = True
         improve_nodes3(self.points, self.mesh, nodes[near[nodes]], low, guard, tally)
+
+    def bounds(self, cells: Ints, enough: float) -> Floats:
+        """The ``quality3`` of some cells, sharp where it is less than ``enough``."""
+        return self._judged(cells, enough)[1]
+
+    def raise_bounds(self, cells: Ints, threshold: float, room: float, guard: Guard, tally: Ints) -> None:
+        """Moves nodes of some cells that are no corners; see kernels.curved.raise3."""
+        near = np.zeros(len(self.points) + 1, dtype=bool)
+        near[self.mesh.cells[cells]] = True
+        raise_nodes3(self.points, self.mesh, np.flatnonzero(near[:-1] & self.inner), threshold, room, guard, tally)
 
     def around(self, nodes: Ints) -> Ints:
         """The cells that have some of the nodes."""

@@ -38,6 +38,11 @@ from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
 SWEEPS = 10
+KEPT = 0.9  # corners of tetrahedra may take a bound so low, if none was lower
+ABOVE, HIGHEST = 0.3, 1.0  # bounds are raised towards the least one and so much more, and none is asked to be higher
+LOWEST = 0.05  # of bounds less than this above the least one, cells are visited
+ENOUGH = 0.95  # of a least bound
+RISE, PATIENCE = 1e-3, 2  # after so many rounds without such a rise of the least bound, raising ends
 FOR_GOOD = "its determinant is not positive where held nodes alone decide it"
 NOT_FOUND = "no valid shape of it was found"
 Floats = NDArray[np.float64]
@@ -150,7 +155,8 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     cells, room = _opened(state), -math.inf
     if options.guard != LEVELS[VALID]:
         sign, quality = cells.judged()
-        room = float(quality[(sign == 1) & given.curved].min(initial=cells.low))
+        most = cells.low if (given.curved & ~given.tetrahedra).any() else KEPT
+        room = float(quality[(sign == 1) & given.curved].min(initial=most))
     corners = _corners(given)
     curved = Curved(cells.mesh, room) if isinstance(cells, PlanarCells) else None
     ready = replace(
@@ -188,6 +194,35 @@ def make_room(state: State, options: SmoothOptions, executor: Executor) -> State
     if state.stop_reason == NOTHING_TO_MOVE:
         state = state.ended(NO_PROGRESS)
     return _judged(state, cells)
+
+
+def raise_bounds(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """Moves nodes that are no corners around those tetrahedra whose certified bounds are lowest.
+
+    Other cells with straight edges have low bounds, too, and would be bent.
+    """
+    given = state.second_order
+    if given is None or not given.tetrahedra.any() or not given.free.any():
+        return state
+    if options.target or state.stop_reason == CALLBACK:
+        return state
+    cells = _opened(state)
+    assert isinstance(cells, SolidCells)
+    level, tally = LEVELS.index(options.guard), np.zeros(3, dtype=np.int64)
+    guard = Field(cells.points, given.protection.topology, state.precision, level).guard(executor)
+    some = np.flatnonzero(given.tetrahedra & (given.sign == 1))
+    least, stuck = -math.inf, 0
+    for _ in range(min(SWEEPS, options.max_sweeps)):
+        bounds = cells.bounds(some, HIGHEST)
+        now = bounds.min(initial=HIGHEST)
+        stuck = 0 if now > least + RISE else stuck + 1
+        least, moved = float(now), int(tally[MOVED])
+        if stuck == PATIENCE or least >= ENOUGH:
+            break
+        cells.raise_bounds(some[bounds < least + LOWEST], min(least + ABOVE, HIGHEST), least, guard, tally)
+        if tally[MOVED] == moved:
+            break
+    return _judged(state, cells) if tally[MOVED] else state
 
 
 def _opened(state: State) -> PlanarCells | SolidCells:

@@ -79,6 +79,16 @@ class SecondOrder:
         return np.asarray(self.kinds < (len(CURVED) if self.solid else len(NAMES)))
 
     @property
+    def tetrahedra(self) -> NDArray[np.bool_]:
+        """(C,) which cells are tetrahedra of the second order."""
+        return np.asarray(self.solid & (self.kinds == CURVED.index("tetra10")))
+
+    @property
+    def risen(self) -> bool:
+        """Are there tetrahedra, and has the lowest bound risen?"""
+        return bool(self.tetrahedra.any() and self.least[1] > self.least[0])
+
+    @property
     def corners(self) -> NDArray[np.bool_]:
         """(N,) by id: which nodes are a corner."""
         found = np.zeros(len(self.free), dtype=bool)

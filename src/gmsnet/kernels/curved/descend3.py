@@ -36,6 +36,7 @@ STRAIGHTENING3 = 1e-6  # κ of Σ max(0, τ − v)²: followers are drawn to the
 PLACES = np.array([
     (0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (1, 1, 0), (0, 1, 1), (1, 0, 1),
 ], dtype=np.float64)  # fmt: skip
+AFFINE = (1, 3, 5)  # those that tell all where coefficients are affine
 
 
 @part
@@ -93,8 +94,10 @@ def fit3(points, mesh, i, size, work):
     In units of ``size``. The node and its followers are as before afterwards.
     """
     x, y, z = points[i, 0], points[i, 1], points[i, 2]
-    count, rows, step = save3(points, mesh, i, work), 0, SAMPLE * size
+    count, rows, step, corner = save3(points, mesh, i, work), 0, SAMPLE * size, is_corner(mesh, i)
     for column in range(SAMPLES):
+        if column > 0 and not (corner or column in AFFINE):
+            continue
         p = PLACES[column]
         place3(points, mesh, i, x + step * p[0], y + step * p[1], z + step * p[2], False)
         rows = sample3(points, mesh, i, column, work)
@@ -103,6 +106,10 @@ def fit3(points, mesh, i, size, work):
     for row in range(rows):
         m = work.model[row]
         v = m[0]
+        if not corner:
+            m[1], m[2], m[3] = one * (m[1] - v), one * (m[3] - v), one * (m[5] - v)
+            m[4], m[5], m[6], m[7], m[8], m[9] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            continue
         gx, gy, gz = 0.5 * (m[1] - m[2]), 0.5 * (m[3] - m[4]), 0.5 * (m[5] - m[6])
         xx, yy, zz = m[1] + m[2] - 2.0 * v, m[3] + m[4] - 2.0 * v, m[5] + m[6] - 2.0 * v
         xy = m[7] - v - gx - gy - 0.5 * (xx + yy)
