@@ -39,10 +39,6 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
     rank: Callable[[QualityReport], Any] = options.target.rank if options.target else rank_by(options.best_by)
     if state.second_order is not None and state.second_order.invalid[0]:  # whose mending may cost straight cells shape
         rank = inverted_alone
-    elif (
-        state.second_order is not None and state.second_order.risen and not options.target
-    ):  # the mean does not show it
-        rank = worst_alone
     if state.motion is not None or state.metric is not None:  # in which meshes were compared
         rank = inverted_alone
     final = outcome(
@@ -193,11 +189,6 @@ def factors_of(exponent: int) -> tuple[float, float]:
 def inverted_alone(report: QualityReport) -> int:
     """Fewer inverted cells, and nothing else."""
     return report.inverted
-
-
-def worst_alone(report: QualityReport) -> tuple[float, ...]:
-    """Fewer inverted cells first, then the larger least η."""
-    return (report.inverted,) if report.totals is None else (report.inverted, -report.totals.shape_min)
 
 
 class Judged(Protocol):

@@ -19,6 +19,7 @@ from gmsnet.kernels.curved.stars import counter_clockwise, curved_mesh
 from gmsnet.kernels.simplex.bernstein import CORNERS, KINDS, NAMES, WIDEST
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import LEVELS, VALID
+from gmsnet.measure.totals import totals_of
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, method_named
@@ -38,7 +39,6 @@ from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
 SWEEPS = 10
-KEPT = 0.9  # corners of tetrahedra may take a bound so low, if none was lower
 ABOVE, HIGHEST = 0.3, 1.0  # bounds are raised towards the least one and so much more, and none is asked to be higher
 LOWEST = 0.05  # of bounds less than this above the least one, cells are visited
 ENOUGH = 0.95  # of a least bound
@@ -155,8 +155,7 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     cells, room = _opened(state), -math.inf
     if options.guard != LEVELS[VALID]:
         sign, quality = cells.judged()
-        most = cells.low if (given.curved & ~given.tetrahedra).any() else KEPT
-        room = float(quality[(sign == 1) & given.curved].min(initial=most))
+        room = float(quality[(sign == 1) & given.curved].min(initial=cells.low))
     corners = _corners(given)
     curved = Curved(cells.mesh, room) if isinstance(cells, PlanarCells) else None
     ready = replace(
@@ -172,6 +171,8 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     level = LEVELS.index(options.guard)
     guard = Field(cells.points, corners.topology, state.precision, level).guard(executor)
     cells.advance(done.points, guard, room)
+    if not options.target and _rank(cells.points, corners, executor) > _rank(state.points, corners, executor):
+        return state  # a move of all corners together may cost what the method gained
     return _judged(state, cells)
 
 
@@ -223,6 +224,13 @@ def raise_bounds(state: State, options: SmoothOptions, executor: Executor) -> St
         if tally[MOVED] == moved:
             break
     return _judged(state, cells) if tally[MOVED] else state
+
+
+def _rank(points: Floats, straight: Protection, executor: Executor) -> tuple[float, float]:
+    """Of two places of the corners those of the lesser rank are the better: see run.outcome."""
+    totals = totals_of(points, straight.topology.simplices, executor)
+    assert totals is not None
+    return -totals.shape_min, -totals.shape_mean
 
 
 def _opened(state: State) -> PlanarCells | SolidCells:

@@ -84,11 +84,6 @@ class SecondOrder:
         return np.asarray(self.solid & (self.kinds == CURVED.index("tetra10")))
 
     @property
-    def risen(self) -> bool:
-        """Are there tetrahedra, and has the lowest bound risen?"""
-        return bool(self.tetrahedra.any() and self.least[1] > self.least[0])
-
-    @property
     def corners(self) -> NDArray[np.bool_]:
         """(N,) by id: which nodes are a corner."""
         found = np.zeros(len(self.free), dtype=bool)
