@@ -4,8 +4,8 @@
 
 Spheres and boxes with holes by Gmsh, without its own optimisation. Told are the cells, the least ``minSJ`` as Gmsh
 measures it with how many are not positive, and seconds of the processor of the whole call on one thread. Gmsh's tools
-may move the boundary along the CAD; ``HighOrder`` is tried with the boundary fixed, too, in a process of its own, for it
-may end the program. --threshold is its Mesh.HighOrderThresholdMin.
+may move the boundary along the CAD; ``HighOrder`` is tried with the boundary fixed, too, in a process of its own, for
+it may end the program. --threshold is its Mesh.HighOrderThresholdMin.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from gmsnet.measure.report import connectivity_of
 from gmsnet.measure.solid import judge_volumes
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.methods.solid_cells import SolidCells
 from gmsnet.run import second_order, stages, stop
 from gmsnet.topology.curved_solids import CURVED, STRAIGHT, mirrored
 
@@ -158,6 +159,24 @@ def test_the_lowest_bounds_of_tetrahedra_rise(seed, monkeypatch):
     without = least_bound(mesh.with_points(gmsnet.smooth(mesh).points))
     assert risen > without + 0.05
     assert risen >= least_bound(mesh)
+
+
+def test_a_move_of_all_corners_that_costs_quality_is_taken_back(monkeypatch):
+    """What a method gains can be lost where cells are refused and their corners go half of the way."""
+    mesh, advance = bent_tetrahedra(5), SolidCells.advance
+
+    def astray(cells, places, guard, room):
+        away = 0.02 * np.random.default_rng(1).normal(size=(len(places), 3))
+        moved = advance(cells, cells.points[:, :3] + away, guard, room)
+        assert len(moved)
+        return moved
+
+    monkeypatch.setattr(SolidCells, "advance", astray)
+    result = gmsnet.smooth(mesh)
+    corners = np.unique(mesh.cells[0].nodes[:, :4])
+    np.testing.assert_array_equal(result.points[corners], mesh.points[corners])
+    assert result.moved.any()
+    assert least_bound(mesh.with_points(result.points)) > least_bound(mesh)
 
 
 def test_raising_moves_no_corner_and_lowers_no_bound_below_the_least(monkeypatch):

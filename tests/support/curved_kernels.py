@@ -1,6 +1,8 @@
-"""What is certain of second-order cells in a plane, and moves of some of their corners, as tests ask for them."""
+"""What is certain of second-order cells in a plane, moves of their corners, and steps in space, as tests ask."""
 
 from gmsnet.kernels.curved.commit import commit_curved, curved_workspace
+from gmsnet.kernels.curved.commit3 import around_workspace
+from gmsnet.kernels.curved.descend3 import ROWS_OF_CELL, SAMPLES, descent3
 from gmsnet.kernels.jit.compile import kernel, part
 from gmsnet.kernels.simplex.bernstein import CORNERS, NODES, straighten_edges
 from gmsnet.kernels.simplex.jacobian import (
@@ -18,6 +20,12 @@ def commit_all(points, mesh, nodes, targets, guard, room, tally):
     work = curved_workspace(mesh)
     for k in range(len(nodes)):
         commit_curved(points, mesh, nodes[k], targets[k, 0], targets[k, 1], guard, room, work, tally)
+
+
+@kernel
+def descend_to(points, mesh, i, mode, threshold):
+    """``descent3`` of a node of volumes."""
+    return descent3(points, mesh, i, mode, threshold, around_workspace(mesh, ROWS_OF_CELL, SAMPLES))
 
 
 @part
