@@ -1,10 +1,10 @@
-"""The stage of second-order cells: the invalid are made valid, corners smoothed, and narrow cells given room.
+"""The stages of second-order cells: the invalid are made valid, corners smoothed, and narrow cells given room.
 
 The method of the call moves the corners, as if cells were straight, and they take their middles along: in a plane after
 each of its sweeps (methods/curved.py), in space all together at the end (methods/solid_cells.py). In a plane nodes of
 first-order cells beside them move, too. Nodes of the boundary, of interfaces and of line cells stay, middles among
 them. A move is taken if all cells around it are certified valid by the coefficients of their determinants
-(docs/guarantees.md).
+(docs/guarantees.md). At last the lowest bounds of tetrahedra are raised by their middles (kernels/curved/raise3.py).
 """
 
 from __future__ import annotations
