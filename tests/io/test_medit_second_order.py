@@ -9,7 +9,7 @@ from support.damage import cells_of
 
 from gmsnet.cells.table import CELLS
 from gmsnet.errors import FormatError
-from gmsnet.io import medit
+from gmsnet.io import gmsh_sections, medit
 from gmsnet.io.medit_orders import ORDERINGS, lattice
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -88,3 +88,53 @@ def test_kinds_without_an_order_of_their_own_keep_that_of_the_table() -> None:
 def test_orders_that_are_none(ordering: str, message: str) -> None:
     with pytest.raises(FormatError, match=message):
         medit.read({".mesh": file_of("EdgesP2", np.eye(3), [0, 1, 2], ordering)})
+
+
+def by_gmsh(key: str, kind: str, count: int, after: bytes = b"End\n") -> bytes:
+    """Cells as Gmsh writes them into ``.mesh``: under the keyword of the first order, in its own order of nodes."""
+    codes = {row.name: row.order for row in gmsh_sections.KINDS.values()}
+    many = CELLS[kind].nodes or 0
+    order = np.argsort(codes[kind] or range(many))
+    rows = "".join(" ".join(str(many * c + k + 1) for k in order) + f" {c + 3}\n" for c in range(count))
+    points = "".join(f"{x}.5 {x * x} 1 0\n" for x in range(many * count))
+    head = f"MeshVersionFormatted 2\nDimension 3\nVertices\n{many * count}\n{points} {key}\n {count}\n{rows} "
+    return head.encode() + after
+
+
+@pytest.mark.parametrize("after", [b"End\n", b"Edges\n1\n1 2 9\nEnd\n"])
+@pytest.mark.parametrize("count", [1, 2, 5, 9, 45])
+@pytest.mark.parametrize(
+    ("key", "kind"),
+    [(f, k) for f, kinds in {"Quadrilaterals": ("quad", "quad8", "quad9"),
+                             "Hexahedra": ("hexahedron", "hexahedron20", "hexahedron27")}.items() for k in kinds],
+)  # fmt: skip
+def test_second_order_under_the_keyword_of_the_first_as_by_gmsh(key: str, kind: str, count: int, after: bytes) -> None:
+    parsed = medit.read({".mesh": by_gmsh(key, kind, count, after)})
+    many = CELLS[kind].nodes or 0
+    assert cells_of(parsed, kind) == np.arange(many * count).reshape(count, many).tolist()
+    assert parsed.cells[0].regions.tolist() == list(range(3, 3 + count))
+    assert [block.kind for block in parsed.cells] == [kind, "line"][: 1 + (b"Edges" in after)]
+
+
+def test_required_faces_of_these_are_held() -> None:
+    data = by_gmsh("Quadrilaterals", "quad9", 2, b"RequiredQuadrilaterals\n1\n2\nEnd\n")
+    assert cells_of(medit.read({".mesh": data}), "vertex") == [[k] for k in range(9, 18)]
+
+
+@pytest.mark.parametrize("words", [b"7\n", b"7 8 9\n"])
+def test_rows_of_no_kind_are_refused_by_their_line(words: bytes) -> None:
+    data = by_gmsh("Quadrilaterals", "quad9", 2, words + b"End\n")
+    line = data[: data.index(b"Quad")].count(b"\n") + 1
+    with pytest.raises(FormatError, match=f"line {line + 3}: a keyword was expected, found '10'"):
+        medit.read({".mesh": data})
+
+
+@pytest.mark.parametrize(("key", "kind"), [("Quadrilaterals", "quad9"), ("Hexahedra", "hexahedron27")])
+def test_what_is_cut_off_is_never_of_another_kind_of_second_order(key: str, kind: str) -> None:
+    data = by_gmsh(key, kind, 3, b"")
+    for cut in range(data.index(b"\n", data.index(key.encode())), len(data)):
+        try:
+            parsed = medit.read({".mesh": data[:cut]})
+        except FormatError:
+            continue
+        assert {block.kind for block in parsed.cells} <= {medit.KINDS[key]}

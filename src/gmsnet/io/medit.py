@@ -18,7 +18,7 @@ from gmsnet.io import convert
 from gmsnet.io.cells import check_nodes, distinct, sealed
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.medit_orders import ORDERINGS, as_written, lattice, order_of
+from gmsnet.io.medit_orders import BY_GMSH, ORDERINGS, WIDER, as_written, lattice, order_of
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Starts, Text
@@ -52,9 +52,13 @@ SKIPPED_VALUES = ("AngleOfCornerBound",)  # one number, no count
 
 
 class Entries(NamedTuple):
-    """What follows a keyword: tokens (n × width), and the numbers of nodes (or faces) and references of each entry."""
+    """What follows a keyword: tokens (n × width), and the numbers of nodes (or faces) and references of each entry.
+
+    kind: of cells; "" of others.
+    """
 
     key: str
+    kind: str
     starts: Starts
     nodes: NDArray[np.int64]
     references: NDArray[np.int64]
@@ -74,6 +78,25 @@ class _Stream:
 
     def count(self, what: str) -> int:
         return self.text.count(self.take(1)[0], what)
+
+    def cells(self, key: str) -> tuple[str, Starts]:
+        """The kind of the cells that follow a keyword, and their words: (n, nodes and reference).
+
+        Gmsh does not say which of its orders cells have, so that what tells is where the next keyword stands.
+        """
+        kind, count, begin = KINDS[key], self.count(key), self.at
+        rows = self.take(count * (nodes_of(kind) + 1))
+        if count and key in WIDER and (behind := self.text.next(self.at)) and not self._is_keyword(behind[0]):
+            words, _ = self.text.tokens(begin)
+            for wider in WIDER[key]:
+                end = count * (nodes_of(wider) + 1)
+                if end < len(words) and self._is_keyword(words[end]):  # at the end of the file it may be cut off
+                    self.at = begin
+                    return wider, self.take(end).reshape(count, -1)
+        return kind, rows.reshape(count, -1)
+
+    def _is_keyword(self, start: int) -> bool:
+        return self.text.token(start)[:1].isalpha()
 
     def keywords(self) -> Iterator[tuple[str, int]]:
         """Each keyword and where it stands, up to End or the end of the file."""
@@ -117,12 +140,16 @@ def read(files: Mapping[str, Data]) -> Parsed:
             rows = stream.take(stream.count("vertices") * (dimension + 1)).reshape(-1, dimension + 1)
             points, ends = text.spans(starts := np.ascontiguousarray(rows[:, :dimension]))
             slots, references = TextSlots(starts, ends), text.integers(rows[:, dimension])
-        elif key in KINDS or key in HELD:
-            width = nodes_of(KINDS[key]) if key in KINDS else 1
-            rows = stream.take(stream.count(key) * (width + (key in KINDS))).reshape(-1, width + (key in KINDS))
-            nodes = text.integers(rows[:, :width])
+        elif key in KINDS:
+            kind, rows = stream.cells(key)
+            nodes = text.integers(rows[:, :-1])
             nodes -= 1
-            entries.append(Entries(key, rows[:, :width], nodes, text.integers(rows[:, width:]).reshape(-1)))
+            entries.append(Entries(key, kind, rows[:, :-1], nodes, text.integers(rows[:, -1])))
+        elif key in HELD:
+            rows = stream.take(stream.count(key)).reshape(-1, 1)
+            nodes = text.integers(rows)
+            nodes -= 1
+            entries.append(Entries(key, "", rows, nodes, np.empty(0, dtype=np.int64)))
         elif key in ORDERINGS:
             told[ORDERINGS[key]] = _ordering(text, stream, key)
         elif key in SKIPPED or key in SKIPPED_VECTORS:
@@ -162,19 +189,20 @@ def _cells(
     """The cells, then the vertices that are held, with the names of these. ``told``: the orders that the file tells."""
     cells: list[CellBlock] = []
     names: dict[tuple[int, int], str] = {}
-    for key, starts, nodes, references in entries:
-        if key in KINDS:
+    faces: dict[str, NDArray[np.int64]] = {}
+    for key, kind, starts, nodes, references in entries:
+        if kind:
             check_nodes(text, starts, nodes, count, base=1)
-            order = order_of(key, KINDS[key], told.get(key)) if key in ORDERINGS.values() else None
-            nodes = nodes if order is None else np.ascontiguousarray(nodes[:, order])
-            cells.append(CellBlock(KINDS[key], sealed(nodes), sealed(references)))
-    faces = {block.kind: block.nodes for block in cells}
-    for key, starts, nodes, _ in entries:
+            order = order_of(key, kind, told.get(key)) if key in ORDERINGS.values() else None
+            order = BY_GMSH.get(kind) if kind in WIDER.get(key, ()) else order
+            faces[key] = nodes if order is None else np.ascontiguousarray(nodes[:, order])
+            cells.append(CellBlock(kind, sealed(faces[key]), sealed(references)))
+    for key, _, starts, nodes, _ in entries:
         if key in HELD:
             if key.endswith("Vertices") or key == "Corners":
                 check_nodes(text, starts, nodes, count, base=1)
             else:
-                of = faces.get(KINDS[key.removeprefix("Required")], np.empty((0, 1), dtype=np.int64))
+                of = faces.get(key.removeprefix("Required"), np.empty((0, 1), dtype=np.int64))
                 _check_faces(text, key, starts, nodes, len(of))
                 nodes = np.unique(of[nodes.ravel()]).reshape(-1, 1)
             cells.append(CellBlock("vertex", nodes, np.full(len(nodes), HELD[key])))

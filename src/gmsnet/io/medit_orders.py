@@ -2,6 +2,8 @@
 
 A file may say by ``HexahedraQ2Ordering`` and its like where each node of a cell lies: in halves of the ideal cell along
 its axes, or of its corners' weights where these are a simplex.
+
+Gmsh writes quadrilaterals and hexahedra of second order under the keywords of the first, in its own order (4.15).
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS
+from gmsnet.io.gmsh_sections import KINDS
 
 _SQUARE = ((0, 0), (2, 0), (2, 2), (0, 2))
 _CORNERS: dict[str, tuple[tuple[int, ...], ...]] = {
@@ -28,6 +31,10 @@ ORDERINGS = {f"{key}Ordering": key for key in _CORNERS}
 # The place in Medit's list of each of Mesh's nodes. It has the middle of a hexahedron's face at the bottom first, then
 # that at the top, then those around.
 _OWN = {"HexahedraQ2": (*range(20), 25, 23, 22, 24, 20, 21, 26)}
+
+# What may stand under a keyword of the first order, and the place in Gmsh's list of each of Mesh's nodes.
+WIDER = {"Quadrilaterals": ("quad8", "quad9"), "Hexahedra": ("hexahedron20", "hexahedron27")}
+BY_GMSH = {row.name: np.array(row.order) for row in KINDS.values() if row.order is not None}
 
 
 def lattice(key: str, kind: str) -> NDArray[np.int64]:
