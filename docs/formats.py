@@ -179,8 +179,8 @@ What else these formats have:
 - Abaqus: C3D27 takes all of its 27 nodes; cells that leave some of the last six out are held.
 - Medit: `HexahedraQ2Ordering` and its like are read. Without them, Q2 hexahedra have the middles of their faces at the
   bottom, at the top, then around; P2 prisms and pyramids have the order of VTK.
-- Medit: Gmsh writes second-order quadrilaterals and hexahedra under `Quadrilaterals` and `Hexahedra`, in its own order. They
-  are told by the keyword that follows.
+- Medit: Gmsh writes second-order quadrilaterals and hexahedra under `Quadrilaterals` and `Hexahedra`, in its own order.
+  They are told by the keyword that follows.
 - Nastran: nodes in another coordinate system (CP), INCLUDE and superelements are refused. Nodes of loads, supports,
   rigid elements, springs, masses and unknown elements are held. Regions are properties.
 - UGRID: the form is part of the name (`.b8.ugrid`, `.lb8.ugrid`, `.r8.ugrid`, …; `.ugrid` is text).
