@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import gmsnet
+from gmsnet.constraints.shapes import units
 from gmsnet.generate import ball_volume, disturb_on, sphere_surface, torus_surface
 from gmsnet.measure.surface_change import PLACES, Compared, Grid, surface_change
 
@@ -107,6 +108,33 @@ def test_a_surface_that_stays_and_one_that_is_moved():
     assert surface_change(Compared(rows, mesh.points, fold)).normal > 90
 
 
+def spanned(area):
+    """By an equilateral spherical triangle of this area and the centre."""
+    cotangent = 1 / np.tan((np.pi + area) / 6)
+    return cotangent * (3 - cotangent**2) / 12
+
+
+def most_enclosed(nodes):
+    """docs/surfaces.md: by a polyhedron with so many nodes on the unit sphere, seen once from its centre."""
+    return (2 * nodes - 4) * spanned(2 * np.pi / (nodes - 2))
+
+
+def test_no_polyhedron_in_a_sphere_encloses_more_than_the_bound():
+    fifth, root = np.pi / 5, np.sqrt(145)
+    regular = {4: 8 * np.sqrt(3) / 27, 6: 4 / 3, 12: 5 / 12 * (3 + np.sqrt(5)) / np.sin(2 * fifth) ** 3}
+    largest = {5: np.sqrt(3) / 2, 7: 5 / 3 * np.sin(2 * fifth), 8: np.sqrt((475 + 29 * root) / 250)}
+    assert [most_enclosed(n) for n in regular] == pytest.approx(list(regular.values()), rel=1e-14)
+    assert all(volume < most_enclosed(n) for n, volume in largest.items())
+    a, b, c = units(np.random.default_rng(5).normal(size=(3 * 10**5, 3))).reshape(3, -1, 3)
+    double = abs((a * np.cross(b, c)).sum(axis=1))  # of what the triangle spans three times
+    area = 2 * np.arctan2(double, 1 + (a * b).sum(axis=1) + (b * c).sum(axis=1) + (c * a).sum(axis=1))
+    assert (double / 6 <= spanned(area) + 1e-15).all()
+    areas = np.linspace(0, 2 * np.pi, 1001)[1:-1]
+    cotangent = 1 / np.tan((np.pi + areas) / 6)
+    second = np.diff(spanned(areas), 2) / (areas[1] - areas[0]) ** 2
+    assert second == pytest.approx(-(cotangent**3 * (1 + cotangent**2) / 36)[1:-1], rel=1e-3, abs=1e-6)
+
+
 def test_what_a_sphere_encloses_hangs_on_how_even_its_facets_are():
     """docs/surfaces.md: less than the ball by √3/6R·ΣA²q, and by no less than Fejes Tóth's bound."""
 
@@ -121,9 +149,7 @@ def test_what_a_sphere_encloses_hangs_on_how_even_its_facets_are():
     mesh = disturb_on(sphere_surface(1500), 0.3, seed=1).mesh
     radius, rows = np.linalg.norm(mesh.points, axis=1).mean(), mesh.cells[0].nodes
     result = gmsnet.smooth(mesh)
-    n = len(mesh.points)
-    omega = np.pi * n / (6 * (n - 2))
-    bound = 4 * np.pi / 3 - (n - 2) / 6 / np.tan(omega) * (3 - 1 / np.tan(omega) ** 2)
+    bound = 4 * np.pi / 3 - most_enclosed(len(mesh.points))
     before, after = (missing(points / radius, rows) for points in (mesh.points, result.mesh.points))
     for found, formula in (before, after):
         assert found == pytest.approx(formula, rel=0.01)
