@@ -12,6 +12,7 @@ from support.surfaces import Twin, boundary, cylinder, ell, facets_of, patches, 
 from gmsnet.constraints.facets import boundary_of, facet_keys
 from gmsnet.constraints.patches import NOTHING, linked, patches_of
 from gmsnet.constraints.sliding_in_space import enclosed
+from gmsnet.constraints.smooth_patches import vertices_of
 from gmsnet.topology.wound import Wound
 
 
@@ -58,6 +59,33 @@ def test_a_sphere_is_one_patch():
     points, rows = sphere(400)
     assert counts(patches(points, rows)) == (1, 0, 400, 0)
     assert counts(patches(points, rows, 0.1))[2:] == (0, 0)
+
+
+@pytest.mark.parametrize(("height", "is_tip"), [(3.0, True), (1.0, True), (0.6, True), (0.55, False), (0.2, False)])
+def test_the_tip_of_a_cone_of_many_facets_is_no_place_to_slide_from(height, is_tip):
+    angle = 2 * np.pi * np.arange(24) / 24
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.vstack(
+        [[[0, 0, height]], *(np.column_stack([r * ring, np.full(24, height * (1 - r))]) for r in (0.5, 1))]
+    )
+    j, k = np.arange(24), (np.arange(24) + 1) % 24
+    rows = np.concatenate(
+        [np.column_stack(row) for row in ((0 * j, 1 + j, 1 + k), (1 + j, 25 + j, 25 + k), (1 + j, 25 + k, 1 + k))]
+    )
+    points = points @ turned(3).T
+    found = patches(points, rows)
+    assert len(np.unique(found.patch)) == 1
+    assert np.flatnonzero(found.tips).tolist() == [0] * is_tip
+    assert found.slides[0] != is_tip
+    assert found.slides[1:25].all()
+    assert not patches(points, rows, 89.0).tips.any()
+    vertices = vertices_of(found, points)
+    if is_tip:  # each facet there has its own normal at the tip, and so straight edges
+        at, corner = np.nonzero(rows == 0)
+        assert np.array_equal(vertices.normals[at, corner], found.unit[at])
+        along = points[rows[at, 0]] - points[rows[at, 1]]
+        normal = vertices.normals[at, 1]
+        assert abs((along * normal).sum(axis=1)).max() < 0.01
 
 
 def test_marks_and_lines_cut_a_plane():
@@ -142,6 +170,7 @@ def test_as_by_definition(seed):
             across = [g for g in twin.owners[edge] if g != f]
             assert found.beside[f, k] == (NOTHING if edge in twin.sharp else across[0])
     assert set(np.flatnonzero(found.slides).tolist()) == twin.slides
+    assert set(np.flatnonzero(found.tips).tolist()) == twin.tips
     on_curves = set(np.flatnonzero(found.curves.slides).tolist())
     assert on_curves <= twin.through
     ends = {int(v) for c in range(len(found.curves)) for v in found.curves.nodes_of(c)[[0, -1]]}

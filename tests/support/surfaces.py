@@ -116,6 +116,12 @@ def sliding(mesh, angle=30.0, fixed=None):
     return topology, SurfaceSliding.of(mesh, facets, found, topology.memory, topology.free)
 
 
+def _is_tip(units, least):
+    """Do all of these normals turn from their mean by an angle of this cosine or more?"""
+    mean = units.sum(axis=0)
+    return least > 0 and max(units @ mean) <= (least + 1e-12) * np.linalg.norm(mean)
+
+
 class Twin:
     """Sharp edges, patches and sliding nodes of facets, by their definitions."""
 
@@ -136,7 +142,7 @@ class Twin:
             one, two = np.linalg.norm(normal[f]), np.linalg.norm(normal[g])
             if facets.label[f] != facets.label[g] or not one or not two:
                 return False
-            return normal[f] @ normal[g] >= (least - 1e-12) * one * two
+            return normal[f] @ normal[g] >= (least + 1e-12) * one * two
 
         self.sharp = {edge for edge, owners in self.owners.items() if not smooth(edge, owners)}
         self.part = list(range(len(rows)))
@@ -152,6 +158,12 @@ class Twin:
             for v in edge:
                 at[v].append(edge)
         able = set(np.flatnonzero(may).tolist()) - still
+        around = defaultdict(list)
+        for f, row in enumerate(rows):
+            for v in row:
+                around[v].append(normal[f] / (np.linalg.norm(normal[f]) or 1.0))
+        self.tips = {v for v, units in around.items() if v not in at and _is_tip(np.array(units), least)}
+        able -= self.tips
         self.slides = {v for row in rows for v in row if v not in at} & able
         self.through = {v for v in able if len(at[v]) == 2 and self._goes_on(v, at[v], facets, lines, points, least)}
 

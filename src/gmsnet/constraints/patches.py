@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.facets import Facets
-from gmsnet.constraints.features import COLLINEAR, SLACK, Curves, curves_along, lengths_of, rounding_of
+from gmsnet.constraints.features import COLLINEAR, SLACK, Curves, curves_along, dot, lengths_of, rounding_of
 from gmsnet.constraints.needles import free_edges
 from gmsnet.constraints.outline import Flags, Longs, Outline, edge_keys
 from gmsnet.kernels.whole import facets as kernels
@@ -25,7 +25,7 @@ class Patches:
     curves: those of its sharp edges. slides: (N,) bool, the nodes inside of patches that slide. rows: (F, 3) node ids.
     patch: (F,) the patch of each facet. beside: (F, 3) the facet across the edge from corner k to k + 1, NOTHING where
     that is sharp. unit: (F, 3) normals, 0 where a facet has no area. area: (F,) twice the area. flat: (F, 3) bool, the
-    facet across lies in the same plane.
+    facet across lies in the same plane. tips: (N,) bool, see ``tips_of``.
     """
 
     curves: Curves
@@ -36,6 +36,7 @@ class Patches:
     unit: Floats
     area: Floats
     flat: Flags
+    tips: Flags
 
 
 def patches_of(
@@ -87,10 +88,30 @@ def patches_of(
     at_sharp[outline.edges] = True
     slides = np.zeros(nodes, dtype=bool)
     slides[rows] = True
-    slides &= ~at_sharp & ~still & may
-    return Patches(
-        curves, slides, rows, linked(beside.reshape(-1, 3)), beside.reshape(-1, 3), unit, area, flat.reshape(-1, 3)
-    )
+    tips = tips_of(rows, unit, least, ~at_sharp)
+    slides &= ~at_sharp & ~tips & ~still & may
+    across = beside.reshape(-1, 3)
+    return Patches(curves, slides, rows, linked(across), across, unit, area, flat.reshape(-1, 3), tips)
+
+
+def tips_of(rows: Longs, unit: Floats, least: float, among: Flags) -> Flags:
+    """(N,) bool, the nodes of these at which every facet turns from the mean of their normals by an angle or more.
+
+    Such is the tip of a cone of many facets, whose edges are all blunt. least: the cosine of the angle.
+    """
+    found = np.zeros(len(among), dtype=bool)
+    if least <= 0.0:
+        return found
+    total, count = np.zeros((len(among), 3)), np.zeros(len(among), dtype=np.int64)
+    kernels.add_units(rows, unit, total, count)
+    found = among & (count > 0) & (dot(total, total) <= (least * count) ** 2)
+    if found.any():
+        facet, corner = np.nonzero(found[rows])
+        node = rows[facet, corner]
+        nearest = np.full(len(among), -np.inf)
+        np.maximum.at(nearest, node, dot(unit[facet], total[node]))
+        found &= nearest <= least * lengths_of(total)
+    return found
 
 
 def _of_cells(facets: Facets, normal: Floats, unit: Floats, area: Floats) -> tuple[Floats, Floats]:

@@ -63,7 +63,8 @@ def vertices_of(patches: Patches, points: Floats) -> Vertices:
 
     At a node, that is the mean of the normals of its facets in the patch, weighted so that it is exact on a sphere
     (Max: Weights for computing vertex normals from facet normals, 1999), and then that of a cubic through two rings
-    (kernels.whole.jets). At nodes of plane parts it is theirs.
+    (kernels.whole.jets). At nodes of plane parts it is theirs. A tip is a vertex of each of its facets, with the normal
+    of that facet, and no cubic is fitted at the nodes next to it.
     """
     rows, nodes = patches.rows, len(points)
     owner, numbers = np.empty(rows.shape, dtype=np.int32), np.full(rows.size + nodes, NOTHING, dtype=np.int64)
@@ -78,8 +79,14 @@ def vertices_of(patches: Patches, points: Floats) -> Vertices:
     table[:nodes, :3] = points
     more = owner >= nodes
     table[owner[more], :3] = points[rows[more]]
-    fit_normals(table, owner, (plane == NOTHING) & (length > 0.0), unit)
+    chosen = (plane == NOTHING) & (length > 0.0)
+    facet, corner = np.nonzero(patches.tips[rows]) if patches.tips.any() else np.empty((2, 0), dtype=np.int64)
+    chosen[owner[facet]] = False
+    fit_normals(table, owner, chosen, unit)
     table[:, 3:] = unit
+    if len(facet):
+        owner[facet, corner] = count + np.arange(len(facet))
+        table = np.vstack([table, np.hstack([points[rows[facet, corner]], patches.unit[facet]])])
     return Vertices(owner, table)
 
 

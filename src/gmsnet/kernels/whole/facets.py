@@ -82,6 +82,17 @@ def list_edges(rows, nodes, found, count, one, other):
 
 
 @kernel
+def add_units(rows, unit, total, count):
+    """Adds the unit normals of facets (F, 3) at their nodes to ``total`` (N, 3), and how many they are to ``count``."""
+    for f in range(len(rows)):
+        for k in range(3):
+            i = rows[f, k]
+            count[i] += 1
+            for axis in range(3):
+                total[i, axis] += unit[f, axis]
+
+
+@kernel
 def cosines(unit, one, other, out):
     """Writes the product of the unit normals (F, 3) on both sides of each edge (E,)."""
     for e in range(len(one)):
