@@ -11,7 +11,7 @@ from gmsnet.generate.curved_volumes import second_order_volume
 from gmsnet.measure.report import connectivity_of
 from gmsnet.measure.solid import judge_volumes
 from gmsnet.methods.solid_cells import SolidCells
-from gmsnet.run import second_order, stages
+from gmsnet.run import room_stage, second_order, stages
 
 
 def signs(mesh, points):
@@ -48,7 +48,7 @@ def test_the_lowest_bounds_of_tetrahedra_rise(seed, monkeypatch):
     assert_sound(mesh, result)
     assert result.after.shape.min() >= result.before.shape.min()
     risen = least_bound(mesh.with_points(result.points))
-    monkeypatch.setattr(second_order, "ENOUGH", 0.0)
+    monkeypatch.setattr(room_stage, "ENOUGH", 0.0)
     without = least_bound(mesh.with_points(gmsnet.smooth(mesh).points))
     assert risen > without + 0.05
     assert risen >= least_bound(mesh)
@@ -74,7 +74,7 @@ def test_a_move_of_all_corners_that_costs_quality_is_taken_back(monkeypatch):
 
 def test_raising_moves_no_corner_and_lowers_no_bound_below_the_least(monkeypatch):
     mesh = bent_tetrahedra(5)
-    some = (second_order.untangle_second_order, second_order.raise_bounds)
+    some = (second_order.untangle_second_order, room_stage.raise_bounds)
     monkeypatch.setattr(stages.carry_out, "__defaults__", (some,))
     result = gmsnet.smooth(mesh, "laplacian")
     corners = np.unique(mesh.cells[0].nodes[:, :4])

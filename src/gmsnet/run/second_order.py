@@ -1,10 +1,10 @@
-"""The stages of second-order cells: the invalid are made valid, corners smoothed, and narrow cells given room.
+"""The stages of second-order cells: the invalid are made valid, and corners smoothed.
 
 The method of the call moves the corners, as if cells were straight, and they take their middles along: in a plane after
 each of its sweeps (methods/curved.py), in space all together at the end (methods/solid_cells.py). In a plane nodes of
 first-order cells beside them move, too. Nodes of the boundary, of interfaces and of line cells stay, middles among
 them. A move is taken if all cells around it are certified valid by the coefficients of their determinants
-(docs/guarantees.md). At last the lowest bounds of tetrahedra are raised by their middles (kernels/curved/raise3.py).
+(docs/guarantees.md). Then follow the stages of run/room_stage.py.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.stars import counter_clockwise, curved_mesh
 from gmsnet.kernels.simplex.bernstein import CORNERS, KINDS, NAMES, WIDEST
-from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import LEVELS, VALID
 from gmsnet.measure.totals import totals_of
 from gmsnet.mesh.cell_block import CellBlock
@@ -29,8 +28,10 @@ from gmsnet.methods.solid_cells import SolidCells
 from gmsnet.parallel.executor import Executor
 from gmsnet.preserve.protection import Protection, protected, protected_volume
 from gmsnet.run.options import SmoothOptions
+from gmsnet.run.outcome import rank_by
+from gmsnet.run.score import Score
 from gmsnet.run.state import SecondOrder, State
-from gmsnet.run.stop import CALLBACK, NO_PROGRESS, NOTHING_TO_MOVE
+from gmsnet.run.stop import CALLBACK, NOTHING_TO_MOVE
 from gmsnet.run.sweep_stage import sweep
 from gmsnet.topology.curved_solids import curved_solids
 from gmsnet.topology.held import OF_SECOND_ORDER
@@ -38,11 +39,6 @@ from gmsnet.topology.ordering import near_points, planar_points
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
-SWEEPS = 10
-ABOVE, HIGHEST = 0.3, 1.0  # bounds are raised towards the least one and so much more, and none is asked to be higher
-LOWEST = 0.05  # of bounds less than this above the least one, cells are visited
-ENOUGH = 0.95  # of a least bound
-RISE, PATIENCE = 1e-3, 2  # after so many rounds without such a rise of the least bound, raising ends
 FOR_GOOD = "its determinant is not positive where held nodes alone decide it"
 NOT_FOUND = "no valid shape of it was found"
 Floats = NDArray[np.float64]
@@ -126,7 +122,7 @@ def untangle_second_order(state: State, options: SmoothOptions, executor: Execut
     given = state.second_order
     if given is None:
         return state
-    cells = _opened(state)
+    cells = opened(state)
     sign, quality = cells.judged()
     by_id = np.empty_like(cells.free)
     by_id[state.topology.memory] = cells.free
@@ -138,8 +134,8 @@ def untangle_second_order(state: State, options: SmoothOptions, executor: Execut
         return state
     from gmsnet.untangle.curved import untangle_curved  # untangling takes 0.15 s more to import
 
-    for_good = untangle_curved(cells, _corners(known).topology, executor).for_good
-    state = _judged(state, cells)
+    for_good = untangle_curved(cells, corners_alone(known).topology, executor).for_good
+    state = judged(state, cells)
     assert state.second_order is not None
     assert state.second_order.sign is not None
     left = np.flatnonzero(state.second_order.sign != 1)
@@ -152,11 +148,11 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     given = state.second_order
     if given is None or given.unable or state.stop_reason == CALLBACK or not given.free.any():
         return state
-    cells, room = _opened(state), -math.inf
+    cells, room = opened(state), -math.inf
     if options.guard != LEVELS[VALID]:
         sign, quality = cells.judged()
         room = float(quality[(sign == 1) & given.curved].min(initial=cells.low))
-    corners = _corners(given)
+    corners = corners_alone(given)
     curved = Curved(cells.mesh, room) if isinstance(cells, PlanarCells) else None
     ready = replace(
         state, points=cells.points, totals=None, protection=corners, released=False, sliding=None,
@@ -167,73 +163,24 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
         return state
     state = replace(state, history=done.history, interruption=done.interruption, stop_reason=done.stop_reason)
     if isinstance(cells, PlanarCells):
-        return _judged(state, cells._replace(points=done.points))
+        return judged(state, cells._replace(points=done.points))
     level = LEVELS.index(options.guard)
     guard = Field(cells.points, corners.topology, state.precision, level).guard(executor)
     cells.advance(done.points, guard, room)
-    if not options.target and _rank(cells.points, corners, executor) > _rank(state.points, corners, executor):
+    after, before = (rank_of(points, corners, options, executor) for points in (cells.points, state.points))
+    if not options.target and after > before:
         return state  # a move of all corners together may cost what the method gained
-    return _judged(state, cells)
+    return judged(state, cells)
 
 
-def make_room(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """Moves the nodes around second-order cells whose certified bound is low, inner middles first."""
-    given = state.second_order
-    if given is None or state.stop_reason == CALLBACK or not given.free.any():
-        return state
-    cells = _opened(state)
-    topology = given.protection.topology
-    inner, corners = np.flatnonzero(cells.inner), np.flatnonzero(cells.free & topology.near_free)
-    level, tally = LEVELS.index(options.guard), np.zeros(3, dtype=np.int64)
-    for _ in range(min(SWEEPS, options.max_sweeps)):
-        moved = int(tally[MOVED])
-        guard = Field(cells.points, topology, state.precision, level).guard(executor)
-        cells.improve(inner, cells.low, guard, tally)
-        cells.improve(corners, cells.low, guard, tally)
-        if tally[MOVED] == moved:
-            break
-    if state.stop_reason == NOTHING_TO_MOVE:
-        state = state.ended(NO_PROGRESS)
-    return _judged(state, cells)
-
-
-def raise_bounds(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """Moves nodes that are no corners around those tetrahedra whose certified bounds are lowest.
-
-    Other cells with straight edges have low bounds, too, and would be bent.
-    """
-    given = state.second_order
-    if given is None or not given.tetrahedra.any() or not given.free.any():
-        return state
-    if options.target or state.stop_reason == CALLBACK:
-        return state
-    cells = _opened(state)
-    assert isinstance(cells, SolidCells)
-    level, tally = LEVELS.index(options.guard), np.zeros(3, dtype=np.int64)
-    guard = Field(cells.points, given.protection.topology, state.precision, level).guard(executor)
-    some = np.flatnonzero(given.tetrahedra & (given.sign == 1))
-    least, stuck = -math.inf, 0
-    for _ in range(min(SWEEPS, options.max_sweeps)):
-        bounds = cells.bounds(some, HIGHEST)
-        now = bounds.min(initial=HIGHEST)
-        stuck = 0 if now > least + RISE else stuck + 1
-        least, moved = float(now), int(tally[MOVED])
-        if stuck == PATIENCE or least >= ENOUGH:
-            break
-        cells.raise_bounds(some[bounds < least + LOWEST], min(least + ABOVE, HIGHEST), least, guard, tally)
-        if tally[MOVED] == moved:
-            break
-    return _judged(state, cells) if tally[MOVED] else state
-
-
-def _rank(points: Floats, straight: Protection, executor: Executor) -> tuple[float, float]:
-    """Of two places of the corners those of the lesser rank are the better: see run.outcome."""
+def rank_of(points: Floats, straight: Protection, options: SmoothOptions, executor: Executor) -> tuple[float, ...]:
+    """Of two places of the corners those of the lesser rank are the better, by the rule of the last stage."""
     totals = totals_of(points, straight.topology.simplices, executor)
-    assert totals is not None
-    return -totals.shape_min, -totals.shape_mean
+    rank: tuple[float, ...] = rank_by(options.best_by)(Score.of(totals, options.best_by))
+    return rank
 
 
-def _opened(state: State) -> PlanarCells | SolidCells:
+def opened(state: State) -> PlanarCells | SolidCells:
     """A copy of the points, the second-order cells, and which nodes may move, all by places in memory."""
     given = state.second_order
     assert given is not None
@@ -247,7 +194,7 @@ def _opened(state: State) -> PlanarCells | SolidCells:
     return PlanarCells(points, mesh, free, state.precision)
 
 
-def _judged(state: State, cells: PlanarCells | SolidCells) -> State:
+def judged(state: State, cells: PlanarCells | SolidCells) -> State:
     """The state with these points, and how its cells are now; as it was if one of them has lost its validity."""
     given = state.second_order
     assert given is not None
@@ -260,7 +207,7 @@ def _judged(state: State, cells: PlanarCells | SolidCells) -> State:
     return replace(state, points=cells.points, totals=None, second_order=known)
 
 
-def _corners(given: SecondOrder) -> Protection:
+def corners_alone(given: SecondOrder) -> Protection:
     """The protection with the nodes alone free that may move."""
     return replace(given.protection, base=given.protection.base.holding(~given.free, OF_SECOND_ORDER))
 

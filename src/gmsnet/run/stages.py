@@ -13,7 +13,8 @@ from gmsnet.run.metric_stage import take_metric
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import write_back
 from gmsnet.run.rest_stage import improve_rest
-from gmsnet.run.second_order import make_room, raise_bounds, smooth_corners, untangle_second_order
+from gmsnet.run.room_stage import make_room, raise_bounds
+from gmsnet.run.second_order import smooth_corners, untangle_second_order
 from gmsnet.run.state import State
 from gmsnet.run.sweep_stage import sweep
 from gmsnet.run.untangle_stage import protect_untangled, untangle_all, untangle_protected
@@ -33,8 +34,7 @@ class Stage(Protocol):
 
 STAGES: tuple[Stage, ...] = (
     untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_rest, improve_dihedrals,
-    improve_mean, improve_near_walls, untangle_second_order, smooth_corners, make_room,
-    raise_bounds,
+    improve_mean, improve_near_walls, untangle_second_order, smooth_corners, make_room, raise_bounds,
 )  # fmt: skip
 
 
