@@ -25,7 +25,7 @@ from gmsnet.io.pieces import Piece as Bytes
 from gmsnet.io.ranges import AT_ONCE, Column, Plan, Ranges
 from gmsnet.io.stamps import Stamps
 
-PLANNED = ("gmsh", "ugrid", "vtk", "vtkhdf", "vtu")  # formats whose files can tell how their numbers lie
+PLANNED = ("cgns", "gmsh", "ugrid", "vtk", "vtkhdf", "vtu")  # formats whose files can tell how their numbers lie
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
 Value = TypeVar("Value")

@@ -6,6 +6,7 @@ Source: CGNS Standard Interface Data Structures, "Element connectivity" and "Str
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from gmsnet.io.cell_table import check_range
 from gmsnet.io.cells import distinct
 from gmsnet.io.exodus_elements import ORDERS
 from gmsnet.io.hdf5 import Node, shown
+from gmsnet.io.ranges import Table
 
 Ints = NDArray[np.int64]
 
@@ -63,6 +65,21 @@ def section(node: Node, count: int) -> Section:
     else:
         raise FormatError(f"{shown(node.path)}: elements of the type {code} are not known")
     return Section(title(node), int(bounds[0]), [(kind, nodes) for kind, nodes in blocks if len(nodes)])
+
+
+def table_of(node: Node) -> tuple[int, Table] | None:
+    """The number of the first element of a section, and where its elements stand; None where only a reader of the whole
+    can tell."""
+    head, bounds = (node.need(path).integers().reshape(-1) for path in (DATA, f"ElementRange/{DATA}"))
+    listed = node.need(f"ElementConnectivity/{DATA}").rows()
+    if len(head) < 1 or len(bounds) != 2 or int(head[0]) not in KINDS or listed is None or listed.dtype[1] not in "iu":
+        return None
+    kind, number = KINDS[int(head[0])], int(bounds[1]) - int(bounds[0]) + 1
+    width = nodes_of(kind)
+    if listed.width != 1 or listed.rows != number * width:
+        return None
+    rows = replace(listed, rows=number, stride=listed.stride * width, width=width)
+    return int(bounds[0]), Table(kind, rows, 1, CGNS_ORDERS.get(kind))
 
 
 def _mixed(node: Node, listed: Ints, number: int, count: int) -> Iterator[tuple[str, Ints]]:

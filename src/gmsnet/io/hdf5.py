@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError, InputError, MissingExtraError
 from gmsnet.io.contents import Data
+from gmsnet.io.ranges import Rows
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 NEEDED = "pip install 'gmsnet[hdf5]'"
@@ -201,15 +202,17 @@ class Node:
                 raise FormatError(f"{shown(self.path)}: a list of whole numbers was expected")
             return np.asarray(self.thing[first:last]).astype(np.int64)
 
-    def dtype(self) -> str:
-        """The type of the numbers of a data set, as NumPy writes it."""
+    def rows(self) -> Rows | None:
+        """Where the numbers of a data set stand, one row or several; None where they are compressed, in parts, or in
+        another file, or are no numbers."""
+        shape = self.shape()
+        begin = 0 if 0 in shape else self.offset()
         with _said_of(self.path):
-            return str(self.thing.dtype.str)
-
-    def is_elsewhere(self) -> bool:
-        """Whether the values of a data set are kept in another file."""
-        with _said_of(self.path):
-            return bool(self.thing.external or self.thing.is_virtual)
+            if begin is None or len(shape) not in (1, 2) or self.thing.external or self.thing.is_virtual:
+                return None
+            kind = self.thing.dtype
+        width = 1 if len(shape) == 1 else shape[1]
+        return Rows(begin, shape[0], width * kind.itemsize, kind.str, width) if self.numeric() and width else None
 
     def numeric(self) -> bool:
         """Whether a data set is of whole numbers or of floats of four or eight bytes."""

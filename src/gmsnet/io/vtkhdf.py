@@ -16,7 +16,7 @@ from gmsnet.io import vtk_cells
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
-from gmsnet.io.ranges import Column, Plan, Ranges, Rows
+from gmsnet.io.ranges import Column, Plan, Ranges
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.io.vtk_runs import Field, tables_of, told_by
 from gmsnet.mesh.mesh import Mesh
@@ -62,35 +62,25 @@ def plan(file: Ranges) -> Plan | None:
         if root.attribute("Type") != "UnstructuredGrid" or root.get("Steps") is not None:
             return None
         count, cells = _only(root, "NumberOfPoints"), _only(root, "NumberOfCells")
-        points, offsets, types, nodes = (root.need(key) for key in ("Points", "Offsets", "Types", "Connectivity"))
-        fields = [_in_rows(root.get(key)) for key in ("PointData", "CellData")]
-        elsewhere = any(each.is_elsewhere() for each in (points, offsets, types, nodes))
-        begin, at = points.offset(), nodes.offset()
-        whole = [each.shape() for each in (points, offsets, types, nodes)]
-        if elsewhere or begin is None or at is None or whole[:3] != [(count, 3), (cells + 1,), (cells,)] or not cells:
+        place, offsets, types, listed = (root.need(key) for key in ("Points", "Offsets", "Types", "Connectivity"))
+        points, nodes = place.rows(), listed.rows()
+        if points is None or nodes is None or points.dtype[1:] not in ("f4", "f8") or nodes.dtype[1] not in "iu":
             return None
-        told = told_by(file, fields[0], fields[1], (count, cells))
-        real = points.dtype()
-        if told is None or real[1:] not in ("f4", "f8") or nodes.dtype()[1] not in "iu":
+        if (points.rows, points.width, nodes.width) != (count, 3, 1):
             return None
-        listed = Rows(at, whole[3][0], 0, nodes.dtype())
-        tables = tables_of(types.some, cells, whole[3][0], listed, offsets.some, told.regions)
-        place = Rows(begin, count, 3 * int(real[2:]), real, 3)
-        blocks = [[table] for table in tables]
-        return Plan([Column(place)], blocks, real[1:] == "f4", fixed=told.fixed) if tables else None
+        if (offsets.shape(), types.shape()) != ((cells + 1,), (cells,)) or not cells:
+            return None
+        told = told_by(file, _fields_in(root.get("PointData")), _fields_in(root.get("CellData")), (count, cells))
+        if told is None:
+            return None
+        blocks = [[each] for each in tables_of(types.some, cells, nodes.rows, nodes, offsets.some, told.regions)]
+        return Plan([Column(points)], blocks, points.dtype[1:] == "f4", fixed=told.fixed) if blocks else None
 
 
-def _in_rows(group: Node | None) -> list[Field]:
+def _fields_in(group: Node | None) -> list[Field]:
     """The data of points or cells, and where they stand."""
-    found = []
-    for node in group.members() if group is not None else ():
-        if node.is_data and node.numeric():
-            begin, shape = node.offset(), node.shape()
-            width = 1 if len(shape) == 1 else shape[-1]
-            size = int(node.dtype()[2:]) * width
-            there = begin is not None and len(shape) in (1, 2) and not node.is_elsewhere()
-            found.append(Field(node.name, Rows(begin or 0, shape[0], size, node.dtype(), width) if there else None))
-    return found
+    members = group.members() if group is not None else ()
+    return [Field(node.name, node.rows()) for node in members if node.is_data and node.numeric()]
 
 
 def _only(root: Node, key: str) -> int:
