@@ -249,3 +249,23 @@ def test_they_do_not_where_nodes_have_far_to_go_or_slide(swept, thrown):
     gmsnet.smooth(thrown, metric=FRONT.metric)  # near already
     gmsnet.smooth(random_mesh(300, seed=1), preserve="metric", slide=True)
     assert not swept
+
+
+@pytest.mark.parametrize("slide", [None, True])
+def test_a_gradient_that_points_nowhere_is_no_end(slide):
+    """Across a sliver of this mesh the metric that is recovered changes as fast as its quality does."""
+    result = gmsnet.smooth(random_mesh(686, "circle", seed=44631), preserve="metric", slide=slide)
+    assert result.conformity.before.least < 1e-3
+    conforms(result, 0.5, 0.3)
+    assert result.conformity.after.mean > 0.8
+
+
+@pytest.mark.parametrize(("nodes", "seed"), [(2050, 51878), (4149, 82555), (4471, 47318)])
+def test_slivers_that_untangling_leaves_are_no_end(nodes, seed):
+    """All other cells have to give way to them at first, or the metric changes as fast as their quality does."""
+    mesh = random_mesh(nodes, seed=seed + 6)
+    tangled = disturb(mesh, Topology.of(mesh).free, 1.0, seed=seed, keep_valid=False)
+    result = gmsnet.smooth(tangled, preserve="metric")
+    assert result.before.inverted
+    conforms(result, 0.4, 0.2)
+    assert result.conformity.after.mean > 0.8

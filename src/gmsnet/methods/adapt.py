@@ -4,6 +4,10 @@ A sum over the corner simplices (methods/metric_sum.py) is minimised by conjugat
 (methods/conjugate.py). Large meshes whose cells are near to the metric come to most of it by sweeps over single nodes
 before. Between two rounds a metric that is a function is asked anew.
 
+The metric is linear between nodes, and its slopes are large across slivers. There the gradient may tell nothing of the
+way down, or all other cells may have to lose. Where not a step is found, the gradient takes the metric as constant.
+Where a round ends with such a cell all the same, single nodes move first from then on.
+
 The rounds: ΣE until it no longer falls; then a power of E for the worst cells, and ΣE again with a barrier that keeps
 what these have gained, as long as that pays.
 """
@@ -37,6 +41,7 @@ DOUBLINGS = 3  # E⁸
 TRADE = 1.0  # what the least 1/E must gain for what it costs in the mean, most of which comes back
 BELOW = 0.99  # times the least 1/E: where the barrier stands that keeps it
 NEAR, CLOSE, LARGE = 0.5, 0.75, 5000  # of the mean of 1/E, and of free nodes: so single nodes move first
+STUCK = 0.01  # a least 1/E below, where a round gains little: single nodes move first from then on
 REPAIRS = 4  # times at most is a round made that lowers the least 1/E
 
 
@@ -79,8 +84,11 @@ class Adapt(Smoother):
             self.near = bool(large and field.constraint is None and NEAR <= before[1] <= CLOSE)
         moved = self._round(field, before, floor=0.0)
         self.rounds += 1
-        gained = self._standing(field.points, field)[1] - before[1]
-        if not moved or gained < ROUND_GAIN * before[1] or self.rounds == ROUNDS:
+        least, mean = self._standing(field.points, field)
+        settled = not moved or mean - before[1] < ROUND_GAIN * before[1]
+        if settled and least < STUCK and not self.near:
+            self.near, settled = True, False
+        if settled or self.rounds == ROUNDS:
             if field.constraint is None or self.slide:
                 self.step = self._worst
             self.slide, self.rounds = True, 0
@@ -106,12 +114,11 @@ class Adapt(Smoother):
         least = problem.least(field.points)
         if len(problem.moved) and least > 0.0:
             problem.doublings, problem.top = DOUBLINGS, 1.0 / least
-            start = problem.swept(field.points) if self.near else field.points
-            found = field.written(minimise(problem, start, SETTLED))
+            found = field.written(self._lowest(problem, field.points))
             after = self._standing(found, field)
             if self.near and after[0] > before[0]:
                 problem.doublings, problem.floor = 0, BELOW * problem.least(found)
-                found = field.written(minimise(problem, problem.swept(found), SETTLED))
+                found = field.written(self._lowest(problem, found))
                 after = self._standing(found, field)
             gained, lost = after[0] - before[0], before[1] - after[1]
             if self._certified(found, field) and gained >= 0.0 and TRADE * lost < gained:
@@ -141,8 +148,7 @@ class Adapt(Smoother):
             if not len(problem.moved):
                 return 0
             problem.floor = floor * max(0.0, problem.least(field.points))
-            start = problem.swept(field.points) if self.near else field.points
-            found = field.written(minimise(problem, start, SETTLED))
+            found = field.written(self._lowest(problem, field.points))
             if not self._certified(found, field):
                 return 0
             if field.level == VALID or self._standing(found, field)[0] >= before[0]:
@@ -153,6 +159,19 @@ class Adapt(Smoother):
             free, floor = free.copy(), BELOW
             free[scored.rows[rows]] = False
         return 0
+
+    def _lowest(self, problem: Problem, points: Floats) -> Floats:
+        """Where conjugate gradients lead from points (N, 2), after single nodes if these move first.
+
+        If they lead nowhere, where they lead with the metric taken as constant.
+        """
+        start = problem.swept(points) if self.near and problem.sliders is None else points
+        found = minimise(problem, start, SETTLED)
+        if (found == start).all():
+            problem.still = True
+            found = minimise(problem, start, SETTLED)
+            problem.still = False
+        return found
 
     def _standing(self, points: Floats, field: Field) -> tuple[float, float]:
         """The least and the mean 1/E of the cells that are compared."""

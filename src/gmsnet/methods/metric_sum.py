@@ -41,7 +41,7 @@ class Problem:
     table: (S, 3) weights of edges, None where all are 1. number: (N,) the rows of the nodes that move, −1 of others.
     sliders: those of them that slide.
     background: the metric between nodes; start: (N,) where each node was in it. logs, slopes: of the metric at the
-    nodes. floor: of 1/E, 0 for none.
+    nodes. floor: of 1/E, 0 for none. still: are the slopes taken as 0?
     """
 
     cells: NDArray[np.int32]
@@ -57,6 +57,7 @@ class Problem:
     doublings: int = 0
     top: float = 1.0
     sliders: Sliders | None = None
+    still: bool = False
 
     @classmethod
     def of(cls, field: Field, metric: Metric, free: NDArray[np.bool_]) -> Problem:
@@ -85,6 +86,8 @@ class Problem:
     def look(self, points: Floats) -> None:
         """Takes the metric from where the nodes are now."""
         places.evaluate_some(self.background, points, self.moved, self.start, self.logs, self.slopes)
+        if self.still:
+            self.slopes[self.moved] = 0.0
 
     def least(self, points: Floats) -> float:
         """The least 1/E of these simplices."""
