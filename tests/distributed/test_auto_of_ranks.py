@@ -58,6 +58,15 @@ def test_volumes_of_any_kinds(kind, method, guard):
 
 
 @pytest.mark.parametrize("guard", ["valid", "worst"])
+def test_hexahedra_that_come_back_to_their_grid(guard):
+    mesh = block(6, 6, 6, jitter=0.1, seed=3)
+    options = SmoothOptions(guard=guard, preserve="none", threads=1)
+    told = same(mesh, options, parts_at_random(mesh, 3, np.random.default_rng(1), "strips"), 3)
+    assert "in float64" in told.history[-1].stage
+    assert told.after.shape_min > 1.0 - 1e-9
+
+
+@pytest.mark.parametrize("guard", ["valid", "worst"])
 def test_the_mean_of_hexahedra_is_raised_last(guard):
     mesh = gmsnet.generate.swept_volume(o_grid_section(24, 4), 12, 3.0, twist=0.6, bend=0.4)
     options = SmoothOptions(guard=guard, preserve="none", threads=1)

@@ -6,6 +6,7 @@ Sweeps in float32 end where nothing more is to be gained that they could tell fr
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet.kernels.methods.descent3 import sweep3
 from gmsnet.kernels.simplex.objectives3 import Aim3, Q
@@ -30,13 +31,17 @@ class ToTheEnd(Smoother):
         tally = np.zeros(3, dtype=np.int64)
         topology = field.topology
         assert isinstance(topology, MixedVolume)
-        ratios = ratios_of(field.points, topology.changeable, executor)
-        if not len(ratios) or len(topology.free) > FEW or ratios.max() > ALIKE * float(np.median(ratios)):
+        if executor.total(np.array(len(topology.free))) > FEW:
+            return tally
+        ratios = _of_all(ratios_of(field.points, topology.changeable, executor), executor)
+        if not len(ratios) or ratios.max() > ALIKE * float(np.median(ratios)):
             return tally
         guard, stars, start = field.guard(executor), topology.stars, field.points.copy()
         if field.level == WORST:  # no proof that a cell is above the worst one is had where all are alike: see below
             guard = plain_guard(field.precision, field.constraint)
-        extent = float(np.ptp(field.points[:, :3], axis=0).max())
+        places = field.points[:, :3]
+        low = executor.minimum(places.min(axis=0, initial=np.inf))
+        extent = float((-executor.minimum(-places.max(axis=0, initial=-np.inf)) - low).max())
 
         def visit(blocks: SpaceBlocks, first: int, last: int, counts: Tally) -> None:
             sweep3(field.points, blocks, first, last, guard, Aim3(Q), 1, np.empty(0), counts)
@@ -44,7 +49,8 @@ class ToTheEnd(Smoother):
         for _ in range(PASSES):
             before = field.points.copy()
             tally += over_stars(visit, stars, field.points, executor)
-            if np.abs(field.points - before).max() <= STILL * extent:
+            farthest = float(np.abs(field.points - before).max(initial=0.0))
+            if -executor.minimum(-farthest) <= STILL * extent:
                 break
         if field.level == WORST and not self._gained(field, topology, float(ratios.max()), executor):
             field.points[:] = start
@@ -53,7 +59,14 @@ class ToTheEnd(Smoother):
 
     def _gained(self, field: Field, topology: MixedVolume, before: float, executor: Executor) -> bool:
         """Is the worst corner better, by more than rounding? What is known of the points is forgotten, if not."""
-        gained = float(ratios_of(field.points, topology.changeable, executor).max()) < (1.0 - SURE) * before
+        worst = float(ratios_of(field.points, topology.changeable, executor).max(initial=-np.inf))
+        gained = -executor.minimum(-worst) < (1.0 - SURE) * before
         if not gained:
             topology.lent[0] = None
         return gained
+
+
+def _of_all(values: NDArray[np.float64], executor: Executor) -> NDArray[np.float64]:
+    """Those of all rows of ``changeable`` of the whole mesh. values: of those that are here."""
+    rows = executor.every(1, len(values))
+    return executor.in_order(executor.row_numbers(rows), values[rows])
