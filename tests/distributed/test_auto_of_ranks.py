@@ -57,6 +57,15 @@ def test_volumes_of_any_kinds(kind, method, guard):
     assert told.messages > 0
 
 
+@pytest.mark.parametrize("kind", SOLIDS)
+def test_ranks_without_a_hexahedron(kind):
+    """The last one has no cell, and of mixed cells others have but one kind."""
+    mesh, kinds = SOLIDS[kind], range(len(SOLIDS[kind].cells))
+    parts = [np.full(len(cells.nodes), k % 3, dtype=np.int32) for k, cells in zip(kinds, mesh.cells, strict=True)]
+    told = same(mesh, SmoothOptions(preserve="none", threads=1), parts, 4)
+    assert told.gathered == ""
+
+
 @pytest.mark.parametrize("guard", ["valid", "worst"])
 def test_hexahedra_that_come_back_to_their_grid(guard):
     mesh = block(6, 6, 6, jitter=0.1, seed=3)

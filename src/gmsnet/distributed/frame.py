@@ -16,12 +16,12 @@ Floats = NDArray[np.float64]
 
 def framed(comm: Any, mesh: Mesh) -> Mesh:
     """The mesh of one rank as a part of the mesh of all."""
-    volumes, quads = (bool(comm.allreduce(each, mpi().LOR)) for each in (mesh.has_volumes, mesh.has_quads))
+    volumes, quads, solids = (bool(comm.allreduce(each, mpi().LOR)) for each in mesh.kinds_there)
     plane = _plane(comm, mesh)
     points = mesh.points if plane is None else in_plane(mesh.points, plane)
     box = box_of(comm, points)
     exponent = exponent_of(box, None, mesh.single)
-    return mesh.as_part(plane, (volumes, quads), exponent, np.ldexp(box, -exponent))
+    return mesh.as_part(plane, (volumes, quads, solids), exponent, np.ldexp(box, -exponent))
 
 
 def _plane(comm: Any, mesh: Mesh) -> tuple[int, int] | None:

@@ -99,7 +99,7 @@ def gathered_field(part: Part, field: Field, active: Flags | None) -> Loan:
     whole = part.mesh
     assert whole.box is not None
     mesh = Mesh(places, tuple(blocks), single=whole.single).as_part(
-        whole.plane, (whole.has_volumes, whole.has_quads), whole.exponent, whole.box
+        whole.plane, whole.kinds_there, whole.exponent, whole.box
     )
     topology = connectivity_of(mesh, ~moves)
     points = points[topology.memory]

@@ -228,9 +228,7 @@ def _written(
     plane = mesh.plane or (0, 1, 2)
     put_back(best, part.points, topology.memory, plane, *factors_of(mesh.exponent), points, moved)
     assert mesh.box is not None
-    written = replace(mesh, points=points).as_part(
-        mesh.plane, (mesh.has_volumes, mesh.has_quads), mesh.exponent, mesh.box
-    )
+    written = replace(mesh, points=points).as_part(mesh.plane, mesh.kinds_there, mesh.exponent, mesh.box)
     near = taken(planar_points(written) if mesh.plane else space_points(written), topology.memory)
     after = totals_of(near, part.simplices, Ranks(part))
     rank, inverted = rank_by(options.best_by), 0 if after is None else after.inverted

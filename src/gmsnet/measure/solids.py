@@ -20,7 +20,6 @@ from gmsnet.mesh.plane import exponent_of
 from gmsnet.topology.curved_solids import has_curved, straight
 from gmsnet.topology.mixed_volume import wound_of
 from gmsnet.topology.ordering import space_points
-from gmsnet.topology.solids import has_solids
 
 Floats = NDArray[np.float64]
 Signs = NDArray[np.int8]
@@ -204,7 +203,7 @@ def _wound(mesh: Mesh) -> Signs:
     """The orientation of each cell of a mesh, 0 for those that are not wound."""
     found = np.zeros(sum(len(block.nodes) for block in mesh.cells), dtype=np.int8)
     curved = has_curved(mesh)
-    if curved or has_solids(mesh):
+    if curved or mesh.has_solids:
         wound = wound_of(straight(mesh) if curved else mesh)
         found[wound.cell[wound.origin]] = wound.orientation
     return found

@@ -29,6 +29,8 @@ from gmsnet.mesh.display import amount, html_table, listed
 from gmsnet.mesh.plane import exponent_of, flat_axes
 from gmsnet.mesh.rounding import Rounding
 
+SOLIDS = ("hexahedron", "wedge", "pyramid")  # those whose edges are straight
+
 
 class Source(Protocol):
     """The file that a mesh was read from: it can write itself again with new coordinates and nothing else changed."""
@@ -165,6 +167,7 @@ class Mesh:
         for name, value in nothing.items():
             object.__setattr__(made, name, value)
         made.__dict__["plane"], made.__dict__["has_volumes"] = self.plane, self.has_volumes
+        made.__dict__.pop("has_solids", None)
         return made
 
     @cached_property
@@ -190,18 +193,23 @@ class Mesh:
         return None
 
     def as_part(
-        self, plane: tuple[int, int] | None, kinds: tuple[bool, bool], exponent: int, box: NDArray[np.float64]
+        self, plane: tuple[int, int] | None, kinds: tuple[bool, bool, bool], exponent: int, box: NDArray[np.float64]
     ) -> Mesh:
         """The same as a part of a mesh with this plane and exponent, and of whose nodes these are.
 
-        kinds: whether the mesh has_volumes and has_quads. box: (2, D) the least and the greatest coordinates of all its
-        nodes, in the plane if there is one, over 2 to the power of the exponent. They are numbered in memory as in the
-        whole mesh: nodes that come first come first.
+        kinds: see ``kinds_there``. box: (2, D) the least and the greatest coordinates of all its nodes, in the plane if
+        there is one, over 2 to the power of the exponent. They are numbered in memory as in the whole mesh: nodes that
+        come first come first.
         """
         made = self._twin()
         made.__dict__.update(plane=plane, exponent=exponent, box=box)
-        made.__dict__["has_volumes"], made.__dict__["has_quads"] = kinds
+        made.__dict__["has_volumes"], made.__dict__["has_quads"], made.__dict__["has_solids"] = kinds
         return made
+
+    @property
+    def kinds_there(self) -> tuple[bool, bool, bool]:
+        """Whether it has_volumes, has_quads and has_solids."""
+        return self.has_volumes, self.has_quads, self.has_solids
 
     @cached_property
     def has_volumes(self) -> bool:
@@ -212,6 +220,11 @@ class Mesh:
     def has_quads(self) -> bool:
         """Whether some faces have four corners."""
         return any(block.dimension == 2 and block.corners == 4 and len(block.nodes) for block in self.cells)
+
+    @cached_property
+    def has_solids(self) -> bool:
+        """Whether some cells are hexahedra, wedges or pyramids with straight edges."""
+        return any(block.kind in SOLIDS and len(block.nodes) for block in self.cells)
 
     @cached_property
     def exponent(self) -> int:

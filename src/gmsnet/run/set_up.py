@@ -37,7 +37,6 @@ from gmsnet.run.state import State
 from gmsnet.topology.held import REASONS
 from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
 from gmsnet.topology.ordering import space_points, taken
-from gmsnet.topology.solids import has_solids
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 from gmsnet.topology.wound import refuse_flat
@@ -209,7 +208,7 @@ def check_target(mesh: Mesh, target: Target) -> None:
         raise InputError(
             "target_angle is of the angles of triangles and quads, and this mesh has volumes: give target_dihedral"
         )
-    if mesh.has_volumes and target.dihedral is not None and has_solids(mesh):
+    if mesh.has_volumes and target.dihedral is not None and mesh.has_solids:
         raise InputError(
             "target_dihedral is of meshes of tetrahedra alone, and this one has other volumes: give target_quality"
         )

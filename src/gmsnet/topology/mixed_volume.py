@@ -23,7 +23,7 @@ from gmsnet.kernels.topology.connectivity import WIDTH
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.held import AT_BOUNDARY, reasons_in_space, released, sorted_out
 from gmsnet.topology.polygons import Ints
-from gmsnet.topology.solids import KINDS, WoundSolids, has_solids, roles, tables
+from gmsnet.topology.solids import KINDS, WoundSolids, roles, tables
 from gmsnet.topology.stars import Colouring, Stars
 from gmsnet.topology.volume import MOST, Flags, Volume
 from gmsnet.topology.wound import Wound
@@ -203,7 +203,7 @@ class MixedVolume(Volume):
 
 def wound_of(mesh: Mesh, fixed: Flags | None = None) -> Wound | WoundSolids:
     """The cells of a mesh with volumes, read alike; ``fixed`` and errors: see ``Volume.of``."""
-    return WoundSolids.of(mesh, fixed) if has_solids(mesh) else Wound.of(mesh, fixed)
+    return WoundSolids.of(mesh, fixed) if mesh.has_solids else Wound.of(mesh, fixed)
 
 
 def volume_of(wound: Wound | WoundSolids, slides: Flags | None = None) -> Volume:

@@ -193,11 +193,6 @@ def halved(quads: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
     return np.stack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)], axis=1).reshape(-1, 3)
 
 
-def has_solids(mesh: Mesh) -> bool:
-    """Whether some cells are hexahedra, wedges or pyramids with straight edges."""
-    return any(block.kind in KINDS[1:] and len(block.nodes) for block in mesh.cells)
-
-
 def _cells(
     mesh: Mesh, fixed: Flags | None
 ) -> tuple[Ints, NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64], Marks]:
