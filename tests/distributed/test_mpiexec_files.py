@@ -66,6 +66,21 @@ def test_the_same_files_as_without_ranks(folder, ranks, method):
     assert report["nodes"] == len(gmsnet.read(folder / "a.pvtu").points)
 
 
+@pytest.mark.parametrize(("quality", "code"), [("0.3", 0), ("0.9", 1)])
+def test_a_target(folder, quality, code):
+    (folder / "serial").mkdir()
+    serial = gmsnet.smooth(gmsnet.read(folder / "a.pvtu"), target_quality=float(quality))
+    gmsnet.write(serial.mesh, folder / "serial" / "b.pvtu")
+    done = smooth(2, "a.pvtu", "b.pvtu", "--target-quality", quality, "--json", cwd=folder)
+    files, report = saved(folder), json.loads(done.stdout)
+    for name in ("b.pvtu", *(f"b/a_{k}.vtu" for k in range(3))):
+        assert files[name] == files[f"serial/{name}"]
+    missed = int(np.count_nonzero(serial.after.shape < float(quality)))
+    assert (report["missed"], report["target_met"], report["gathered"]) == (missed, code == 0, "")
+    assert done.returncode == code, done.stderr
+    assert ("target not met" in done.stderr) == (code == 1)
+
+
 @pytest.mark.parametrize("target", ["a.pvtu", "b.pvtu"])
 def test_a_full_disk_on_one_rank(folder, target):
     before = saved(folder)

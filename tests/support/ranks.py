@@ -45,6 +45,8 @@ def same(mesh, options, parts, ranks, fixed=None):
     serial = gmsnet.smooth(
         mesh, options.method, guard=options.guard, max_sweeps=options.max_sweeps, preserve=options.preserve,
         variant=options.variant, objective=options.objective, threads=1, fixed=fixed,
+        target_quality=options.target_quality, target_angle=options.target_angle,
+        target_dihedral=options.target_dihedral,
     )  # fmt: skip
     points, results = spread(mesh, options, parts, ranks, fixed)
     assert points.tobytes() == serial.points.tobytes()
@@ -53,6 +55,8 @@ def same(mesh, options, parts, ranks, fixed=None):
     assert repr(told.after) == repr(serial.after.totals)
     assert told.stop_reason == serial.stop_reason
     assert [sweep.moved for sweep in told.history] == [sweep.moved for sweep in serial.history]
+    if options.target:
+        assert told.missed == len(options.target.missed_in(serial.after))
     assert told.held == {reason: len(ids) for reason, ids in serial.held.items()}
     return told
 

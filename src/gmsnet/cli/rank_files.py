@@ -9,7 +9,7 @@ import typer
 from gmsnet.cli import output as printed
 from gmsnet.cli.file_work import FileWork
 from gmsnet.cli.ranks import rank_of
-from gmsnet.mesh.display import amount, visible
+from gmsnet.mesh.display import amount, missing, visible
 from gmsnet.parallel.interrupts import interruptible
 
 if TYPE_CHECKING:
@@ -29,7 +29,8 @@ def shared_format(source: str, target: str, read_as: str | None, write_as: str |
 
 
 def smooth_in_pieces(work: FileWork, options: SmoothOptions, target: str, format: str) -> int:
-    """Smooths the file, prints the figures of all ranks, and returns the exit code: 1 where cells are inverted."""
+    """Smooths the file, prints the figures of all ranks, and returns the exit code: 1 where cells are
+    inverted, or miss the target."""
     from gmsnet.distributed.file_run import FileTask
     from gmsnet.distributed.first import smooth_file_from_first
 
@@ -47,4 +48,6 @@ def smooth_in_pieces(work: FileWork, options: SmoothOptions, target: str, format
     inverted = 0 if found.after is None else found.after.inverted
     if inverted:
         typer.echo(f"gmsnet: {amount(inverted, 'cell')} inverted still", err=True)
-    return 1 if inverted else 0
+    if found.missed:
+        typer.echo(f"gmsnet: target not met: {missing(found.missed)} it", err=True)
+    return 1 if inverted or found.missed else 0

@@ -220,7 +220,7 @@ def smooth(
         **values_at_nodes(metric, size),
     )  # fmt: skip
 
-    plain = not any((fix, slide, plot, report, dry_run, metric, size, asked.target))
+    plain = not any((fix, slide, plot, report, dry_run, metric, size))
     if whole is not None and plain and (kind := shared_format(input, whole.path, format, output_format)):
         work = FileWork(
             input, None, whole, in_place=in_place, plot=None, report=None, most_sweeps=max_sweeps, json=json,

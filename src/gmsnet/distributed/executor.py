@@ -10,10 +10,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.distributed.answered import Answered
 from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.library import mpi
-from gmsnet.distributed.loan import Loan, gathered_field
+from gmsnet.distributed.loan import SHARE, Loan, around, gathered_field
 from gmsnet.distributed.numbering import NO_NUMBERS, Numbers
 from gmsnet.distributed.part import Part
 from gmsnet.methods.base import Field
@@ -154,6 +155,28 @@ class Ranks:
             active &= free
         self.loan = gathered_field(self.part, field, active)
         return self.loan.field
+
+    def gathered_around(
+        self, field: Field, corners: NDArray[np.int32], rings: int
+    ) -> tuple[Field | None, NDArray[np.int32]]:
+        """See Executor. Where these are most of the nodes, all are gathered."""
+        topology = field.topology
+        chosen = np.zeros(len(topology.memory), dtype=bool)
+        chosen[corners] = True
+        active = around(self.part, topology, chosen, rings)
+        of_all = np.array([np.count_nonzero(active), len(topology.free)])
+        some, free = self.comm.allreduce(of_all).tolist()
+        self.loan = gathered_field(self.part, field, active if some <= SHARE * free else None)
+        return self.loan.field, self.loan.cells(self.part, corners)
+
+    def cells_returned(self, part: Field | None, corners: NDArray[np.int32]) -> NDArray[np.int32]:
+        """See Executor."""
+        assert self.loan is not None
+        return self.loan.cells_back(self.part, corners)
+
+    def called_alone(self, callback: Callable[[Any], Any] | None) -> Callable[[Any], Any] | None:
+        """See Executor."""
+        return callback.own if isinstance(callback, Answered) else callback
 
     def restricted(self, topology: Topology | Volume, active: NDArray[np.bool_]) -> Topology | Volume:
         """See Executor."""

@@ -6,35 +6,41 @@ cells are, if the stars are whole.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.distributed.part import Part
+from gmsnet.distributed.part import Known, Part
 from gmsnet.distributed.piece import Ids
+from gmsnet.kernels.topology import connectivity
 from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.base import Field
 from gmsnet.topology.solids import KINDS
+from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 PLANAR = "triangle", "quad"
+SHARE = 0.5  # of the free nodes: where they would be more, all cells are gathered
 
 
 class Parcel(NamedTuple):
     """Nodes and cells of one rank. ids: (n,). places: (n, dim) in the input, by which they are ordered. points: as they
-    are, (n, 2), of volumes (n, 4). moves: (n,) bool, which are free. cells: for each block, nodes by their ids and the
-    numbers of cells.
+    are, (n, 2), of volumes (n, 4). moves: (n,) bool, which are free. colours: (n,). cells: for each block, nodes by
+    their ids and the numbers of cells.
     """
 
     ids: Ids
     places: Floats
     points: Floats
     moves: Flags
+    colours: NDArray[np.int32]
     cells: list[tuple[Ids, Ids]]
 
 
@@ -59,6 +65,29 @@ class Loan(NamedTuple):
             found[np.searchsorted(self.all, ids)] = some
         in_memory: Floats = found[self.field.topology.memory]
         return in_memory
+
+    def cells(self, part: Part, corners: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Cells (K, k) of all ranks, by places in memory, in that of the gathered field, each once.
+
+        None but on the first rank.
+        """
+        came = part.comm.gather(part.around.nodes.ids[part.topology.memory[corners]])
+        if came is None or self.field is None or self.all is None:
+            return corners[:0]
+        ids = np.concatenate(came)
+        _, once = np.unique(np.sort(ids, axis=1), axis=0, return_index=True)
+        found: NDArray[np.int32] = self.field.topology.places[np.searchsorted(self.all, ids[once])]
+        return found
+
+    def cells_back(self, part: Part, corners: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Cells (K, k) of the gathered field, by places in memory there: those of them that this rank has, in its."""
+        ids = None
+        if self.field is not None and self.all is not None:
+            ids = self.all[self.field.topology.memory[corners]]
+        ids, known = part.comm.bcast(ids), part.around.nodes.ids
+        here = ids[np.isin(ids, known).all(axis=1)]
+        found: NDArray[np.int32] = part.topology.places[np.searchsorted(known, here)]
+        return found
 
     def _places(self, part: Part) -> NDArray[np.int32]:
         """In memory, of the nodes that were sent."""
@@ -102,7 +131,9 @@ def gathered_field(part: Part, field: Field, active: Flags | None) -> Loan:
         whole.plane, whole.kinds_there, whole.exponent, whole.box
     )
     topology = connectivity_of(mesh, ~moves)
-    points = points[topology.memory]
+    known, colours = topology.colouring, np.concatenate([each.colours for each in came])[first][topology.memory]
+    colouring = Known(known.places, known.start, known.ring, colours, fewest=part.topology.colouring.fewest)
+    topology, points = replace(topology, colouring=colouring), points[topology.memory]
     return Loan(parcel.ids, Field(points, topology, field.precision, field.level), ids, [each.ids for each in came])
 
 
@@ -123,6 +154,15 @@ def _parcel(part: Part, field: Field, active: Flags | None) -> Parcel:
         chosen = part.around.own[k] if active is None else moves[nodes].any(axis=1)
         used[nodes[chosen]] = True
         cells.append((block.nodes[chosen], block.numbers[chosen]))
-    by_id = np.empty_like(field.points)
-    by_id[topology.memory] = field.points
-    return Parcel(ids[used], part.mesh.points[used], by_id[used], moves[used], cells)
+    near = topology.places[np.flatnonzero(used)]
+    colours = topology.colouring.colours[near]
+    return Parcel(ids[used], part.mesh.points[used], field.points[near], moves[used], colours, cells)
+
+
+def around(part: Part, topology: Topology | Volume, chosen: Flags, rings: int) -> Flags:
+    """(n,) by places in memory: the free nodes of this rank within so many rings of the chosen ones of all ranks."""
+    chosen = chosen.copy()
+    for _ in range(rings):
+        chosen = part.halo.spread(chosen)
+        chosen[topology.near[connectivity.touching(topology.near, chosen)]] = True
+    return part.halo.spread(chosen) & topology.near_free

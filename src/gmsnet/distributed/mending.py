@@ -7,15 +7,14 @@ look farther, it is tried again with more rings, and last with all cells; so it 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.library import mpi
-from gmsnet.distributed.loan import gathered_field
-from gmsnet.distributed.part import Known, Part
+from gmsnet.distributed.loan import SHARE, around, gathered_field
+from gmsnet.distributed.part import Part
 from gmsnet.distributed.winding import Winding
 from gmsnet.kernels.topology import connectivity
 from gmsnet.measure.report import measure
@@ -35,7 +34,6 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 RINGS = 4, 12  # around the inverted cells
-SHARE = 0.5  # of the free nodes: where they would be more, all cells are gathered
 
 
 class Mended(NamedTuple):
@@ -71,8 +69,7 @@ def mended(part: Part, topology: Topology | Volume, inverted: int) -> Mended | N
     for active in _regions(part, topology, bad, total):
         loan = gathered_field(part, Field(part.points, topology, precision_of(part.mesh)), active)
         known = None if active is None else loan.at_nodes(part, free.astype(np.float64)) > 0.0
-        colours = loan.at_nodes(part, topology.colouring.colours.astype(np.float64))
-        note: str = part.comm.bcast(_tried(loan.field, known, colours.astype(np.int32), forth, inverted, total))
+        note: str = part.comm.bcast(_tried(loan.field, known, forth, inverted, total))
         if note:
             points = part.points.copy()
             loan.give_back(part, points)
@@ -86,7 +83,9 @@ def _regions(part: Part, topology: Topology | Volume, bad: Flags, total: int) ->
     bad: (T,) rows. total: free nodes.
     """
     for rings in RINGS:
-        active = _around(part, topology, bad, rings)
+        chosen = np.zeros(len(topology.memory), dtype=bool)
+        chosen[topology.near[bad]] = True
+        active = around(part, topology, chosen, rings)
         if part.comm.allreduce(int(np.count_nonzero(active))) > SHARE * total:
             break
         yield active
@@ -111,33 +110,19 @@ def _movable(topology: Topology | Volume, free: Flags) -> Flags:
     return whole_cells(topology, np.asarray(free[topology.near].any(axis=1)))
 
 
-def _around(part: Part, topology: Topology | Volume, bad: Flags, rings: int) -> Flags:
-    """(n,) by places in memory: the free nodes of this rank within so many rings of the bad rows of all ranks."""
-    chosen = np.zeros(len(topology.memory), dtype=bool)
-    chosen[topology.near[bad]] = True
-    for _ in range(rings):
-        chosen = part.halo.spread(chosen)
-        chosen[topology.near[connectivity.touching(topology.near, chosen)]] = True
-    return part.halo.spread(chosen) & topology.near_free
-
-
-def _tried(
-    field: Field | None, free: Flags | None, colours: NDArray[np.int32], forth: bool, inverted: int, total: int
-) -> str:  # fmt: skip
+def _tried(field: Field | None, free: Flags | None, forth: bool, inverted: int, total: int) -> str:
     """What to say where all is mended, and the field is changed; "" where not, or where there is no field.
 
-    free: (m,) by places in memory, which nodes some rank moves; None if the field is of all cells. colours: (m,) of the
-    whole mesh. forth: are cells read forwards? inverted: how many, total: free nodes of the whole mesh.
+    free: (m,) by places in memory, which nodes some rank moves; None if the field is of all cells. forth: are
+    cells read forwards? inverted: how many, total: free nodes of the whole mesh.
     """
     if field is None:
         return ""
     from gmsnet.untangle.reach import BeyondReachError, Reach
 
-    found, winding = field.topology, Winding.of(field.topology)
+    topology, winding = field.topology, Winding.of(field.topology)
     if not winding.alike or bool(winding.forth) != forth:  # most of what is here is inverted
         return ""
-    known = found.colouring
-    topology = replace(found, colouring=Known(known.places, known.start, known.ring, colours, fewest=known.fewest))
     edge = None
     if free is not None:
         edge = np.zeros(len(free), dtype=bool)

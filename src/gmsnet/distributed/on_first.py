@@ -59,7 +59,8 @@ def intent_of(
             found = protected_volume(topology, options.preserved, options.fix_layers, near, firm=firm)
         else:
             mesh = whole.mesh if now is None else whole.mesh.with_points(_written(whole.mesh, now))
-            found = protected(mesh, topology, options.preserved, options.fix_layers, near, firm=firm)
+            sure = firm or bool(options.target)
+            found = protected(mesh, topology, options.preserved, options.fix_layers, near, firm=sure)
         layers = np.zeros(len(whole.ids), dtype=bool) if found.layers is None else found.layers
         kept = None if found.walls is None else np.column_stack(found.walls)
         told = _of_walls(found), found.notes
@@ -100,7 +101,7 @@ def smoothed_on_first(
     raise_everywhere(comm, wrong)
     figures: dict[str, Any] | None = None
     if whole is not None and result is not None:
-        figures = _figures(whole, result)
+        figures = _figures(whole, result, options)
     told = comm.bcast(figures)
     points = scattered(whole, None if result is None else result.points, piece, comm)
     moved = scattered(whole, None if result is None else result.moved, piece, comm)
@@ -119,7 +120,7 @@ def _smoothed(whole: Whole, options: SmoothOptions) -> SmoothResult:
         return result
 
 
-def _figures(whole: Whole, result: SmoothResult) -> dict[str, Any]:
+def _figures(whole: Whole, result: SmoothResult, options: SmoothOptions) -> dict[str, Any]:
     """What all ranks are told."""
     return {
         "before": result.before.totals,
@@ -131,6 +132,7 @@ def _figures(whole: Whole, result: SmoothResult) -> dict[str, Any]:
         "held": {reason: len(ids) for reason, ids in result.held.items()},
         "nodes": len(whole.ids),
         "cells": sum(len(block.nodes) for block in whole.mesh.cells),
+        "missed": len(options.target.missed_in(result.after)) if options.target else None,
         "interruption": result.stop_reason == INTERRUPTED,
     }
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.measure.totals import Totals
-from gmsnet.mesh.display import plain
+from gmsnet.mesh.display import missing, plain
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.sweep import Sweep
 
@@ -22,7 +22,8 @@ class RankResult:
     cells of the mesh. sweeps, stop_reason, history, notes: as of a SmoothResult. held: reason → how many nodes of the
     mesh. nodes, cells: of the mesh. gathered: why the mesh was smoothed on the first rank, "" where it was shared out.
     seconds: for the whole call. messages, bytes: that this rank sent after colours. interrupted: this is the best mesh
-    so far. whole: the SmoothResult of the first rank, where that has one.
+    so far. missed: how many cells miss the target, None without one. whole: the SmoothResult of the first rank, where
+    that has one.
     """
 
     points: NDArray[np.float64]
@@ -41,13 +42,15 @@ class RankResult:
     messages: int = 0
     bytes: int = 0
     interrupted: bool = False
+    missed: int | None = None
     whole: SmoothResult | None = field(default=None, repr=False)
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers, ready for JSON."""
         return {
             "nodes": self.nodes, "cells": self.cells, "held": self.held, "sweeps": self.sweeps,
-            "stop_reason": self.stop_reason, "gathered": self.gathered, "seconds": self.seconds,
+            "stop_reason": self.stop_reason, "target_met": None if self.missed is None else not self.missed,
+            "missed": self.missed, "gathered": self.gathered, "seconds": self.seconds,
             **{name: _figures(totals) for name, totals in (("before", self.before), ("after", self.after))},
         }  # fmt: skip
 
@@ -58,6 +61,8 @@ class RankResult:
             f"RankResult: {self.nodes:,} nodes, {self.sweeps} sweeps in {plain(self.seconds)} s, {self.stop_reason}"
         ]
         lines += [f"{name}: {before[name]:.6g} → {after[name]:.6g}" for name in before]
+        if self.missed:
+            lines.append(f"target not met: {missing(self.missed)} it")
         return "\n".join([*lines, *self.notes])
 
 

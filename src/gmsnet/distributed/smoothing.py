@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.agreement import everywhere
+from gmsnet.distributed.answered import Answered
 from gmsnet.distributed.executor import Ranks
 from gmsnet.distributed.gathered import Whole
 from gmsnet.distributed.ghosts import surrounded
 from gmsnet.distributed.intent import may_be_meant
+from gmsnet.distributed.library import mpi
 from gmsnet.distributed.mending import Mended, inverted_in, mended
 from gmsnet.distributed.on_first import Intent, intent_of, smoothed_on_first
 from gmsnet.distributed.part import Part
@@ -23,21 +25,23 @@ from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.stages import Meant, swept
 from gmsnet.distributed.winding import Winding
 from gmsnet.kernels.topology.write_back import put_back
+from gmsnet.measure.report import measure
 from gmsnet.measure.totals import Totals, totals_of
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.methods.banded import Kept
 from gmsnet.methods.base import CELLS
 from gmsnet.preserve.protection import LAYER, WALL
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import factors_of, rank_by
-from gmsnet.run.sweep import Sweep
+from gmsnet.run.set_up import check_options
+from gmsnet.run.state import State
 from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.solids import KINDS
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
-Callback = Callable[[Sweep], bool | None]
 
 SHARED = (*CELLS, *KINDS, "line", "vertex")  # the kinds of cells that sweeps over ranks know
 
@@ -49,12 +53,13 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
     """
     began = time.perf_counter()
     smoother = everywhere(comm, options.smoother)
-    around = surrounded(piece, comm)
-    why = _not_shared(piece, smoother, options, comm)
+    around, counts = surrounded(piece, comm), _counts(piece, comm)
+    why = _not_shared(counts, smoother, options)
     if why:
         return smoothed_on_first(piece, options, comm, why, began, known)
     part = Part.of(around, comm, piece.single)
     try:
+        everywhere(comm, lambda: check_options(part.mesh, options, counts))
         before = totals_of(part.points, part.simplices, Ranks(part))
         ready = _ready(piece, part, options, before, known)
         if ready.why:
@@ -64,18 +69,23 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
         part.halo.free()
 
 
-def _not_shared(piece: Piece, smoother: Smoother, options: SmoothOptions, comm: Any) -> str:
+def _counts(piece: Piece, comm: Any) -> dict[str, int]:
+    """Kind → how many cells the mesh has, of kinds with any."""
+    found: dict[str, int] = {}
+    for block in piece.blocks:
+        found[block.kind] = found.get(block.kind, 0) + int(comm.allreduce(len(block.nodes)))
+    return {kind: count for kind, count in found.items() if count}
+
+
+def _not_shared(counts: Mapping[str, int], smoother: Smoother, options: SmoothOptions) -> str:
     """Why this call cannot be shared out, whatever the coordinates; "" if it can."""
     if not smoother.shared_out:
         return f"{options.method_name} has steps that follow one another"
-    if options.target:
-        return "a target is reached patch after patch"
     if options.slides:
         return "curves to slide on are those of the whole mesh"
     if options.adapts:
         return "a metric is one of the whole mesh"
-    kinds = {block.kind for block in piece.blocks if comm.allreduce(len(block.nodes))}
-    others = sorted(kinds - set(SHARED))
+    others = sorted(set(counts) - set(SHARED))
     return f"cells of the kind {', '.join(others)} are not shared out" if others else ""
 
 
@@ -157,10 +167,10 @@ def _shared(
 ) -> RankResult:  # fmt: skip
     at = np.searchsorted(part.around.nodes.ids, piece.ids)
     intent, done = ready.intent, ready.mended
-    options = replace(options, callback=_answered(part.comm, options.callback))
+    asked = part.comm.bcast(options.callback is not None)
+    options = replace(options, callback=Answered(part.comm, options.callback) if asked else None)
     state = swept(part, _meant(intent, piece, part), smoother, options, done)
-    judged = _Judged(0 if done is None else done.cells, before)
-    points, moved, after = _written(part, state.points, options, judged)
+    points, moved, after, missed = _written(part, state, options, _Judged(0 if done is None else done.cells, before))
     return RankResult(
         points=points[at],
         moved=moved[at],
@@ -178,27 +188,8 @@ def _shared(
         messages=part.halo.messages,
         bytes=part.halo.bytes,
         interrupted=state.interruption is not None,
+        missed=missed,
     )
-
-
-def _answered(comm: Any, callback: Callback | None) -> Callback | None:
-    """A callback for all ranks: the first one asks its own and tells the others the answer. None if it has none."""
-    if not comm.bcast(callback is not None):
-        return None
-
-    def ask(sweep: Sweep) -> bool | None:
-        answer: Any = None
-        if comm.rank == 0:
-            try:
-                answer = callback is not None and bool(callback(sweep))
-            except KeyboardInterrupt:
-                answer = KeyboardInterrupt
-        answer = comm.bcast(answer)
-        if answer is KeyboardInterrupt:
-            raise KeyboardInterrupt
-        return bool(answer)
-
-    return ask
 
 
 def _held(part: Part, topology: Topology | Volume) -> dict[str, int]:
@@ -220,18 +211,36 @@ class _Judged(NamedTuple):
 
 
 def _written(
-    part: Part, best: Floats, options: SmoothOptions, before: _Judged
-) -> tuple[Floats, NDArray[np.bool_], Totals | None]:
-    """The best mesh by global ids; that of the input if it is the better one as it is written."""
-    mesh, topology = part.mesh, part.topology
+    part: Part, state: State, options: SmoothOptions, before: _Judged
+) -> tuple[Floats, NDArray[np.bool_], Totals | None, int | None]:
+    """The best mesh by global ids, that of the input if it is the better one as it is written; which nodes moved; its
+    figures; and how many cells miss the target, None without one."""
+    mesh, topology, target = part.mesh, part.topology, options.target
     points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
     plane = mesh.plane or (0, 1, 2)
-    put_back(best, part.points, topology.memory, plane, *factors_of(mesh.exponent), points, moved)
+    put_back(state.points, part.points, topology.memory, plane, *factors_of(mesh.exponent), points, moved)
     assert mesh.box is not None
     written = replace(mesh, points=points).as_part(mesh.plane, mesh.kinds_there, mesh.exponent, mesh.box)
     near = taken(planar_points(written) if mesh.plane else space_points(written), topology.memory)
     after = totals_of(near, part.simplices, Ranks(part))
-    rank, inverted = rank_by(options.best_by), 0 if after is None else after.inverted
-    if rank(_Judged(inverted, after)) <= rank(before):
-        return points, moved, after
-    return mesh.points, np.zeros_like(moved), before.totals
+    inverted, missed, missed_before = 0 if after is None else after.inverted, None, None
+    if target:
+        (missed, least), (missed_before, least_before) = (
+            _missing(part, each, around, options) for each, around in ((written, near), (mesh, part.points))
+        )
+        better = (inverted, missed, -least) <= (before.inverted, missed_before, -least_before)
+    else:
+        rank = rank_by(options.best_by)
+        better = rank(_Judged(inverted, after)) <= rank(before)
+    if better:
+        return points, moved, after, missed
+    return mesh.points, np.zeros_like(moved), before.totals, missed_before
+
+
+def _missing(part: Part, mesh: Mesh, near: Floats, options: SmoothOptions) -> tuple[int, float]:
+    """How many cells of all ranks miss the target, and the least 1/q among them. mesh: the part at the points near."""
+    report = measure(mesh, part.topology, near)
+    rows, shape = options.target.missed_with_shapes(report)
+    own = np.concatenate([*part.around.own, np.empty(0, dtype=bool)])[report.cell[rows]]
+    count = int(part.comm.allreduce(int(np.count_nonzero(own))))
+    return count, float(part.comm.allreduce(float(shape[own].min(initial=np.inf)), mpi().MIN))

@@ -10,7 +10,7 @@ import numpy as np
 from gmsnet.distributed.executor import Ranks
 from gmsnet.distributed.mending import Mended
 from gmsnet.distributed.part import Part
-from gmsnet.measure.report import QualityReport
+from gmsnet.measure.report import QualityReport, measure
 from gmsnet.methods import Smoother
 from gmsnet.methods.banded import Kept
 from gmsnet.preserve.protection import Protection
@@ -46,6 +46,8 @@ def swept(part: Part, meant: Meant, smoother: Smoother, options: SmoothOptions, 
     """
     executor, topology = _ready(part, meant.held)
     nothing, before = np.empty(0, dtype=np.float32), cast(QualityReport, _Input(0 if mended is None else mended.cells))
+    if options.target and mended is None:  # it tells which cells miss the target
+        before = replace(measure(part.mesh, part.topology, part.points), signs=None)
     state = State(
         part.mesh, lambda points: points, smoother, before, Protection(topology, []), part.points, part.points, nothing
     )

@@ -98,10 +98,10 @@ class Target:
 
         What the report says of a cell decides; of those that are clear of the target it need not be asked.
         """
-        return self._missed_in(report)[0]
+        return self.missed_with_shapes(report)[0]
 
-    def _missed_in(self, report: QualityReport) -> tuple[NDArray[np.int32], Floats]:
-        """And their 1/q."""
+    def missed_with_shapes(self, report: QualityReport) -> tuple[NDArray[np.int32], Floats]:
+        """The same rows, and the 1/q of these cells."""
         triangles = report.cells
         if isinstance(triangles, MeasuredTetrahedra):
             cells = Tetrahedra(triangles.corners, triangles.orientation)
@@ -138,7 +138,7 @@ class Target:
 
     def rank(self, report: QualityReport) -> tuple[int, int, float]:
         """Of two meshes that of the lesser rank is nearer: by inverted cells, cells that miss it, the worst one."""
-        rows, shape = self._missed_in(report)
+        rows, shape = self.missed_with_shapes(report)
         return report.inverted, len(rows), -float(shape.min(initial=np.inf))
 
     @property

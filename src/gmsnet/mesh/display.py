@@ -14,6 +14,11 @@ _SHOWN = {code: f"\\x{code:02x}" for code in _CONTROLS} | {code: f"\\u{code:04x}
 del _SHOWN[ord("\n")]
 
 
+def missing(count: int) -> str:
+    """So many cells, and that they miss something."""
+    return f"{amount(count, 'cell')} {'misses' if count == 1 else 'miss'}"
+
+
 def amount(count: int, what: str) -> str:
     """A count with its noun, in the plural where it needs one."""
     return f"{count:,} {what}" if count == 1 else f"{count:,} {what}s"

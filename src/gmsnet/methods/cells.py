@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NoReturn
 
 from gmsnet.cells.jacobian import has_form
@@ -17,11 +18,17 @@ NAMES = {
 }  # fmt: skip
 
 
-def check_cells(mesh: Mesh, name: str, choice: str | None = None) -> None:
+def check_cells(
+    mesh: Mesh, name: str, choice: str | None = None, counts: Mapping[str, int] | None = None
+) -> None:  # fmt: skip
     """InputError if the mesh has quads or tetrahedra and the method, with this objective or variant, leaves them.
 
     Such a mesh it does not smooth at all: nodes of triangles alone would be moved as if there were no quads.
+
+    counts: kind → how many cells, where the mesh is but a part.
     """
+    if counts is None:
+        counts = counts_of(mesh)
     method = method_named(name)
     choice = choice or method.default
     if mesh.plane is None and not mesh.has_volumes and not method.moves_surfaces(choice):
@@ -30,9 +37,17 @@ def check_cells(mesh: Mesh, name: str, choice: str | None = None) -> None:
             f"{name}{f' ({choice})' if method.surfaces else ''} is not for surfaces in space: choose {others}"
         )
     for kind in ("tetra", "hexahedron", "wedge", "pyramid") if mesh.has_volumes else ("quad",):
-        count = sum(len(block.nodes) for block in mesh.cells if _alike(block.kind, kind))
+        count = sum(many for each, many in counts.items() if _alike(each, kind))
         if count and not method.moves(kind, choice):
             _refuse(method, choice, kind, count)
+
+
+def counts_of(mesh: Mesh) -> dict[str, int]:
+    """Kind → how many cells."""
+    found: dict[str, int] = {}
+    for block in mesh.cells:
+        found[block.kind] = found.get(block.kind, 0) + len(block.nodes)
+    return found
 
 
 def _alike(kind: str, straight: str) -> bool:

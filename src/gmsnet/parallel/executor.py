@@ -93,6 +93,21 @@ class Executor(Protocol):
         """
         ...
 
+    def gathered_around(self, field: Any, corners: NDArray[np.int32], rings: int) -> tuple[Any, NDArray[np.int32]]:
+        """The same of the free nodes within so many rings of some cells of all processes, and these cells there.
+
+        corners: (K, 3 or 4) of the cells; of all processes each comes once.
+        """
+        ...
+
+    def cells_returned(self, part: Any, corners: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Cells (K, 3 or 4) of what was gathered, which has them: those of them that are here, by places in memory."""
+        ...
+
+    def called_alone(self, callback: Callable[[Any], Any] | None) -> Callable[[Any], Any] | None:
+        """A callback as the process calls it by itself that has what was gathered."""
+        ...
+
     def restricted(self, topology: Any, active: NDArray[np.bool_]) -> Any:
         """A topology in which the active nodes (N,) by places in memory alone are free, of those that are free here."""
         ...

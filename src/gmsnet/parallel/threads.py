@@ -87,6 +87,18 @@ class Process:
         """See Executor."""
         return field
 
+    def gathered_around(self, field: Any, corners: NDArray[np.int32], rings: int) -> tuple[Any, NDArray[np.int32]]:
+        """See Executor."""
+        return field, corners
+
+    def cells_returned(self, part: Any, corners: NDArray[np.int32]) -> NDArray[np.int32]:
+        """See Executor."""
+        return corners
+
+    def called_alone(self, callback: Callable[[Any], Any] | None) -> Callable[[Any], Any] | None:
+        """See Executor."""
+        return callback
+
     def restricted(self, topology: Any, active: NDArray[np.bool_]) -> Any:
         """See Executor."""
         return topology.restricted(active)

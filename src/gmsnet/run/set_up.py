@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -59,10 +59,7 @@ def first_state(
     target = options.target
     given, restore = to_mesh(mesh)
     check_mesh(given, target)
-    check_cells(given, options.method_name, options.objective or options.variant)
-    check_surface_options(given, options)
-    if given.plane is None:
-        check_in_space(options)
+    check_options(given, options)
     remarks = []
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     asked = fixed_mask(given, fixed)
@@ -183,6 +180,15 @@ def _first_of_volume(
         given, restore, smoother, before, protection, start, start, nothing, tuple(remarks), sliding=sliding,
         second_order=second,
     )  # fmt: skip
+
+
+def check_options(mesh: Mesh, options: SmoothOptions, counts: Mapping[str, int] | None = None) -> None:
+    """InputError for options that cells of this mesh do not have. counts: kind → cells, where the mesh is a part."""
+    check_target(mesh, options.target)
+    check_cells(mesh, options.method_name, options.objective or options.variant, counts)
+    check_surface_options(mesh, options)
+    if mesh.plane is None:
+        check_in_space(options)
 
 
 def check_surface_options(mesh: Mesh, options: SmoothOptions) -> None:

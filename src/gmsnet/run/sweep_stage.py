@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+
+import numpy as np
 
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.constraint import locate
@@ -14,10 +17,9 @@ from gmsnet.run.dihedral_stage import improve_dihedrals
 from gmsnet.run.mean_stage import improve_mean
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run
-from gmsnet.run.score import Score
 from gmsnet.run.state import State
 from gmsnet.run.stop import NO_PROGRESS
-from gmsnet.run.target_run import corners_missing, reach_target
+from gmsnet.run.target_run import reach_target
 from gmsnet.topology.volume import Volume
 
 # Shares of the cells, and cells: of so many that miss a target, one of η or of dihedral angles, all are smoothed.
@@ -57,20 +59,27 @@ def _closer_one(state: State, other: State, options: SmoothOptions, executor: Ex
 
 def _closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
     """Is a state closer to the target than another one?"""
-    return _score(state, options, executor).closer_to_target(_score(other, options, executor))
+    return _rank(state, options, executor) < _rank(other, options, executor)
 
 
 def _miss_it(state: State, options: SmoothOptions, executor: Executor, share: float, few: int) -> bool:
     """Do more than so many of the cells that ``auto`` smooths miss the target?"""
-    topology = state.topology
-    if not isinstance(state.smoother, Auto) or not len(topology.free):
+    if not isinstance(state.smoother, Auto) or not executor.total(np.array(len(state.topology.free))):
         return False
-    cells, target = topology.changeable, options.target
+    count = executor.cell_count(state.topology.changeable)
+    return _missing(state, options, executor) > max(share * count, few)
+
+
+def _missing(state: State, options: SmoothOptions, executor: Executor) -> int:
+    """How many of the cells that can change miss the target."""
+    cells, target = state.topology.changeable, options.target
     if isinstance(cells, Tetrahedra):
         rows, _ = target.tetrahedra_missing(state.points, cells)
     else:
         rows = target.corners_missing(state.points, cells)
-    return len(rows) > max(share * executor.cell_count(cells), few)
+    flags = np.zeros(len(cells.rows), dtype=bool)
+    flags[rows] = True
+    return executor.counted(flags)
 
 
 def _at_large(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -92,9 +101,10 @@ def _going_on(state: State) -> State:
     return replace(state, stop_reason="") if state.stop_reason == NO_PROGRESS else state
 
 
-def _score(state: State, options: SmoothOptions, executor: Executor) -> Score:
-    missing = corners_missing(state.points, state.topology, options.target)
-    return Score.of(totals_of(state.points, state.topology.scored, executor), options.best_by, missing)
+def _rank(state: State, options: SmoothOptions, executor: Executor) -> tuple[int, int, float]:
+    """Of two states that of the lesser rank is closer to the target."""
+    totals, missing = totals_of(state.points, state.topology.scored, executor), _missing(state, options, executor)
+    return (0, missing, -math.inf) if totals is None else (totals.inverted, missing, -totals.shape_min)
 
 
 def _sweep_all(state: State, options: SmoothOptions, executor: Executor) -> State:

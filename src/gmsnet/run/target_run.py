@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +14,11 @@ from gmsnet.kernels.topology.patch import around
 from gmsnet.measure.target import Target
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods.auto import Auto, for_target
+from gmsnet.methods.base import Field
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
+from gmsnet.parallel.threads import serial
+from gmsnet.preserve.protection import Protection
 from gmsnet.run.dihedral_stage import floor_for_angles
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run, Start
@@ -40,6 +42,29 @@ LEAST_SHARE = 0.7  # of the least η must be left when smallest dihedral angles 
 FEWER, IDLE = 0.9, 2  # a round that leaves more of the cells below the target is idle; so many in a row are the last
 
 
+class Aim(NamedTuple):
+    """What cannot be told from a patch. hopeless: cells without a free node miss the target. free: nodes of the whole
+    mesh. floor: of volumes, see _floor_in_space.
+    """
+
+    hopeless: bool
+    free: int
+    floor: float | None
+
+
+class Left(NamedTuple):
+    """What misses the target still. corners: (K, 3 or 4) of the cells with a free node, on ranks of those that are
+    here. clear: do all of them, however they are measured? at_first: how many there were of all processes, 0 before the
+    first round. idle: rounds in a row that left most of them. over: nothing more is to be tried.
+    """
+
+    corners: NDArray[np.int32]
+    clear: bool
+    at_first: int = 0
+    idle: int = 0
+    over: bool = False
+
+
 def reach_target(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Smooths patches around the cells that miss the target until none does, or nothing is gained any more.
 
@@ -48,68 +73,103 @@ def reach_target(state: State, options: SmoothOptions, executor: Executor) -> St
     """
     if state.stop_reason and isinstance(state.topology, Volume):  # the sweeps before (sweep_stage) have ended it
         return state
+    corners, clear = cells_missing(state, options.target)
+    if not executor.total(np.array(len(corners))):
+        return state.ended(TARGET_REACHED)
+    free = state.topology.near_free.astype(np.float64)
+    executor.exchange(free)
+    able = (free > 0.0)[corners].any(axis=1)
+    if not executor.total(np.array(np.count_nonzero(able))):
+        return _without_gain(state)
+    aim = Aim(
+        hopeless=bool(executor.total(np.array(np.count_nonzero(~able)))),
+        free=int(executor.total(np.array(len(state.topology.free)))),
+        floor=_floor_in_space(state, options, executor) if isinstance(state.topology, Volume) else None,
+    )
+    left = Left(corners[able], clear)
     try:
         with interruptible():
-            for reached in _rounds(state, options, executor):
-                state = reached
+            for rings in NARROW if isinstance(state.smoother, Auto) else RINGS:
+                state, left = _round(state, options, executor, aim, left, rings)
                 if state.stop_reason:
+                    return state
+                if left.over:
                     break
     except KeyboardInterrupt as interruption:  # between rounds: in a round the run has caught it
         return state.interrupted(interruption)
-    return state
+    return state.ended(NO_PROGRESS)
 
 
-def _rounds(state: State, options: SmoothOptions, executor: Executor) -> Iterator[State]:
-    """The state after each set of patches; the last one has a reason to stop."""
+def _round(
+    state: State, options: SmoothOptions, executor: Executor, aim: Aim, left: Left, rings: int
+) -> tuple[State, Left]:  # fmt: skip
+    """After sweeps over one set of patches. Of several processes one makes them, with what lies around."""
+    field = Field(state.points, state.topology, state.precision)
+    part, corners = executor.gathered_around(field, left.corners, rings)
+    if part is field:
+        return _on_patches(state, options, executor, aim, left, rings)
+    found: Any = None
+    after = left
+    if part is not None:
+        inner = replace(state, protection=Protection(part.topology, []), start=part.points, points=part.points)
+        alone = replace(options, callback=executor.called_alone(options.callback))
+        done, after = _on_patches(inner, alone, serial, aim, left._replace(corners=corners), rings)
+        moved, interrupted = done.points is not part.points, done.interruption is not None
+        part.points = done.points
+        found = done.history, done.stop_reason, moved, interrupted, after[1:]
+    left = left._replace(corners=executor.cells_returned(part, after.corners))
+    field.points = field.points.copy()
+    history, reason, moved, interrupted, rest = executor.returned(field, part, found)
+    state = replace(state, points=field.points if moved else state.points, history=history, totals=None)
+    state = state.interrupted(KeyboardInterrupt()) if interrupted else state.ended(reason)
+    return state, Left(left.corners, *rest)
+
+
+def _without_gain(state: State) -> State:
+    return state.ended(NO_PROGRESS if state.history else NOTHING_TO_MOVE)
+
+
+def _on_patches(
+    state: State, options: SmoothOptions, executor: Executor, aim: Aim, left: Left, rings: int
+) -> tuple[State, Left]:  # fmt: skip
+    """The same where all of it is here."""
     target, topology, own_plan = options.target, state.topology, isinstance(state.smoother, Auto)
-    corners, clear = cells_missing(state, target)
+    corners = left.corners
+    left = left if left.at_first else left._replace(at_first=len(corners))
     if not len(corners):
-        yield state.ended(TARGET_REACHED)
-        return
-    every, corners = len(corners), _changeable(corners, topology)
-    hopeless = len(corners) < every
-    idle, at_first, precision = 0, len(corners), state.precision
-    positive = state.before.signs is None
-    floor = _floor_in_space(state, options, executor) if isinstance(topology, Volume) else None
-    for rings in NARROW if own_plan else RINGS:
-        if not len(corners):
-            yield state.ended(NO_PROGRESS if state.history else NOTHING_TO_MOVE)
-            return
-        active = around(corners, rings, topology.near_free, topology.near_start, topology.near_ring)
-        if own_plan and rings > 1 and too_large(rings, active, len(corners) / at_first, topology):
-            break
-        patch = topology.restricted(active)
-        fraction = len(corners) / (patch.simplices.cell_count if isinstance(patch, Volume) else len(patch.near))
-        planned = for_target(target, fraction, rings=rings, floor=floor) if own_plan else None
-        smoother = planned or options.smoother()
-        missing = partial(_changeable_missing, topology=topology, patch=patch, target=target)
-        measure = partial(totals_of, state.points, patch.scored)
-        before = Score(measure, options.best_by, corners if clear else missing(state.points), positive)
-        run = Run(
-            Start(patch, state.points, precision, before, state.history, state.constraint, state.curved),
-            smoother,
-            options,
-            executor,
-            missing,
-        )
-        reason = run.to_the_end()
-        after = run.best_score
-        state = replace(state, history=tuple(run.history), totals=None)
-        if after.closer_to_target(before):
-            state, corners, clear = replace(state, points=run.best), after.missing, True
-        if run.interruption is not None:
-            state = state.interrupted(run.interruption)
-        elif not after.missed:
-            state = state.ended(NO_PROGRESS if hopeless else TARGET_REACHED)
-        elif reason not in (NO_PROGRESS, TARGET_REACHED):  # stopped by the callback, or at the most sweeps
-            state = state.ended(reason)
-        elif run.sweeps >= options.max_sweeps:
-            state = state.ended(MAX_SWEEPS)
-        yield state
-        idle = idle + 1 if after.missed > FEWER * before.missed else 0
-        if idle == IDLE:
-            break
-    yield state.ended(NO_PROGRESS)
+        return _without_gain(state), left
+    active = around(corners, rings, topology.near_free, topology.near_start, topology.near_ring)
+    if own_plan and rings > 1 and too_large(rings, active, len(corners) / left.at_first, aim.free):
+        return state, left._replace(over=True)
+    patch = topology.restricted(active)
+    fraction = len(corners) / (patch.simplices.cell_count if isinstance(patch, Volume) else len(patch.near))
+    planned = for_target(target, fraction, rings=rings, floor=aim.floor) if own_plan else None
+    smoother = planned or options.smoother()
+    missing = partial(_changeable_missing, topology=topology, patch=patch, target=target)
+    measure, positive = partial(totals_of, state.points, patch.scored), not state.before.inverted
+    before = Score(measure, options.best_by, corners if left.clear else missing(state.points), positive)
+    run = Run(
+        Start(patch, state.points, state.precision, before, state.history, state.constraint, state.curved),
+        smoother,
+        options,
+        executor,
+        missing,
+    )
+    reason = run.to_the_end()
+    after = run.best_score
+    state = replace(state, history=tuple(run.history), totals=None)
+    if after.closer_to_target(before):
+        state, left = replace(state, points=run.best), left._replace(corners=after.missing, clear=True)
+    if run.interruption is not None:
+        state = state.interrupted(run.interruption)
+    elif not after.missed:
+        state = state.ended(NO_PROGRESS if aim.hopeless else TARGET_REACHED)
+    elif reason not in (NO_PROGRESS, TARGET_REACHED):  # stopped by the callback, or at the most sweeps
+        state = state.ended(reason)
+    elif run.sweeps >= options.max_sweeps:
+        state = state.ended(MAX_SWEEPS)
+    idle = left.idle + 1 if after.missed > FEWER * before.missed else 0
+    return state, left._replace(idle=idle, over=idle == IDLE)
 
 
 def _floor_in_space(state: State, options: SmoothOptions, executor: Executor) -> float:
@@ -122,18 +182,16 @@ def _floor_in_space(state: State, options: SmoothOptions, executor: Executor) ->
 def cells_missing(state: State, target: Target) -> tuple[NDArray[np.int32], bool]:
     """The corners (K, 3 or 4) of the cells that miss the target; do all of them, however they are measured?"""
     topology, points, before = state.topology, state.points, state.before
+    if points is not state.start or before.inverted:  # the report is of other points, or of more cells
+        return corners_missing(points, topology, target), True
     if isinstance(topology, Volume):
-        if points is not state.start or state.second_order is not None or isinstance(topology, MixedVolume):
+        if state.second_order is not None or isinstance(topology, MixedVolume):
             # the report has more cells, or cells whole, where corners without a free node must be told apart
             return corners_missing(points, topology, target), True
         return topology.places[topology.cells[target.missed_in(before)]], False
-    rows = rows_missing(points, topology, target, state.shapes if points is state.start else None)
+    rows = rows_missing(points, topology, target, state.shapes if len(state.shapes) else None)
     corners = topology.near.take(rows, axis=0)
-    if (
-        before.inverted
-        or topology.near_shapes is not None
-        or target.clearly_missed(points, topology.simplices.take(rows))
-    ):
+    if topology.near_shapes is not None or target.clearly_missed(points, topology.simplices.take(rows)):
         return corners, True
     return topology.places[topology.triangles[target.missed_in(before)]], False
 
@@ -150,10 +208,13 @@ def _changeable_missing(
     return _changeable(corners_missing(points, patch, target), topology)
 
 
-def too_large(rings: int, active: Flags, left: float, topology: Topology | Volume) -> bool:
-    """Do patches of so many active nodes take more than they bring? left: the share of the cells that still miss it."""
+def too_large(rings: int, active: Flags, left: float, free: int) -> bool:
+    """Do patches of so many active nodes take more than they bring? left: the share of the cells that still miss it.
+
+    free: nodes of the whole mesh.
+    """
     count = np.count_nonzero(active)
-    return bool(count > SMALL and (count > LARGE * len(topology.free) or (rings == NARROW[-1] and left > FEW)))
+    return bool(count > SMALL and (count > LARGE * free or (rings == NARROW[-1] and left > FEW)))
 
 
 def rows_missing(

@@ -1,0 +1,184 @@
+"""A target is reached over ranks with the bits of the serial run: the first one smooths patches with what is around."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import gmsnet
+import gmsnet.generate
+
+pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+
+from support.blocks import block
+from support.ranks import parts_at_random, same, spread
+
+import gmsnet.distributed.executor as executor
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.stop import CALLBACK, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
+
+MESHES = {
+    "triangles": gmsnet.random_mesh(3000, seed=3),
+    "quads": gmsnet.generate.random_quad_mesh(2500, seed=3),
+    "mixed": gmsnet.generate.random_quad_mesh(2500, seed=4, cells="mixed"),
+    "tetrahedra": gmsnet.generate.random_volume(3000, seed=2),
+    "hexahedra": block(12, 12, 12, jitter=0.2, seed=1),
+    "solids": block(12, 12, 12, wedges=np.ndindex(2, 5), pyramids=np.ndindex(2, 3, 5), jitter=0.15, seed=2),
+}
+SHAPES = {kind: np.sort(gmsnet.quality(mesh).shape) for kind, mesh in MESHES.items()}
+
+
+def aim(**options):
+    return SmoothOptions(**{"preserve": "none", "threads": 1, **options})
+
+
+def strips(mesh, ranks=3):
+    return parts_at_random(mesh, ranks, np.random.default_rng(1), "strips")
+
+
+@pytest.fixture
+def lent(monkeypatch):
+    """How many nodes the first rank got each time."""
+    counts, gathered = [], executor.gathered_field
+
+    def counting(part, field, active):
+        loan = gathered(part, field, active)
+        if loan.field is not None:
+            counts.append(len(loan.field.points))
+        return loan
+
+    monkeypatch.setattr(executor, "gathered_field", counting)
+    return counts
+
+
+@pytest.mark.parametrize("kind", MESHES)
+def test_a_few_cells_are_smoothed_with_what_lies_around(lent, kind):
+    mesh = MESHES[kind]
+    told = same(mesh, aim(target_quality=float(SHAPES[kind][2])), strips(mesh), 3)
+    assert told.gathered == ""
+    assert told.missed == 0
+    assert told.stop_reason == TARGET_REACHED
+    assert 0 < lent[0] < 0.9 * len(mesh.points)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3])
+@pytest.mark.parametrize("kind", MESHES)
+def test_many_cells_with_sweeps_over_all_of_them(kind, share):
+    mesh = MESHES[kind]
+    target = float(SHAPES[kind][int(share * len(SHAPES[kind]))])
+    assert same(mesh, aim(target_quality=target), strips(mesh), 3).gathered == ""
+
+
+@pytest.mark.parametrize("guard", ["valid", "worst", "star"])
+@pytest.mark.parametrize("method", ["barrier", "laplacian", "optimize", "gmsnet"])
+@pytest.mark.parametrize("kind", ["triangles", "tetrahedra"])
+def test_any_method_and_guard(kind, method, guard):
+    if kind == "tetrahedra" and method == "gmsnet":
+        pytest.skip("gmsnet moves triangles alone")
+    mesh = MESHES[kind]
+    options = aim(method=method, guard=guard, target_quality=float(SHAPES[kind][12]), max_sweeps=9)
+    assert same(mesh, options, strips(mesh), 3).gathered == ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "target"),
+    [("triangles", {"target_angle": 22.0}), ("mixed", {"target_angle": 40.0}),
+     ("tetrahedra", {"target_dihedral": 9.0}), ("tetrahedra", {"target_dihedral": 14.0, "target_quality": 0.3})],
+)  # fmt: skip
+def test_angles(kind, target):
+    told = same(MESHES[kind], aim(**target), strips(MESHES[kind]), 3)
+    assert told.gathered == ""
+    assert told.history
+
+
+@pytest.mark.parametrize("kind", ["triangles", "quads", "tetrahedra", "solids"])
+def test_inverted_cells_first(kind):
+    mesh, rng = MESHES[kind], np.random.default_rng(5)
+    points = mesh.points.copy()
+    middle = points.mean(axis=0)
+    chosen = np.argsort(np.linalg.norm(points - middle, axis=1))[:2]
+    points[chosen] += 0.1 * np.ptp(points) * rng.normal(size=(2, points.shape[1]))
+    tangled = replace(mesh, points=points)
+    assert gmsnet.quality(tangled).inverted
+    told = same(tangled, aim(target_quality=float(SHAPES[kind][5])), strips(mesh), 3)
+    assert told.gathered == ""
+    assert told.after.inverted == 0
+
+
+@pytest.mark.parametrize("kind", ["triangles", "mixed", "tetrahedra", "solids"])
+def test_cells_that_are_held_stay_below(kind):
+    mesh = MESHES[kind]
+    worst = np.argsort(gmsnet.quality(mesh).shape)[:4]
+    nodes = np.concatenate([corners_of(mesh, cell) for cell in worst[:2]])
+    fixed = np.zeros(len(mesh.points), dtype=bool)
+    fixed[nodes] = True
+    told = same(mesh, aim(target_quality=float(SHAPES[kind][4])), strips(mesh), 3, fixed)
+    assert told.gathered == ""
+    assert told.missed >= 2
+    assert told.stop_reason == NO_PROGRESS
+    fixed[:] = True
+    told = same(mesh, aim(target_quality=float(SHAPES[kind][4])), strips(mesh), 3, fixed)
+    assert told.stop_reason == NOTHING_TO_MOVE
+
+
+def corners_of(mesh, cell):
+    for cells in mesh.cells:
+        if cell < len(cells.nodes):
+            return cells.nodes[cell]
+        cell -= len(cells.nodes)
+    raise AssertionError("there is no such cell")
+
+
+def test_nothing_is_gathered_where_all_cells_reach_it(lent):
+    mesh = MESHES["triangles"]
+    told = same(mesh, aim(target_quality=float(SHAPES["triangles"][0])), strips(mesh), 3)
+    assert (told.sweeps, told.stop_reason, lent) == (0, TARGET_REACHED, [])
+
+
+def test_the_callback_of_the_first_rank_ends_it():
+    mesh, seen = MESHES["triangles"], []
+    options = aim(target_quality=float(SHAPES["triangles"][900]), callback=lambda sweep: seen.append(sweep) or True)
+    _, results = spread(mesh, options, strips(mesh), 3)
+    assert [result.stop_reason for result in results] == [CALLBACK] * 3
+    assert len(seen) == 1
+
+
+def test_an_interruption_of_the_first_rank_reaches_all():
+    mesh = MESHES["triangles"]
+
+    def stop(sweep):
+        raise KeyboardInterrupt
+
+    options = aim(target_quality=float(SHAPES["triangles"][40]), callback=stop)
+    _, results = spread(mesh, options, strips(mesh), 3)
+    assert all(result.interrupted for result in results)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "says"),
+    [("quads", {"method": "gmsnet"}, "488 quads"), ("tetrahedra", {"target_angle": 20.0}, "target_dihedral"),
+     ("triangles", {"target_dihedral": 20.0}, "target_angle"), ("triangles", {"hausdorff": 0.1}, "leave it out"),
+     ("tetrahedra", {"best_by": "aspect"}, "leave it out")],
+)  # fmt: skip
+def test_options_that_the_mesh_does_not_take(kind, options, says):
+    """No rank goes on, though some may have no such cell."""
+    mesh = gmsnet.generate.random_quad_mesh(400, seed=3) if kind == "quads" else MESHES[kind]
+    with pytest.raises(gmsnet.InputError, match=says):
+        spread(mesh, aim(**options), parts_at_random(mesh, 3, np.random.default_rng(1), "lonely"), 3)
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1), ranks=st.integers(1, 4), kind=st.sampled_from(sorted(MESHES)),
+    share=st.floats(0.0, 0.2), how=st.sampled_from(["interleaved", "strips", "lonely"]),
+    preserve=st.sampled_from(["none", "shape"]),
+)  # fmt: skip
+@settings(max_examples=12, deadline=None)
+def test_any_target_on_any_partition(seed, ranks, kind, share, how, preserve):
+    rng, mesh = np.random.default_rng(seed), MESHES[kind]
+    fixed = rng.random(len(mesh.points)) < 0.02
+    options = aim(target_quality=float(SHAPES[kind][int(share * len(SHAPES[kind]))]), preserve=preserve)
+    assert same(mesh, options, parts_at_random(mesh, ranks, rng, how), ranks, fixed).gathered == ""
