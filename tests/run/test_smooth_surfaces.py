@@ -114,6 +114,29 @@ def test_a_node_of_a_non_manifold_edge_is_held():
     assert result.moved.any()
 
 
+def test_what_is_not_joined_stays_together_and_is_told():
+    mesh = wavy(kind="triangle")
+    rows, points = mesh.cells[0].nodes.copy(), mesh.points
+    cut = np.unique(rows[points[rows][:, :, 0].mean(axis=1) > 8.0])
+    cut = cut[np.isin(cut, rows[points[rows][:, :, 0].mean(axis=1) < 8.0])]
+    copy = np.arange(len(points))
+    copy[cut] = len(points) + np.arange(len(cut))
+    beyond = points[rows][:, :, 0].mean(axis=1) > 8.0
+    rows[beyond] = copy[rows[beyond]]
+    points = np.vstack([points, points[cut] * (1.0 + 1e-7)])
+    result = gmsnet.smooth((points, rows), slide=True)
+    assert not result.moved[[*cut, *copy[cut]]].any()
+    assert result.moved[result.held["boundary"]].sum() == 0
+    assert result.moved.any()
+    assert f"{2 * len(cut)} nodes of the boundary have another one in their place" in " ".join(result.notes)
+    assert "another one" not in " ".join(gmsnet.smooth(mesh, slide=True).notes)
+    points = points[rows].reshape(-1, 3)
+    points = points + 1e-7 * np.random.default_rng(0).uniform(-1, 1, points.shape)
+    result = gmsnet.smooth((points, np.arange(len(points)).reshape(-1, 3)), slide=True)
+    assert not result.moved.any()
+    assert "Make equal points one point first" in " ".join(result.notes)
+
+
 def test_isolated_nodes_and_doubled_and_flat_faces_are_no_trouble():
     mesh = ball(200)
     rows, points = mesh.cells[0].nodes, np.vstack([mesh.points, [[9.0, 9.0, 9.0]]])

@@ -24,6 +24,7 @@ from gmsnet.topology.topology import Topology
 Floats = NDArray[np.float64]
 
 FEATURE = "feature of the surface"  # why nodes of sharp edges are held
+SAME = 2e-6  # of the largest coordinate: so far apart may be what would be one point but for rounding
 
 
 def patches_of_surface(
@@ -40,6 +41,18 @@ def patches_of_surface(
     patches = patches_of(facets, points, feature_angle, mesh.single, ~held, free_needles)
     along = patches.curves.slides & may_slide(mesh, names, held)
     return facets, replace(patches, curves=replace(patches.curves, slides=along))
+
+
+def torn_apart(points: Floats, rim: NDArray[np.int64] | NDArray[np.int32] | None) -> Flags:
+    """(N,) bool, the nodes of the boundary, given by ids, at which there is another one of these, to rounding."""
+    found = np.zeros(len(points), dtype=bool)
+    if rim is not None and len(rim) > 1:
+        from scipy.spatial import cKDTree  # it takes a tenth of a second to import
+
+        at = points[rim]
+        near = SAME * abs(at).max()
+        found[rim] = cKDTree(at).query(at, k=[2], distance_upper_bound=near)[0][:, 0] <= near
+    return found
 
 
 def sides_of(mesh: Mesh, topology: Topology, patches: Patches, vertices: Vertices) -> NDArray[np.float32]:

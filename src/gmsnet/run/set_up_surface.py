@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.options import check_slide
-from gmsnet.constraints.shell import FEATURE, patches_of_surface, sides_of
+from gmsnet.constraints.shell import FEATURE, patches_of_surface, sides_of, torn_apart
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.constraints.smooth_patches import vertices_of
 from gmsnet.measure.report import measure
@@ -19,6 +19,7 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.preserve.protection import Protection
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
+from gmsnet.topology.held import ON_BOUNDARY
 from gmsnet.topology.ordering import space_points
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
@@ -33,7 +34,10 @@ def first_of_surface(
     """The state of a mesh in no plane before the first stage. asked: (N,) bool, nodes to hold."""
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     topology, start = Topology.and_points(given, asked, options.thread_count)
-    facets, patches = patches_of_surface(given, topology, names, options.feature_angle, asked, options.free_needles)
+    torn = torn_apart(space_points(given)[:, :3], topology.held.get(ON_BOUNDARY))
+    facets, patches = patches_of_surface(
+        given, topology, names, options.feature_angle, asked | torn, options.free_needles
+    )
     slides = patches.slides | patches.curves.slides
     if (patches.curves.slides & ~_flagged(topology.free, len(slides))).any():
         topology, start = Topology.and_points(given, asked, options.thread_count, patches.curves.slides)
@@ -54,6 +58,11 @@ def first_of_surface(
     remarks: tuple[str, ...] = (f"not measured, and their nodes are held: {others}",) if others else ()
     if curved := unmoved_faces(given):
         remarks += (f"cells of second order move in a plane and in volumes, on a surface they are held: {curved}",)
+    if torn.any():
+        remarks += (
+            f"{int(torn.sum()):,} nodes of the boundary have another one in their place, to rounding: facets are not "
+            "joined there, so these nodes are held. Make equal points one point first, and they can move",
+        )
     given = given.without_cells()
     before = measure(given, shell, start, executor.for_blocks(0))
     nothing = np.empty(0, dtype=np.float32)
