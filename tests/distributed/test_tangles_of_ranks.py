@@ -122,3 +122,12 @@ def test_any_tangle_on_any_partition(seed, ranks, kind, count, far, how):
     fixed = rng.random(len(mesh.points)) < 0.02
     options = SmoothOptions(method="barrier", max_sweeps=3, preserve="none", threads=1)
     same(mesh, options, parts_at_random(mesh, ranks, rng, how), ranks, fixed)
+
+
+@pytest.mark.parametrize("seed", [8, 10, 19])
+def test_a_rank_that_has_an_inverted_quad_apart(seed):
+    """It would read it the other way round, and find it inverted once it is mended."""
+    rng = np.random.default_rng(seed)
+    mesh = tangled(gmsnet.generate.structured_mesh(12), rng, 4, 1.5)
+    options = SmoothOptions(method="laplacian", max_sweeps=2, preserve="none", threads=1)
+    assert same(mesh, options, parts_at_random(mesh, 4, rng, "interleaved"), 4).after.inverted == 0

@@ -26,7 +26,10 @@ class Winding(NamedTuple):
     def of(cls, topology: Topology | Volume) -> Winding:
         """Of the cells that are here."""
         reasons = reasons_in_space(MOST) if isinstance(topology, Volume) else REASONS
-        orientation = topology.orientation if isinstance(topology, MixedVolume) else topology.near_orientation
+        if isinstance(topology, Topology):  # near, those of quads are turned already
+            orientation = np.concatenate([topology.orientation, topology.quad_orientation])
+        else:
+            orientation = topology.orientation if isinstance(topology, MixedVolume) else topology.near_orientation
         unread = any(reasons[mark] in topology.held for mark in UNREAD if mark in reasons)
         return cls(int(np.count_nonzero(orientation > 0)), int(np.count_nonzero(orientation < 0)), unread)
 

@@ -73,7 +73,7 @@ def reach_target(state: State, options: SmoothOptions, executor: Executor) -> St
     """
     if state.stop_reason and isinstance(state.topology, Volume):  # the sweeps before (sweep_stage) have ended it
         return state
-    corners, clear = cells_missing(state, options.target)
+    corners, clear = cells_missing(state, options.target, executor)
     if not executor.total(np.array(len(corners))):
         return state.ended(TARGET_REACHED)
     free = state.topology.near_free.astype(np.float64)
@@ -179,7 +179,7 @@ def _floor_in_space(state: State, options: SmoothOptions, executor: Executor) ->
     return floor_for_angles(state, LEVELS.index(options.guard), shape, executor)
 
 
-def cells_missing(state: State, target: Target) -> tuple[NDArray[np.int32], bool]:
+def cells_missing(state: State, target: Target, executor: Executor) -> tuple[NDArray[np.int32], bool]:
     """The corners (K, 3 or 4) of the cells that miss the target; do all of them, however they are measured?"""
     topology, points, before = state.topology, state.points, state.before
     if points is not state.start or before.inverted:  # the report is of other points, or of more cells
@@ -191,7 +191,8 @@ def cells_missing(state: State, target: Target) -> tuple[NDArray[np.int32], bool
         return topology.places[topology.cells[target.missed_in(before)]], False
     rows = rows_missing(points, topology, target, state.shapes if len(state.shapes) else None)
     corners = topology.near.take(rows, axis=0)
-    if topology.near_shapes is not None or target.clearly_missed(points, topology.simplices.take(rows)):
+    clear = topology.near_shapes is not None or target.clearly_missed(points, topology.simplices.take(rows))
+    if executor.minimum(float(clear)):
         return corners, True
     return topology.places[topology.triangles[target.missed_in(before)]], False
 
