@@ -120,8 +120,8 @@ def _tried(field: Field | None, free: Flags | None, forth: bool, inverted: int, 
         return ""
     from gmsnet.untangle.reach import BeyondReachError, Reach
 
-    topology, winding = field.topology, Winding.of(field.topology)
-    if not winding.alike or bool(winding.forth) != forth:  # most of what is here is inverted
+    topology = field.topology
+    if not Winding.of(topology).reads(forth=forth):  # most of what is here is inverted
         return ""
     edge = None
     if free is not None:

@@ -37,3 +37,7 @@ class Winding(NamedTuple):
     def alike(self) -> bool:
         """Are all cells read in one way?"""
         return not self.unread and not (self.forth and self.back)
+
+    def reads(self, *, forth: bool) -> bool:
+        """Are all cells read forwards, or all backwards?"""
+        return self.alike and not (self.back if forth else self.forth)
