@@ -16,7 +16,7 @@ pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
 from support.blocks import block
 from support.layer_meshes import grid, heights
-from support.ranks import parts_at_random, same
+from support.ranks import nodes_lent, parts_at_random, same
 
 import gmsnet.distributed.mending as mending
 from gmsnet.distributed.partition import bisection
@@ -50,25 +50,11 @@ def compact(mesh, ranks):
     return [of_node[block.nodes[:, 0]] for block in mesh.cells]
 
 
-def lent(monkeypatch):
-    """How many nodes the first rank got at each try, filled while it runs."""
-    counts, gathered = [], mending.gathered_field
-
-    def counting(part, field, active):
-        loan = gathered(part, field, active)
-        if loan.field is not None:
-            counts.append(len(loan.field.points))
-        return loan
-
-    monkeypatch.setattr(mending, "gathered_field", counting)
-    return counts
-
-
 @pytest.mark.parametrize("kind", MESHES)
 def test_a_few_cells_are_mended_with_what_lies_around(monkeypatch, kind):
     mesh = tangled(MESHES[kind], np.random.default_rng(5), 2, 1.3, (0.1, 0.25))
     assert gmsnet.quality(mesh).inverted
-    counts = lent(monkeypatch)
+    counts = nodes_lent(monkeypatch, mending, "gathered_field")
     options = SmoothOptions(method="barrier", max_sweeps=4, preserve="none", threads=1)
     told = same(mesh, options, compact(mesh, 3), 3)
     assert told.gathered == ""
@@ -80,7 +66,7 @@ def test_a_few_cells_are_mended_with_what_lies_around(monkeypatch, kind):
 @pytest.mark.parametrize("kind", ["triangles", "mixed", "tetrahedra", "hexahedra"])
 def test_many_cells_are_mended_with_all(monkeypatch, kind):
     mesh = tangled(MESHES[kind], np.random.default_rng(7), 400, 0.5)
-    counts = lent(monkeypatch)
+    counts = nodes_lent(monkeypatch, mending, "gathered_field")
     options = SmoothOptions(method="laplacian", max_sweeps=3, preserve="none", threads=1)
     told = same(mesh, options, compact(mesh, 2), 2)
     assert told.gathered == ""

@@ -61,6 +61,20 @@ def same(mesh, options, parts, ranks, fixed=None):
     return told
 
 
+def nodes_lent(monkeypatch, module, name):
+    """How many nodes the first rank got each time, filled while ranks run. name: of what gathers them, in a module."""
+    counts, gathered = [], getattr(module, name)
+
+    def counting(part, field, active):
+        loan = gathered(part, field, active)
+        if loan.field is not None:
+            counts.append(len(loan.field.points))
+        return loan
+
+    monkeypatch.setattr(module, name, counting)
+    return counts
+
+
 def _of_stages(notes):
     """What is said of inverted cells and of walls."""
     return [note for note in notes if note.startswith(("untangling", "the mesh is refined"))]

@@ -9,7 +9,7 @@ import typer
 from gmsnet.cli import output as printed
 from gmsnet.cli.file_work import FileWork
 from gmsnet.cli.ranks import rank_of
-from gmsnet.mesh.display import amount, missing, visible
+from gmsnet.mesh.display import amount, miss_it, visible
 from gmsnet.parallel.interrupts import interruptible
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ def shared_format(source: str, target: str, read_as: str | None, write_as: str |
 
 
 def smooth_in_pieces(work: FileWork, options: SmoothOptions, target: str, format: str) -> int:
-    """Smooths the file, prints the figures of all ranks, and returns the exit code: 1 where cells are
-    inverted, or miss the target."""
+    """Smooths the file, prints the figures of all ranks, and returns the exit code: 1 where cells are inverted
+    or miss the target."""
     from gmsnet.distributed.file_run import FileTask
     from gmsnet.distributed.first import smooth_file_from_first
 
@@ -49,5 +49,5 @@ def smooth_in_pieces(work: FileWork, options: SmoothOptions, target: str, format
     if inverted:
         typer.echo(f"gmsnet: {amount(inverted, 'cell')} inverted still", err=True)
     if found.missed:
-        typer.echo(f"gmsnet: target not met: {missing(found.missed)} it", err=True)
+        typer.echo(f"gmsnet: target not met: {amount(found.missed, 'cell')} {miss_it(found.missed)}", err=True)
     return 1 if inverted or found.missed else 0

@@ -14,7 +14,7 @@ from gmsnet.distributed.answered import Answered
 from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.library import mpi
-from gmsnet.distributed.loan import SHARE, Loan, around, gathered_field
+from gmsnet.distributed.loan import SHARE, Loan, around, read_alike
 from gmsnet.distributed.numbering import NO_NUMBERS, Numbers
 from gmsnet.distributed.part import Part
 from gmsnet.methods.base import Field
@@ -153,7 +153,7 @@ class Ranks:
             active = np.zeros(len(free), dtype=bool)
             active[field.topology.changeable.rows[rows]] = True
             active &= free
-        self.loan = gathered_field(self.part, field, active)
+        self.loan = read_alike(self.part, field, active)
         return self.loan.field
 
     def gathered_around(
@@ -166,7 +166,7 @@ class Ranks:
         active = around(self.part, topology, chosen, rings)
         of_all = np.array([np.count_nonzero(active), len(topology.free)])
         some, free = self.comm.allreduce(of_all).tolist()
-        self.loan = gathered_field(self.part, field, active if some <= SHARE * free else None)
+        self.loan = read_alike(self.part, field, active if some <= SHARE * free else None)
         return self.loan.field, self.loan.cells(self.part, corners)
 
     def cells_returned(self, part: Field | None, corners: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Known, Part
 from gmsnet.distributed.piece import Ids
 from gmsnet.distributed.winding import Winding
@@ -110,17 +109,8 @@ class Loan(NamedTuple):
 def gathered_field(part: Part, field: Field, active: Flags | None) -> Loan:
     """What is smoothed, with all cells at the active nodes of all ranks, which alone are free. All ranks call it.
 
-    active: (N,) by places in memory, of the nodes that are free here; None for the whole mesh. Where cells of the input
-    are inverted, some that are cut off from others may be read the other way round: then the whole mesh is gathered.
+    active: (N,) by places in memory, of the nodes that are free here; None for the whole mesh.
     """
-    loan = _gathered(part, field, active)
-    forth = bool(part.comm.allreduce(bool(Winding.of(part.topology).forth), mpi().LOR))
-    if part.comm.bcast(loan.field is None or Winding.of(loan.field.topology).reads(forth=forth)) or active is None:
-        return loan
-    return _gathered(part, field, None)
-
-
-def _gathered(part: Part, field: Field, active: Flags | None) -> Loan:
     parcel = _parcel(part, field, active)
     came = part.comm.gather(parcel)
     if came is None:
@@ -146,6 +136,18 @@ def _gathered(part: Part, field: Field, active: Flags | None) -> Loan:
     colouring = Known(known.places, known.start, known.ring, colours, fewest=part.topology.colouring.fewest)
     topology, points = replace(topology, colouring=colouring), points[topology.memory]
     return Loan(parcel.ids, Field(points, topology, field.precision, field.level), ids, [each.ids for each in came])
+
+
+def read_alike(part: Part, field: Field, active: Flags | None) -> Loan:
+    """The same, with all cells read as in the whole mesh.
+
+    Where cells of the input are inverted, some that are cut off from others may be read the other way round: then the
+    whole mesh is gathered.
+    """
+    loan = gathered_field(part, field, active)
+    if active is None or part.comm.bcast(loan.field is None or Winding.of(loan.field.topology).reads(forth=part.forth)):
+        return loan
+    return gathered_field(part, field, None)
 
 
 def _faces(part: Part) -> list[tuple[int, str]]:

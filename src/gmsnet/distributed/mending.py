@@ -64,7 +64,7 @@ def mended(part: Part, topology: Topology | Volume, inverted: int) -> Mended | N
     bad = _bad(part, topology)
     if part.comm.allreduce(bool((bad & ~_movable(topology, free)).any()), mpi().LOR):
         return None
-    forth = bool(part.comm.allreduce(bool(Winding.of(topology).forth), mpi().LOR))
+    forth = part.forth
     total = int(part.comm.allreduce(int(np.count_nonzero(topology.near_free))))
     for active in _regions(part, topology, bad, total):
         loan = gathered_field(part, Field(part.points, topology, precision_of(part.mesh)), active)

@@ -18,6 +18,7 @@ from gmsnet.distributed.ghosts import Surrounded, owners_beside
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.numbering import Numbers, before
+from gmsnet.distributed.winding import Winding
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
@@ -55,6 +56,7 @@ class Part:
     mesh: its cells, and those around. topology: with the nodes free that it moves. points: in memory order. codes: (n,)
     places on the curve, in memory order. moves: (n,) by places in memory, the nodes that this rank has to move or hold.
     own_rows: of ``topology.simplices``, those of its own cells: each cell is one rank's.
+    forth: the cells of the whole mesh are read forwards.
     """
 
     comm: Any
@@ -66,6 +68,7 @@ class Part:
     codes: Ids
     moves: Flags
     own_rows: Ints
+    forth: bool
 
     @classmethod
     def of(cls, around: Surrounded, comm: Any, single: bool) -> Part:
@@ -84,7 +87,8 @@ class Part:
         own = np.concatenate([*around.own, np.empty(0, dtype=bool)])
         rows = np.arange(len(topology.simplices.rows), dtype=np.int32)
         own_rows = rows[own[topology.cells_of(rows.astype(np.intp))]]
-        return cls(comm, around, mesh, topology, near, halo, codes, moves[topology.memory], own_rows)
+        forth = bool(comm.allreduce(bool(Winding.of(topology).forth), mpi().LOR))
+        return cls(comm, around, mesh, topology, near, halo, codes, moves[topology.memory], own_rows, forth)
 
     @property
     def simplices(self) -> Simplices | Tetrahedra:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.measure.totals import Totals
-from gmsnet.mesh.display import missing, plain
+from gmsnet.mesh.display import amount, miss_it, plain
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.sweep import Sweep
 
@@ -62,7 +62,7 @@ class RankResult:
         ]
         lines += [f"{name}: {before[name]:.6g} → {after[name]:.6g}" for name in before]
         if self.missed:
-            lines.append(f"target not met: {missing(self.missed)} it")
+            lines.append(f"target not met: {amount(self.missed, 'cell')} {miss_it(self.missed)}")
         return "\n".join([*lines, *self.notes])
 
 

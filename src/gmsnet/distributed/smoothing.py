@@ -25,16 +25,15 @@ from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.stages import Meant, swept
 from gmsnet.distributed.winding import Winding
 from gmsnet.kernels.topology.write_back import put_back
-from gmsnet.measure.report import measure
+from gmsnet.measure.report import QualityReport, measure
 from gmsnet.measure.totals import Totals, totals_of
-from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.methods.banded import Kept
 from gmsnet.methods.base import CELLS
 from gmsnet.preserve.protection import LAYER, WALL
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import factors_of, rank_by
-from gmsnet.run.set_up import check_options
+from gmsnet.run.set_up import check_options, check_target
 from gmsnet.run.state import State
 from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.solids import KINDS
@@ -59,6 +58,7 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
         return smoothed_on_first(piece, options, comm, why, began, known)
     part = Part.of(around, comm, piece.single)
     try:
+        everywhere(comm, lambda: check_target(part.mesh, options.target))
         everywhere(comm, lambda: check_options(part.mesh, options, counts))
         before = totals_of(part.points, part.simplices, Ranks(part))
         ready = _ready(piece, part, options, before, known)
@@ -225,9 +225,9 @@ def _written(
     after = totals_of(near, part.simplices, Ranks(part))
     inverted, missed, missed_before = 0 if after is None else after.inverted, None, None
     if target:
-        (missed, least), (missed_before, least_before) = (
-            _missing(part, each, around, options) for each, around in ((written, near), (mesh, part.points))
-        )
+        first = state.before if isinstance(state.before, QualityReport) else measure(mesh, topology, part.points)
+        missed, least = _missing(part, measure(written, topology, near), options)
+        missed_before, least_before = _missing(part, first, options)
         better = (inverted, missed, -least) <= (before.inverted, missed_before, -least_before)
     else:
         rank = rank_by(options.best_by)
@@ -237,9 +237,8 @@ def _written(
     return mesh.points, np.zeros_like(moved), before.totals, missed_before
 
 
-def _missing(part: Part, mesh: Mesh, near: Floats, options: SmoothOptions) -> tuple[int, float]:
-    """How many cells of all ranks miss the target, and the least 1/q among them. mesh: the part at the points near."""
-    report = measure(mesh, part.topology, near)
+def _missing(part: Part, report: QualityReport, options: SmoothOptions) -> tuple[int, float]:
+    """How many cells of all ranks miss the target, and the least 1/q among them. report: of the part."""
     rows, shape = options.target.missed_with_shapes(report)
     own = np.concatenate([*part.around.own, np.empty(0, dtype=bool)])[report.cell[rows]]
     count = int(part.comm.allreduce(int(np.count_nonzero(own))))

@@ -14,9 +14,9 @@ _SHOWN = {code: f"\\x{code:02x}" for code in _CONTROLS} | {code: f"\\u{code:04x}
 del _SHOWN[ord("\n")]
 
 
-def missing(count: int) -> str:
-    """So many cells, and that they miss something."""
-    return f"{amount(count, 'cell')} {'misses' if count == 1 else 'miss'}"
+def miss_it(count: int) -> str:
+    """What so many cells do that miss a target."""
+    return "misses it" if count == 1 else "miss it"
 
 
 def amount(count: int, what: str) -> str:

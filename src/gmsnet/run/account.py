@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gmsnet.measure.target import Target
 from gmsnet.measure.worst import NAMED, named_cells, worst_cells
-from gmsnet.mesh.display import amount, plain
+from gmsnet.mesh.display import amount, miss_it, plain
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.protection import LAYER
 from gmsnet.run import stop
@@ -90,9 +90,8 @@ class Account:
             figures.append(f"the minimum {kind} is {angle:.4g}°, {least - angle:.4g}° below {least:g}°")
         cells = self.missed[:NAMED]
         why = self.result.limits.reasons(cells, self.target.shape)
-        miss = "misses it" if len(self.missed) == 1 else "miss it"
         reasons = "".join(f"\n  cell {after.cell[row]}: {why[row]}" for row in cells.tolist())
-        return f"{'; '.join(figures)}; {named_cells(after, self.missed, miss)}{reasons}"
+        return f"{'; '.join(figures)}; {named_cells(after, self.missed, miss_it(len(self.missed)))}{reasons}"
 
     def stages(self) -> list[tuple[str, int, Sweep]]:
         """What the method did one after the other, with how many sweeps, and the mesh then; empty if all was one."""

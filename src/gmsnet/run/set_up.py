@@ -183,8 +183,7 @@ def _first_of_volume(
 
 
 def check_options(mesh: Mesh, options: SmoothOptions, counts: Mapping[str, int] | None = None) -> None:
-    """InputError for options that cells of this mesh do not have. counts: kind → cells, where the mesh is a part."""
-    check_target(mesh, options.target)
+    """InputError for options that a mesh of these cells does not take. counts: kind → cells, where it is a part."""
     check_cells(mesh, options.method_name, options.objective or options.variant, counts)
     check_surface_options(mesh, options)
     if mesh.plane is None:

@@ -17,7 +17,7 @@ from gmsnet.kernels.topology import solids as kernels
 from gmsnet.kernels.topology.facets import ALONE, OPPOSITE
 from gmsnet.kernels.topology.solids import FACETS, NONE, Tables
 from gmsnet.mesh.cell_block import CellBlock
-from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.mesh import SOLIDS, Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.topology.fans import Marks
 from gmsnet.topology.ordering import memory_order, space_points
@@ -27,7 +27,7 @@ from gmsnet.topology.wound import mark_of, refuse_flat
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 
-KINDS = ("tetra", "hexahedron", "wedge", "pyramid")  # by the numbers of kernels.simplex.mean_ratio3
+KINDS = ("tetra", *SOLIDS)  # by the numbers of kernels.simplex.mean_ratio3
 # The corners of a cell that is read inside out, in an order in which it is not.
 MIRRORED = np.array([
     (0, 2, 1, 3, 4, 5, 6, 7), (4, 5, 6, 7, 0, 1, 2, 3), (3, 4, 5, 0, 1, 2, 6, 7), (0, 3, 2, 1, 4, 5, 6, 7),

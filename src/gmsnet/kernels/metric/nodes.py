@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.metric.places import barycentric, found_at, locate
-from gmsnet.kernels.metric.quality import EQUILATERAL_AREA, SQUARE_AREA, THIRD, hyperbolic, square
+from gmsnet.kernels.metric.quality import EQUILATERAL_AREA, SQUARE_AREA, THIRD, hyperbolic, length_of, parts_of_length
 from gmsnet.kernels.simplex.mean_ratio2 import TWO_SQRT3
 
 HALVINGS, ARMIJO = 6, 1e-4
@@ -125,8 +125,7 @@ def value_at(star, term, row, points, logs, x, y, own_t, own_u, own_v):
         t = THIRD * (own_t + logs[p, 0] + logs[r, 0])
         u, v = THIRD * (own_u + logs[p, 1] + logs[r, 1]), THIRD * (own_v + logs[p, 2] + logs[r, 2])
         c, s, _ = hyperbolic(u * u + v * v)
-        length = wa * square(ax, ay, c, s, u, v) + wb * square(bx, by, c, s, u, v)
-        length += wo * square(bx - ax, by - ay, c, s, u, v)
+        length = length_of(ax, ay, bx, by, (wa, wb, wo), c, s, u, v)
         tau = math.exp(t) * d / area
         value, _, _ = term_of(length / (TWO_SQRT3 * d) * 0.5 * (tau + 1.0 / tau), term)
         total += value
@@ -147,12 +146,7 @@ def model(star, term, row, points, logs, slopes, i):
             return np.inf, gx, gy, hxx, hxy, hyy, mxx, mxy, myy, spokes
         t = THIRD * (logs[i, 0] + logs[p, 0] + logs[r, 0])
         u, v = THIRD * (logs[i, 1] + logs[p, 1] + logs[r, 1]), THIRD * (logs[i, 2] + logs[p, 2] + logs[r, 2])
-        c, s, bend = hyperbolic(u * u + v * v)
-        ex, ey = bx - ax, by - ay
-        plain = wa * (ax * ax + ay * ay) + wb * (bx * bx + by * by) + wo * (ex * ex + ey * ey)
-        along = wa * (ax * ax - ay * ay) + wb * (bx * bx - by * by) + wo * (ex * ex - ey * ey)
-        across = 2.0 * (wa * ax * ay + wb * bx * by + wo * ex * ey)
-        skew = u * along + v * across
+        c, s, bend, plain, along, across, skew = parts_of_length(ax, ay, bx, by, (wa, wb, wo), u, v)
         length = c * plain + s * skew
         tau = math.exp(t) * d / area
         energy = length / (TWO_SQRT3 * d) * 0.5 * (tau + 1.0 / tau)

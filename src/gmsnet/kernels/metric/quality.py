@@ -60,6 +60,26 @@ def square(x, y, c, s, u, v):
     return c * (x * x + y * y) + s * (u * (x * x - y * y) + 2.0 * v * x * y)
 
 
+@inlined
+def length_of(ax, ay, bx, by, weights, c, s, u, v):
+    """L of a simplex."""
+    wa, wb, wo = weights
+    length = wa * square(ax, ay, c, s, u, v) + wb * square(bx, by, c, s, u, v)
+    return length + wo * square(bx - ax, by - ay, c, s, u, v)
+
+
+@inlined
+def parts_of_length(ax, ay, bx, by, weights, u, v):
+    """c, s and bend of ``hyperbolic``; Σ w_e of x² + y², of x² − y² and of 2xy; what u and v make of the last two."""
+    wa, wb, wo = weights
+    c, s, bend = hyperbolic(u * u + v * v)
+    ex, ey = bx - ax, by - ay
+    plain = wa * (ax * ax + ay * ay) + wb * (bx * bx + by * by) + wo * (ex * ex + ey * ey)
+    along = wa * (ax * ax - ay * ay) + wb * (bx * bx - by * by) + wo * (ex * ex - ey * ey)
+    across = 2.0 * (wa * ax * ay + wb * bx * by + wo * ex * ey)
+    return c, s, bend, plain, along, across, u * along + v * across
+
+
 @kernel
 def qualities(points, cells, table, logs, out):
     """1/E of each simplex (S,); 0 or less, as 1/q is, where the area is not positive.
@@ -77,8 +97,7 @@ def qualities(points, cells, table, logs, out):
         c, s, _ = hyperbolic(u * u + v * v)
         wa, wb, wo, area = ideal(table, n)
         d = ax * by - ay * bx
-        length = wa * square(ax, ay, c, s, u, v) + wb * square(bx, by, c, s, u, v)
-        length += wo * square(bx - ax, by - ay, c, s, u, v)
+        length = length_of(ax, ay, bx, by, (wa, wb, wo), c, s, u, v)
         shape = TWO_SQRT3 * d / length if length > 0.0 else 0.0
         tau = math.exp(t) * d / area
         out[n] = shape * (2.0 / (tau + 1.0 / tau)) if d > 0.0 else min(shape, 0.0)
@@ -101,16 +120,12 @@ def energy(points, cells, table, logs, slopes, floor, doublings, top, gradient, 
         t = THIRD * (logs[i, 0] + logs[j, 0] + logs[k, 0])
         u = THIRD * (logs[i, 1] + logs[j, 1] + logs[k, 1])
         v = THIRD * (logs[i, 2] + logs[j, 2] + logs[k, 2])
-        c, s, bend = hyperbolic(u * u + v * v)
         wa, wb, wo, area = ideal(table, n)
         d = ax * by - ay * bx
         if not d > 0.0:
             return np.inf
+        c, s, bend, plain, along, across, skew = parts_of_length(ax, ay, bx, by, (wa, wb, wo), u, v)
         ex, ey = bx - ax, by - ay
-        plain = wa * (ax * ax + ay * ay) + wb * (bx * bx + by * by) + wo * (ex * ex + ey * ey)
-        along = wa * (ax * ax - ay * ay) + wb * (bx * bx - by * by) + wo * (ex * ex - ey * ey)
-        across = 2.0 * (wa * ax * ay + wb * bx * by + wo * ex * ey)
-        skew = u * along + v * across
         length = c * plain + s * skew
         tau = math.exp(t) * d / area
         value = length / (TWO_SQRT3 * d) * 0.5 * (tau + 1.0 / tau)
