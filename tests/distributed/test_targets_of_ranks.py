@@ -75,6 +75,39 @@ def test_any_method_and_guard(kind, method, guard):
     assert same(mesh, options, strips(mesh), 3).gathered == ""
 
 
+def blocks_with_pyramids(seed):
+    """A block in which some cubes are six pyramids each, and a target that a few of its cells miss."""
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(5, 11, 3)
+    cubes = list(np.ndindex(*counts))
+    pyramids = [cubes[k] for k in rng.permutation(len(cubes))[: len(cubes) // 4]]
+    mesh = block(*counts, pyramids=pyramids, jitter=0.12, seed=seed)
+    return mesh, float(np.sort(gmsnet.quality(mesh).shape)[len(cubes) // 8])
+
+
+@pytest.mark.parametrize("seed", [10, 90, 290])
+def test_stars_of_nodes_that_do_not_move_are_kept(seed):
+    mesh, target = blocks_with_pyramids(seed)
+    same(mesh, aim(method="laplacian", guard="star", target_quality=target), strips(mesh, 2), 2)
+
+
+@pytest.mark.parametrize("kind", MESHES)
+def test_the_first_rank_knows_which_nodes_have_stars(kind, monkeypatch):
+    mesh, gathered, seen = MESHES[kind], executor.read_alike, []
+
+    def looked(part, field, active):
+        loan = gathered(part, field, active)
+        if loan.field is not None:
+            topology = loan.field.topology
+            seen.append((topology.near_ringed.sum(), topology.near_free.sum()))
+        return loan
+
+    monkeypatch.setattr(executor, "read_alike", looked)
+    spread(mesh, aim(target_quality=float(SHAPES[kind][2])), strips(mesh), 3)
+    starred, free = seen[0]
+    assert starred > free
+
+
 @pytest.mark.parametrize(
     ("kind", "target"),
     [("triangles", {"target_angle": 22.0}), ("mixed", {"target_angle": 40.0}),

@@ -33,14 +33,15 @@ SHARE = 0.5  # of the free nodes: where they would be more, all cells are gather
 
 class Parcel(NamedTuple):
     """Nodes and cells of one rank. ids: (n,). places: (n, dim) in the input, by which they are ordered. points: as they
-    are, (n, 2), of volumes (n, 4). moves: (n,) bool, which are free. colours: (n,). cells: for each block, nodes by
-    their ids and the numbers of cells.
+    are, (n, 2), of volumes (n, 4). moves: (n,) bool, which are free. starred: (n,) bool, which have a star in the whole
+    mesh. colours: (n,). cells: for each block, nodes by their ids and the numbers of cells.
     """
 
     ids: Ids
     places: Floats
     points: Floats
     moves: Flags
+    starred: Flags
     colours: NDArray[np.int32]
     cells: list[tuple[Ids, Ids]]
 
@@ -132,9 +133,12 @@ def gathered_field(part: Part, field: Field, active: Flags | None) -> Loan:
         whole.plane, whole.kinds_there, whole.exponent, whole.box
     )
     topology = connectivity_of(mesh, ~moves)
-    known, colours = topology.colouring, np.concatenate([each.colours for each in came])[first][topology.memory]
+    starred, colours = (
+        np.concatenate([each[k] for each in came])[first][topology.memory] for k in (4, 5)
+    )  # fmt: skip
+    known = topology.colouring
     colouring = Known(known.places, known.start, known.ring, colours, fewest=part.topology.colouring.fewest)
-    topology, points = replace(topology, colouring=colouring), points[topology.memory]
+    topology, points = replace(topology, colouring=colouring, starred=starred), points[topology.memory]
     return Loan(parcel.ids, Field(points, topology, field.precision, field.level), ids, [each.ids for each in came])
 
 
@@ -168,8 +172,8 @@ def _parcel(part: Part, field: Field, active: Flags | None) -> Parcel:
         used[nodes[chosen]] = True
         cells.append((block.nodes[chosen], block.numbers[chosen]))
     near = topology.places[np.flatnonzero(used)]
-    colours = topology.colouring.colours[near]
-    return Parcel(ids[used], part.mesh.points[used], field.points[near], moves[used], colours, cells)
+    starred, colours = part.halo.spread(topology.near_ringed)[near], topology.colouring.colours[near]
+    return Parcel(ids[used], part.mesh.points[used], field.points[near], moves[used], starred, colours, cells)
 
 
 def around(part: Part, topology: Topology | Volume, chosen: Flags, rings: int) -> Flags:

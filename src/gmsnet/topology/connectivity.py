@@ -21,13 +21,15 @@ class Connectivity:
     """The base of ``Topology`` and ``Volume``.
 
     held: reason → node ids, the first reason that applies. free: (F,) ids of the nodes that may move, ascending.
-    memory: (N,) node ids in memory order. near_free: (N,) by places in memory, which nodes may move.
+    memory: (N,) node ids in memory order. near_free: (N,) by places in memory, which nodes may move. starred: (N,)
+    likewise, which have a star in the mesh that this is a part of; None: this is the whole mesh.
     """
 
     held: dict[str, NDArray[np.int64]]
     free: Ints
     memory: Ints
     near_free: Flags
+    starred: Flags | None = None
 
     def holding(self: Kind, chosen: Flags, reason: str) -> Kind:
         """The same, with the free nodes among the chosen (N,) by id held for this reason."""

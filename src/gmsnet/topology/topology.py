@@ -223,8 +223,11 @@ class Topology(Connectivity):
 
     @cached_property
     def near_ringed(self) -> Flags:
-        """(N,) by places in memory: which nodes have a ring: the free ones, and those held since (``holding``)."""
-        return np.diff(self.near_start) > 0
+        """(N,) by places in memory: which nodes have a ring: the free ones, and those held since (``holding``).
+
+        Of a part those of the whole mesh.
+        """
+        return np.diff(self.near_start) > 0 if self.starred is None else self.starred
 
     def with_rings_of_free_nodes(self) -> Topology:
         """The same, in which a node has a ring only if it is free."""
@@ -235,7 +238,8 @@ class Topology(Connectivity):
         start = np.zeros_like(self.near_start)
         np.cumsum(np.where(free, degree, 0), out=start[1:])
         pattern = None if self.near_pattern is None else np.where(free, self.near_pattern, 0)  # 0: of no cells
-        return replace(self, near_start=start, near_ring=self.near_ring[np.repeat(free, degree)], near_pattern=pattern)
+        ring = self.near_ring[np.repeat(free, degree)]
+        return replace(self, near_start=start, near_ring=ring, near_pattern=pattern, starred=None)
 
     def orientation_of(self, cells: NDArray[np.int64]) -> NDArray[np.int8]:
         """How faces with three or four corners are read, by their indices among all cells of the mesh: ±1."""

@@ -100,8 +100,8 @@ class Volume(Connectivity):
 
     @property
     def near_ringed(self) -> Flags:
-        """(N,) by places in memory: which nodes have a star."""
-        return np.diff(self.start) > 0
+        """(N,) by places in memory: which nodes have a star, of a part those of the whole mesh."""
+        return np.diff(self.start) > 0 if self.starred is None else self.starred
 
     def cells_of(self, rows: NDArray[np.intp]) -> NDArray[np.int64]:
         """The index among all cells of the mesh of the cell of each of some rows of ``near``."""
