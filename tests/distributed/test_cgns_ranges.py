@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 import gmsnet
+from gmsnet.cells.table import nodes_of
 from gmsnet.distributed.file_ranges import planned_format
 from gmsnet.generate import random_mesh, random_volume, recombine
+from gmsnet.io import typed_rows
 from gmsnet.io.cgns_elements import CGNS_ORDERS, KINDS
 from gmsnet.mesh.mesh import Mesh
 
@@ -29,8 +31,20 @@ MESHES = {
 }
 
 
-def save(mesh: Mesh, path: Path, kinds: tuple[str, ...] = ("f8", "f8", "f8"), whole: str = "i4", **how: object) -> Path:
-    """Sections in another order in the file than their numbers tell; an empty one is among them."""
+def in_one(sections: list[tuple[int, int, np.ndarray]]) -> list[tuple[int, int, np.ndarray]]:
+    """All sections but the last as one of all kinds of elements, which alternate."""
+    *some, last = sections
+    rows = [(code, *row) for code, _, nodes in some for row in (nodes + 1).tolist()]
+    order = np.random.default_rng(1).permutation(len(rows))
+    listed = np.array([number for k in order for number in rows[k]]) - 1  # as all numbers, one is added again
+    return [(20, 1, listed), last]
+
+
+def save(
+    mesh: Mesh, path: Path, kinds: tuple[str, ...] = ("f8", "f8", "f8"), whole: str = "i4", mixed: bool = False,
+    **how: object,
+) -> Path:  # fmt: skip
+    """Sections in another order in the file than their numbers tell; an empty one is among them. mixed: see in_one."""
     with h5py.File(path, "w") as file:
 
         def node(parent, name, label, values=None, **how):
@@ -51,9 +65,12 @@ def save(mesh: Mesh, path: Path, kinds: tuple[str, ...] = ("f8", "f8", "f8"), wh
             order = CGNS_ORDERS.get(kind)
             sections.append((CODES[kind], first, nodes if order is None else nodes[:, np.argsort(order)]))
             first += len(nodes)
+        if mixed:
+            sections = in_one(sections)
         for number, (code, begin, nodes) in reversed(list(enumerate(sections))):
             section = node(zone, f"Part{number}", "Elements_t", np.array([code, 0], "i4"))
-            node(section, "ElementRange", "IndexRange_t", np.array([begin, begin + len(nodes) - 1], whole))
+            last = first - len(sections[-1][2]) - 1 if code == 20 else begin + len(nodes) - 1
+            node(section, "ElementRange", "IndexRange_t", np.array([begin, last], whole))
             node(section, "ElementConnectivity", "DataArray_t", (nodes + 1).ravel().astype(whole), **how)
     return path
 
@@ -75,10 +92,57 @@ def test_the_bytes_of_a_serial_run(kind: str, kinds: tuple[str, ...], ranks: int
     assert_bytes_of_one_process(save(MESHES[kind](), tmp_path / "a.cgns", kinds), "cgns", ranks, method)
 
 
+@pytest.mark.parametrize("ranks", [1, 2, 3, 4])
+@pytest.mark.parametrize("marks", [64, 1 << 18])
+@pytest.mark.parametrize("kind", ["quads and triangles", "all volumes"])
+def test_sections_of_several_kinds(kind: str, marks: int, ranks: int, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(typed_rows, "AT_ONCE", marks)
+    mesh = MESHES[kind]()
+    for whole in ("<i4", ">i8"):
+        assert_read_alike(save(mesh, tmp_path / "a.cgns", whole=whole, mixed=True), "cgns", ranks)
+    assert len(gmsnet.read(tmp_path / "a.cgns").cells) == len(mesh.cells)
+    assert_bytes_of_one_process(tmp_path / "a.cgns", "cgns", ranks, "barrier")
+
+
+@pytest.mark.parametrize("wrong", [1, 20, 22, -1, 99])
+def test_a_section_of_unknown_kinds_is_for_the_reader_of_the_whole(wrong: int, tmp_path: Path) -> None:
+    path = save(mixed(), tmp_path / "a.cgns", mixed=True)
+    assert planned_format(str(path), "cgns") == "cgns"
+    with h5py.File(path, "a") as file:
+        listed = file["Base/Zone/Part0/ElementConnectivity/ data"]
+        sizes = {code: nodes_of(kind) for code, kind in KINDS.items()}
+        second = 1 + sizes[int(listed[0])]
+        listed[second] = wrong
+    assert planned_format(str(path), "cgns") == ""
+    with pytest.raises(gmsnet.InputError, match=r"element 1 \(counted from 0\) has a type that is not known"):
+        gmsnet.read(path)
+
+
+def test_damage_in_a_section_of_several_kinds_is_named_on_all_ranks(tmp_path: Path) -> None:
+    path = save(mixed(), tmp_path / "a.cgns", mixed=True)
+    with h5py.File(path, "a") as file:
+        listed = file["Base/Zone/Part0/ElementConnectivity/ data"]
+        at = listed.id.get_offset()
+        listed[2] = 10**6
+    assert f"byte {at} or behind: a cell names the node 999999, but the nodes are 0 to" in heard(3, path, "cgns")[0]
+
+
+def test_a_section_of_several_kinds_that_is_cut_is_for_the_reader_of_the_whole(tmp_path: Path) -> None:
+    path = save(mixed(), tmp_path / "a.cgns", mixed=True)
+    with h5py.File(path, "a") as file:
+        section = file["Base/Zone/Part0"]
+        listed = section["ElementConnectivity/ data"][:]
+        del section["ElementConnectivity/ data"]
+        section["ElementConnectivity/ data"] = listed[:-1]
+    assert planned_format(str(path), "cgns") == ""
+    with pytest.raises(gmsnet.InputError, match="do not fit their types"):
+        gmsnet.read(path)
+
+
 @pytest.mark.parametrize(
     ("data", "shared"),
     [
-        (made.cgns(), "cgns"), (made.cgns(kind=np.float32), "cgns"), (made.cgns(mixed=True), ""),
+        (made.cgns(), "cgns"), (made.cgns(kind=np.float32), "cgns"), (made.cgns(mixed=True), "cgns"),
         (made.cgns(packed=True), ""), (made.cgns_zones(), ""), (made.cgns_structured(), ""), (b"no HDF5", ""),
     ],
 )  # fmt: skip

@@ -364,10 +364,10 @@ def test_a_failure_leaves_the_file(begin: int, tmp_path: Path, monkeypatch) -> N
     path = save_ugrid(mixed(), tmp_path / "a.lb8.ugrid")
     before, spliced = saved(tmp_path), file_ranges.FileRanges._spliced
 
-    def broken(self, column, first, last, moved):
+    def broken(self, column, rows, first, last, moved):
         if first >= begin:
             raise InputError("the disk is broken")
-        return spliced(self, column, first, last, moved)
+        return spliced(self, column, rows, first, last, moved)
 
     monkeypatch.setattr(file_ranges, "AT_ONCE", 240)
     monkeypatch.setattr(file_ranges.FileRanges, "_spliced", broken)

@@ -16,7 +16,7 @@ import gmsnet
 from gmsnet.distributed.file_ranges import planned_format, read_ranges
 from gmsnet.distributed.layouts import shared_format
 from gmsnet.generate import random_mesh, random_volume, recombine
-from gmsnet.io.ranges import Ranges, Rows
+from gmsnet.io.rows import Ranges, Rows
 from gmsnet.io.vtk_runs import Field, told_by
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import NUMBERED, regions_of

@@ -22,7 +22,8 @@ from gmsnet.errors import FormatError, GmsnetError, InputError
 from gmsnet.io.atomic import replace_files
 from gmsnet.io.formats import FORMATS
 from gmsnet.io.pieces import Piece as Bytes
-from gmsnet.io.ranges import AT_ONCE, Column, Plan, Ranges
+from gmsnet.io.ranges import Column, Plan, put
+from gmsnet.io.rows import AT_ONCE, Ranges, Rows
 from gmsnet.io.stamps import Stamps
 
 PLANNED = ("cgns", "gmsh", "ugrid", "vtk", "vtkhdf", "vtu")  # formats whose files can tell how their numbers lie
@@ -58,7 +59,7 @@ class FileRanges:
         if comm.rank == 0:
             try:
                 stamps = Stamps.of([(self.file.path, None, self.file.stamp)])
-                replace_files({target: self._contents(moved)}, stamps)
+                replace_files({target: self._contents(moved, target)}, stamps)
             except GmsnetError as error:
                 wrong = str(error)
             finally:
@@ -76,33 +77,33 @@ class FileRanges:
         ids, first = np.unique(np.concatenate([each for each, _ in came]), return_index=True)
         return ids, np.concatenate([each for _, each in came])[first]
 
-    def _contents(self, moved: Moved) -> Iterator[Bytes]:
+    def _contents(self, moved: Moved, target: str) -> Iterator[Bytes]:
         """The file, on the first rank."""
-        at = 0
-        for column in sorted(self.plan.points, key=lambda each: each.rows.start):
-            rows = column.rows
-            yield from self._copied(at, rows.start)
-            step = max(1, AT_ONCE // rows.stride)
-            for begin in range(0, rows.rows, step):
-                yield self._spliced(column, begin, min(begin + step, rows.rows), moved)
-            at = rows.end
-        yield from self._copied(at, self.file.size)
+        if self.plan.encoded is not None:
+            folder = os.path.dirname(os.path.realpath(target))
+            yield from self.plan.encoded.contents(self.file, moved.between, folder)
+        else:
+            yield from self._in_place(moved)
         self.file.check()
 
-    def _copied(self, begin: int, end: int) -> Iterator[Bytes]:
-        for at in range(begin, end, AT_ONCE):
-            yield bytes(self.file.read(at, min(AT_ONCE, end - at)))
+    def _in_place(self, moved: Moved) -> Iterator[Bytes]:
+        """The same bytes, but for those of coordinates."""
+        at = 0
+        found = [(each, each.rows) for each in self.plan.points if isinstance(each.rows, Rows)]
+        for column, rows in sorted(found, key=lambda each: each[1].start):
+            yield from self.file.copied(at, rows.start)
+            step = max(1, AT_ONCE // rows.stride)
+            for begin in range(0, rows.rows, step):
+                yield self._spliced(column, rows, begin, min(begin + step, rows.rows), moved)
+            at = rows.end
+        yield from self.file.copied(at, self.file.size)
 
-    def _spliced(self, column: Column, begin: int, end: int, moved: Moved) -> bytes:
+    def _spliced(self, column: Column, rows: Rows, begin: int, end: int, moved: Moved) -> bytes:
         """The bytes of some rows of coordinates, those of moved nodes in their new places."""
-        rows, first, axis = column
         start = rows.start + begin * rows.stride
         data = self.file.read(start, min(rows.start + end * rows.stride, rows.end) - start)
         values = rows.in_bytes(data, end - begin)
-        for ids, places in moved.between(first + begin, first + end):
-            here, new = ids - first - begin, places[:, axis : axis + rows.width]
-            old = values[here].astype(np.float64)
-            values[here] = np.where(new != old, new, old)
+        put(values, moved.between, column.first + begin, column.axis)
         return bytes(data)
 
 
@@ -197,12 +198,12 @@ def _renumbered(comm: Any, file: Ranges, plan: Plan, read: Sequence[Cells], firs
         if len(twice):
             node = int(twice.min())
             tag = int(plan.tags_of(file, node, node + 1)[0])
-            raise FormatError(f"byte {plan.byte_of_tag(node)}: the node {tag} is given twice")
+            raise FormatError(f"{plan.where_tag(node)}: the node {tag} is given twice")
         found = [replace(block, nodes=nodes[np.searchsorted(named, block.nodes)]) for block in read]
         for number, (block, old) in enumerate(zip(found, read, strict=True)):
             if (block.nodes < 0).any():
                 row, column = np.argwhere(block.nodes < 0)[0].tolist()
-                raise FormatError(f"byte {plan.byte_of_cell(number, int(block.numbers[row]))}: a cell names the node "
+                raise FormatError(f"{plan.where_cell(number, int(block.numbers[row]))}: a cell names the node "
                                   f"{old.nodes[row, column]}, which the file has not")  # fmt: skip
         return found
 

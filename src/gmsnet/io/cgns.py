@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS
 from gmsnet.errors import FormatError
-from gmsnet.io.cgns_elements import DATA, section, structured, table_of, title
+from gmsnet.io.cgns_elements import DATA, section, structured, tables_of, title
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
 from gmsnet.io.merge import Part, merged
-from gmsnet.io.ranges import Column, Plan, Ranges
+from gmsnet.io.ranges import Column, Plan
+from gmsnet.io.rows import Ranges
 from gmsnet.io.splice import Share
 from gmsnet.io.stored import Part as Axis
 from gmsnet.io.stored import coordinates, shared
@@ -105,8 +106,8 @@ def _conditions(zone: Node, count: int) -> Iterator[tuple[str, Ints]]:
 
 
 def plan(file: Ranges) -> Plan | None:
-    """How the numbers of an unstructured zone lie; None of several or other zones, with polyhedra or sections of mixed
-    elements, and where numbers are compressed or in chunks."""
+    """How the numbers of an unstructured zone lie; None of several or other zones, of polyhedra, and where numbers are
+    compressed or in chunks."""
     with File.opened(file.path) as opened:
         zones = [zone for base in _labelled(opened.root, "CGNSBase_t") for zone in _labelled(base, "Zone_t")]
         grids = _labelled(zones[0], "GridCoordinates_t") if len(zones) == 1 else []
@@ -114,13 +115,14 @@ def plan(file: Ranges) -> Plan | None:
             return None
         axes = [found.rows() for axis in "XYZ" if (found := grids[0].get(f"Coordinate{axis}/{DATA}")) is not None]
         points = [Column(rows, 0, axis) for axis, rows in enumerate(axes) if rows is not None and rows.width == 1]
-        sections = [table_of(node) for node in _labelled(zones[0], "Elements_t")]
+        sections = [tables_of(node, file) for node in _labelled(zones[0], "Elements_t")]
     listed = sorted((each for each in sections if each is not None), key=lambda each: each[0])
     told = len(listed) == len(sections) and len(points) == len(axes) > 1
     if not told or len({each.rows.rows for each in points}) > 1 or any(each.rows.dtype[1] != "f" for each in points):
         return None
-    blocks = [[table._replace(region=region)] for region, (_, table) in enumerate(listed, 1) if table.nodes.rows]
-    return Plan(points, blocks, all(each.rows.size == 4 for each in points)) if blocks else None
+    blocks = [[table._replace(region=region)]
+              for region, (_, tables) in enumerate(listed, 1) for table in tables if table.nodes.rows]  # fmt: skip
+    return Plan(points, blocks, all(each.rows.dtype[1:] == "f4" for each in points)) if blocks else None
 
 
 def write(mesh: Mesh) -> Written:

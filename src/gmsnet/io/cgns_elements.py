@@ -6,7 +6,6 @@ Source: CGNS Standard Interface Data Structures, "Element connectivity" and "Str
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +18,9 @@ from gmsnet.io.cells import distinct
 from gmsnet.io.exodus_elements import ORDERS
 from gmsnet.io.hdf5 import Node, shown
 from gmsnet.io.ranges import Table
+from gmsnet.io.rows import AnyRows, Ranges
+from gmsnet.io.typed_rows import typed_rows
+from gmsnet.kernels.text.typed import typed_starts
 
 Ints = NDArray[np.int64]
 
@@ -31,6 +33,7 @@ KINDS = {
 # Middles as in Exodus files, but for the centres: of a hexahedron its faces −z, −y, x, y, −x, z, then its inside.
 CGNS_ORDERS = ORDERS | {"hexahedron27": (*range(12), *range(16, 20), *range(12, 16), 24, 22, 21, 23, 20, 25, 26)}
 MIXED, NGON, NFACE = 20, 22, 23
+SIZES = np.array([nodes_of(KINDS[code]) if code in KINDS else 0 for code in range(max(KINDS) + 1)])
 
 
 class Section(NamedTuple):
@@ -67,30 +70,36 @@ def section(node: Node, count: int) -> Section:
     return Section(title(node), int(bounds[0]), [(kind, nodes) for kind, nodes in blocks if len(nodes)])
 
 
-def table_of(node: Node) -> tuple[int, Table] | None:
-    """The number of the first element of a section, and where its elements stand; None where only a reader of the whole
-    can tell."""
+def tables_of(node: Node, file: Ranges) -> tuple[int, list[Table]] | None:
+    """The number of the first element of a section, and where its elements of each kind stand; None where only a reader
+    of the whole can tell."""
     head, bounds = (node.need(path).integers().reshape(-1) for path in (DATA, f"ElementRange/{DATA}"))
-    listed = node.need(f"ElementConnectivity/{DATA}").rows()
-    if len(head) < 1 or len(bounds) != 2 or int(head[0]) not in KINDS or listed is None or listed.dtype[1] not in "iu":
+    found = node.need(f"ElementConnectivity/{DATA}").rows()
+    if len(head) < 1 or len(bounds) != 2 or found is None or found.dtype[1] not in "iu":
         return None
-    kind, number = KINDS[int(head[0])], int(bounds[1]) - int(bounds[0]) + 1
-    width = nodes_of(kind)
-    if listed.width != 1 or listed.rows != number * width:
+    number, listed = int(bounds[1]) - int(bounds[0]) + 1, found.cut(0, found.rows * found.width, 1, 1)
+    if int(head[0]) == MIXED:
+        parts = typed_rows(file, listed, SIZES)
+        if parts is None or sum(rows.rows for rows in parts.values()) != number:
+            return None
+        return int(bounds[0]), [_table(code, rows) for code, rows in parts.items()]
+    width = nodes_of(KINDS[int(head[0])]) if int(head[0]) in KINDS else 0
+    if not width or listed.rows != number * width:
         return None
-    rows = replace(listed, rows=number, stride=listed.stride * width, width=width)
-    return int(bounds[0]), Table(kind, rows, 1, CGNS_ORDERS.get(kind))
+    return int(bounds[0]), [_table(int(head[0]), listed.cut(0, number, width, width))]
+
+
+def _table(code: int, rows: AnyRows) -> Table:
+    return Table(KINDS[code], rows, 1, CGNS_ORDERS.get(KINDS[code]))
 
 
 def _mixed(node: Node, listed: Ints, number: int, count: int) -> Iterator[tuple[str, Ints]]:
     """Blocks of elements that each have their type in front, in the order of the types."""
-    starts, at = np.empty(max(0, min(number, len(listed))), dtype=np.int64), 0
-    values = listed.tolist()
-    for k in range(len(starts)):
-        if at >= len(values) or values[at] not in KINDS:
-            raise FormatError(f"{shown(node.path)}: element {k} (counted from 0) has a type that is not known")
-        starts[k], at = at, at + 1 + nodes_of(KINDS[values[at]])
-    if at != len(values) or len(starts) != number:
+    starts = np.empty(max(0, min(number, len(listed))), dtype=np.int64)
+    found, at = typed_starts(listed, SIZES, 0, starts)
+    if found < len(starts):
+        raise FormatError(f"{shown(node.path)}: element {found} (counted from 0) has a type that is not known")
+    if at != len(listed) or len(starts) != number:
         raise FormatError(f"{shown(node.path)}: the nodes of the elements do not fit their types")
     codes = listed[starts]
     for code in distinct(codes):

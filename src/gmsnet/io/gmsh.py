@@ -32,7 +32,8 @@ from gmsnet.io.gmsh_entities import (
 from gmsnet.io.gmsh_periodic import nodes_of_images, read_images
 from gmsnet.io.gmsh_sections import KINDS, Contents, Elements, Nodes
 from gmsnet.io.pieces import Piece, Pieces
-from gmsnet.io.ranges import Plan, Ranges
+from gmsnet.io.ranges import Plan
+from gmsnet.io.rows import Ranges
 from gmsnet.io.text import quoted
 from gmsnet.mesh.mesh import Mesh
 

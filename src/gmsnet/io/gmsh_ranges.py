@@ -23,7 +23,8 @@ from gmsnet.io.gmsh_entities import (
 from gmsnet.io.gmsh_sections import KINDS, PARTITIONED, SIZES, Contents, Elements
 from gmsnet.io.places import Lattice, Places
 from gmsnet.io.range_words import RangeWords, rows_of
-from gmsnet.io.ranges import Column, Plan, Ranges, Rows, Table, blocks_of
+from gmsnet.io.ranges import Column, Plan, Table, blocks_of
+from gmsnet.io.rows import Ranges, Rows
 
 READ = (b"PhysicalNames", b"Entities", b"PartitionedEntities", b"Nodes", b"Elements")
 AT_ONCE = 1 << 20  # bytes in which the end of a section is looked for

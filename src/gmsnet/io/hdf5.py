@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError, InputError, MissingExtraError
 from gmsnet.io.contents import Data
-from gmsnet.io.ranges import Rows
+from gmsnet.io.rows import Rows
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 NEEDED = "pip install 'gmsnet[hdf5]'"

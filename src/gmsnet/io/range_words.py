@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.io.places import Addresses, Lattice, Places
-from gmsnet.io.ranges import Ranges, Rows
+from gmsnet.io.rows import Ranges, Rows
 from gmsnet.io.words import ByteWords
 
 AT_ONCE = 1 << 16  # bytes that are read together

@@ -6,112 +6,39 @@ a plan is the mesh that the format's reader makes of the whole file.
 
 from __future__ import annotations
 
-import contextlib
 import itertools
-import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from io import FileIO
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.errors import FormatError, InputError
-from gmsnet.io.atomic import reason
+from gmsnet.errors import FormatError
 from gmsnet.io.cells import MOST_BLOCKS
-from gmsnet.io.contents import refuse_unless_regular
-from gmsnet.io.stamps import Stamp
-
-AT_ONCE = 1 << 22  # bytes that are copied together
-
-
-class Ranges:
-    """A file as it is now. It is open only while some of it is read."""
-
-    path: str
-    stamp: Stamp
-    size: int
-
-    def __init__(self, path: str) -> None:
-        refuse_unless_regular(path)
-        self.path = path
-        with self._opened() as file:
-            self.stamp = Stamp.of(os.fstat(file.fileno()))
-        self.size = self.stamp.size
-
-    def read(self, begin: int, count: int) -> bytearray:
-        """``count`` bytes from ``begin`` on.
-
-        Raises FormatError where the file ends before, and InputError where others have changed it since.
-        """
-        found, at = bytearray(count), 0
-        with self._opened() as file:
-            file.seek(begin)
-            while at < count and (some := file.readinto(memoryview(found)[at:])):
-                at += some
-            self._check(file)
-        if at < count:
-            raise FormatError(f"byte {begin + at}: the file ends, is it cut off?")
-        return found
-
-    def check(self) -> None:
-        """Raises InputError where others have changed the file since."""
-        with self._opened() as file:
-            self._check(file)
-
-    @contextlib.contextmanager
-    def _opened(self) -> Iterator[FileIO]:
-        try:
-            with open(self.path, "rb", buffering=0) as file:
-                yield file
-        except OSError as error:
-            raise InputError(f"{self.path}: cannot be read: {reason(error)}") from None
-
-    def _check(self, file: FileIO) -> None:
-        if Stamp.of(os.fstat(file.fileno())) != self.stamp:
-            raise InputError(f"{self.path}: the file changed while it was read: read it again once it is finished")
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Rows of binary numbers: row k has ``width`` numbers of the type from the byte start + k · stride on."""
-
-    start: int
-    rows: int
-    stride: int
-    dtype: str
-    width: int = 1
-
-    @property
-    def size(self) -> int:
-        """Bytes of the numbers of a row."""
-        return self.width * np.dtype(self.dtype).itemsize
-
-    @property
-    def end(self) -> int:
-        """The byte behind the last row."""
-        return self.start + ((self.rows - 1) * self.stride + self.size if self.rows else 0)
-
-    def of(self, file: Ranges, first: int, last: int) -> NDArray[np.generic]:
-        """(last − first, width) the numbers of some rows."""
-        if last <= first:
-            return np.empty((0, self.width), dtype=self.dtype)
-        count = last - first
-        return self.in_bytes(file.read(self.start + first * self.stride, (count - 1) * self.stride + self.size), count)
-
-    def in_bytes(self, data: bytearray, count: int) -> NDArray[np.generic]:
-        """(count, width) the numbers of rows, the first of which begins with ``data``, in its memory."""
-        return np.ndarray((count, self.width), self.dtype, data, 0, (self.stride, self.size // self.width))
+from gmsnet.io.pieces import Piece
+from gmsnet.io.rows import AnyRows, Listed, Ranges, Rows
 
 
 class Column(NamedTuple):
     """Coordinates of nodes that follow each other. first: the node of the first row. axis: of the first number of a
     row, those of the next axes follow it."""
 
-    rows: Rows
+    rows: Listed
     first: int = 0
     axis: int = 0
+
+
+Moves = Callable[[int, int], Iterable[tuple[NDArray[np.int64], NDArray[np.float64]]]]
+
+
+class Encoded(Protocol):
+    """How a file is written again whose coordinates do not stand in it as they are."""
+
+    def contents(self, file: Ranges, moves: Moves, folder: str) -> Iterator[Piece]:
+        """The file. moves: of nodes from one to another those that have moved, ascending, and where they are, in parts.
+        folder: for what does not fit into memory."""
+        ...
 
 
 class Table(NamedTuple):
@@ -119,25 +46,26 @@ class Table(NamedTuple):
     ``regions`` does not tell that of each. counts: numbers of nodes that the file tells of each, if it does."""
 
     kind: str
-    nodes: Rows
+    nodes: AnyRows
     base: int
     order: tuple[int, ...] | None = None
     region: int = 0
-    regions: Rows | None = None
-    counts: Rows | None = None
+    regions: AnyRows | None = None
+    counts: AnyRows | None = None
 
 
 @dataclass(frozen=True)
 class Plan:
     """points: the coordinates of all nodes, in the order of the file. blocks: of the mesh, each of one table or several
     of one kind. single: see Mesh. tags: those of all nodes, where cells name these by tags. fixed: numbers of all
-    nodes; those that are not 0 are to be held."""
+    nodes; those that are not 0 are to be held. encoded: where the rows of some points are not bytes of the file."""
 
     points: Sequence[Column]
     blocks: Sequence[Sequence[Table]]
     single: bool
     tags: Sequence[Rows] = ()
-    fixed: Rows | None = None
+    fixed: AnyRows | None = None
+    encoded: Encoded | None = None
 
     @property
     def nodes(self) -> int:
@@ -154,8 +82,9 @@ class Plan:
             some = rows.of(file, begin, end)
             if not np.isfinite(some).all():
                 row = begin + int(np.argmin(np.isfinite(some).all(axis=1)))
-                raise FormatError(f"byte {rows.start + row * rows.stride}: a coordinate of node {start + row} (counted "
-                                  "from 0) is not finite")  # fmt: skip
+                raise FormatError(
+                    f"{rows.where(row)}: a coordinate of node {start + row} (counted from 0) is not finite"
+                )
             found[start + begin - first : start + end - first, axis : axis + rows.width] = some
         return found
 
@@ -167,19 +96,19 @@ class Plan:
             before += rows.rows
         return np.concatenate(parts)
 
-    def byte_of_tag(self, node: int) -> int:
+    def where_tag(self, node: int) -> str:
         """Where the tag of a node stands."""
         for rows in self.tags:
             if node < rows.rows:
-                return rows.start + node * rows.stride
+                return rows.where(node)
             node -= rows.rows
         raise IndexError(node)
 
-    def byte_of_cell(self, block: int, number: int) -> int:
+    def where_cell(self, block: int, number: int) -> str:
         """Where the nodes of a cell of a block stand."""
         for table in self.blocks[block]:
             if number < table.nodes.rows:
-                return table.nodes.start + number * table.nodes.stride
+                return table.nodes.where(number)
             number -= table.nodes.rows
         raise IndexError(number)
 
@@ -213,17 +142,29 @@ class Plan:
         counts, width = table.counts.of(file, first, last)[:, 0], table.nodes.width
         if (counts != width).any():
             row = int(np.argmax(counts != width))
-            raise FormatError(f"byte {table.counts.start + (first + row) * table.counts.stride}: a {table.kind} with "
-                              f"{counts[row]} nodes instead of {width}")  # fmt: skip
+            raise FormatError(f"{table.counts.where(first + row)}: a {table.kind} with {counts[row]} nodes instead of "
+                              f"{width}")  # fmt: skip
 
     def _check(self, nodes: NDArray[np.int64], block: int, first: int) -> None:
         wrong = (nodes < 0) | (nodes >= self.nodes)
         if wrong.any():
             row = int(np.argmax(wrong.any(axis=1)))
             raise FormatError(
-                f"byte {self.byte_of_cell(block, first + row)}: a cell names the node {nodes[row][wrong[row]][0]}, but "
+                f"{self.where_cell(block, first + row)}: a cell names the node {nodes[row][wrong[row]][0]}, but "
                 f"the nodes are 0 to {self.nodes - 1} (counted from 0)"
             )
+
+
+def put(values: NDArray[Any], moves: Moves, first: int, axis: int) -> bool:
+    """Puts moved nodes into rows (n, axes) of coordinates, of which row 0 is that of node ``first`` and has its
+    coordinates from ``axis`` on. Tells whether a number is another one now."""
+    changed = False
+    for ids, places in moves(first, first + len(values)):
+        here, new = ids - first, places[:, axis : axis + values.shape[1]]
+        old = values[here].astype(np.float64)
+        changed |= bool((new != old).any())
+        values[here] = np.where(new != old, new, old)
+    return changed
 
 
 def blocks_of(tables: Sequence[Table]) -> list[list[Table]]:

@@ -23,7 +23,8 @@ from gmsnet.io.cells import distinct, sealed
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
-from gmsnet.io.ranges import Column, Plan, Ranges, Rows, Table
+from gmsnet.io.ranges import Column, Plan, Table
+from gmsnet.io.rows import Ranges, Rows
 from gmsnet.io.text import Text
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 from gmsnet.mesh.cell_block import CellBlock
@@ -112,14 +113,14 @@ def plan(file: Ranges) -> Plan | None:
     whole = f"{form.order}i4"
     points = Rows(at, counts[0], 3 * form.real, f"{form.order}f{form.real}", 3)
     at += 3 * form.real * counts[0]
-    tables = []
+    tables, surfaces = [], at
     for kind, count in zip(KINDS, counts[1:], strict=True):
         width = nodes_of(kind)
         if kind == KINDS[FACES]:  # behind the numbers of the surfaces
+            surfaces = at
             at += 4 * (counts[1] + counts[2])
         tables.append(Table(kind, Rows(at, count, 4 * width, whole, width), 1, PYRAMID if kind == "pyramid" else None))
         at += 4 * width * count
-    surfaces = tables[FACES].nodes.start - 4 * (counts[1] + counts[2])
     for k in range(FACES):
         tables[k] = tables[k]._replace(regions=Rows(surfaces, counts[1 + k], 4, whole))
         surfaces += 4 * counts[1 + k]

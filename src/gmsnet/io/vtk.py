@@ -21,7 +21,8 @@ from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Addresses, Lattice, Places, lists, pick
-from gmsnet.io.ranges import Plan, Ranges
+from gmsnet.io.ranges import Plan
+from gmsnet.io.rows import Ranges
 from gmsnet.io.vtk_fields import attribute, field_arrays, keyword
 from gmsnet.io.vtk_stream import TYPES, Array, Line, Stream, opened, word_of
 from gmsnet.kernels.text import text as kernels

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from gmsnet.io.places import Lattice
 from gmsnet.io.range_words import RangeWords, rows_of
-from gmsnet.io.ranges import Column, Plan, Ranges, Rows
+from gmsnet.io.ranges import Column, Plan
+from gmsnet.io.rows import Ranges, Rows
 from gmsnet.io.vtk_fields import attribute, field_arrays, keyword
 from gmsnet.io.vtk_runs import Field, tables_of, told_by
 from gmsnet.io.vtk_stream import Array, Line, Stream, opened

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +13,8 @@ from gmsnet.cells.table import nodes_of
 from gmsnet.io import vtk_cells
 from gmsnet.io.cell_table import Kind
 from gmsnet.io.cells import MOST_BLOCKS
-from gmsnet.io.ranges import Ranges, Rows, Table
+from gmsnet.io.ranges import Table
+from gmsnet.io.rows import Listed, Ranges
 from gmsnet.io.vtk_ghosts import LEVELS, TYPES
 from gmsnet.mesh.region_fields import NUMBERED, names_a_region
 from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX
@@ -30,14 +30,14 @@ class Field(NamedTuple):
     """Data of cells or points. rows: where these stand; None where they are in no such rows."""
 
     name: str
-    rows: Rows | None
+    rows: Listed | None
 
 
 class Told(NamedTuple):
     """regions: of cells; fixed: of nodes, those that are not 0 are held. None where the file has no such numbers."""
 
-    regions: Rows | None
-    fixed: Rows | None
+    regions: Listed | None
+    fixed: Listed | None
 
 
 def told_by(file: Ranges, points: Iterable[Field], cells: Iterable[Field], counts: tuple[int, int]) -> Told | None:
@@ -56,13 +56,13 @@ def told_by(file: Ranges, points: Iterable[Field], cells: Iterable[Field], count
     return Told(single[0] if single else None, held[0] if held else None)
 
 
-def _may_number(file: Ranges, rows: Rows) -> bool:
+def _may_number(file: Ranges, rows: Listed) -> bool:
     """Whether each of many cells may have a value of its own, as the first ones have."""
     return rows.rows >= NUMBERED and len(np.unique(rows.of(file, 0, NUMBERED))) == NUMBERED
 
 
 def tables_of(
-    types: Some, cells: int, numbers: int, nodes: Rows, offsets: Some | None = None, regions: Rows | None = None
+    types: Some, cells: int, numbers: int, nodes: Listed, offsets: Some | None = None, regions: Listed | None = None
 ) -> list[Table]:
     """A table for each run of cells of one kind; none where that cannot be told.
 
@@ -70,15 +70,12 @@ def tables_of(
     where the nodes of each cell begin, with the end of the last one (cells + 1 in all); without, each cell has its
     number of nodes in front, which counts as one of them. regions: of the cells.
     """
-    tables, size, lead = list[Table](), np.dtype(nodes.dtype).itemsize, int(offsets is None)
+    tables, lead = list[Table](), int(offsets is None)
     for first, last, kind, start in _runs(types, offsets, cells, numbers):
         width = nodes_of(kind.name)
-        begin, stride = nodes.start + start * size, (width + lead) * size
-        rows = Rows(begin + lead * size, last - first, stride, nodes.dtype, width)
-        counts = Rows(begin, last - first, stride, nodes.dtype) if lead else None
-        own = regions
-        if regions is not None:
-            own = replace(regions, start=regions.start + first * regions.stride, rows=last - first)
+        rows = nodes.cut(start + lead, last - first, width + lead, width)
+        counts = nodes.cut(start, last - first, width + lead, 1) if lead else None
+        own = None if regions is None else regions.cut(first, last - first, 1, 1)
         tables.append(Table(kind.name, rows, 0, kind.order, 0, own, counts))
     return tables
 

@@ -16,7 +16,8 @@ from gmsnet.io import vtk_cells
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
-from gmsnet.io.ranges import Column, Plan, Ranges
+from gmsnet.io.ranges import Column, Plan
+from gmsnet.io.rows import Ranges
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.io.vtk_runs import Field, tables_of, told_by
 from gmsnet.mesh.mesh import Mesh

@@ -21,7 +21,8 @@ from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Lattice, Places
-from gmsnet.io.ranges import Plan, Ranges
+from gmsnet.io.ranges import Plan
+from gmsnet.io.rows import Ranges
 from gmsnet.io.splice import BinarySlots, EncodedSlots, Slots
 from gmsnet.io.vtu_arrays import Encoded
 from gmsnet.io.vtu_reader import TYPES, Reader, one_word

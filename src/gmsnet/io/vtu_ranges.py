@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.io.ranges import Column, Plan, Ranges, Rows
+from gmsnet.io.ranges import Column, Plan
+from gmsnet.io.rows import Ranges, Rows
 from gmsnet.io.vtk_runs import Field, tables_of, told_by
 from gmsnet.io.vtu_reader import TYPES, Reader
 from gmsnet.io.vtu_xml import DataArray
@@ -66,7 +66,7 @@ def plan(file: Ranges) -> Plan | None:
 def _field(arrays: Mapping[tuple[int, int], Rows], array: DataArray, reader: Reader) -> Field:
     rows, width = arrays.get(array.tag), reader.width(array, 1)
     if rows is not None and width > 1:
-        rows = replace(rows, rows=rows.rows // width, stride=rows.stride * width, width=width)
+        rows = rows.cut(0, rows.rows // width, width, width)
     return Field(array.attributes.get("Name", ""), rows)
 
 
