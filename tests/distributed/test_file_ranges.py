@@ -231,8 +231,6 @@ def test_which_files_are_shared(tmp_path: Path) -> None:
         assert shared_format(path, str(tmp_path / target)) == ""
     text = str(save_ugrid(mixed(), tmp_path / "a.ugrid"))
     assert shared_format(text, str(tmp_path / "b.ugrid")) == ""
-    packed = str(save_vtkhdf(random_mesh(50, seed=1), tmp_path / "p.vtkhdf", compression="gzip"))
-    assert shared_format(packed, str(tmp_path / "b.vtkhdf")) == ""
     assert shared_format(str(tmp_path / "none.lb8.ugrid"), str(tmp_path / "b.lb8.ugrid")) == ""
 
 

@@ -19,9 +19,10 @@ from gmsnet.io.cgns_elements import DATA, section, structured, tables_of, title
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
+from gmsnet.io.hdf5_rows import StoredPoints, rows_of
 from gmsnet.io.merge import Part, merged
 from gmsnet.io.ranges import Column, Plan
-from gmsnet.io.rows import Ranges
+from gmsnet.io.rows import Ranges, Rows
 from gmsnet.io.splice import Share
 from gmsnet.io.stored import Part as Axis
 from gmsnet.io.stored import coordinates, shared
@@ -106,15 +107,15 @@ def _conditions(zone: Node, count: int) -> Iterator[tuple[str, Ints]]:
 
 
 def plan(file: Ranges) -> Plan | None:
-    """How the numbers of an unstructured zone lie; None of several or other zones, of polyhedra, and where numbers are
-    compressed or in chunks."""
+    """How the numbers of an unstructured zone lie; None of several or other zones, and of polyhedra."""
     with File.opened(file.path) as opened:
         zones = [zone for base in _labelled(opened.root, "CGNSBase_t") for zone in _labelled(base, "Zone_t")]
         grids = _labelled(zones[0], "GridCoordinates_t") if len(zones) == 1 else []
         if len(grids) != 1 or ((kind := zones[0].get("ZoneType/" + DATA)) is not None and kind.text() == "Structured"):
             return None
-        axes = [found.rows() for axis in "XYZ" if (found := grids[0].get(f"Coordinate{axis}/{DATA}")) is not None]
-        points = [Column(rows, 0, axis) for axis, rows in enumerate(axes) if rows is not None and rows.width == 1]
+        axes = [found for axis in "XYZ" if (found := grids[0].get(f"Coordinate{axis}/{DATA}")) is not None]
+        rows = [rows_of(node) for node in axes]
+        points = [Column(each, 0, axis) for axis, each in enumerate(rows) if each is not None and each.width == 1]
         sections = [tables_of(node, file) for node in _labelled(zones[0], "Elements_t")]
     listed = sorted((each for each in sections if each is not None), key=lambda each: each[0])
     told = len(listed) == len(sections) and len(points) == len(axes) > 1
@@ -122,7 +123,11 @@ def plan(file: Ranges) -> Plan | None:
         return None
     blocks = [[table._replace(region=region)]
               for region, (_, tables) in enumerate(listed, 1) for table in tables if table.nodes.rows]  # fmt: skip
-    return Plan(points, blocks, all(each.rows.dtype[1:] == "f4" for each in points)) if blocks else None
+    if not blocks:
+        return None
+    in_place = all(isinstance(each.rows, Rows) for each in points)
+    encoded = None if in_place else StoredPoints({node.path: axis for axis, node in enumerate(axes)})
+    return Plan(points, blocks, all(each.rows.dtype[1:] == "f4" for each in points), encoded=encoded)
 
 
 def write(mesh: Mesh) -> Written:

@@ -17,6 +17,7 @@ from gmsnet.io.cell_table import check_range
 from gmsnet.io.cells import distinct
 from gmsnet.io.exodus_elements import ORDERS
 from gmsnet.io.hdf5 import Node, shown
+from gmsnet.io.hdf5_rows import rows_of
 from gmsnet.io.ranges import Table
 from gmsnet.io.rows import AnyRows, Ranges
 from gmsnet.io.typed_rows import typed_rows
@@ -74,7 +75,7 @@ def tables_of(node: Node, file: Ranges) -> tuple[int, list[Table]] | None:
     """The number of the first element of a section, and where its elements of each kind stand; None where only a reader
     of the whole can tell."""
     head, bounds = (node.need(path).integers().reshape(-1) for path in (DATA, f"ElementRange/{DATA}"))
-    found = node.need(f"ElementConnectivity/{DATA}").rows()
+    found = rows_of(node.need(f"ElementConnectivity/{DATA}"))
     if len(head) < 1 or len(bounds) != 2 or found is None or found.dtype[1] not in "iu":
         return None
     number, listed = int(bounds[1]) - int(bounds[0]) + 1, found.cut(0, found.rows * found.width, 1, 1)

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError, InputError, MissingExtraError
 from gmsnet.io.contents import Data
-from gmsnet.io.rows import Rows
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 NEEDED = "pip install 'gmsnet[hdf5]'"
@@ -40,7 +39,7 @@ def library() -> Any:
 
 
 @contextmanager
-def _said_of(path: str) -> Iterator[None]:
+def said_of(path: str) -> Iterator[None]:
     """Errors of the library as FormatError. Nothing but calls of the library may stand in the block."""
     try:
         yield
@@ -70,7 +69,7 @@ class File:
         if bytes(data[: len(MAGIC)]) != MAGIC:
             raise FormatError("byte 0: this is no HDF5 file")
         self.budget = ANYWAY + PER_BYTE * len(data)
-        with _said_of(""):
+        with said_of(""):
             self.root = Node(self, "", self.h5py.File(io.BytesIO(data[:]), "r"))
 
     @classmethod
@@ -80,7 +79,7 @@ class File:
         file = cls.__new__(cls)
         file.h5py, file.data = library(), b""
         file.budget = ANYWAY + PER_BYTE * os.path.getsize(path)
-        with _said_of(""):
+        with said_of(""):
             handle = file.h5py.File(path, "r")
         try:
             file.root = Node(file, "", handle)
@@ -116,7 +115,7 @@ class Node:
         """The members of a group in the order of their creation, where the file keeps it; none of a data set."""
         if self.is_data:
             return []
-        with _said_of(self.path):
+        with said_of(self.path):
             if len(self.thing) > MOST_MEMBERS:
                 raise FormatError(f"{shown(self.path)}: a group of more than {MOST_MEMBERS} members")
             return list(self.thing)
@@ -131,7 +130,7 @@ class Node:
             if at.is_data:
                 return None
             path = f"{at.path}/{part}"
-            with _said_of(path):
+            with said_of(path):
                 link = at.thing.get(part, getlink=True)
                 if link is None:
                     return None
@@ -163,7 +162,7 @@ class Node:
 
     def attribute(self, name: str) -> Any:
         """An attribute as text, number or array; None where there is none."""
-        with _said_of(f"{self.path}/{name}"):
+        with said_of(f"{self.path}/{name}"):
             value = self.thing.attrs.get(name)
         if isinstance(value, bytes):
             value = value.decode("utf-8", "replace")
@@ -173,7 +172,7 @@ class Node:
         """Of a data set. Raises FormatError for a group and for a data set of no numbers."""
         if not self.is_data:
             raise FormatError(f"{shown(self.path)}: a data set was expected, found a group")
-        with _said_of(self.path):
+        with said_of(self.path):
             found = self.thing.shape
         if found is None:
             raise FormatError(f"{shown(self.path)}: the data set is empty")
@@ -185,7 +184,7 @@ class Node:
         Raises FormatError where they are not, and where they are kept in another file.
         """
         shape = self.shape()
-        with _said_of(self.path):
+        with said_of(self.path):
             kind = self.thing.dtype
             if kind.kind not in kinds or (kind.kind == "f" and kind.itemsize not in (4, 8)):
                 raise FormatError(f"{shown(self.path)}: values of type {kind} are not understood here")
@@ -197,26 +196,14 @@ class Node:
 
     def some(self, first: int, last: int) -> NDArray[np.int64]:
         """Some of the whole numbers of a data set with one number in a row. Raises FormatError for another one."""
-        with _said_of(self.path):
+        with said_of(self.path):
             if self.thing.dtype.kind not in "iu" or self.thing.ndim != 1:
                 raise FormatError(f"{shown(self.path)}: a list of whole numbers was expected")
             return np.asarray(self.thing[first:last]).astype(np.int64)
 
-    def rows(self) -> Rows | None:
-        """Where the numbers of a data set stand, one row or several; None where they are compressed, in parts, or in
-        another file, or are no numbers."""
-        shape = self.shape()
-        begin = 0 if 0 in shape else self.offset()
-        with _said_of(self.path):
-            if begin is None or len(shape) not in (1, 2) or self.thing.external or self.thing.is_virtual:
-                return None
-            kind = self.thing.dtype
-        width = 1 if len(shape) == 1 else shape[1]
-        return Rows(begin, shape[0], width * kind.itemsize, kind.str, width) if self.numeric() and width else None
-
     def numeric(self) -> bool:
         """Whether a data set is of whole numbers or of floats of four or eight bytes."""
-        with _said_of(self.path):
+        with said_of(self.path):
             kind = self.thing.dtype
         return kind.kind in "iu" or (kind.kind == "f" and kind.itemsize in (4, 8))
 
@@ -232,15 +219,6 @@ class Node:
 
     def offset(self) -> int | None:
         """The byte at which the values stand as they are; None where they are compressed or in parts."""
-        with _said_of(self.path):
+        with said_of(self.path):
             found = self.thing.id.get_offset()
         return None if found is None else int(found)
-
-
-def with_values(data: Data, values: dict[str, NDArray[Any]]) -> bytes:
-    """The file with other values in data sets (path → all its values)."""
-    stream = io.BytesIO(data[:])
-    with library().File(stream, "r+") as file:
-        for path, array in values.items():
-            file[path][...] = array
-    return stream.getvalue()

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
-from gmsnet.io.hdf5 import Node, shown, with_values
+from gmsnet.io.hdf5 import Node, shown
+from gmsnet.io.hdf5_rows import with_values
 from gmsnet.io.pieces import Piece
 from gmsnet.io.splice import EncodedSlots, Points, Share, Slots
 

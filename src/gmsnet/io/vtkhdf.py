@@ -16,8 +16,9 @@ from gmsnet.io import vtk_cells
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
+from gmsnet.io.hdf5_rows import StoredPoints, rows_of
 from gmsnet.io.ranges import Column, Plan
-from gmsnet.io.rows import Ranges
+from gmsnet.io.rows import Ranges, Rows
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.io.vtk_runs import Field, tables_of, told_by
 from gmsnet.mesh.mesh import Mesh
@@ -56,15 +57,15 @@ def read(files: Mapping[str, Data]) -> Parsed:
 
 
 def plan(file: Ranges) -> Plan | None:
-    """How the numbers of a file lie; None where they are compressed or in chunks, and of grids with ghost cells, with
-    regions by several fields, with cells of no certain number of nodes, or whose types alternate often."""
+    """How the numbers of a file lie; None of grids with ghost cells, with regions by several fields, with cells of no
+    certain number of nodes, or whose types alternate often."""
     with File.opened(file.path) as opened:
         root = opened.root.need("VTKHDF")
         if root.attribute("Type") != "UnstructuredGrid" or root.get("Steps") is not None:
             return None
         count, cells = _only(root, "NumberOfPoints"), _only(root, "NumberOfCells")
         place, offsets, types, listed = (root.need(key) for key in ("Points", "Offsets", "Types", "Connectivity"))
-        points, nodes = place.rows(), listed.rows()
+        points, nodes = rows_of(place), rows_of(listed)
         if points is None or nodes is None or points.dtype[1:] not in ("f4", "f8") or nodes.dtype[1] not in "iu":
             return None
         if (points.rows, points.width, nodes.width) != (count, 3, 1):
@@ -75,13 +76,14 @@ def plan(file: Ranges) -> Plan | None:
         if told is None:
             return None
         blocks = [[each] for each in tables_of(types.some, cells, nodes.rows, nodes, offsets.some, told.regions)]
-        return Plan([Column(points)], blocks, points.dtype[1:] == "f4", fixed=told.fixed) if blocks else None
+        encoded = None if isinstance(points, Rows) else StoredPoints({place.path: 0})
+        return Plan([Column(points)], blocks, points.dtype[1:] == "f4", (), told.fixed, encoded) if blocks else None
 
 
 def _fields_in(group: Node | None) -> list[Field]:
     """The data of points or cells, and where they stand."""
     members = group.members() if group is not None else ()
-    return [Field(node.name, node.rows()) for node in members if node.is_data and node.numeric()]
+    return [Field(node.name, rows_of(node)) for node in members if node.is_data and node.numeric()]
 
 
 def _only(root: Node, key: str) -> int:

@@ -1,0 +1,147 @@
+"""Data sets of HDF5 as rows of numbers, and files whose coordinates the library itself has to write again.
+
+That is where they are compressed, in chunks, or in the header of their data set (the layout COMPACT).
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.io.contents import Data
+from gmsnet.io.hdf5 import File, Node, library, said_of, shown
+from gmsnet.io.ranges import Moves, put
+from gmsnet.io.rows import AT_ONCE, EncodedRows, Listed, Ranges, Rows
+from gmsnet.io.temporary import Temporary
+
+
+@dataclass(frozen=True)
+class Stored:
+    """The numbers of a data set, which the library reads. path: within the file. width: of a row, 0 where there is but
+    one axis."""
+
+    path: str
+    dtype: str
+    width: int
+
+    def numbers(self, file: Ranges, first: int, last: int) -> NDArray[np.generic]:
+        """See Source."""
+        width = self.width or 1
+        begin, end = first // width, -(-last // width)
+        with File.opened(file.path) as opened:
+            data = opened.root.need(self.path)
+            with said_of(self.path):
+                found = np.asarray(data.thing[begin:end]).reshape(-1)
+        return found[first - begin * width : last - begin * width]
+
+    def where(self, number: int) -> str:
+        """See Source."""
+        return f"{shown(self.path)}, number {number}"
+
+
+@dataclass(frozen=True)
+class StoredPoints:
+    """Coordinates in data sets. axes: path → the axis of the first number of a row."""
+
+    axes: Mapping[str, int]
+
+    def contents(self, file: Ranges, moves: Moves, folder: str) -> Iterator[bytes]:
+        """See Encoded."""
+        with Temporary(folder) as temporary, _Stream(temporary.create(), "r+") as stream:
+            for part in file.copied(0, file.size):
+                stream.write(part)
+            stream.raise_error()
+            with _written(stream) as handle:
+                for path, axis in self.axes.items():
+
+                    def fill(begin: int, values: NDArray[Any], axis: int = axis) -> bool:
+                        return put(values.reshape(len(values), -1), moves, begin, axis)
+
+                    _fill(handle[path], fill)
+            stream.seek(0)
+            while part := stream.read(AT_ONCE):
+                yield part
+
+
+def rows_of(node: Node) -> Listed | None:
+    """The numbers of a data set, one in a row or several; None where they are in another file, or are no numbers."""
+    shape = node.shape()
+    begin = 0 if 0 in shape else node.offset()
+    with said_of(node.path):
+        if len(shape) not in (1, 2) or node.thing.external or node.thing.is_virtual:
+            return None
+        kind = node.thing.dtype
+    width = 1 if len(shape) == 1 else shape[1]
+    if not node.numeric() or not width:
+        return None
+    if begin is not None:
+        return Rows(begin, shape[0], width * kind.itemsize, kind.str, width)
+    node.file.take(node.path, math.prod(shape))
+    return EncodedRows(Stored(node.path, kind.str, 0 if len(shape) == 1 else width), 0, shape[0], width, width)
+
+
+class _Stream(io.FileIO):
+    """A file that never lets an error into the library, which would not survive it: ``error`` is the first one."""
+
+    error: BaseException | None = None
+
+    def write(self, data: Any) -> int:
+        """See FileIO. All or nothing is written."""
+        view = memoryview(data).cast("B")
+        try:
+            at = 0
+            while at < len(view) and self.error is None:
+                at += super().write(view[at:])
+        except BaseException as error:
+            self.error = error
+        return len(view)
+
+    def raise_error(self) -> None:
+        """Raises the first error there was, if there was one."""
+        if self.error is not None:
+            raise self.error
+
+
+@contextmanager
+def _written(stream: _Stream) -> Iterator[Any]:
+    """A file in a stream, to be written to."""
+    try:
+        with library().File(stream, "r+") as handle:
+            yield handle
+    finally:
+        stream.raise_error()
+
+
+def with_values(data: Data, values: Mapping[str, NDArray[Any]]) -> bytes:
+    """The file with other values in data sets (path → all its values). Parts without a change stay."""
+    stream = io.BytesIO(data[:])
+    with library().File(stream, "r+") as handle:
+        for path, array in values.items():
+
+            def fill(begin: int, old: NDArray[Any], array: NDArray[Any] = array) -> bool:
+                new = array[begin : begin + len(old)]
+                changed = bool((new != old).any())
+                old[...] = new
+                return changed
+
+            _fill(handle[path], fill)
+    return stream.getvalue()
+
+
+def _fill(data: Any, fill: Callable[[int, NDArray[Any]], bool]) -> None:
+    """Some rows of a data set after the others, in whole chunks. fill: changes rows from a first one on, and tells
+    whether it has. One and the same file gets the same bytes by the same changes, in memory or not."""
+    row = max(1, math.prod(data.shape[1:]) * data.dtype.itemsize)
+    chunk = data.chunks[0] if data.chunks else 1
+    step = chunk * max(1, AT_ONCE // (row * chunk))
+    for begin in range(0, data.shape[0], step):
+        values = data[begin : begin + step]
+        if fill(begin, values):
+            data[begin : begin + step] = values
