@@ -12,8 +12,10 @@ from gmsnet.generate import Curve, disturb, good_mesh
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
+from support.layer_meshes import blunt
 from support.ranks import parts_at_random, same
 
+from gmsnet.preserve.protection import LAYER
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.wall_stage import PHASE
 from gmsnet.topology.topology import Topology
@@ -64,3 +66,13 @@ def test_the_airfoil_of_the_real_meshes(real_meshes):
     told = same(mesh, SmoothOptions(threads=1), parts_at_random(mesh, 3, np.random.default_rng(4), "strips"), 3)
     assert told.gathered == ""
     assert any("refined towards its walls" in note for note in told.notes)
+
+
+def test_gaps_in_the_rows_of_layers_are_held():
+    mesh, node = blunt()
+    given = disturb(mesh, node[26:-1].ravel(), 0.5, seed=1, edge="shortest")
+    told = same(given, SmoothOptions(threads=1), parts_at_random(given, 3, np.random.default_rng(4), "strips"), 3)
+    assert told.gathered == ""
+    held = gmsnet.smooth(given).held[LAYER]
+    assert np.isin(node[12:20, :5], held).all()
+    assert told.held[LAYER] == len(held)

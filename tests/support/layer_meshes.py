@@ -31,6 +31,29 @@ def grid(x, y, alternate=False, region=None):
     return Mesh(points, (CellBlock("triangle", triangles, regions),))
 
 
+def made(points, quads, cells):
+    """A mesh of quads, or of their halves."""
+    rows = quads if cells == "quad" else np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return Mesh(points, (CellBlock(cells, rows, np.zeros(len(rows), dtype=int)),))
+
+
+def blunt(cells="triangle", rows=32, half=40):
+    """An O-grid around an ellipse, and its nodes row by row, from the nose (the first) around.
+
+    At the nose they are so close together that from row 13 on cells are as thick as long, and thicker from row 20 on.
+    """
+    step = np.minimum(0.01 * 1.6 ** np.maximum(np.arange(half) - 8, 0), 0.12)
+    way = np.pi * np.cumsum(step) / step.sum()
+    angle = np.pi + np.concatenate([[0.0], way, 2.0 * np.pi - way[-2::-1]])
+    normal = np.column_stack([0.1 * np.cos(angle), np.sin(angle)])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    height = np.append(0.0, np.cumsum(1e-4 * 1.25 ** np.arange(rows)))
+    points = np.column_stack([np.cos(angle), 0.1 * np.sin(angle)]) + height[:, None, None] * normal
+    node = np.arange(points.size // 2).reshape(len(height), -1)
+    a, b, d, c = node[:-1], np.roll(node[:-1], -1, axis=1), node[1:], np.roll(node[1:], -1, axis=1)
+    return made(points.reshape(-1, 2), np.stack((a, d, c, b), axis=-1).reshape(-1, 4), cells), node
+
+
 def shaken(mesh, x, y, amount, seed=0):
     """The free nodes of a grid thrown along both axes by up to ``amount`` of the smaller spacing beside them."""
 

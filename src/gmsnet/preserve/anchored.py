@@ -27,6 +27,7 @@ from gmsnet.kernels.simplex import stretch
 from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL
 from gmsnet.kernels.topology.components import pieces
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.preserve.gaps import in_gaps
 from gmsnet.preserve.layers import Layers
 from gmsnet.preserve.survey import Survey
 from gmsnet.topology.ordering import planar_points
@@ -50,7 +51,7 @@ UNEVEN = math.log(1.6)  # more from cell to cell is no row, but the slivers of a
 
 
 def split(mesh: Mesh, topology: Topology, survey: Survey, layers: Layers) -> tuple[Layers, Layers]:
-    """Of the stretched cells of a mesh, those that are layers of a wall, and the others."""
+    """Of the stretched cells of a mesh, those that are layers of a wall, gaps closed, and the others."""
     triangles, orientation, of_cell = topology.triangles, topology.orientation, topology.near_cells
     chosen = layers.cells
     if of_cell is not None:
@@ -59,26 +60,27 @@ def split(mesh: Mesh, topology: Topology, survey: Survey, layers: Layers) -> tup
     rim = np.zeros(len(topology.memory), dtype=bool)
     rim[topology.memory] = survey.rim > 0
     part = triangles[chosen]
-    equal = np.ones(len(part), dtype=bool)
+    equal, points = np.ones(len(chosen), dtype=bool), planar_points(mesh)
     if of_cell is not None and topology.near_shapes is not None:
-        equal = topology.near_shapes[chosen] == EQUILATERAL
-    kept = _at_walls(part, orientation[chosen], planar_points(mesh), rim, len(chosen), equal)
+        equal = topology.near_shapes == EQUILATERAL
+    kept, wall = _at_walls(part, orientation[chosen], points, rim, len(chosen), equal[chosen])
     whole = np.zeros(len(chosen), dtype=bool)
     whole[np.flatnonzero(chosen)[kept]] = True
     first = np.ones(len(chosen), dtype=bool) if of_cell is None else np.append(True, np.diff(of_cell) != 0)
     at_walls = whole[first]
     nodes = np.zeros(len(layers.nodes), dtype=bool)
     nodes[part[kept]] = True
+    gaps = in_gaps(triangles, orientation, equal, points, rim, nodes, points[wall].mean(axis=1)) if len(wall) else False
     return (
-        replace(layers, nodes=layers.nodes & nodes, cells=at_walls),
+        replace(layers, nodes=layers.nodes & nodes | gaps, cells=at_walls),
         replace(layers, nodes=layers.nodes & ~nodes, cells=layers.cells & ~at_walls, damaged=0),
     )
 
 
 def _at_walls(
     triangles: NDArray[np.int32], orientation: NDArray[np.int8], points: Floats, rim: Flags, of_all: int, equal: Flags
-) -> Flags:
-    """Which simplices (S, 3), all of them stretched alike with their neighbours, belong to layers of a wall.
+) -> tuple[Flags, NDArray[np.int32]]:
+    """Which simplices (S, 3), all of them stretched alike with their neighbours, belong to layers of a wall; its edges.
 
     points: (N, 2). rim: (N,) which nodes are on boundaries or interfaces. of_all: how many the mesh has. equal: (S,)
     which are triangles, the others are corners of quads, 0 the corner itself.
@@ -94,7 +96,7 @@ def _at_walls(
     row, length, aligned, one, two, off = (np.concatenate(each) for each in zip(*found, strict=True))
     height = np.log(np.maximum(np.abs(cells[row, stretch.AREA]), stretch.TINY) / length)
     across = 0.5 * (np.log(np.maximum(np.abs(cells[:, stretch.AREA]), stretch.TINY)) - cells[:, stretch.LENGTH])
-    kept = np.zeros(len(triangles), dtype=bool)
+    kept, wall = np.zeros(len(triangles), dtype=bool), np.zeros(len(row), dtype=bool)
     for name in np.unique(piece[row]):
         own, here = piece == name, piece[row] == name
         along = here & aligned
@@ -112,7 +114,8 @@ def _at_walls(
         orderly = clear or (thin >= THIN and lie >= MOSTLY and ((higher and grown >= GROWN and rows) or even))
         if orderly and change <= UNEVEN:
             kept |= own
-    return kept
+            wall |= along
+    return kept, np.column_stack([one, two])[wall]
 
 
 def _edges_on(

@@ -52,11 +52,12 @@ CALM = (
 class Layers:
     """Cells that are stretched on purpose.
 
-    nodes: (N,) bool by node id, the corners of those cells, but for damaged places. cells: (T,) bool, which
-    triangles and quads. median, largest: stretch of those cells, the ratio of the longer to the shorter axis of
-    their Steiner ellipse (1 where there are none). damaged: how many of those cells are inverted, or have less than a
-    twentieth of the area of those around; their nodes are left out of ``nodes``, so that they can be untangled, but for
-    those of which half the cells are as large as those around: they are not what damaged them.
+    nodes: (N,) bool by node id, the corners of those cells, but for damaged places; of layers of walls those in gaps,
+    too. cells: (T,) bool, which triangles and quads. median, largest: stretch of those cells, the ratio of the longer
+    to the shorter axis of their Steiner ellipse (1 where there are none). damaged: how many of those cells are
+    inverted, or have less than a twentieth of the area of those around; their nodes are left out of ``nodes``, so that
+    they can be untangled, but for those of which half the cells are as large as those around: they are not what damaged
+    them.
     """
 
     nodes: Flags
