@@ -62,6 +62,13 @@ def test_a_plain_file() -> None:
     assert b"<!-- 7 7 7 -->" in out
 
 
+def test_letters_behind_an_element_within_an_array() -> None:
+    data = variants()["binary, header 32, order 1, compress True"]
+    more = re.sub(rb"(<DataArray[^>]*format=\"binary\"[^>]*>)", rb"\1<InformationKey/>", data)
+    assert more != data
+    assert read(vtu, more).points.tolist() == read(vtu, data).points.tolist()
+
+
 @pytest.mark.parametrize("single", [False, True])
 def test_every_encoding_reads_the_same(single: bool) -> None:
     mesh = mixed_mesh()

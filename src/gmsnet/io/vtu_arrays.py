@@ -59,7 +59,7 @@ class Encoded:
         for k, block in enumerate(self.blocks):
             part = new[k * size : (k + 1) * size]
             same = part == old[k * size : (k + 1) * size]
-            blocks.append(block if same else zlib.compress(part, _LEVELS[block[1] >> 6]))
+            blocks.append(block if same else compressed_like(block, part))
         return self._text(np.array([*self.head, *map(len, blocks)], dtype=kind).tobytes(), b"".join(blocks))
 
     def _text(self, header: bytes, body: bytes) -> bytes:
@@ -81,54 +81,65 @@ def decode(data: memoryview, encoding: Encoding, expected: int) -> tuple[Encoded
 
 def _plain(data: memoryview, encoding: Encoding, expected: int) -> tuple[Encoded, memoryview]:
     width = encoding.width
-    head, at = _take(data, 0, width, encoding)
+    head, at = taken(data, 0, width, encoding.base64)
     size = int(np.frombuffer(head, dtype=encoding.header, count=1)[0])
     if size != expected:
         raise FormatError(f"it has {size} bytes instead of {expected}")
     apart = len(head) == width  # else the first group of characters holds bytes of the numbers too
     start, skip = (at, 0) if apart else (0, width)
-    both, end = _take(data, start, skip + size, encoding)
+    both, end = taken(data, start, skip + size, encoding.base64)
     return Encoded(encoding, end, apart), both[skip : skip + size]
 
 
 def _compressed(data: memoryview, encoding: Encoding, expected: int) -> tuple[Encoded, memoryview]:
     width = encoding.width
-    start, _ = _take(data, 0, 3 * width, encoding)
+    start, _ = taken(data, 0, 3 * width, encoding.base64)
     count, block_size, last = np.frombuffer(start, dtype=encoding.header, count=3).tolist()
     total = count * block_size - (block_size - last if last else 0)
     if total != expected or last > block_size:
         raise FormatError(f"it has {total} bytes instead of {expected}")
-    head, at = _take(data, 0, (3 + count) * width, encoding)
+    head, at = taken(data, 0, (3 + count) * width, encoding.base64)
     lengths = np.frombuffer(head, dtype=encoding.header, count=3 + count)[3:].tolist()
     stored = sum(lengths)
     if stored > len(data) or expected > MOST_INFLATED * stored:
         raise FormatError(f"{expected} bytes cannot come from {stored} compressed bytes")
-    body, end = _take(data, at, stored, encoding)
+    body, end = taken(data, at, stored, encoding.base64)
     payload, filled, blocks, at = np.empty(expected, dtype=np.uint8).data, 0, [], 0
     for k, length in enumerate(lengths):
         block = bytes(body[at : at + length])
         at += length
         size = last if last and k == count - 1 else block_size
-        unpacker = zlib.decompressobj()
-        try:
-            part = unpacker.decompress(block, size + 1)
-        except zlib.error as error:
-            raise FormatError(f"block {k} cannot be decompressed: {error}") from None
-        if len(part) != size or not unpacker.eof or unpacker.unused_data:
-            raise FormatError(f"block {k} does not decompress to the {size} bytes that its header announces")
+        part = decompressed(block, k, size)
         payload[filled : filled + size] = part
         filled += size
         blocks.append(block)
     return Encoded(encoding, end, True, tuple(blocks), (count, block_size, last)), payload
 
 
-def _take(data: memoryview, at: int, size: int, encoding: Encoding) -> tuple[memoryview, int]:
+def compressed_like(block: bytes, part: bytes) -> bytes:
+    """Other bytes, compressed as hard as a block was."""
+    return zlib.compress(part, _LEVELS[block[1] >> 6])
+
+
+def decompressed(block: bytes, number: int, size: int) -> bytes:
+    """The bytes of a block, which must be so many. Raises FormatError, naming its number, where it is damaged."""
+    unpacker = zlib.decompressobj()
+    try:
+        found = unpacker.decompress(block, size + 1)
+    except zlib.error as error:
+        raise FormatError(f"block {number} cannot be decompressed: {error}") from None
+    if len(found) != size or not unpacker.eof or unpacker.unused_data:
+        raise FormatError(f"block {number} does not decompress to the {size} bytes that its header announces")
+    return found
+
+
+def taken(data: memoryview, at: int, size: int, in_base64: bool) -> tuple[memoryview, int]:
     """At least ``size`` bytes that begin at byte ``at`` of the file (in base64 up to two more), and where they end."""
-    length = (size + 2) // 3 * 4 if encoding.base64 else size
+    length = (size + 2) // 3 * 4 if in_base64 else size
     found = data[at : at + length]
     if len(found) < length:
         raise FormatError(f"it ends after {len(found)} of {length} bytes: the file is cut off")
-    if encoding.base64:
+    if in_base64:
         try:
             found = memoryview(base64.b64decode(found, validate=True))
         except binascii.Error as error:

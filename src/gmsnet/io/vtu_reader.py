@@ -166,5 +166,7 @@ class Reader:
 def one_word(text: memoryview) -> tuple[int, int] | None:
     """Where the one word of a text begins and ends; None if it has more, or none."""
     visible = np.frombuffer(text, dtype=np.uint8) > ord(" ")
+    if not visible.any():
+        return None
     first, end = int(np.argmax(visible)), len(text) - int(np.argmax(visible[::-1]))
-    return (first, end) if np.count_nonzero(visible) == end - first > 0 else None
+    return (first, end) if np.count_nonzero(visible) == end - first else None
