@@ -20,7 +20,7 @@ from gmsnet.generate import random_mesh, random_volume, recombine
 from gmsnet.io import ugrid
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.mesh.selection import held_by_data
+from gmsnet.mesh.selection import held_by_data, images
 from gmsnet.run.options import SmoothOptions
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
@@ -167,8 +167,10 @@ def assert_read_alike(path: Path, format: str, ranks: int) -> None:
     assert whole.ids.tolist() == list(range(len(mesh.points)))
     assert whole.mesh.points.tobytes() == mesh.points.tobytes()
     assert whole.mesh.single == mesh.single
-    held = held_by_data(mesh.point_data["fixed"]).tolist() if "fixed" in mesh.point_data else [False] * len(whole.ids)
-    assert whole.fixed.tolist() == held
+    held = images(mesh)
+    if "fixed" in mesh.point_data:
+        held |= held_by_data(mesh.point_data["fixed"])
+    assert whole.fixed.tolist() == held.tolist()
     assert [block.kind for block in whole.mesh.cells] == [block.kind for block in mesh.cells]
     for mine, block in zip(whole.mesh.cells, mesh.cells, strict=True):
         assert mine.nodes.tolist() == block.nodes.tolist()

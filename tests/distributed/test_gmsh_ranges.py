@@ -11,12 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gmsnet
-from gmsnet.distributed.file_ranges import planned_format
+from gmsnet.distributed.file_ranges import planned_format, read_ranges
 from gmsnet.distributed.layouts import shared_format
 from gmsnet.generate import random_mesh, random_volume, recombine
 from gmsnet.io import gmsh_ranges
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.selection import images
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 from distributed.test_file_pieces import saved
@@ -106,12 +107,50 @@ def test_which_files_are_shared(tmp_path: Path, monkeypatch) -> None:
     more = b"$NodeData\n1\n" + b"$EndNode" * 1000 + b"\n$EndNodeData\n"
     assert shared(new + more) == "gmsh"
     assert shared(new + more[:-4]) == ""
-    assert shared(new + b"$Periodic\n" + bytes(8) + b"\n$EndPeriodic\n") == ""
+    assert shared(new + b"$Periodic\n" + bytes(8) + b"\n$EndPeriodic\n") == "gmsh"
+    assert shared(new + b"$Periodic\n" + bytes(9) + b"\n$EndPeriodic\n") == ""
     assert shared(VARIANTS["4.1 text"]) == shared(VARIANTS["2.2 text"]) == ""
     assert shared(b"(0 a mesh of Fluent)") == ""
     assert [shared(data[:end]) for data in (new, old) for end in range(0, len(data) - 10, 37)].count("") > 30
     monkeypatch.setattr(gmsh_ranges, "MOST", 2)
     assert shared(new) == shared(old) == ""
+
+
+def periodic(data: bytes, version: str, order: str, images: np.ndarray) -> bytes:
+    """A file with a curve and a surface that are images of others, and one image of a node that is not there."""
+    parts = [images[::2], np.concatenate([images[1::2], [[10**6, images[0, 0]]]])]
+    if version == "2.2":
+        rows = ["".join(f"{one} {other}\n" for one, other in part.tolist()) for part in parts]
+        affine = f"Affine{' 1' * 16}\n"
+        text = "".join(f"{k + 1} {k + 2} 1\n{affine * k}{len(part)}\n{row}"
+                       for k, (part, row) in enumerate(zip(parts, rows, strict=True)))  # fmt: skip
+        return data + f"$Periodic\n2\n{text}$EndPeriodic\n".encode()
+    long, short = f"{order}u8", f"{order}i4"
+    body = [np.array([2], long).tobytes()]
+    for k, part in enumerate(parts):
+        body += [np.array([k + 1, k + 2, 1], short).tobytes(), np.array([16 * k], long).tobytes()]
+        body += [np.ones(16 * k, f"{order}f8").tobytes(), np.array([len(part)], long).tobytes()]
+        body.append(part.astype(long).tobytes())
+    return data + b"$Periodic\n" + b"".join(body) + b"\n$EndPeriodic\n"
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3, 4])
+@pytest.mark.parametrize("form", FORMS)
+def test_periodic_boundaries(form, ranks: int, tmp_path: Path) -> None:
+    """Here nodes from anywhere have images, so that it shows that they are held."""
+    path, (version, order, wildly) = saved_as("tetrahedra", form, tmp_path / "a.msh"), form
+    count = len(MESHES["tetrahedra"]().points)
+    tags = wild(count) if wildly else np.arange(1, count + 1)
+    chosen = np.random.default_rng(2).permutation(count)[:60].reshape(-1, 2)
+    path.write_bytes(periodic(path.read_bytes(), version, order, tags[chosen]))
+    assert_read_alike(path, "gmsh", ranks)
+    mesh = gmsnet.read(path)
+    assert np.flatnonzero(images(mesh)).tolist() == np.unique(chosen).tolist()
+    pieces = together(ranks, lambda comm: read_ranges(str(path), "gmsh", comm).piece)
+    for piece in pieces:
+        assert piece.fixed.tolist() == images(mesh)[piece.ids].tolist()
+    assert_bytes_of_one_process(path, "gmsh", ranks, "barrier")
+    assert not (gmsnet.read(path).points != mesh.points)[chosen].any()
 
 
 @pytest.mark.parametrize("variant", ["2.2 little", "2.2 big", "4.1 little", "4.1 big"])

@@ -13,13 +13,16 @@ import pytest
 
 import gmsnet
 from gmsnet.distributed.file_ranges import planned_format
+from gmsnet.distributed.file_run import FileTask, smooth_file
 from gmsnet.io import vtu_skeleton, vtu_sources
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.run.options import SmoothOptions
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 from distributed.test_file_pieces import saved
 from distributed.test_file_ranges import assert_bytes_of_one_process, assert_read_alike, heard, mixed, save_vtu
 from distributed.test_vtk_ranges import with_data
+from support.comm import together
 from support.vtk_variants import grid_of, vtu_variants
 
 
@@ -183,11 +186,6 @@ def test_a_file_in_which_nothing_moves(tmp_path: Path) -> None:
         if "header 64, order 1" in name:
             path, target = tmp_path / "a.vtu", tmp_path / "b.vtu"
             path.write_bytes(data)
-            from support.comm import together
-
-            from gmsnet.distributed.file_run import FileTask, smooth_file
-            from gmsnet.run.options import SmoothOptions
-
             options = SmoothOptions(method="barrier", max_sweeps=2, threads=1)
             task = FileTask(str(path), str(target), "vtu", options)
             together(2, lambda comm, task=task: smooth_file(task, comm))

@@ -71,8 +71,7 @@ class FileRanges:
     def _brought(self, points: Floats, comm: Any) -> tuple[Ids, Floats]:
         """Of the rows that this rank keeps: the nodes that have moved on any rank, ascending, and where they are."""
         rows = np.flatnonzero((points != self.piece.points).any(axis=1))
-        homes = np.searchsorted(self.rows, self.piece.ids[rows], side="right") - 1
-        lists = by_rank(homes, comm.size)
+        lists = by_rank(_homes(self.rows, self.piece.ids[rows]), comm.size)
         came = comm.alltoall([(self.piece.ids[rows[some]], points[rows[some]]) for some in lists])
         ids, first = np.unique(np.concatenate([each for each, _ in came]), return_index=True)
         return ids, np.concatenate([each for _, each in came])[first]
@@ -156,8 +155,9 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     rows = np.array([plan.nodes * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
     first, last = rows[comm.rank : comm.rank + 2].tolist()
     read = everywhere(comm, lambda: _said(file, lambda: _blocks(file, plan, comm)))
+    images = np.empty(0, dtype=np.int64)
     if plan.tags:
-        read = _renumbered(comm, file, plan, read, first, last)
+        read, images = _renumbered(comm, file, plan, read, first, last)
     mine = everywhere(comm, lambda: _said(file, lambda: plan.places(file, first, last)))
     ids, points, _ = _asked(comm, rows, mine, _ids_of([block.nodes[:, 0] for block in read]))
     blocks = _shared_out(comm, read, ids, points)
@@ -165,10 +165,13 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     ids = np.concatenate([ids, np.flatnonzero(lonely) + rows[comm.rank]])
     order = np.argsort(ids)
     ids, points = ids[order], np.concatenate([points, mine[lonely]])[order]
-    fixed = np.zeros(len(ids), dtype=bool)
+    held = np.zeros((last - first, 1), dtype=bool)
     if plan.fixed is not None:
         held = everywhere(comm, lambda: _said(file, lambda: plan.fixed.of(file, first, last) != 0))
-        fixed = _asked(comm, rows, held.any(axis=1, keepdims=True).astype(np.float64), ids)[1][:, 0] != 0
+    for some in comm.alltoall([images[found] for found in by_rank(_homes(rows, images), comm.size)]):
+        held[some - first] = True
+    marks = np.asarray(held.any(axis=1), dtype=np.float64)
+    fixed = _asked(comm, rows, marks.reshape(-1, 1), ids)[1][:, 0] != 0
     everywhere(comm, file.check)
     piece = everywhere(comm, lambda: Piece(ids, points, fixed, tuple(blocks), plan.single))
     return FileRanges(file, plan, piece, rows)
@@ -188,10 +191,20 @@ def _blocks(file: Ranges, plan: Plan, comm: Any) -> list[Cells]:
     ]
 
 
-def _renumbered(comm: Any, file: Ranges, plan: Plan, read: Sequence[Cells], first: int, last: int) -> list[Cells]:
-    """Cells by nodes, of cells by tags. first, last: the nodes whose tags this rank reads."""
+def _homes(rows: Ids, nodes: Ids) -> Ids:
+    """Which rank keeps the rows of some nodes."""
+    found: Ids = np.searchsorted(rows, nodes, side="right") - 1
+    return found
+
+
+def _renumbered(
+    comm: Any, file: Ranges, plan: Plan, read: Sequence[Cells], first: int, last: int
+) -> tuple[list[Cells], Ids]:
+    """Cells by nodes, of cells by tags, and the nodes of a share of the images. first, last: the nodes whose tags this
+    rank reads."""
     tags = everywhere(comm, lambda: _said(file, lambda: plan.tags_of(file, first, last)))
-    named = _ids_of([block.nodes for block in read])
+    images = np.array_split(plan.images, comm.size)[comm.rank]
+    named = _ids_of([*(block.nodes for block in read), images])
     nodes, twice = nodes_of(comm, tags, first, plan.nodes, named)
 
     def checked() -> list[Cells]:
@@ -207,7 +220,8 @@ def _renumbered(comm: Any, file: Ranges, plan: Plan, read: Sequence[Cells], firs
                                   f"{old.nodes[row, column]}, which the file has not")  # fmt: skip
         return found
 
-    return everywhere(comm, lambda: _said(file, checked))
+    pairs = nodes[np.searchsorted(named, images)]
+    return everywhere(comm, lambda: _said(file, checked)), pairs[(pairs >= 0).all(axis=1)].ravel()
 
 
 def _said(file: Ranges, make: Callable[[], Value]) -> Value:
@@ -243,7 +257,7 @@ def _shared_out(comm: Any, blocks: Sequence[Cells], ids: Ids, points: Floats) ->
 
 def _asked(comm: Any, rows: Ids, mine: Floats, needed: Ids) -> tuple[Ids, Floats, NDArray[np.bool_]]:
     """Some nodes (n,), ascending, their points, and which rows of this rank no rank asks for."""
-    lists = by_rank(np.searchsorted(rows, needed, side="right") - 1, comm.size)
+    lists = by_rank(_homes(rows, needed), comm.size)
     start, asked = int(rows[comm.rank]), comm.alltoall([needed[some] for some in lists])
     lonely = np.ones(len(mine), dtype=bool)
     for each in asked:

@@ -20,10 +20,11 @@ from gmsnet.io.gmsh_entities import (
     read_names,
     without_interfaces,
 )
+from gmsnet.io.gmsh_periodic import read_images
 from gmsnet.io.gmsh_sections import KINDS, PARTITIONED, SIZES, Contents, Elements
 from gmsnet.io.places import Lattice, Places
 from gmsnet.io.range_words import RangeWords, rows_of
-from gmsnet.io.ranges import Column, Plan, Table, blocks_of
+from gmsnet.io.ranges import NO_IMAGES, Column, Plan, Table, blocks_of
 from gmsnet.io.rows import Ranges, Rows
 
 READ = (b"PhysicalNames", b"Entities", b"PartitionedEntities", b"Nodes", b"Elements")
@@ -71,7 +72,7 @@ class RangeCursor(Cursor):
 
 
 def plan(file: Ranges) -> Plan | None:
-    """How the numbers of a file lie; None for texts, periodic meshes, ghost cells, and very many blocks.
+    """How the numbers of a file lie; None for texts, ghost cells, and very many blocks.
 
     Raises FormatError for a file that is damaged.
     """
@@ -82,10 +83,17 @@ def plan(file: Ranges) -> Plan | None:
     cursor, found, seen = RangeCursor(file, source.at, order), Contents(), set[bytes]()
     nodes: tuple[list[Lattice], list[Lattice]] = [], []
     tables: Callable[[], list[Table] | None] = list
+    images = [NO_IMAGES]
     while title := cursor.word():
         name = title[1:]
-        if title in seen or title[:1] != b"$" or name in (b"Periodic", b"ParametricNodes"):
+        if title in seen or title[:1] != b"$" or name == b"ParametricNodes":
             return None
+        if name == b"Periodic":
+            section = cursor.section(name)
+            words = section.words(name, as_text=old)
+            images.append(read_images(words, old))
+            section.close(name, words)
+            continue
         if name not in READ or (old and b"Entities" in name):
             cursor.skip_section(name)
             continue
@@ -113,7 +121,7 @@ def plan(file: Ranges) -> Plan | None:
     first = np.cumsum([0, *(each.rows for each in nodes[1])]).tolist()
     points = [Column(rows_of(each, f"{order}f8"), begin) for each, begin in zip(nodes[1], first[:-1], strict=True)]
     tags = [rows_of(each, order + ("i4" if old else "u8")) for each in nodes[0]]
-    return Plan(points, blocks, False, tags)
+    return Plan(points, blocks, False, tags, images=np.concatenate(images))
 
 
 def _old_nodes(words: RangeWords, count: int) -> tuple[list[Lattice], list[Lattice]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -54,11 +54,15 @@ class Table(NamedTuple):
     counts: AnyRows | None = None
 
 
-@dataclass(frozen=True)
+NO_IMAGES = np.empty((0, 2), dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
 class Plan:
     """points: the coordinates of all nodes, in the order of the file. blocks: of the mesh, each of one table or several
     of one kind. single: see Mesh. tags: those of all nodes, where cells name these by tags. fixed: numbers of all
-    nodes; those that are not 0 are to be held. encoded: where the rows of some points are not bytes of the file."""
+    nodes; those that are not 0 are to be held. encoded: where the rows of some points are not bytes of the file.
+    images: (n, 2) tags of nodes and of those that they are images of; these are to be held, too."""
 
     points: Sequence[Column]
     blocks: Sequence[Sequence[Table]]
@@ -66,6 +70,7 @@ class Plan:
     tags: Sequence[Rows] = ()
     fixed: AnyRows | None = None
     encoded: Encoded | None = None
+    images: NDArray[np.int64] = field(default_factory=lambda: NO_IMAGES)
 
     @property
     def nodes(self) -> int:
