@@ -19,6 +19,8 @@ from support.blocks import block
 from support.ranks import nodes_lent, parts_at_random, same, spread
 
 import gmsnet.distributed.executor as executor
+from gmsnet.distributed import loan
+from gmsnet.kernels.topology import patch
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 
@@ -89,6 +91,26 @@ def blocks_with_pyramids(seed):
 def test_stars_of_nodes_that_do_not_move_are_kept(seed):
     mesh, target = blocks_with_pyramids(seed)
     same(mesh, aim(method="laplacian", guard="star", target_quality=target), strips(mesh, 2), 2)
+
+
+@pytest.mark.parametrize("kind", MESHES)
+def test_the_first_rank_gets_all_that_moves_without_ranks(kind, monkeypatch):
+    gathered, left_out = executor.Ranks.gathered_around, []
+
+    def looked(ranks, field, corners, rings):
+        topology = field.topology
+        chosen = np.zeros(len(topology.memory), dtype=bool)
+        chosen[corners] = True
+        for many in (1, 2, 4, 8):
+            moving = patch.around(corners, many, topology.near_free, topology.near_start, topology.near_ring)
+            left_out.append(np.count_nonzero(moving & ~loan.around(ranks.part, topology, chosen, many)))
+        return gathered(ranks, field, corners, rings)
+
+    monkeypatch.setattr(executor.Ranks, "gathered_around", looked)
+    mesh = MESHES[kind]
+    spread(mesh, aim(target_quality=float(SHAPES[kind][1])), strips(mesh, 1), 1)
+    assert left_out
+    assert not any(left_out)
 
 
 @pytest.mark.parametrize("kind", MESHES)

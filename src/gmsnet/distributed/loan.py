@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from gmsnet.distributed.part import Known, Part
 from gmsnet.distributed.piece import Ids
 from gmsnet.distributed.winding import Winding
-from gmsnet.kernels.topology import connectivity
 from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -181,5 +180,5 @@ def around(part: Part, topology: Topology | Volume, chosen: Flags, rings: int) -
     chosen = chosen.copy()
     for _ in range(rings):
         chosen = part.halo.spread(chosen)
-        chosen[topology.near[connectivity.touching(topology.near, chosen)]] = True
+        chosen[topology.near[topology.rows_at(chosen)]] = True
     return part.halo.spread(chosen) & topology.near_free

@@ -16,7 +16,6 @@ from gmsnet.distributed.library import mpi
 from gmsnet.distributed.loan import SHARE, around, gathered_field
 from gmsnet.distributed.part import Part
 from gmsnet.distributed.winding import Winding
-from gmsnet.kernels.topology import connectivity
 from gmsnet.measure.report import measure
 from gmsnet.measure.signs import exact_signs
 from gmsnet.methods.base import Field
@@ -126,7 +125,7 @@ def _tried(field: Field | None, free: Flags | None, forth: bool, inverted: int, 
     edge = None
     if free is not None:
         edge = np.zeros(len(free), dtype=bool)
-        edge[topology.near[connectivity.touching(topology.near, free & ~topology.near_free)]] = True
+        edge[topology.near[topology.rows_at(free & ~topology.near_free)]] = True
     try:
         done = _untangled(field, topology, Reach(total, edge), inverted)
     except BeyondReachError:

@@ -137,8 +137,8 @@ class MixedVolume(Volume):
         """See Volume."""
         return self.all_simplices
 
-    def _touching(self, chosen: Flags) -> NDArray[np.int32]:
-        """The corner simplices of the cells that have a chosen node."""
+    def rows_at(self, chosen: Flags) -> NDArray[np.int32]:
+        """See Volume. Of a cell that has one, all corner simplices."""
         simplices = self.all_simplices
         assert simplices.solids is not None
         assert simplices.cells is not None
@@ -148,12 +148,12 @@ class MixedVolume(Volume):
     @cached_property
     def changeable(self) -> Tetrahedra:
         """See Volume."""
-        rows = self._touching(self.near_free)
+        rows = self.rows_at(self.near_free)
         return self.simplices if len(rows) == len(self.near) else self.simplices.take(rows)
 
     def restricted(self, active: Flags) -> MixedVolume:
         """See Volume."""
-        around = self.simplices.take(self._touching(active))
+        around = self.simplices.take(self.rows_at(active))
         inner = replace(
             self, near=around.rows, near_orientation=around.orientation, all_simplices=around,
             free=np.sort(self.memory[np.flatnonzero(active)]), near_free=active,

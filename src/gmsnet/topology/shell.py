@@ -12,7 +12,6 @@ from gmsnet.kernels.star import shell_simplices as kernels
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
 from gmsnet.kernels.star.shell_simplices import ShellSimplices
-from gmsnet.kernels.topology import connectivity
 from gmsnet.kernels.whole.jets import list_facets
 from gmsnet.topology.stars import Flags, Ints, Stars
 from gmsnet.topology.topology import Topology
@@ -61,7 +60,7 @@ class Shell(Topology):
         return self._around(self.near_free)
 
     def _around(self, active: Flags) -> ShellSimplices:
-        rows = connectivity.touching(self.near, active)
+        rows = self.rows_at(active)
         if self.near_cells is not None:
             cells = np.zeros(int(self.near_cells.max(initial=-1)) + 1, dtype=bool)
             cells[self.near_cells[rows]] = True

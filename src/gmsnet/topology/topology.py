@@ -148,6 +148,11 @@ class Topology(Connectivity):
             colouring=Colouring(self.colouring.places, stars.start, stars.around),
         )
 
+    def rows_at(self, chosen: Flags) -> Ints:
+        """The rows of ``near`` with a chosen node: of cells that have one, enough to name all nodes. chosen: (N,)."""
+        found: Ints = connectivity.touching(self.near, chosen)
+        return found
+
     def restricted(self, active: Flags) -> Topology:
         """The same with the active nodes (N,) by places in memory alone free, and only the triangles around them.
 
@@ -158,7 +163,7 @@ class Topology(Connectivity):
             near = patch.triangles_around(nodes, active, self.near_start, self.near_ring)
             around = Simplices(near, np.ones(len(near), dtype=np.int8))
         else:
-            around = self.simplices.take(connectivity.touching(self.near, active))
+            around = self.simplices.take(self.rows_at(active))
         inner = replace(
             self, near=around.rows, near_orientation=around.orientation, near_shapes=around.shapes,
             near_cells=around.cells, free=np.sort(self.memory[nodes]), near_free=active,
@@ -272,7 +277,7 @@ class Topology(Connectivity):
     @cached_property
     def changeable(self) -> Simplices:
         """Those that have a free node."""
-        return self._taken(connectivity.touching(self.near, self.near_free))
+        return self._taken(self.rows_at(self.near_free))
 
     def _taken(self, rows: Ints) -> Simplices:
         """Some of the simplices; themselves, if all."""

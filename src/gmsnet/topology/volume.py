@@ -118,13 +118,17 @@ class Volume(Connectivity):
         """See ``near_start``."""
         return self.ring
 
+    def rows_at(self, chosen: Flags) -> Ints:
+        """The rows of ``near`` of the cells that have a chosen node. chosen: (N,) by places in memory."""
+        found: Ints = connectivity.touching(self.near, chosen)
+        return found
+
     def restricted(self, active: Flags) -> Volume:
         """The same with the active nodes (N,) by places in memory alone free, and only the cells around them.
 
         For a while: ``held`` does not tell of the others, nor ``cells_of`` of which cells the rows are.
         """
-        rows = np.flatnonzero(active[self.near].any(axis=1)).astype(np.int32)
-        around = self.simplices.take(rows)
+        around = self.simplices.take(self.rows_at(active))
         inner = replace(
             self, near=around.rows, near_orientation=around.orientation,
             free=np.sort(self.memory[np.flatnonzero(active)]), near_free=active,
@@ -140,7 +144,7 @@ class Volume(Connectivity):
     @cached_property
     def changeable(self) -> Tetrahedra:
         """Those that have a free node."""
-        rows = connectivity.touching(self.near, self.near_free)
+        rows = self.rows_at(self.near_free)
         return self.simplices if len(rows) == len(self.near) else self.simplices.take(rows)
 
     @cached_property
