@@ -58,9 +58,9 @@ def test_a_move_of_all_corners_that_costs_quality_is_taken_back(monkeypatch):
     """What a method gains can be lost where cells are refused and their corners go half of the way."""
     mesh, advance = bent_tetrahedra(5), SolidCells.advance
 
-    def astray(cells, places, guard, room):
+    def astray(cells, places, guard, room, valid):
         away = 0.02 * np.random.default_rng(1).normal(size=(len(places), 3))
-        moved = advance(cells, cells.points[:, :3] + away, guard, room)
+        moved = advance(cells, cells.points[:, :3] + away, guard, room, valid)
         assert len(moved)
         return moved
 

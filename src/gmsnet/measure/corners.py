@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.cells.kind import CellKind
+from gmsnet.kernels.simplex.tetra_measures import COLUMNS, per_tetrahedron
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +28,10 @@ AXES = ((1, 2, 6, 5, 0, 3, 7, 4), (3, 2, 6, 7, 0, 1, 5, 4), (4, 5, 6, 7, 0, 1, 2
 
 def of_corners(points: Floats, nodes: NDArray[np.int32], kind: CellKind, orientation: NDArray[np.int8]) -> Floats:
     """(4, C) smallest and largest dihedral angle in degrees, η and scaled Jacobian of cells (C, n) of one kind."""
+    if kind.corners == 4:  # all its corners are alike
+        columns = np.empty((COLUMNS, len(nodes)))
+        per_tetrahedron(points, np.ascontiguousarray(nodes[:, :4], dtype=np.int32), orientation, columns)
+        return columns[:4]
     found = np.empty((4, len(nodes)))
     for first in range(0, len(nodes), AT_ONCE):
         some = slice(first, first + AT_ONCE)

@@ -12,7 +12,7 @@ from gmsnet.kernels.curved.commit3 import judge_curved_solids, refused, straight
 from gmsnet.kernels.curved.descend3 import improve_nodes3, straighten3, untangling_sweep3
 from gmsnet.kernels.curved.raise3 import raise_nodes3
 from gmsnet.kernels.curved.stars3 import NO_FOLLOWER, CurvedSolids, put_all
-from gmsnet.kernels.star.guard import Guard, Precision, plain_guard
+from gmsnet.kernels.star.guard import Guard, Precision
 from gmsnet.measure.solid import exact_signs_of
 from gmsnet.topology.curved_solids import CURVED
 
@@ -140,17 +140,17 @@ class SolidCells(NamedTuple):
         chosen[nodes] = True
         return np.flatnonzero(chosen[self.mesh.cells].any(axis=1))
 
-    def advance(self, places: Floats, guard: Guard, room: float) -> Ints:
+    def advance(self, places: Floats, guard: Guard, room: float, valid: Flags) -> Ints:
         """Takes the corners to their places (N, 3 or more) together, with what follows them; returns which have moved.
 
         A cell of a corner that moves is valid afterwards, with a ``quality3`` of ``room`` or more, and its
         corners are certified above the guard's floor. Where one would not be, its corners go half of the way, and so
-        on. Those of cells that are not certified to begin with stay.
+        on. Those of cells that are not valid to begin with stay. valid: (C,) which cells are, straight ones apart.
         """
         start, share = self.points.copy(), np.zeros(len(self.points))
         share[self.corner & (places[:, :3] != start[:, :3]).any(axis=1)] = 1.0
         cells = self.around(np.flatnonzero(share))
-        share[self._corners(cells[self._refused(cells, plain_guard(self.precision), -math.inf)])] = 0.0
+        share[self._corners(cells[~valid[cells] | (self.straight_signs(cells) != 1)])] = 0.0
         nodes, rounds = np.flatnonzero(share), 0
         while len(nodes):
             part = share[nodes, None]

@@ -8,7 +8,7 @@ import numpy as np
 
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import LEVELS, WORST
-from gmsnet.methods import Field
+from gmsnet.methods import Field, planar_cells, solid_cells
 from gmsnet.methods.planar_cells import PlanarCells
 from gmsnet.methods.solid_cells import SolidCells
 from gmsnet.parallel.executor import Executor
@@ -33,20 +33,26 @@ def make_room(state: State, options: SmoothOptions, executor: Executor) -> State
     if given is None or state.stop_reason == CALLBACK or not given.free.any():
         return state
     cells = _with_room(state, options, executor, corners=True)
-    if not (options.target or given.invalid[0]):
+    if cells is not None and not (options.target or given.invalid[0]):
         straight = corners_alone(given)
         now, first = (rank_of(points, straight, options, executor) for points in (cells.points, state.start))
         if now > first:
             cells = _with_room(state, options, executor, corners=False)
     if state.stop_reason == NOTHING_TO_MOVE:
         state = state.ended(NO_PROGRESS)
-    return judged(state, cells)
+    return state if cells is None else judged(state, cells)
 
 
-def _with_room(state: State, options: SmoothOptions, executor: Executor, *, corners: bool) -> PlanarCells | SolidCells:
-    """The cells with more room. Straight cells keep a floor for the least of them at each level of the guard."""
+def _with_room(
+    state: State, options: SmoothOptions, executor: Executor, *, corners: bool
+) -> PlanarCells | SolidCells | None:
+    """The cells with more room, None where nothing has moved. Straight cells keep a floor for the least of them at each
+    level of the guard."""
     given = state.second_order
     assert given is not None
+    assert given.quality is not None
+    if (given.quality >= (solid_cells if given.solid else planar_cells).LOW).all():
+        return None
     cells, topology = opened(state), given.protection.topology
     inner, outer = np.flatnonzero(cells.inner), np.flatnonzero(cells.free & topology.near_free & corners)
     level, tally = max(LEVELS.index(options.guard), WORST), np.zeros(3, dtype=np.int64)
@@ -57,7 +63,7 @@ def _with_room(state: State, options: SmoothOptions, executor: Executor, *, corn
         cells.improve(outer, cells.low, guard, tally)
         if tally[MOVED] == moved:
             break
-    return cells
+    return cells if tally[MOVED] else None
 
 
 def raise_bounds(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -70,11 +76,12 @@ def raise_bounds(state: State, options: SmoothOptions, executor: Executor) -> St
         return state
     if options.target or state.stop_reason == CALLBACK:
         return state
+    assert given.quality is not None
     cells = opened(state)
     assert isinstance(cells, SolidCells)
     level, tally = LEVELS.index(options.guard), np.zeros(3, dtype=np.int64)
     guard = Field(cells.points, given.protection.topology, state.precision, level).guard(executor)
-    some = np.flatnonzero(given.tetrahedra & (given.sign == 1))
+    some = np.flatnonzero(given.tetrahedra & (given.sign == 1) & (given.quality < HIGHEST))
     least, stuck = -math.inf, 0
     for _ in range(min(SWEEPS, options.max_sweeps)):
         bounds = cells.bounds(some, HIGHEST)

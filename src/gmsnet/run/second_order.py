@@ -33,7 +33,7 @@ from gmsnet.run.score import Score
 from gmsnet.run.state import SecondOrder, State
 from gmsnet.run.stop import CALLBACK, NOTHING_TO_MOVE
 from gmsnet.run.sweep_stage import sweep
-from gmsnet.topology.curved_solids import curved_solids
+from gmsnet.topology.curved_solids import curved_solids, remembered
 from gmsnet.topology.held import OF_SECOND_ORDER
 from gmsnet.topology.ordering import near_points, planar_points
 from gmsnet.topology.topology import Topology
@@ -126,9 +126,11 @@ def untangle_second_order(state: State, options: SmoothOptions, executor: Execut
     sign, quality = cells.judged()
     by_id = np.empty_like(cells.free)
     by_id[state.topology.memory] = cells.free
-    known = replace(given, free=by_id, sign=sign)
+    known = replace(given, free=by_id, sign=sign, quality=quality, unable=_unable(given, options))
     invalid, least = known.figures(sign, quality)
-    known = replace(known, invalid=(invalid, invalid), least=(least, least), unable=_unable(given, options))
+    known = replace(known, invalid=(invalid, invalid), least=(least, least))
+    if isinstance(cells, SolidCells):
+        known = replace(known, linked=cells.mesh)
     state = replace(state, second_order=known)
     if not (options.untangle and (sign != 1).any() and cells.free.any()):
         return state
@@ -150,8 +152,8 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
         return state
     cells, room = opened(state), -math.inf
     if options.guard != LEVELS[VALID]:
-        sign, quality = cells.judged()
-        room = float(quality[(sign == 1) & given.curved].min(initial=cells.low))
+        assert given.quality is not None
+        room = float(given.quality[(given.sign == 1) & given.curved].min(initial=cells.low))
     corners = corners_alone(given)
     curved = Curved(cells.mesh, room) if isinstance(cells, PlanarCells) else None
     ready = replace(
@@ -166,7 +168,7 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
         return judged(state, cells._replace(points=done.points))
     level = LEVELS.index(options.guard)
     guard = Field(cells.points, corners.topology, state.precision, level).guard(executor)
-    cells.advance(done.points, guard, room)
+    cells.advance(done.points, guard, room, np.asarray(given.sign == 1))
     after, before = (rank_of(points, corners, options, executor) for points in (cells.points, state.points))
     if not options.target and after > before:
         return state  # a move of all corners together may cost what the method gained
@@ -185,8 +187,10 @@ def opened(state: State) -> PlanarCells | SolidCells:
     given = state.second_order
     assert given is not None
     topology, points = state.topology, state.points.copy()
-    table = np.where(given.cells >= 0, topology.places[given.cells], np.int32(-1))
     free = given.free[topology.memory]
+    if given.linked is not None:
+        return SolidCells(points, remembered(points, given.linked), free, state.precision)
+    table = np.where(given.cells >= 0, topology.places[given.cells], np.int32(-1))
     if given.solid:
         return SolidCells(points, curved_solids(points, table, given.kinds, ~free), free, state.precision)
     mesh = curved_mesh(points, table, given.kinds, ~free)
@@ -203,7 +207,9 @@ def judged(state: State, cells: PlanarCells | SolidCells) -> State:
     if ((given.sign == 1) & (sign != 1)).any():
         return state
     invalid, least = given.figures(sign, quality)
-    known = replace(given, sign=sign, invalid=(given.invalid[0], invalid), least=(given.least[0], least))
+    known = replace(
+        given, sign=sign, quality=quality, invalid=(given.invalid[0], invalid), least=(given.least[0], least)
+    )
     return replace(state, points=cells.points, totals=None, second_order=known)
 
 

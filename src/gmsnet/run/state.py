@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.sliding import Sliding
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
+from gmsnet.kernels.curved.stars3 import CurvedSolids
 from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES
 from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.guard import Precision
@@ -51,7 +52,8 @@ class SecondOrder:
     free: (N,) bool by ids. whole: the connectivity of the mesh with straight cells, where corners are free, too;
     protection: of that, and what of it is protected. sign: (C,) of det J in each cell, as it is now. invalid: how many
     second-order cells are not certified valid, least: the least certified bound over a straight cell's size, of volumes
-    over its least determinant at a corner, both at first and now. None of the three is known before the first stage.
+    over its least determinant at a corner, both at first and now. quality: (C,) these bounds now, sharp where they are
+    low. linked: volumes and what follows their corners, by places in memory. None is known before the first stage.
     unable: why the method does not move corners. numbers: (C,) of each cell among all of the mesh. reasons: why cells,
     by these, could not be made valid.
     """
@@ -63,6 +65,8 @@ class SecondOrder:
     protection: Protection
     numbers: NDArray[np.int64]
     sign: NDArray[np.int8] | None = None
+    quality: Floats | None = None
+    linked: CurvedSolids | None = None
     invalid: tuple[int, int] = (0, 0)
     least: tuple[float, float] = (0.0, 0.0)
     unable: str = ""

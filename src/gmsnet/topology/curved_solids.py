@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from gmsnet.cells.jacobian import form_of
 from gmsnet.cells.table import CELLS
@@ -81,6 +82,12 @@ def table_of(mesh: Mesh) -> tuple[Ints, NDArray[np.int8], NDArray[np.int64], Fla
     return cells, kinds, number, others
 
 
+def _there(kinds: NDArray[np.int8]) -> list[tuple[str, NDArray[np.int64]]]:
+    """The kinds that there are, and which cells."""
+    found = ((name, np.flatnonzero(kinds == kind)) for kind, name in enumerate(CURVED))
+    return [(name, rows) for name, rows in found if len(rows)]
+
+
 def of_positive_sense(cells: Ints, kinds: NDArray[np.int8], inside_out: Flags) -> Ints:
     """The table with the cells that are inside out read in the other order."""
     made = cells.copy()
@@ -93,16 +100,16 @@ def of_positive_sense(cells: Ints, kinds: NDArray[np.int8], inside_out: Flags) -
 
 def on_rim(cells: Ints, kinds: NDArray[np.int8], regions: NDArray[np.int64], count: int) -> Flags:
     """(count,) the nodes of facets that are not between two cells of one region, which agree on all its nodes."""
-    facets, regions_of = [np.empty((0, 9), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
-    for kind, name in enumerate(CURVED):
-        rows = np.flatnonzero(kinds == kind)
-        for facet in CELLS[name].facets if len(rows) else ():
-            wide = np.full((len(rows), 9), count, dtype=np.int64)
-            wide[:, : len(facet)] = cells[rows][:, list(facet)]
+    there, facets, regions_of = _there(kinds), [], []
+    width = max(len(facet) for name, _ in there for facet in CELLS[name].facets)
+    for name, rows in there:
+        for facet in CELLS[name].facets:
+            wide = np.full((len(rows), width), count, dtype=np.int32)
+            wide[:, : len(facet)] = cells[rows[:, None], facet]
             facets.append(np.sort(wide, axis=1))
             regions_of.append(regions[rows])
     nodes, region = np.concatenate(facets), np.concatenate(regions_of)
-    key = nodes[:, 0] * (count + 1) + nodes[:, 1]  # two nodes tell most facets apart, the third the rest
+    key = nodes[:, 0] * np.int64(count + 1) + nodes[:, 1]  # two nodes tell most facets apart, the third the rest
     order = np.lexsort((nodes[:, 3], nodes[:, 2], key))
     nodes, region = nodes[order], region[order]
     same = (nodes[1:] == nodes[:-1]).all(axis=1)
@@ -117,19 +124,19 @@ def on_rim(cells: Ints, kinds: NDArray[np.int8], regions: NDArray[np.int64], cou
 
 def at_odds(cells: Ints, kinds: NDArray[np.int8], count: int) -> Flags:
     """(count,) the nodes of cells that name one twice, and those that are not everywhere between the same corners."""
-    found, first = np.zeros(count, dtype=bool), np.full((count, 8), NONE, dtype=np.int32)
+    there = _there(kinds)
+    width = max(len(around) for name, _ in there for _, around in frames(name))
+    found, first = np.zeros(count, dtype=bool), np.full((count, width), NONE, dtype=np.int32)
     known = np.zeros(count, dtype=bool)
-    for kind, name in enumerate(CURVED):
-        rows = cells[kinds == kind][:, : CELLS[name].nodes]
-        if not len(rows):
-            continue
+    for name, chosen in there:
+        rows = cells[chosen, : CELLS[name].nodes]
         ordered = np.sort(rows, axis=1)
         found[rows[(ordered[:, 1:] == ordered[:, :-1]).any(axis=1)]] = True
         corners = CELLS[name].corners or 0
         places = [*((k, (k,)) for k in range(corners)), *frames(name)]
         for node, around in places:
-            wide = np.full((len(rows), 8), NONE, dtype=np.int32)
-            wide[:, : len(around)] = np.sort(rows[:, list(around)], axis=1)
+            wide = np.full((len(rows), width), NONE, dtype=np.int32)
+            wide[:, : len(around)] = np.sort(rows[:, around], axis=1)
             nodes = rows[:, node]
             new = ~known[nodes]
             first[nodes[new]] = wide[new]
@@ -178,12 +185,18 @@ def curved_solids(points: NDArray[np.float64], cells: Ints, kinds: NDArray[np.in
         np.array([KINDS.index(STRAIGHT[name]) for name in CURVED]), cell_start, cell_of, start, follower_of,
         np.ascontiguousarray(follower), around_of, ~held[follower], number, np.zeros((len(follower), 6)),
     )  # fmt: skip
-    remember_followers(points, made, np.arange(len(follower)))
+    return remembered(points, made)
+
+
+def remembered(points: NDArray[np.float64], linked: CurvedSolids) -> CurvedSolids:
+    """The same cells with the offsets that ``points`` have."""
+    made = linked._replace(kept=np.zeros_like(linked.kept))
+    remember_followers(points, made, np.arange(len(made.follower)))
     return made
 
 
 def _by_node(nodes: Ints, items: NDArray[np.int64], count: int) -> tuple[NDArray[np.int64], Ints]:
     """CSR: for each node the items that stand beside it, in ascending order."""
-    order = np.argsort(nodes, kind="stable")
-    start = np.concatenate([[0], np.cumsum(np.bincount(nodes, minlength=count))]).astype(np.int64)
-    return start, items[order].astype(np.int32)
+    rows = csr_array((np.ones(len(nodes), dtype=bool), nodes, np.arange(len(nodes) + 1)), shape=(len(nodes), count))
+    columns = rows.tocsc()
+    return columns.indptr.astype(np.int64), items[columns.indices].astype(np.int32)

@@ -254,7 +254,11 @@ def refused(points, mesh, cells, guard, room, found):
     work = solid_workspace()
     for k in range(len(cells)):
         c = cells[k]
-        straight = straight_sign3(points, mesh, c, floor_of3(guard, mesh, c), guard.unit, guard.grain)
-        found[k] = straight != 1 or judged(points, mesh, c, guard.unit, guard.grain, work) != VALID
+        found[k] = straight_sign3(points, mesh, c, floor_of3(guard, mesh, c), guard.unit, guard.grain) != 1
+        if found[k]:
+            continue
+        form = mesh.forms[mesh.kinds[c]]
+        bound = expanded(points, mesh, c, guard.unit, guard.grain, work)
+        found[k] = sign_of_solid(form, bound, DEPTH, work) != VALID
         if not found[k] and room > -np.inf:
-            found[k] = not quality3(points, mesh, c, room, guard.unit, guard.grain, work) >= room
+            found[k] = not quality_over3(least_straight3(points, mesh, c), form, bound, room, work) >= room

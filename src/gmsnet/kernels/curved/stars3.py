@@ -92,10 +92,10 @@ def axes(points, corner, count, out):
         out[6], out[7], out[8] = share * x, share * y, share * z
 
 
-@part
+@inlined
 def remember3(points, mesh, f):
     """Keeps the offset of a follower as it is."""
-    count, kept, out = corners_of(mesh, f), mesh.kept[f], np.empty(9)
+    count, kept = corners_of(mesh, f), mesh.kept[f]
     mx, my, mz = mean_place(points, mesh, f, count)
     i = mesh.follower[f]
     x, y, z = points[i, 0] - mx, points[i, 1] - my, points[i, 2] - mz
@@ -104,8 +104,16 @@ def remember3(points, mesh, f):
         for axis in range(3):
             kept[3 + axis] = points[b, axis] - points[a, axis]
         kept[0], kept[1], kept[2] = x, y, z
-        return
-    axes(points, mesh.frame[f], count, out)
+    else:
+        remember_in_frame(points, mesh.frame[f], count, x, y, z, kept)
+
+
+@part
+def remember_in_frame(points, corner, count, x, y, z, kept):
+    """The same of one that no edge has: its offset (x, y, z) in the frame of its corners. Apart, for it takes memory of
+    its own, and what does so costs an edge ten times its time."""
+    out = np.empty(9)
+    axes(points, corner, count, out)
     ax, ay, az, bx, by, bz, cx, cy, cz = out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8]
     size = determinant(ax, ay, az, bx, by, bz, cx, cy, cz)
     share = 1.0 / size if abs(size) > TINY else 0.0
@@ -140,19 +148,28 @@ def turned(x, y, z, px, py, pz, qx, qy, qz):
 
 
 @part
+def in_frame(points, corner, count, kept):
+    """What is kept of a follower that no edge has, by the frame that its corners have now."""
+    out = np.empty(9)
+    axes(points, corner, count, out)
+    return (
+        kept[0] * out[0] + kept[1] * out[3] + kept[2] * out[6],
+        kept[0] * out[1] + kept[1] * out[4] + kept[2] * out[7],
+        kept[0] * out[2] + kept[1] * out[5] + kept[2] * out[8],
+    )
+
+
+@part
 def drag3(points, mesh, f, single):
     """Puts a follower where its kept offset says."""
-    count, kept, out = corners_of(mesh, f), mesh.kept[f], np.empty(9)
+    count, kept = corners_of(mesh, f), mesh.kept[f]
     mx, my, mz = mean_place(points, mesh, f, count)
     if count == EDGE:
         a, b = mesh.frame[f, 0], mesh.frame[f, 1]
         dx, dy, dz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
         x, y, z = turned(kept[0], kept[1], kept[2], kept[3], kept[4], kept[5], dx, dy, dz)
     else:
-        axes(points, mesh.frame[f], count, out)
-        x = kept[0] * out[0] + kept[1] * out[3] + kept[2] * out[6]
-        y = kept[0] * out[1] + kept[1] * out[4] + kept[2] * out[7]
-        z = kept[0] * out[2] + kept[1] * out[5] + kept[2] * out[8]
+        x, y, z = in_frame(points, mesh.frame[f], count, kept)
     put3(points, mesh.follower[f], mx + x, my + y, mz + z, single)
 
 
