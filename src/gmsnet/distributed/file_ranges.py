@@ -18,6 +18,7 @@ from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.partition import along_curve
 from gmsnet.distributed.piece import Cells, Piece
 from gmsnet.distributed.tags import nodes_of
+from gmsnet.distributed.zones import Shared, Zones, asked, homes, in_zones
 from gmsnet.errors import FormatError, GmsnetError, InputError
 from gmsnet.io.atomic import replace_files
 from gmsnet.io.formats import FORMATS
@@ -42,19 +43,23 @@ def plan_of(file: Ranges, format: str) -> Plan | None:
 @dataclass(frozen=True, eq=False)
 class FileRanges:
     """What one rank has of a file. piece: its share of the cells, and their nodes. rows: (ranks + 1,) where the rows of
-    coordinates begin that each rank keeps."""
+    coordinates begin that each rank keeps. zones: where the nodes are not the points of the file."""
 
     file: Ranges
     plan: Plan
     piece: Piece
     rows: Ids
+    zones: Zones | None = None
 
     def write(self, target: str, points: Floats, comm: Any) -> None:
         """All ranks call it: a file of the same bytes but for the points (n, dim) of the piece that are elsewhere.
 
         Raises InputError, on all ranks, where it cannot be written; then nothing is.
         """
-        moved = Moved(comm, self.rows, *self._brought(points, comm))
+        rows, (ids, places) = self.rows, self._brought(points, comm)
+        if self.zones is not None:
+            rows, (ids, places) = self.zones.rows, self.zones.moved(comm, rows, ids, places)
+        moved = Moved(comm, rows, ids, places)
         wrong = ""
         if comm.rank == 0:
             try:
@@ -71,7 +76,7 @@ class FileRanges:
     def _brought(self, points: Floats, comm: Any) -> tuple[Ids, Floats]:
         """Of the rows that this rank keeps: the nodes that have moved on any rank, ascending, and where they are."""
         rows = np.flatnonzero((points != self.piece.points).any(axis=1))
-        lists = by_rank(_homes(self.rows, self.piece.ids[rows]), comm.size)
+        lists = by_rank(homes(self.rows, self.piece.ids[rows]), comm.size)
         came = comm.alltoall([(self.piece.ids[rows[some]], points[rows[some]]) for some in lists])
         ids, first = np.unique(np.concatenate([each for each, _ in came]), return_index=True)
         return ids, np.concatenate([each for _, each in came])[first]
@@ -158,23 +163,32 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     images = np.empty(0, dtype=np.int64)
     if plan.tags:
         read, images = _renumbered(comm, file, plan, read, first, last)
-    mine = everywhere(comm, lambda: _said(file, lambda: plan.places(file, first, last)))
-    ids, points, _ = _asked(comm, rows, mine, _ids_of([block.nodes[:, 0] for block in read]))
-    blocks = _shared_out(comm, read, ids, points)
-    ids, points, lonely = _asked(comm, rows, mine, _ids_of([block.nodes for block in blocks]))
-    ids = np.concatenate([ids, np.flatnonzero(lonely) + rows[comm.rank]])
-    order = np.argsort(ids)
-    ids, points = ids[order], np.concatenate([points, mine[lonely]])[order]
-    held = np.zeros((last - first, 1), dtype=bool)
-    if plan.fixed is not None:
-        held = everywhere(comm, lambda: _said(file, lambda: plan.fixed.of(file, first, last) != 0))
-    for some in comm.alltoall([images[found] for found in by_rank(_homes(rows, images), comm.size)]):
-        held[some - first] = True
-    marks = np.asarray(held.any(axis=1), dtype=np.float64)
-    fixed = _asked(comm, rows, marks.reshape(-1, 1), ids)[1][:, 0] != 0
+    nodes = everywhere(comm, lambda: _said(file, lambda: _nodes(file, plan, rows, comm.rank)))
+    nodes = nodes._replace(held=nodes.held | nodes.marked(comm, images))
+    zones = None
+    if plan.zones:
+        named = _ids_of([block.nodes for block in read])
+        zones, nodes = in_zones(comm, plan.zones, nodes, named)
+        node = zones.of_points(comm, named)
+        read = [replace(block, nodes=node[np.searchsorted(named, block.nodes)]) for block in read]
+    ids = _ids_of([block.nodes[:, 0] for block in read])
+    blocks = _shared_out(comm, read, ids, asked(comm, nodes.rows, nodes.points, ids))
+    ids = _ids_of([block.nodes for block in blocks])
+    lonely = np.flatnonzero(~nodes.marked(comm, ids)) + nodes.rows[comm.rank]  # of no cell
+    ids = np.sort(np.concatenate([ids, lonely]))
+    points, fixed = (asked(comm, nodes.rows, mine, ids) for mine in (nodes.points, nodes.held))
     everywhere(comm, file.check)
     piece = everywhere(comm, lambda: Piece(ids, points, fixed, tuple(blocks), plan.single))
-    return FileRanges(file, plan, piece, rows)
+    return FileRanges(file, plan, piece, nodes.rows, zones)
+
+
+def _nodes(file: Ranges, plan: Plan, rows: Ids, rank: int) -> Shared:
+    """Those of a rank. rows: see Shared."""
+    first, last = rows[rank : rank + 2].tolist()
+    held = np.zeros(last - first, dtype=bool)
+    if plan.fixed is not None:
+        held |= (plan.fixed.of(file, first, last) != 0).any(axis=1)
+    return Shared(rows, plan.places(file, first, last), held)
 
 
 def _planned(file: Ranges, format: str) -> Plan:
@@ -189,12 +203,6 @@ def _blocks(file: Ranges, plan: Plan, comm: Any) -> list[Cells]:
         Cells(tables[0].kind, *plan.cells(file, block, comm.rank, comm.size))
         for block, tables in enumerate(plan.blocks)
     ]
-
-
-def _homes(rows: Ids, nodes: Ids) -> Ids:
-    """Which rank keeps the rows of some nodes."""
-    found: Ids = np.searchsorted(rows, nodes, side="right") - 1
-    return found
 
 
 def _renumbered(
@@ -253,20 +261,6 @@ def _shared_out(comm: Any, blocks: Sequence[Cells], ids: Ids, points: Floats) ->
         whole = Cells(block.kind, *parts)
         found.append(whole.take(np.argsort(whole.numbers)))
     return found
-
-
-def _asked(comm: Any, rows: Ids, mine: Floats, needed: Ids) -> tuple[Ids, Floats, NDArray[np.bool_]]:
-    """Some nodes (n,), ascending, their points, and which rows of this rank no rank asks for."""
-    lists = by_rank(_homes(rows, needed), comm.size)
-    start, asked = int(rows[comm.rank]), comm.alltoall([needed[some] for some in lists])
-    lonely = np.ones(len(mine), dtype=bool)
-    for each in asked:
-        lonely[each - start] = False
-    answers = comm.alltoall([mine[each - start] for each in asked])
-    points = np.empty((len(needed), mine.shape[1]))
-    for some, places in zip(lists, answers, strict=True):
-        points[some] = places
-    return needed, points, lonely
 
 
 def planned_format(source: str, format: str) -> str:

@@ -35,8 +35,21 @@ class Joined(NamedTuple):
 def joined(comm: Any, parts: Sequence[Part], first_piece: int, dim: int) -> Joined:
     """See ``gmsnet.io.merge.merged``. All ranks call it. first_piece: how many pieces the ranks before have."""
     points = np.concatenate([*(part.parsed.points for part in parts), np.empty((0, dim))])
+    numbered = all(comm.allgather(all(part.ids is not None for part in parts)))
+    ids = np.concatenate([*(part.ids for part in parts if numbered and part.ids is not None), points[:0, 0]])
+    piece = first_piece + np.repeat(np.arange(len(parts)), [len(part.parsed.points) for part in parts])
+    if numbered:
+        return joined_points(comm, points, piece, np.ones(len(points), dtype=bool), ids.astype(np.int64))
+    return joined_points(comm, points, piece, used_points(parts))
+
+
+def joined_points(comm: Any, points: Floats, piece: Ids, used: Flags, ids: Ids | None = None) -> Joined:
+    """The same of points (n, dim) that follow one another in a file. piece: (n,) of each. used: (n,) which count. ids:
+    (n,) where pieces have some."""
     rows = _starts(comm, len(points))
-    first, unsure = _first(comm, parts, points, first_piece, int(rows[comm.rank]))
+    if ids is None:
+        ids = np.zeros(len(points), dtype=np.int64)
+    first, unsure = _first(comm, (points, ids, piece), np.flatnonzero(used), int(rows[comm.rank]))
     own = first == np.arange(rows[comm.rank], rows[comm.rank + 1])
     starts = _starts(comm, int(np.count_nonzero(own)))
     number = starts[comm.rank] + np.cumsum(own) - 1
@@ -53,14 +66,13 @@ def _starts(comm: Any, count: int) -> Ids:
     return np.cumsum([0, *comm.allgather(count)])
 
 
-def _first(comm: Any, parts: Sequence[Part], points: Floats, first_piece: int, start: int) -> tuple[Ids, Flags]:
-    """For each point the first one that is the same node, by its place in the file, and whether that is unsure."""
-    numbered = all(comm.allgather(all(part.ids is not None for part in parts)))
-    ids = np.concatenate([*(part.ids for part in parts if numbered and part.ids is not None), points[:0, 0]])
-    ids = ids.astype(np.int64) if numbered else np.zeros(len(points), dtype=np.int64)
-    piece = first_piece + np.repeat(np.arange(len(parts)), [len(part.parsed.points) for part in parts])
+def _first(comm: Any, given: tuple[Floats, Ids, Ids], used: NDArray[np.intp], start: int) -> tuple[Ids, Flags]:
+    """For each point the first one that is the same node, by its place in the file, and whether that is unsure.
+
+    given: points, ids and pieces. used: those that count.
+    """
+    points, ids, piece = given
     number = start + np.arange(len(points))
-    used = np.arange(len(points)) if numbered else np.flatnonzero(used_points(parts))
     lists = [used[rows] for rows in by_rank(_homes(points[used], ids[used], comm.size), comm.size)]
     came = comm.alltoall([(points[rows], ids[rows], piece[rows], number[rows]) for rows in lists])
     found = same_points(*(np.concatenate(each) for each in zip(*came, strict=True)))

@@ -19,10 +19,10 @@ from gmsnet.io.cgns_elements import DATA, section, structured, tables_of, title
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
-from gmsnet.io.hdf5_rows import StoredPoints, rows_of
+from gmsnet.io.hdf5_rows import rows_of, stored_points
 from gmsnet.io.merge import Part, merged
-from gmsnet.io.ranges import Column, Plan
-from gmsnet.io.rows import Ranges, Rows
+from gmsnet.io.ranges import Column, Plan, Table
+from gmsnet.io.rows import Ranges
 from gmsnet.io.splice import Share
 from gmsnet.io.stored import Part as Axis
 from gmsnet.io.stored import coordinates, shared
@@ -107,27 +107,52 @@ def _conditions(zone: Node, count: int) -> Iterator[tuple[str, Ints]]:
 
 
 def plan(file: Ranges) -> Plan | None:
-    """How the numbers of an unstructured zone lie; None of several or other zones, and of polyhedra."""
+    """How the numbers of unstructured zones lie; None where some are structured or of polyhedra."""
+    columns, tables, nodes, region = list[dict[str, Column]](), list[Table](), [0], 1
     with File.opened(file.path) as opened:
-        zones = [zone for base in _labelled(opened.root, "CGNSBase_t") for zone in _labelled(base, "Zone_t")]
-        grids = _labelled(zones[0], "GridCoordinates_t") if len(zones) == 1 else []
-        if len(grids) != 1 or ((kind := zones[0].get("ZoneType/" + DATA)) is not None and kind.text() == "Structured"):
+        for zone in (zone for base in _labelled(opened.root, "CGNSBase_t") for zone in _labelled(base, "Zone_t")):
+            found = _planned(zone, file, nodes[-1], region)
+            if found is None:
+                return None
+            columns.append(found[0])
+            tables += found[1]
+            nodes.append(nodes[-1] + next(iter(found[0].values())).rows.rows)
+            region = 1 + max([region - 1, *(table.region for table in found[1])])
+    points = [column for of in columns for column in of.values()]
+    if not tables or len({len(of) for of in columns}) > 1:
+        return None
+    single = any(all(column.rows.dtype[1:] == "f4" for column in of.values()) for of in columns)
+    blocks, zones = [[table] for table in tables], list[int]()
+    if len(columns) > 1:  # as of all pieces of a mesh
+        blocks = [[table for table in tables if table.kind == kind]
+                  for kind in dict.fromkeys(table.kind for table in tables)]  # fmt: skip
+        zones = nodes
+    return Plan(points, blocks, single, encoded=stored_points(columns), zones=zones)
+
+
+def _planned(zone: Node, file: Ranges, first: int, region: int) -> tuple[dict[str, Column], list[Table]] | None:
+    """The coordinates of a zone by their paths, and its cells. first: of all nodes the first of the zone. region: the
+    number of its first one."""
+    grids, kind = _labelled(zone, "GridCoordinates_t"), zone.get("ZoneType/" + DATA)
+    if len(grids) != 1 or (kind is not None and kind.text() == "Structured"):
+        return None
+    columns, axes = dict[str, Column](), [grids[0].get(f"Coordinate{axis}/{DATA}") for axis in "XYZ"]
+    for axis, node in enumerate(node for node in axes if node is not None):
+        rows = rows_of(node)
+        if rows is None or rows.width != 1 or rows.dtype[1] != "f":
             return None
-        axes = [found for axis in "XYZ" if (found := grids[0].get(f"Coordinate{axis}/{DATA}")) is not None]
-        rows = [rows_of(node) for node in axes]
-        points = [Column(each, 0, axis) for axis, each in enumerate(rows) if each is not None and each.width == 1]
-        sections = [tables_of(node, file) for node in _labelled(zones[0], "Elements_t")]
+        columns[node.path] = Column(rows, first, axis)
+    counts = [*{column.rows.rows for column in columns.values()}]
+    sections = [tables_of(node, file) for node in _labelled(zone, "Elements_t")]
     listed = sorted((each for each in sections if each is not None), key=lambda each: each[0])
-    told = len(listed) == len(sections) and len(points) == len(axes) > 1
-    if not told or len({each.rows.rows for each in points}) > 1 or any(each.rows.dtype[1] != "f" for each in points):
+    if len(columns) < 2 or len(counts) > 1 or len(listed) < len(sections):
         return None
-    blocks = [[table._replace(region=region)]
-              for region, (_, tables) in enumerate(listed, 1) for table in tables if table.nodes.rows]  # fmt: skip
-    if not blocks:
-        return None
-    in_place = all(isinstance(each.rows, Rows) for each in points)
-    encoded = None if in_place else StoredPoints({node.path: axis for axis, node in enumerate(axes)})
-    return Plan(points, blocks, all(each.rows.dtype[1:] == "f4" for each in points), encoded=encoded)
+    return columns, [
+        table._replace(region=number, zone=(first, counts[0]))
+        for number, (_, tables) in enumerate(listed, region)
+        for table in tables
+        if table.nodes.rows
+    ]
 
 
 def write(mesh: Mesh) -> Written:

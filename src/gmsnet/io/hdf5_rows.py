@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gmsnet.io.contents import Data
 from gmsnet.io.hdf5 import File, Node, library, said_of, shown
-from gmsnet.io.ranges import Moves, put
+from gmsnet.io.ranges import Column, Moves, put
 from gmsnet.io.rows import AT_ONCE, EncodedRows, Listed, Ranges, Rows
 from gmsnet.io.temporary import Temporary
 
@@ -48,9 +48,10 @@ class Stored:
 
 @dataclass(frozen=True)
 class StoredPoints:
-    """Coordinates in data sets. axes: path → the axis of the first number of a row."""
+    """Coordinates in data sets. parts: path → column, of data sets that are written together: by the library, unless
+    the numbers of all stand in the file as they are."""
 
-    axes: Mapping[str, int]
+    parts: Sequence[Mapping[str, Column]]
 
     def contents(self, file: Ranges, moves: Moves, folder: str) -> Iterator[bytes]:
         """See Encoded."""
@@ -58,16 +59,46 @@ class StoredPoints:
             for part in file.copied(0, file.size):
                 stream.write(part)
             stream.raise_error()
-            with _written(stream) as handle:
-                for path, axis in self.axes.items():
-
-                    def fill(begin: int, values: NDArray[Any], axis: int = axis) -> bool:
-                        return put(values.reshape(len(values), -1), moves, begin, axis)
-
-                    _fill(handle[path], fill)
+            for columns in self.parts:
+                in_place = [(each, each.rows) for each in columns.values() if isinstance(each.rows, Rows)]
+                if len(in_place) == len(columns):
+                    for column, rows in in_place:
+                        _splice(stream, column, rows, moves)
+                else:
+                    _refill(stream, columns, moves)
             stream.seek(0)
             while part := stream.read(AT_ONCE):
                 yield part
+
+
+def stored_points(parts: Sequence[Mapping[str, Column]]) -> StoredPoints | None:
+    """How coordinates in data sets are written again; None where all stand in the file as they are."""
+    in_place = all(isinstance(column.rows, Rows) for columns in parts for column in columns.values())
+    return None if in_place else StoredPoints(parts)
+
+
+def _splice(stream: _Stream, column: Column, rows: Rows, moves: Moves) -> None:
+    """Numbers that stand in the file as they are."""
+    step = max(1, AT_ONCE // rows.stride)
+    for begin in range(0, rows.rows, step):
+        part = replace(rows, start=rows.start + begin * rows.stride, rows=min(step, rows.rows - begin))
+        stream.seek(part.start)
+        data = bytearray(stream.read(part.end - part.start))
+        put(part.in_bytes(data, part.rows), moves, column.first + begin, column.axis)
+        stream.seek(part.start)
+        stream.write(data)
+    stream.raise_error()
+
+
+def _refill(stream: _Stream, columns: Mapping[str, Column], moves: Moves) -> None:
+    """Numbers that the library writes."""
+    with _written(stream) as handle:
+        for path, column in columns.items():
+
+            def fill(begin: int, values: NDArray[Any], column: Column = column) -> bool:
+                return put(values.reshape(len(values), -1), moves, column.first + begin, column.axis)
+
+            _fill(handle[path], fill)
 
 
 def rows_of(node: Node) -> Listed | None:

@@ -43,7 +43,8 @@ class Encoded(Protocol):
 
 class Table(NamedTuple):
     """Cells of one kind. nodes: of each, counted from ``base``. order: see Kind. region: of all of them, where
-    ``regions`` does not tell that of each. counts: numbers of nodes that the file tells of each, if it does."""
+    ``regions`` does not tell that of each. counts: numbers of nodes that the file tells of each, if it does. zone: the
+    first of the nodes that are meant, and how many these are, where not all are."""
 
     kind: str
     nodes: AnyRows
@@ -52,6 +53,7 @@ class Table(NamedTuple):
     region: int = 0
     regions: AnyRows | None = None
     counts: AnyRows | None = None
+    zone: tuple[int, int] | None = None
 
 
 NO_IMAGES = np.empty((0, 2), dtype=np.int64)
@@ -62,7 +64,8 @@ class Plan:
     """points: the coordinates of all nodes, in the order of the file. blocks: of the mesh, each of one table or several
     of one kind. single: see Mesh. tags: those of all nodes, where cells name these by tags. fixed: numbers of all
     nodes; those that are not 0 are to be held. encoded: where the rows of some points are not bytes of the file.
-    images: (n, 2) tags of nodes and of those that they are images of; these are to be held, too."""
+    images: (n, 2) tags of nodes and of those that they are images of; these are to be held, too. zones: (k + 1,) first
+    nodes of zones; those of different zones that are at one place are one node. None where there is but one."""
 
     points: Sequence[Column]
     blocks: Sequence[Sequence[Table]]
@@ -71,6 +74,7 @@ class Plan:
     fixed: AnyRows | None = None
     encoded: Encoded | None = None
     images: NDArray[np.int64] = field(default_factory=lambda: NO_IMAGES)
+    zones: Sequence[int] = ()
 
     @property
     def nodes(self) -> int:
@@ -133,7 +137,9 @@ class Plan:
                 self._check_counts(file, table, begin, end)
                 listed = table.nodes.of(file, begin, end).astype(np.int64) - table.base
                 if not self.tags:
-                    self._check(listed, block, before + begin)
+                    self._check(listed, table, begin)
+                if table.zone is not None:
+                    listed += table.zone[0]
                 nodes.append(listed if table.order is None else listed[:, table.order])
                 own = None if table.regions is None else table.regions.of(file, begin, end)
                 alike = np.full(end - begin, table.region, dtype=np.int64)
@@ -150,14 +156,13 @@ class Plan:
             raise FormatError(f"{table.counts.where(first + row)}: a {table.kind} with {counts[row]} nodes instead of "
                               f"{width}")  # fmt: skip
 
-    def _check(self, nodes: NDArray[np.int64], block: int, first: int) -> None:
-        wrong = (nodes < 0) | (nodes >= self.nodes)
+    def _check(self, nodes: NDArray[np.int64], table: Table, first: int) -> None:
+        count = self.nodes if table.zone is None else table.zone[1]
+        wrong = (nodes < 0) | (nodes >= count)
         if wrong.any():
             row = int(np.argmax(wrong.any(axis=1)))
-            raise FormatError(
-                f"{self.where_cell(block, first + row)}: a cell names the node {nodes[row][wrong[row]][0]}, but "
-                f"the nodes are 0 to {self.nodes - 1} (counted from 0)"
-            )
+            raise FormatError(f"{table.nodes.where(first + row)}: a cell names the node {nodes[row][wrong[row]][0]}, "
+                              f"but the nodes are 0 to {count - 1} (counted from 0)")  # fmt: skip
 
 
 def put(values: NDArray[Any], moves: Moves, first: int, axis: int) -> bool:

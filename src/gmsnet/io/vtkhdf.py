@@ -16,9 +16,9 @@ from gmsnet.io import vtk_cells
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
-from gmsnet.io.hdf5_rows import StoredPoints, rows_of
+from gmsnet.io.hdf5_rows import rows_of, stored_points
 from gmsnet.io.ranges import Column, Plan
-from gmsnet.io.rows import Ranges, Rows
+from gmsnet.io.rows import Ranges
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.io.vtk_runs import Field, tables_of, told_by
 from gmsnet.mesh.mesh import Mesh
@@ -76,8 +76,9 @@ def plan(file: Ranges) -> Plan | None:
         if told is None:
             return None
         blocks = [[each] for each in tables_of(types.some, cells, nodes.rows, nodes, offsets.some, told.regions)]
-        encoded = None if isinstance(points, Rows) else StoredPoints({place.path: 0})
-        return Plan([Column(points)], blocks, points.dtype[1:] == "f4", (), told.fixed, encoded) if blocks else None
+        column = Column(points)
+        encoded = stored_points([{place.path: column}])
+        return Plan([column], blocks, points.dtype[1:] == "f4", (), told.fixed, encoded) if blocks else None
 
 
 def _fields_in(group: Node | None) -> list[Field]:
