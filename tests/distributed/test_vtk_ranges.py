@@ -16,8 +16,10 @@ import gmsnet
 from gmsnet.distributed.file_ranges import planned_format, read_ranges
 from gmsnet.distributed.layouts import shared_format
 from gmsnet.generate import random_mesh, random_volume, recombine
+from gmsnet.io import vtk_runs
 from gmsnet.io.rows import Ranges, Rows
 from gmsnet.io.vtk_runs import Field, told_by
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import NUMBERED, regions_of
 from gmsnet.mesh.selection import held_by_data
@@ -90,6 +92,50 @@ def test_vtu_and_vtkhdf_with_regions_and_held_nodes(tmp_path: Path) -> None:
         root["PointData/fixed"] = mesh.point_data["fixed"]
     assert_read_alike(path, "vtkhdf", 3)
     assert_bytes_of_one_process(path, "vtkhdf", 2, "barrier")
+
+
+def alternating(runs: int) -> Mesh:
+    """Cells of all kinds of volumes in turn, so often, and regions of them that alternate otherwise."""
+    mesh = mixed()
+    cells = [(block.kind, row) for block in mesh.cells for row in block.nodes]
+    order = np.random.default_rng(3).permutation(len(cells)).tolist() * 40
+    kinds = [order[0]]
+    for k in order:
+        if cells[k][0] != cells[kinds[-1]][0] and len(kinds) < runs:
+            kinds.append(k)
+    blocks = [CellBlock(cells[k][0], cells[k][1][None], np.zeros(1, dtype=np.int64)) for k in kinds]
+    regions = tuple(np.array([k % 3]) for k in range(len(blocks)))
+    return Mesh(mesh.points, tuple(blocks), cell_data={"material": regions})
+
+
+@pytest.mark.parametrize("at_once", [100, 1 << 18])
+@pytest.mark.parametrize(("runs", "ranks"), [(999, 1), (1000, 3), (1001, 2), (1002, 4), (1500, 3)])
+def test_types_that_alternate_often(runs: int, ranks: int, at_once: int, tmp_path: Path, monkeypatch) -> None:
+    """More than a thousand runs of cells of one type are blocks by type."""
+    monkeypatch.setattr(vtk_runs, "AT_ONCE", at_once)
+    mesh = alternating(runs)
+    for version in (42, 51):
+        path = legacy(mesh, tmp_path, version)
+        assert (len(gmsnet.read(path).cells) == runs) == (runs <= 1000)
+        assert_read_alike(path, "vtk", ranks)
+    variants = dict(vtu_variants(grid_of(mesh)))
+    for mode in ("raw", "binary"):
+        (tmp_path / "a.vtu").write_bytes(variants[f"{mode}, header 32, order 1, compress {mode == 'binary'}"])
+        assert_read_alike(tmp_path / "a.vtu", "vtu", ranks)
+    path = save_vtkhdf(replace(mesh, cell_data={}), tmp_path / "a.vtkhdf")
+    assert_read_alike(path, "vtkhdf", ranks)
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_the_bytes_where_types_alternate_often(ranks: int, tmp_path: Path) -> None:
+    whole = recombine(random_mesh(3000, seed=3))
+    cells = [(block.kind, row) for block in whole.cells for row in block.nodes]
+    order = np.random.default_rng(3).permutation(len(cells)).tolist()
+    blocks = [CellBlock(cells[k][0], cells[k][1][None], np.zeros(1, dtype=np.int64)) for k in order]
+    for version in (42, 51):
+        path = legacy(Mesh(whole.points, tuple(blocks)), tmp_path, version)
+        assert len(gmsnet.read(path).cells) == 3
+        assert_bytes_of_one_process(path, "vtk", ranks, "barrier")
 
 
 def test_held_nodes_of_vectors(tmp_path: Path) -> None:

@@ -128,15 +128,13 @@ def _plan(file: Ranges, arrays: dict[str, Rows], counts: dict[str, int], fields:
     if wrong or points.dtype not in (">f4", ">f8") or not cells or listed != cells:
         return None
 
-    def some(rows: Rows) -> Any:
-        def of(first: int, last: int) -> NDArray[Any]:
-            return rows.of(file, first, last)[:, 0]
-
-        return of
+    def begins(first: int, last: int) -> NDArray[Any]:
+        assert offsets is not None
+        return offsets.of(file, first, last)[:, 0]
 
     told = told_by(file, fields.get("POINT_DATA", []), fields.get("CELL_DATA", []), (points.rows, cells))
     if told is None or nodes.dtype[1] not in "iu" or (offsets is not None and offsets.dtype[1] not in "iu"):
         return None
-    tables = tables_of(some(types), cells, nodes.rows, nodes, None if offsets is None else some(offsets), told.regions)
+    tables = tables_of(file, types, nodes, None if offsets is None else begins, told.regions)
     blocks = [[table] for table in tables]
     return Plan([Column(points)], blocks, points.dtype == ">f4", fixed=told.fixed) if tables else None

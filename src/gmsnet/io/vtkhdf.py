@@ -57,16 +57,18 @@ def read(files: Mapping[str, Data]) -> Parsed:
 
 
 def plan(file: Ranges) -> Plan | None:
-    """How the numbers of a file lie; None of grids with ghost cells, with regions by several fields, with cells of no
-    certain number of nodes, or whose types alternate often."""
+    """How the numbers of a file lie; None of grids with ghost cells, with regions by several fields, and with cells of
+    no certain number of nodes."""
     with File.opened(file.path) as opened:
         root = opened.root.need("VTKHDF")
         if root.attribute("Type") != "UnstructuredGrid" or root.get("Steps") is not None:
             return None
         count, cells = _only(root, "NumberOfPoints"), _only(root, "NumberOfCells")
         place, offsets, types, listed = (root.need(key) for key in ("Points", "Offsets", "Types", "Connectivity"))
-        points, nodes = rows_of(place), rows_of(listed)
-        if points is None or nodes is None or points.dtype[1:] not in ("f4", "f8") or nodes.dtype[1] not in "iu":
+        points, nodes, codes = rows_of(place), rows_of(listed), rows_of(types)
+        if points is None or nodes is None or codes is None or points.dtype[1:] not in ("f4", "f8"):
+            return None
+        if nodes.dtype[1] not in "iu" or codes.dtype[1] not in "iu":
             return None
         if (points.rows, points.width, nodes.width) != (count, 3, 1):
             return None
@@ -75,7 +77,7 @@ def plan(file: Ranges) -> Plan | None:
         told = told_by(file, _fields_in(root.get("PointData")), _fields_in(root.get("CellData")), (count, cells))
         if told is None:
             return None
-        blocks = [[each] for each in tables_of(types.some, cells, nodes.rows, nodes, offsets.some, told.regions)]
+        blocks = [[each] for each in tables_of(file, codes, nodes, offsets.some, told.regions)]
         column = Column(points)
         encoded = stored_points([{place.path: column}])
         return Plan([column], blocks, points.dtype[1:] == "f4", (), told.fixed, encoded) if blocks else None
