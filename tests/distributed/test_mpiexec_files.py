@@ -11,12 +11,16 @@ from support.decomposed import block, strips
 from support.foam_processors import save
 from support.gmsh_split import save_split
 from support.pieces import save_pieces
+from support.vtk_variants import grid_of, vtu_variants
 
 import gmsnet
 from gmsnet.generate import random_volume
 from gmsnet.mesh.mesh import Mesh
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+from distributed.test_cgns_zones_ranges import save_zones
+from distributed.test_file_ranges import mixed, save_vtkhdf
+from distributed.test_hdf5_ranges import packed
 from distributed.test_mpiexec import MPIEXEC, mpiexec, smooth
 
 pytestmark = pytest.mark.skipif(MPIEXEC is None, reason="mpiexec is not installed")
@@ -37,6 +41,8 @@ FULL = (
     "        write(*given)\n"
     "    together.replace_files = full"
 )
+MODULES = {"vtkhdf": "hdf5_rows", "vtu": "vtu_sources"}
+PACKING = "import gmsnet.io.{module} as module; module.put = lambda *given: os.kill(os.getpid(), 9)"
 KILLED = "atomic._write = lambda *given: os.kill(os.getpid(), 9)"
 
 
@@ -138,6 +144,48 @@ def test_split_files_have_the_bytes_of_one_process(tmp_path):
     assert done.returncode == 0, done.stderr
     for k in (1, 2, 3):
         assert (tmp_path / f"serial_{k}.msh").read_bytes() == (tmp_path / f"ranks_{k}.msh").read_bytes()
+
+
+SHARED = {
+    "vtkhdf": lambda path: packed(save_vtkhdf(mixed(), path), "gzip"),
+    "vtu": lambda path: path.write_bytes(dict(vtu_variants(grid_of(mixed())))[COMPRESSED]),
+    "cgns": lambda path: save_zones(mixed(), path, packed=(1,)),
+}
+COMPRESSED = "binary, header 32, order 1, compress True"
+
+
+@pytest.mark.parametrize("suffix", SHARED)
+def test_an_encoded_file_that_ranks_share_has_the_bytes_of_one_process(tmp_path, suffix):
+    SHARED[suffix](tmp_path / f"a.{suffix}")
+    gmsnet.write(gmsnet.smooth(gmsnet.read(tmp_path / f"a.{suffix}")).mesh, tmp_path / f"serial.{suffix}")
+    done = smooth(3, f"a.{suffix}", f"ranks.{suffix}", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "gathered" in json.loads(done.stdout)  # of all ranks
+    assert (tmp_path / f"serial.{suffix}").read_bytes() == (tmp_path / f"ranks.{suffix}").read_bytes()
+
+
+@pytest.mark.parametrize("suffix", ["vtkhdf", "vtu"])
+@pytest.mark.parametrize(("what", "code"), [(KILLED, None), (FULL, 2)])
+def test_the_first_rank_fails_as_it_writes_what_was_packed(tmp_path, suffix, what, code):
+    """It packs in a temporary file of its own."""
+    SHARED[suffix](tmp_path / f"a.{suffix}")
+    before = saved(tmp_path)
+    what = what.replace("together", "file_ranges") if code else PACKING.format(module=MODULES[suffix])
+    script = ON_RANK_1.replace("import gmsnet.distributed.together as", "import gmsnet.distributed.file_ranges as")
+    script = script.replace("together", "file_ranges").replace("== '1'", "== '0'").replace("a.pvtu", f"a.{suffix}")
+    done = mpiexec(2, "-c", script.format(what=what, target=f"b.{suffix}", more="[]"), cwd=tmp_path)
+    after = saved(tmp_path)
+    assert {name: after[name] for name in before} == before
+    if code:
+        assert done.returncode == code, done.stderr
+        assert done.stderr.count(f"gmsnet: error: b.{suffix}: cannot be written: file too large") == 1
+        assert after == before
+    else:
+        assert done.returncode not in (0, 1, 2)
+        assert all(name.endswith(".tmp") for name in after.keys() - before.keys())
+        assert len(after) > len(before) + 1
+        assert smooth(2, f"a.{suffix}", f"b.{suffix}", "--max-sweeps", "1", cwd=tmp_path).returncode == 0
+        assert sorted(saved(tmp_path)) == sorted([*before, f"b.{suffix}"])
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
