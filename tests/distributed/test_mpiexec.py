@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import gmsnet
+from gmsnet.generate import random_volume
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 MPIEXEC = shutil.which("mpiexec") or shutil.which("mpiexec", path=os.path.dirname(sys.executable))
@@ -94,6 +95,49 @@ def test_a_bug_on_one_rank_ends_all(folder):
     assert done.returncode != 0
     assert "internal error: ZeroDivisionError: on purpose" in done.stderr
     assert not (folder / "out.su2").exists()
+
+
+INTERRUPTED = """
+import os, signal, sys
+{imported} as module
+before = module.{name}
+def interrupted(*given, calls=[0]):
+    calls[0] += 1
+    if calls[0] == {call}:
+        os.kill(os.getpid(), signal.SIGINT)
+    return before(*given)
+module.{name} = interrupted
+from gmsnet.cli import main
+sys.exit(main(['smooth', '{file}', 'out{end}', '--method', 'barrier']))
+"""
+
+
+@pytest.mark.parametrize(("file", "imported", "name", "call"), [
+    ("in.lb8.ugrid", "import gmsnet.distributed.file_ranges", "asked", 1),  # as they read
+    ("in.lb8.ugrid", "import gmsnet.distributed.part", "before", 1),
+    ("in.su2", "import gmsnet.distributed.part", "before", 1),
+])  # fmt: skip
+def test_ctrl_c_on_all_ranks_ends_all_with_one_message(folder, file, imported, name, call):
+    """As launchers hand it on."""
+    gmsnet.write(random_volume(300, seed=1), folder / "in.lb8.ugrid")
+    script = INTERRUPTED.format(imported=imported, name=name, call=call, file=file, end=file[2:])
+    done = mpiexec(3, "-c", script, cwd=folder)
+    assert done.returncode != 0
+    assert "Traceback" not in done.stderr
+    assert done.stderr.count("gmsnet: interrupted") == 1, done.stderr
+    assert sorted(path.name for path in folder.iterdir() if path.name.endswith(".tmp")) == []
+
+
+def test_ctrl_c_in_a_sweep_writes_the_best_mesh_so_far(folder):
+    """As without ranks."""
+    script = INTERRUPTED.format(
+        imported="from gmsnet.distributed.halo import Halo", name="after", call=30, file="in.su2", end=".su2"
+    )
+    done = mpiexec(3, "-c", script, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "interrupted" in done.stdout
+    assert "Traceback" not in done.stderr
+    assert (gmsnet.read(folder / "out.su2").points != gmsnet.read(folder / "in.su2").points).any()
 
 
 def test_messages_and_bytes_are_those_of_the_shared_nodes(folder):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
@@ -31,20 +32,21 @@ def on_all_ranks(run: Callable[[], int]) -> int:
     if size == 1:
         return run()
     try:
-        from gmsnet.distributed.first import follow, release
+        from gmsnet.distributed.first import follow, left_others, release
         from gmsnet.distributed.library import mpi
 
         world = mpi().COMM_WORLD
     except GmsnetError as error:
         return print_failure(error) if rank == 0 else BAD_INPUT
     if rank:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # of Ctrl-C they hear from the first one
         try:
             follow(world)
         except Exception as error:
             _end_all(world, print_failure(error))
         return DONE
     code = run()
-    if code == BUG:
+    if code == BUG or left_others():
         _end_all(world, code)
     release(world)
     return code

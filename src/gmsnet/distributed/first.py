@@ -6,6 +6,7 @@ import contextlib
 import time
 from dataclasses import replace
 from functools import partial
+from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,23 @@ def follow(comm: Any = None) -> None:
                 comm.gather(found.points)
 
 
+class _Together(contextlib.AbstractContextManager["_Together"]):
+    """Work of all ranks, on the first one. broken: it has left the others in the middle of it, who wait for it."""
+
+    broken = False
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, at: TracebackType | None) -> None:
+        self.broken = kind is not None and not issubclass(kind, GmsnetError)  # of which all ranks know
+
+
+_TOGETHER = _Together()
+
+
+def left_others() -> bool:
+    """Whether the first rank has left the others in the middle of their work, by Ctrl-C or a bug."""
+    return _TOGETHER.broken
+
+
 def release(comm: Any = None) -> None:
     """The first rank has nothing more to be smoothed."""
     (mpi().COMM_WORLD if comm is None else comm).bcast(None)
@@ -58,14 +76,15 @@ def smooth_from_first(mesh: Mesh, options: SmoothOptions, fixed: Any = None, com
     began, comm = time.perf_counter(), mpi().COMM_WORLD if comm is None else comm
     chosen = fixed_mask(mesh, fixed)
     pieces = pieces_of(mesh, chosen, partition(mesh, comm.size), comm.size)
-    comm.bcast(replace(options, callback=None))
-    whole = Whole(mesh, np.arange(len(mesh.points)), chosen)
-    found = smoothed(comm.scatter(pieces), options, comm, whole)
-    if found.whole is not None and not found.interrupted:
-        return found.whole
     points = mesh.points.copy()
-    for piece, places in zip(pieces, comm.gather(found.points), strict=True):
-        points[piece.ids] = places
+    with _TOGETHER:
+        comm.bcast(replace(options, callback=None))
+        whole = Whole(mesh, np.arange(len(mesh.points)), chosen)
+        found = smoothed(comm.scatter(pieces), options, comm, whole)
+        if found.whole is not None and not found.interrupted:
+            return found.whole
+        for piece, places in zip(pieces, comm.gather(found.points), strict=True):
+            points[piece.ids] = places
     done = partial(_as_a_state, mesh, points, fixed, options, found)
     return ended(done, lambda state: result_of(state, options, began))
 
@@ -73,8 +92,9 @@ def smooth_from_first(mesh: Mesh, options: SmoothOptions, fixed: Any = None, com
 def smooth_file_from_first(task: FileTask, comm: Any = None) -> RankResult:
     """``smooth_file`` while the others ``follow``. Errors: see there."""
     comm = mpi().COMM_WORLD if comm is None else comm
-    comm.bcast(replace(task, options=replace(task.options, callback=None)))
-    return smooth_file(task, comm)
+    with _TOGETHER:
+        comm.bcast(replace(task, options=replace(task.options, callback=None)))
+        return smooth_file(task, comm)
 
 
 def _as_a_state(mesh: Mesh, points: Floats, fixed: Any, options: SmoothOptions, found: RankResult) -> State:
