@@ -19,7 +19,7 @@ LAPLACIAN_SWEEPS = 8
 MEDIANS, WEIGHING = 2, 5  # the first sweeps are to medians of the rings, by so many steps from the mean
 RINGS = (2, 6, 20, 60, 10**9)  # of the patches around what is left to mend
 LEAP = 10  # how many times as many nodes the largest patch may have as the one before
-MOST = 0.75  # a patch of a larger share of the free nodes becomes one of all
+MOST = 0.5  # a patch of a larger share of the free nodes becomes one of all
 FEW = 0.25  # harmonic places are a better start if they leave no more than this share of the cells to mend
 PATIENCE, LAST_PATIENCE = 3, 8  # of L-BFGS, and where the patch cannot grow any more
 
