@@ -11,6 +11,9 @@ edge on a wall and are stretched along it: they must be many, thin, and
 - as even along the wall as rows of one height are made, where most of the piece lies along the wall, and the piece is
   not the mesh.
 
+Unless the piece has grown by much, most of those at the wall have one height, or one ratio of length and height. Of a
+mesh that was sheared or squeezed they are thin by more here and by less there.
+
 Growth is told by the stretch of cells and by their height: where rows of one height go around a bend, only their length
 differs.
 """
@@ -47,6 +50,8 @@ SOME = 0.4  # of the cells, where it is the share of the edges that tells: aroun
 MOSTLY = 0.72  # of the cells of a layer are stretched along the wall nearest to them
 OVER = 0.35  # of an edge there, from its middle to where the third corner lies along it: in rows, over an end of it
 PART, EVEN = 0.6, math.log(1.05)  # of a piece without growth: share of the mesh, change from cell to cell
+# Between most cells along a wall, of heights, or of ratios of length and height: rows that were made keep one of them.
+STEADY, ALL_EVEN = math.log(1.25), math.log(1.1)
 UNEVEN = math.log(1.6)  # more from cell to cell is no row, but the slivers of a hull
 
 
@@ -107,12 +112,13 @@ def _at_walls(
         higher = np.median(across[own]) - np.median(across[row[along]]) >= HIGHER
         lie = _along_nearest(triangles[own], points, cells[own], one[along], two[along])
         change = _change(height[along], one[along], two[along])
-        even = change <= EVEN and np.count_nonzero(own) <= PART * of_all
+        varies = min(_spread(height[along]), _spread((np.log(length) - height)[along]))
+        even = change <= EVEN and varies <= ALL_EVEN and np.count_nonzero(own) <= PART * of_all
         most = lie >= OF_PIECE or (lie >= SOME and np.count_nonzero(along) >= OF_EDGES * np.count_nonzero(here))
         clear = thin >= CLEARLY_THIN and higher and grown >= (CLEARLY_GROWN if most else GROWN_BY_MUCH)
         rows = np.median(off[along]) >= OVER
         orderly = clear or (thin >= THIN and lie >= MOSTLY and ((higher and grown >= GROWN and rows) or even))
-        if orderly and change <= UNEVEN:
+        if orderly and change <= UNEVEN and (varies <= STEADY or grown >= GROWN_BY_MUCH):
             kept |= own
             wall |= along
     return kept, np.column_stack([one, two])[wall]
@@ -145,6 +151,12 @@ def _change(height: Floats, one: NDArray[np.int32], two: NDArray[np.int32]) -> f
     several = np.diff(np.append(start, len(node))) > 1
     change = np.maximum.reduceat(value, start) - np.minimum.reduceat(value, start)
     return float(np.mean(change[several])) if several.any() else math.inf
+
+
+def _spread(values: Floats) -> float:
+    """Between the tenth and the ninetieth of a hundred."""
+    low, high = np.percentile(values, [10.0, 90.0])
+    return float(high - low)
 
 
 def _along_nearest(
