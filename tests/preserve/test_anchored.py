@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.layer_meshes import rows_around
 
 from gmsnet.generate import (
     c_grid_mesh,
@@ -86,6 +87,10 @@ LAYERS = {
     "C-grid of triangles": lambda: c_grid_mesh(10, 50, cells="triangle"),
     "few thick ones": lambda: layered_mesh(10, 5),
     "hardly any": lambda: layered_mesh(10, 3),
+    "to the other boundary": lambda: rows_around(60, 30, 1e-3, 1.15),
+    "to the other boundary, of triangles": lambda: rows_around(60, 30, 1e-3, 1.15, cells="triangle"),
+    "around a flat body": lambda: rows_around(60, 30, 1e-3, 1.15, flat=0.2),
+    "thin and many": lambda: rows_around(60, 45, 1e-4, 1.2, flat=0.5),
 }
 
 

@@ -37,6 +37,20 @@ def made(points, quads, cells):
     return Mesh(points, (CellBlock(cells, rows, np.zeros(len(rows), dtype=int)),))
 
 
+def rows_around(around, rows, first, growth, flat=1.0, cells="quad"):
+    """An O-grid around an ellipse: rows of one height each, from the first one on, to the other boundary."""
+    angle = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
+    height = np.append(0.0, np.cumsum(first * growth ** np.arange(rows)))[:, None]
+    points = np.stack([(1.0 + height) * np.cos(angle), (flat + height) * np.sin(angle)], axis=-1).reshape(-1, 2)
+    return made(points, _cells_between(np.arange(len(points)).reshape(-1, around)), cells)
+
+
+def _cells_between(node):
+    """(C, 4) the quads between closed rows of nodes."""
+    a, b, d, c = node[:-1], np.roll(node[:-1], -1, axis=1), node[1:], np.roll(node[1:], -1, axis=1)
+    return np.stack((a, d, c, b), axis=-1).reshape(-1, 4)
+
+
 def blunt(cells="triangle", rows=32, half=40):
     """An O-grid around an ellipse, and its nodes row by row, from the nose (the first) around.
 
@@ -50,8 +64,7 @@ def blunt(cells="triangle", rows=32, half=40):
     height = np.append(0.0, np.cumsum(1e-4 * 1.25 ** np.arange(rows)))
     points = np.column_stack([np.cos(angle), 0.1 * np.sin(angle)]) + height[:, None, None] * normal
     node = np.arange(points.size // 2).reshape(len(height), -1)
-    a, b, d, c = node[:-1], np.roll(node[:-1], -1, axis=1), node[1:], np.roll(node[1:], -1, axis=1)
-    return made(points.reshape(-1, 2), np.stack((a, d, c, b), axis=-1).reshape(-1, 4), cells), node
+    return made(points.reshape(-1, 2), _cells_between(node), cells), node
 
 
 def shaken(mesh, x, y, amount, seed=0):

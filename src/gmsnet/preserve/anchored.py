@@ -3,7 +3,8 @@
 Cells are stretched alike for other reasons, too: a mesh was sheared, swirled or stretched as a whole, or squeezed
 between bodies that moved. Such cells are stretched away from the boundary, or as much inside as there, or across it.
 A layer is thinnest where it starts. So of each piece of stretched cells that hang together, those count that have an
-edge on a wall and are stretched along it: they must be many, thin, and
+edge on a wall and are stretched along it, of all walls or, where a layer reaches from one to another, of one. They must
+be many, thin, and
 
 - much thinner than most of the piece, which has grown from row to row by much, or by less where most of the piece or
   of its edges on walls, and some of the piece, lie so, or
@@ -102,11 +103,13 @@ def _at_walls(
     height = np.log(np.maximum(np.abs(cells[row, stretch.AREA]), stretch.TINY) / length)
     across = 0.5 * (np.log(np.maximum(np.abs(cells[:, stretch.AREA]), stretch.TINY)) - cells[:, stretch.LENGTH])
     kept, wall = np.zeros(len(triangles), dtype=bool), np.zeros(len(row), dtype=bool)
-    for name in np.unique(piece[row]):
-        own, here = piece == name, piece[row] == name
-        along = here & aligned
+    loop = pieces(np.column_stack([one, two]), rim)[one]
+
+    def starts_at(some: Flags, own: Flags) -> bool:
+        """Is a piece a layer of the wall with some of the edges?"""
+        along = some & aligned
         if np.count_nonzero(along) < FEWEST:
-            continue
+            return False
         thin = float(np.median((np.log(length) - height)[along]))
         grown = float(np.median(cells[row[along], stretch.LENGTH]) - np.median(cells[own, stretch.LENGTH]))
         higher = np.median(across[own]) - np.median(across[row[along]]) >= HIGHER
@@ -114,13 +117,20 @@ def _at_walls(
         change = _change(height[along], one[along], two[along])
         varies = min(_spread(height[along]), _spread((np.log(length) - height)[along]))
         even = change <= EVEN and varies <= ALL_EVEN and np.count_nonzero(own) <= PART * of_all
-        most = lie >= OF_PIECE or (lie >= SOME and np.count_nonzero(along) >= OF_EDGES * np.count_nonzero(here))
+        most = lie >= OF_PIECE or (lie >= SOME and np.count_nonzero(along) >= OF_EDGES * np.count_nonzero(some))
         clear = thin >= CLEARLY_THIN and higher and grown >= (CLEARLY_GROWN if most else GROWN_BY_MUCH)
         rows = np.median(off[along]) >= OVER
         orderly = clear or (thin >= THIN and lie >= MOSTLY and ((higher and grown >= GROWN and rows) or even))
-        if orderly and change <= UNEVEN and (varies <= STEADY or grown >= GROWN_BY_MUCH):
+        return bool(orderly and change <= UNEVEN and (varies <= STEADY or grown >= GROWN_BY_MUCH))
+
+    for name in np.unique(piece[row]):
+        own, here = piece == name, piece[row] == name
+        loops = np.unique(loop[here])
+        walls = [here, *(here & (loop == each) for each in loops)] if len(loops) > 1 else [here]
+        found_at = next((some for some in walls if starts_at(some, own)), None)
+        if found_at is not None:
             kept |= own
-            wall |= along
+            wall |= found_at & aligned
     return kept, np.column_stack([one, two])[wall]
 
 
