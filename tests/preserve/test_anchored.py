@@ -110,6 +110,19 @@ def test_layers_of_walls_are_kept_whole(name):
     assert (at_walls.median, at_walls.largest) == (layers.median, layers.largest)
 
 
+@pytest.mark.parametrize("cells", ["quad", "triangle"])
+def test_only_what_lies_along_the_wall_is_a_layer_of_it(cells):
+    """Rows that grow until cells are stretched away from the body."""
+    mesh = rows_around(120, 15, 1e-2, 1.3, cells=cells)
+    _, at_walls, elsewhere = found(mesh)
+    row = np.arange(len(mesh.points)) // 120
+    last = row[at_walls.nodes].max()
+    assert 5 <= last <= 7
+    assert np.count_nonzero(at_walls.nodes) == 120 * (last + 1)
+    assert elsewhere
+    assert not (at_walls.cells & elsewhere.cells).any()
+
+
 def test_rows_have_nodes_over_nodes():
     """Both are thinner at their walls alike, but cells of one lie in no rows that anybody could have made."""
     assert found(squeezed(0.8, sheared_mesh(37, amplitude=0.0), everywhere=True))[1]

@@ -10,7 +10,7 @@ be many, thin, and
   of its edges on walls, and some of the piece, lie so, or
 - thinner, and most of the piece lies along the wall that is nearest, with nodes over nodes as rows have them, or
 - as even along the wall as rows of one height are made, where most of the piece lies along the wall, and the piece is
-  not the mesh.
+  not the mesh; or thinner by much, where only what lies along the wall is the layer.
 
 Unless the piece has grown by much, most of those at the wall have one height, or one ratio of length and height. Of a
 mesh that was sheared or squeezed they are thin by more here and by less there.
@@ -105,32 +105,37 @@ def _at_walls(
     kept, wall = np.zeros(len(triangles), dtype=bool), np.zeros(len(row), dtype=bool)
     loop = pieces(np.column_stack([one, two]), rim)[one]
 
-    def starts_at(some: Flags, own: Flags) -> bool:
-        """Is a piece a layer of the wall with some of the edges?"""
+    def starts_at(some: Flags, own: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Which cells of a piece are a layer of the wall with some of the edges: all, none, or those along the wall."""
         along = some & aligned
         if np.count_nonzero(along) < FEWEST:
-            return False
+            return own[:0]
         thin = float(np.median((np.log(length) - height)[along]))
         grown = float(np.median(cells[row[along], stretch.LENGTH]) - np.median(cells[own, stretch.LENGTH]))
         higher = np.median(across[own]) - np.median(across[row[along]]) >= HIGHER
-        lie = _along_nearest(triangles[own], points, cells[own], one[along], two[along])
+        lies = _along_nearest(triangles[own], points, cells[own], one[along], two[along])
+        lie = float(lies.mean())
         change = _change(height[along], one[along], two[along])
         varies = min(_spread(height[along]), _spread((np.log(length) - height)[along]))
-        even = change <= EVEN and varies <= ALL_EVEN and np.count_nonzero(own) <= PART * of_all
+        regular = change <= EVEN and varies <= ALL_EVEN
+        even = regular and len(own) <= PART * of_all
         most = lie >= OF_PIECE or (lie >= SOME and np.count_nonzero(along) >= OF_EDGES * np.count_nonzero(some))
         clear = thin >= CLEARLY_THIN and higher and grown >= (CLEARLY_GROWN if most else GROWN_BY_MUCH)
         rows = np.median(off[along]) >= OVER
         orderly = clear or (thin >= THIN and lie >= MOSTLY and ((higher and grown >= GROWN and rows) or even))
-        return bool(orderly and change <= UNEVEN and (varies <= STEADY or grown >= GROWN_BY_MUCH))
+        if orderly and change <= UNEVEN and (varies <= STEADY or grown >= GROWN_BY_MUCH):
+            return own
+        return own[lies] if regular and thin >= CLEARLY_THIN and higher and grown >= CLEARLY_GROWN else own[:0]
 
     for name in np.unique(piece[row]):
-        own, here = piece == name, piece[row] == name
+        own, here = np.flatnonzero(piece == name), piece[row] == name
         loops = np.unique(loop[here])
         walls = [here, *(here & (loop == each) for each in loops)] if len(loops) > 1 else [here]
-        found_at = next((some for some in walls if starts_at(some, own)), None)
-        if found_at is not None:
-            kept |= own
-            wall |= found_at & aligned
+        for some in walls:
+            layer = starts_at(some, own)
+            if len(layer):
+                kept[layer], wall = True, wall | (some & aligned)
+                break
     return kept, np.column_stack([one, two])[wall]
 
 
@@ -171,12 +176,12 @@ def _spread(values: Floats) -> float:
 
 def _along_nearest(
     triangles: NDArray[np.int32], points: Floats, cells: Floats, one: NDArray[np.int32], two: NDArray[np.int32]
-) -> float:
-    """The share of some cells that are stretched along the nearest edge of the wall, from ``one`` to ``two``."""
+) -> Flags:
+    """Which of some cells are stretched along the nearest edge of the wall, from ``one`` to ``two``."""
     from scipy.spatial import cKDTree  # it takes a tenth of a second to import
 
     _, nearest = cKDTree((points[one] + points[two]) / 2.0).query(points[triangles].mean(axis=1))
-    return float(_aligned(cells, points[two[nearest]] - points[one[nearest]]).mean())
+    return _aligned(cells, points[two[nearest]] - points[one[nearest]])
 
 
 def _aligned(cells: Floats, way: Floats) -> Flags:
