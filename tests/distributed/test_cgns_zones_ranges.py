@@ -11,23 +11,16 @@ import pytest
 import gmsnet
 from gmsnet.distributed.file_ranges import planned_format, read_ranges
 from gmsnet.distributed.gathered import gathered
-from gmsnet.generate import random_mesh, random_volume, recombine
-from gmsnet.io.cgns_elements import CGNS_ORDERS, KINDS
+from gmsnet.generate import random_mesh, random_volume
+from gmsnet.io.cgns_elements import CGNS_ORDERS
 from gmsnet.mesh.mesh import Mesh
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
-from distributed.test_cgns_ranges import in_one
+from distributed.test_cgns_ranges import CODES, MESHES, in_one
 from distributed.test_file_pieces import saved
-from distributed.test_file_ranges import assert_bytes_of_one_process, assert_read_alike, heard, mixed
+from distributed.test_file_ranges import assert_bytes_of_one_process, assert_read_alike, heard
 from support.comm import together
 
-CODES = {name: code for code, name in KINDS.items()}
-MESHES = {
-    "triangles": lambda: random_mesh(300, seed=1),
-    "quads and triangles": lambda: recombine(random_mesh(300, seed=3)),
-    "tetrahedra": lambda: random_volume(200, seed=1),
-    "all volumes": mixed,
-}
 GZIP = {"chunks": (19,), "compression": "gzip"}
 
 
