@@ -65,13 +65,6 @@ def expanded(points, mesh, c, unit, grain, work):
     return expand_solid(form, 1.0, delta, work)
 
 
-@part
-def judged(points, mesh, c, unit, grain, work):
-    """The sign of a cell: see validity3.sign_of_solid."""
-    bound = expanded(points, mesh, c, unit, grain, work)
-    return sign_of_solid(mesh.forms[mesh.kinds[c]], bound, DEPTH, work)
-
-
 @inlined
 def spokes3(points, mesh, c, s):
     """The spokes of a corner simplex of a cell, and the largest coordinate of its nodes."""
