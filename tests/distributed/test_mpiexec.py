@@ -24,6 +24,7 @@ LIMIT = 300  # seconds: ranks that wait for each other end then
 def mpiexec(ranks, *command, cwd):
     environment = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     environment |= {"PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe", "OMP_NUM_THREADS": "1"}
+    environment["OMPI_MCA_mpi_yield_when_idle"] = "1"  # ranks that wait leave the cores to other tests
     return subprocess.run(
         [MPIEXEC, "-n", str(ranks), sys.executable, *command],
         cwd=cwd, env=environment, timeout=LIMIT, capture_output=True, text=True,
