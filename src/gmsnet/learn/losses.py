@@ -2,7 +2,8 @@
 
 ring: (B × M × 2) neighbours counter-clockwise, padded; degree: (B,); position: (B × 2) of the free node, all in one
 frame. Each loss is the mean of one number over the n triangles of the star. None depends on the scale, and a position
-that is not a number has a loss that is none either.
+that is not a number has a loss that is none either. B may be several dimensions, which are broadcast: (B × 1 × M × 2),
+(B × 1) and (B × G × 2) are G positions in each star.
 """
 
 from __future__ import annotations
@@ -102,10 +103,10 @@ def _spokes(
     ring: torch.Tensor, degree: torch.Tensor, position: torch.Tensor
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Edges a, b (B × M × 2) from the free node to each neighbour and the next one, and what is not padding (B × M)."""
-    place = torch.arange(ring.shape[1])
-    last = (place == degree[:, None] - 1)[:, :, None]
-    following = torch.where(last, ring[:, :1], ring.roll(-1, dims=1))
-    return ring - position[:, None], following - position[:, None], place < degree[:, None]
+    place, free = torch.arange(ring.shape[-2]), position[..., None, :]
+    last = (place == degree[..., None] - 1)[..., None]
+    following = torch.where(last, ring[..., :1, :], ring.roll(-1, dims=-2))
+    return ring - free, following - free, place < degree[..., None]
 
 
 def _corners(a: torch.Tensor, b: torch.Tensor) -> tuple[tuple[torch.Tensor, torch.Tensor], ...]:
@@ -115,12 +116,13 @@ def _corners(a: torch.Tensor, b: torch.Tensor) -> tuple[tuple[torch.Tensor, torc
 
 def _squares(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
     """l² + m² + n² of the triangles (0, a, b)."""
-    return (a.square() + b.square() + (b - a).square()).sum(dim=2)
+    squares = a.square() + b.square() + (b - a).square()
+    return squares[..., 0] + squares[..., 1]
 
 
 def _mean(values: torch.Tensor, inside: torch.Tensor, degree: torch.Tensor) -> torch.Tensor:
     """The mean over the triangles of each star, (B × M) → (B,)."""
-    return torch.where(inside, values, 0.0).sum(dim=1) / degree
+    return torch.where(inside, values, 0.0).sum(dim=-1) / degree
 
 
 def _cross(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
@@ -128,7 +130,8 @@ def _cross(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
 
 
 def _dot(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-    return (a * b).sum(dim=2)
+    product = a * b
+    return product[..., 0] + product[..., 1]  # faster than sum(dim=-1)
 
 
 def _inverse_length(a: torch.Tensor) -> torch.Tensor:

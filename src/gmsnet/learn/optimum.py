@@ -29,10 +29,9 @@ def _search(ring: torch.Tensor, degree: torch.Tensor, loss: Loss) -> torch.Tenso
     for points in (WIDE, *[NARROW] * ROUNDS):
         axis = torch.linspace(-1.0, 1.0, points, dtype=ring.dtype)
         tried = middle[:, None] + half[:, None] * torch.cartesian_prod(axis, axis)  # (B × G × 2)
-        rings, degrees = (each.repeat_interleave(points**2, 0) for each in (ring, degree))
-        values = loss(rings, degrees, tried.reshape(-1, 2))
-        values[(doubled_areas(rings, degrees, tried.reshape(-1, 2)) <= 0).any(dim=1)] = torch.inf
-        found, at = values.reshape(len(ring), -1).min(dim=1)
+        values = loss(ring[:, None], degree[:, None], tried)
+        values[(doubled_areas(ring[:, None], degree[:, None], tried) <= 0).any(dim=-1)] = torch.inf
+        found, at = values.min(dim=1)
         best = torch.where((found < least)[:, None], tried[torch.arange(len(ring)), at], best)
         least = torch.minimum(found, least)
         middle, half = best, half * (3.0 / (points - 1))
