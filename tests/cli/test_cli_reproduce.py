@@ -117,35 +117,46 @@ def test_all_of_it_quickly(tmp_path, run):
     other_options_never_mix(quick, run)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("group", [False, True], ids=["SIGINT", "SIGTERM to all its processes"])
-def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path, run, group):
-    out = tmp_path / "out"
-    arguments = ["reproduce", "table3", "--quick", "--runs", "1", "--sweeps", "2", "--out", str(out)]
+def stopped(arguments, out, *, of_all):
+    """What there is of a run that a signal ends as soon as it has a training more; of_all: SIGTERM to all processes."""
+    before = set(out.glob("units/training/*/*.json"))
     process = subprocess.Popen(
         [sys.executable, "-m", "gmsnet", *arguments], stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     try:
         deadline = time.monotonic() + 300
-        while not list(out.glob("units/training/*/*.json")) and process.poll() is None and time.monotonic() < deadline:
+        while set(out.glob("units/training/*/*.json")) == before and process.poll() is None:
+            assert time.monotonic() < deadline
             time.sleep(0.05)
-        if group:
+        if of_all:
             os.killpg(process.pid, signal.SIGTERM)
         else:
             process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=120)
     finally:
         process.kill()
-    assert (process.returncode, said) == (
-        130, f"gmsnet: interrupted; {out} keeps what is done: the same command goes on with it\n"
-    )  # fmt: skip
-    there = {path: path.stat().st_mtime_ns for path in out.rglob("units/**/*.json")}
-    assert 0 < len(there) < 12
+    assert process.returncode == 130
+    assert said.endswith(f"gmsnet: interrupted; {out} keeps what is done: the same command goes on with it\n")
     assert not (out / "reproduction.html").exists()
+    return said, {path: path.stat().st_mtime_ns for path in out.rglob("units/**/*.json")}
+
+
+@pytest.mark.long
+def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path, run):
+    """Once by SIGTERM to all its processes, once by SIGINT, then to the end."""
+    out = tmp_path / "out"
+    arguments = ["reproduce", "table3", "--quick", "--runs", "1", "--sweeps", "2", "--out", str(out)]
+    said, first = stopped(arguments, out, of_all=True)
+    assert said.count("\n") == 1
+    said, second = stopped(arguments, out, of_all=False)
+    assert re.match(rf".*{len(first)} of 12 parts are there already; going on.*\n", said)
+    assert said.count("\n") == 2
+    assert 0 < len(first) < len(second) < 12
     done = run(*arguments)
     assert done.code == 0
-    assert re.search(rf"{len(there)} of 12 parts are there already; going on", done.err)
-    assert {path: path.stat().st_mtime_ns for path in there} == there
+    assert re.search(rf"{len(second)} of 12 parts are there already; going on", done.err)
+    for there in (first, second):
+        assert {path: path.stat().st_mtime_ns for path in there} == there
     document = json.loads((out / "reproduction.json").read_text())
     assert "table2" not in document
     assert document["table3"]["pipe"]["metric"]["trainings"] == 2

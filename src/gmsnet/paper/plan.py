@@ -45,12 +45,12 @@ class Plan:
     @property
     def epochs(self) -> int:
         """Of each training of the loss study."""
-        return 60 if self.quick else 1000
+        return 24 if self.quick else 1000
 
     @property
     def timed_nodes(self) -> int:
         """How many nodes of a case each method in plain Python is timed on."""
-        return 60 if self.quick else 600
+        return 30 if self.quick else 600
 
     @property
     def timed_sweeps(self) -> int:

@@ -20,6 +20,7 @@ from gmsnet.paper.units import Context
 from gmsnet.topology.topology import Topology
 
 EPOCHS = (1, 10)
+QUICK = 2  # meshes of each kind that are counted in a quick run, the smallest ones
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ def draw(context: Context) -> Drawn:
     meshes = data.meshes(0)
     first, second, _ = data.SPLIT
     kinds = {"training": meshes[:first], "test": meshes[first + second :]}
+    if context.plan.quick:
+        kinds = {kind: sorted(those, key=lambda each: len(each.points))[:QUICK] for kind, those in kinds.items()}
     snapshots = [Snapshot(f"after {n} epoch{'s' * (n > 1)}", _after(n, context.plan.seed)) for n in EPOCHS]
     snapshots.append(Snapshot("after the full training", GMSNet.from_tensors(weights.load().tensors)))
     figure = plot.new_figure(12.0, 16.5)
