@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from gmsnet.topology.topology import Topology
 WALL = "refined near a wall"
 
 
+@cache
 def plate(amount):
     """With a hole that it is refined towards, its free nodes thrown."""
     turn = np.linspace(0.0, 2.0 * np.pi, 150)

@@ -69,7 +69,8 @@ def labelled(mesh: Triangulation, markers: Sequence[str], *, scale: float = 1.0)
 
 def unique_edges(triangles: Ints) -> Ints:
     """(E × 2) each edge once, the smaller number first, in the order of the numbers."""
-    return np.unique(np.sort(_edges(triangles), axis=1), axis=0)
+    nodes = int(triangles.max(initial=0)) + 1
+    return np.column_stack(np.divmod(np.unique(_keys(_edges(triangles), nodes)), nodes))
 
 
 def _edges(triangles: Ints) -> Ints:
