@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from gmsnet.learn.backend import torch
 from gmsnet.learn.losses import Loss, doubled_areas, metric_loss
 
@@ -18,6 +20,18 @@ def optimal_position(ring: torch.Tensor, degree: torch.Tensor, loss: Loss = metr
     """
     chunks = range(0, len(ring), CHUNK)
     return torch.cat([_search(ring[k : k + CHUNK], degree[k : k + CHUNK], loss) for k in chunks])
+
+
+def least_mean(ring: torch.Tensor, degree: torch.Tensor, loss: Loss) -> float:
+    """The mean loss of all stars at these positions. Trainings from other seeds ask for it again: it is kept."""
+    return _least_mean(ring.numpy().tobytes(), ring.shape, degree.to(torch.int64).numpy().tobytes(), loss)
+
+
+@lru_cache(maxsize=4)
+def _least_mean(ring: bytes, shape: tuple[int, ...], degree: bytes, loss: Loss) -> float:
+    rings = torch.frombuffer(bytearray(ring), dtype=torch.float32).reshape(shape)
+    degrees = torch.frombuffer(bytearray(degree), dtype=torch.int64)
+    return float(loss(rings, degrees, optimal_position(rings, degrees, loss)).mean())
 
 
 def _search(ring: torch.Tensor, degree: torch.Tensor, loss: Loss) -> torch.Tensor:

@@ -12,7 +12,7 @@ from gmsnet.learn import data, dense
 from gmsnet.learn.backend import torch
 from gmsnet.learn.losses import LOSSES, Loss, metric_loss, truncation
 from gmsnet.learn.model import GMSNet
-from gmsnet.learn.optimum import optimal_position
+from gmsnet.learn.optimum import least_mean
 from gmsnet.learn.options import TrainOptions
 from gmsnet.learn.trainee import Trainee
 from gmsnet.mesh.mesh import Mesh
@@ -95,8 +95,7 @@ class GMSNetTrainee(Trainee):
                 marks[f"{name}_loss"] = float(batch.mean(self.loss, moved))
                 marks[f"{name}_metric_loss_before"] = float(batch.mean(metric_loss, still))
                 marks[f"{name}_metric_loss"] = float(batch.mean(metric_loss, moved))
-            best = optimal_position(self.validation.ring, self.validation.degree, self.loss)
-            marks["validation_loss_optimum"] = float(self.validation.mean(self.loss, best))
+            marks["validation_loss_optimum"] = least_mean(self.validation.ring, self.validation.degree, self.loss)
         return marks
 
     def tensors(self) -> dict[str, NDArray[np.float32]]:
