@@ -9,13 +9,19 @@ import pytest
 
 import gmsnet
 from gmsnet.cli.moves import joined
+from gmsnet.generate import moved_hole_mesh
 from gmsnet.io import write
 
 
+@pytest.fixture(scope="module")
+def plate_mesh():
+    return moved_hole_mesh(0.06, shift=0.0)
+
+
 @pytest.fixture
-def plate(tmp_path):
+def plate(tmp_path, plate_mesh):
     path = tmp_path / "plate.su2"
-    write(gmsnet.generate.moved_hole_mesh(0.06, shift=0.0), path)
+    write(plate_mesh, path)
     return path
 
 
