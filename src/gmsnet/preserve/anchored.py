@@ -15,6 +15,9 @@ be many, thin, and
 Unless the piece has grown by much, most of those at the wall have one height, or one ratio of length and height. Of a
 mesh that was sheared or squeezed they are thin by more here and by less there.
 
+Where heights change little along a wall, nobody has disturbed them. Then there must be rows over it (courses.py), and
+rows of which all have been made alike are layers whatever else is in their piece.
+
 Growth is told by the stretch of cells and by their height: where rows of one height go around a bend, only their length
 differs.
 """
@@ -31,6 +34,7 @@ from gmsnet.kernels.simplex import stretch
 from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL
 from gmsnet.kernels.topology.components import pieces
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.preserve.courses import FLAT, Courses, Walls
 from gmsnet.preserve.gaps import in_gaps
 from gmsnet.preserve.layers import Layers
 from gmsnet.preserve.survey import Survey
@@ -53,6 +57,7 @@ OVER = 0.35  # of an edge there, from its middle to where the third corner lies 
 PART, EVEN = 0.6, math.log(1.05)  # of a piece without growth: share of the mesh, change from cell to cell
 # Between most cells along a wall, of heights, or of ratios of length and height: rows that were made keep one of them.
 STEADY, ALL_EVEN = math.log(1.25), math.log(1.1)
+ORDERED = 0.5  # of the edges of a wall along which heights change by EVEN or less: a share that has rows over it
 UNEVEN = math.log(1.6)  # more from cell to cell is no row, but the slivers of a hull
 
 
@@ -69,7 +74,8 @@ def split(mesh: Mesh, topology: Topology, survey: Survey, layers: Layers) -> tup
     equal, points = np.ones(len(chosen), dtype=bool), planar_points(mesh)
     if of_cell is not None and topology.near_shapes is not None:
         equal = topology.near_shapes == EQUILATERAL
-    kept, wall = _at_walls(part, orientation[chosen], points, rim, len(chosen), equal[chosen])
+    courses = Courses.of(_edges(triangles, equal), points, _walls(topology, survey, points, rim))
+    kept, wall = _at_walls(part, orientation[chosen], points, rim, len(chosen), equal[chosen], courses.ordered)
     whole = np.zeros(len(chosen), dtype=bool)
     whole[np.flatnonzero(chosen)[kept]] = True
     first = np.ones(len(chosen), dtype=bool) if of_cell is None else np.append(True, np.diff(of_cell) != 0)
@@ -77,30 +83,55 @@ def split(mesh: Mesh, topology: Topology, survey: Survey, layers: Layers) -> tup
     nodes = np.zeros(len(layers.nodes), dtype=bool)
     nodes[part[kept]] = True
     gaps = in_gaps(triangles, orientation, equal, points, rim, nodes, points[wall].mean(axis=1)) if len(wall) else False
+    damaged = np.zeros(len(nodes), dtype=bool)
+    damaged[part] = True
+    damaged &= ~layers.nodes
+    rows = courses.whole(nodes) & ~damaged
+    at_walls |= _all_of(np.asarray(rows[triangles].all(axis=1)), first)
+    nodes |= rows
     return (
-        replace(layers, nodes=layers.nodes & nodes | gaps, cells=at_walls),
+        replace(layers, nodes=layers.nodes & nodes | gaps | rows, cells=at_walls),
         replace(layers, nodes=layers.nodes & ~nodes, cells=layers.cells & ~at_walls, damaged=0),
     )
 
 
+def _all_of(simplices: Flags, first: Flags) -> Flags:
+    """The cells (C,) all of whose simplices (S,) are chosen. first: (S,) the first simplex of each cell."""
+    return np.asarray(np.logical_and.reduceat(simplices, np.flatnonzero(first)))
+
+
+def _edges(triangles: NDArray[np.int32], equal: Flags) -> NDArray[np.int32]:
+    """(E, 2) of all cells; those between corners of quads that are no edge are left out."""
+    return np.concatenate([triangles[:, [0, 1]], triangles[:, [0, 2]], triangles[equal][:, [1, 2]]])
+
+
+def _walls(topology: Topology, survey: Survey, points: Floats, rim: Flags) -> Walls:
+    """All edges of cells on walls."""
+    beside = np.flatnonzero(np.count_nonzero((survey.rim > 0)[topology.near], axis=1) >= 2)
+    corners, shapes = topology.memory[topology.near[beside]], topology.near_shapes
+    equal = np.ones(len(corners), dtype=bool) if shapes is None else shapes[beside] == EQUILATERAL
+    cells = np.empty((len(corners), stretch.COLUMNS))
+    stretch.per_cell(points, corners, topology.near_orientation[beside], math.inf, cells)
+    _, length, height, aligned, one, two, _ = _on_walls(corners, points, rim, cells, equal)
+    return Walls(np.column_stack([one, two]), height, aligned & (np.log(length) - height >= FLAT))
+
+
 def _at_walls(
-    triangles: NDArray[np.int32], orientation: NDArray[np.int8], points: Floats, rim: Flags, of_all: int, equal: Flags
-) -> tuple[Flags, NDArray[np.int32]]:
+    triangles: NDArray[np.int32], orientation: NDArray[np.int8], points: Floats, rim: Flags, of_all: int, equal: Flags,
+    ordered: Flags,
+) -> tuple[Flags, NDArray[np.int32]]:  # fmt: skip
     """Which simplices (S, 3), all of them stretched alike with their neighbours, belong to layers of a wall; its edges.
 
     points: (N, 2). rim: (N,) which nodes are on boundaries or interfaces. of_all: how many the mesh has. equal: (S,)
-    which are triangles, the others are corners of quads, 0 the corner itself.
+    which are triangles, the others are corners of quads, 0 the corner itself. ordered: (N,) nodes of walls with rows
+    over them.
     """
     cells = np.empty((len(triangles), stretch.COLUMNS))
     stretch.per_cell(points, triangles, orientation, math.inf, cells)
     inside = np.zeros(len(points), dtype=bool)
     inside[triangles] = True
     piece = pieces(triangles, inside)[triangles[:, 0]]
-    every = np.ones(len(triangles), dtype=bool)
-    edges = ((0, 1, every), (0, 2, every), (1, 2, equal))  # of a quad, those of its corner
-    found = [_edges_on(triangles, points, rim, cells, *each) for each in edges]
-    row, length, aligned, one, two, off = (np.concatenate(each) for each in zip(*found, strict=True))
-    height = np.log(np.maximum(np.abs(cells[row, stretch.AREA]), stretch.TINY) / length)
+    row, length, height, aligned, one, two, off = _on_walls(triangles, points, rim, cells, equal)
     across = 0.5 * (np.log(np.maximum(np.abs(cells[:, stretch.AREA]), stretch.TINY)) - cells[:, stretch.LENGTH])
     kept, wall = np.zeros(len(triangles), dtype=bool), np.zeros(len(row), dtype=bool)
     loop = pieces(np.column_stack([one, two]), rim)[one]
@@ -119,6 +150,8 @@ def _at_walls(
         varies = min(_spread(height[along]), _spread((np.log(length) - height)[along]))
         regular = change <= EVEN and varies <= ALL_EVEN
         even = regular and len(own) <= PART * of_all
+        if change <= EVEN and ordered[one[along]].mean() < ORDERED:
+            return own[:0]
         most = lie >= OF_PIECE or (lie >= SOME and np.count_nonzero(along) >= OF_EDGES * np.count_nonzero(some))
         clear = thin >= CLEARLY_THIN and higher and grown >= (CLEARLY_GROWN if most else GROWN_BY_MUCH)
         rows = np.median(off[along]) >= OVER
@@ -139,22 +172,27 @@ def _at_walls(
     return kept, np.column_stack([one, two])[wall]
 
 
-def _edges_on(
-    triangles: NDArray[np.int32], points: Floats, rim: Flags, cells: Floats, a: int, b: int, some: Flags
-) -> tuple[NDArray[np.intp], Floats, Flags, NDArray[np.int32], NDArray[np.int32], Floats]:
-    """Of the edges ab of some simplices with both ends on the rim: the row, the length, whether the cell is stretched
-    along, the ends; and how far from the middle the third corner lies along the edge, in lengths: 0.5 over an end.
+def _on_walls(
+    triangles: NDArray[np.int32], points: Floats, rim: Flags, cells: Floats, equal: Flags
+) -> tuple[NDArray[np.intp], Floats, Floats, Flags, NDArray[np.int32], NDArray[np.int32], Floats]:
+    """Of the edges of some simplices with both ends on the rim: the row, the length, the logarithm of the height over
+    it, whether the cell is stretched along, the ends; and how far from the middle the third corner lies along the edge,
+    in lengths: 0.5 over an end.
 
-    some: (S,) bool.
+    equal: (S,) which are triangles; of the corner of a quad, only its own edges count.
     """
-    one, two = triangles[:, a], triangles[:, b]
-    row = np.flatnonzero(rim[one] & rim[two] & some)
-    one, two = one[row], two[row]
+    edges = ((0, 1, np.ones(len(triangles), dtype=bool)), (0, 2, np.ones(len(triangles), dtype=bool)), (1, 2, equal))
+    found = []
+    for a, b, some in edges:
+        row = np.flatnonzero(rim[triangles[:, a]] & rim[triangles[:, b]] & some)
+        found.append((row, triangles[row, a], triangles[row, b], triangles[row, 3 - a - b]))
+    row, one, two, third = (np.concatenate(each) for each in zip(*found, strict=True))
     way = points[two] - points[one]
     length = np.hypot(way[:, 0], way[:, 1])
     aligned, length = _aligned(cells[row], way), np.maximum(length, stretch.TINY)
-    share = ((points[triangles[row, 3 - a - b]] - points[one]) * way).sum(axis=1) / length**2
-    return row, length, aligned, one, two, np.abs(share - 0.5)
+    height = np.log(np.maximum(np.abs(cells[row, stretch.AREA]), stretch.TINY) / length)
+    share = ((points[third] - points[one]) * way).sum(axis=1) / length**2
+    return row, length, height, aligned, one, two, np.abs(share - 0.5)
 
 
 def _change(height: Floats, one: NDArray[np.int32], two: NDArray[np.int32]) -> float:

@@ -1,0 +1,103 @@
+"""Rows of nodes over walls: layers of low aspect, around sharp tails, and of meshes that are all layers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.layer_meshes import grid, made
+
+import gmsnet
+from gmsnet.generate import disturb
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.preserve.protection import LAYER
+from gmsnet.topology.topology import Topology
+
+
+def airfoil(cells, around=80, aspect=4.0, growth=1.15, thickness=0.2, rows=30):
+    """An O-grid of one height in each row around a NACA airfoil with a sharp tail, and its nodes row by row.
+
+    Nodes are so close together at the tail and at the nose that cells there are as thick as long.
+    """
+    x = 0.5 + 0.5 * np.cos(np.linspace(0.0, np.pi, around // 2 + 1))
+    y = np.polynomial.Polynomial([0.0, -0.126, -0.3516, 0.2843, -0.1036])(x) + 0.2969 * np.sqrt(x)
+    upper = np.column_stack([x, 5.0 * thickness * y])
+    loop = np.vstack([upper, (upper * (1.0, -1.0))[-2:0:-1]])
+    along = np.roll(loop, -1, axis=0) - np.roll(loop, 1, axis=0)
+    normal = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
+    width = np.hypot(*(np.roll(loop, -1, axis=0) - loop).T).mean()
+    height = np.append(0.0, np.cumsum(width / aspect * growth ** np.arange(rows)))[:, None, None]
+    turn = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
+    circle = [0.5, 0.0] + height[-1] * np.column_stack([np.cos(turn), np.sin(turn)])
+    share = height / height[-1]
+    points = (1.0 - share) ** 2 * (loop + height * normal)
+    points = points + (1.0 - (1.0 - share) ** 2) * (share * circle + (1.0 - share) * (loop + height * normal))
+    node = np.arange((rows + 1) * around).reshape(rows + 1, around)
+    a, b, d, c = node[:-1], np.roll(node[:-1], -1, axis=1), node[1:], np.roll(node[1:], -1, axis=1)
+    return made(points.reshape(-1, 2), np.stack((a, d, c, b), axis=-1).reshape(-1, 4), cells), node
+
+
+def plate(cells, aspect, growth, rows, columns):
+    """Rectangles over a wall from one end of the mesh to the other, and the nodes row by row."""
+    y = np.append(0.0, np.cumsum(growth ** np.arange(rows) / columns / aspect))
+    x = np.linspace(0.0, 1.0, columns + 1)
+    node = np.arange(len(x) * len(y)).reshape(len(y), len(x))
+    if cells == "triangle":
+        return grid(x, y, alternate=True), node
+    quads = np.stack((node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]), axis=-1)
+    return made(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2), quads.reshape(-1, 4), cells), node
+
+
+def are_kept(mesh, node, rows):
+    """Are all nodes of so many rows over the wall held?"""
+    result = gmsnet.smooth(mesh)
+    free = np.zeros(len(mesh.points), dtype=bool)
+    free[Topology.of(mesh).free] = True
+    first = node[1 : rows + 1]
+    return np.isin(first[free[first]], result.held[LAYER]).all()
+
+
+@pytest.mark.parametrize("cells", ["quad", "triangle"])
+def test_rows_go_around_a_sharp_tail_and_a_nose(cells):
+    mesh, node = airfoil(cells)
+    assert are_kept(mesh, node, 7)
+    assert are_kept(disturb(mesh, node[14:-1].ravel(), 0.4, seed=3, edge="shortest"), node, 7)
+
+
+@pytest.mark.parametrize("cells", ["quad", "triangle"])
+def test_layers_of_low_aspect_that_are_all_of_the_mesh(cells):
+    """Cells grow until they are as high as wide, and stretched the other way."""
+    mesh, node = plate(cells, 5.0, 1.1, 30, 60)
+    assert are_kept(mesh, node, 9)
+    mesh, node = plate(cells, 4.0, 1.15, 20, 80)
+    assert are_kept(mesh, node, 4)
+
+
+@pytest.mark.parametrize("cells", ["quad", "triangle"])
+def test_layers_on_both_sides_of_an_interface(cells):
+    mesh, node = plate(cells, 60.0, 1.25, 20, 60)
+    points = np.concatenate([mesh.points[node[:0:-1].ravel()] * (1.0, -1.0), mesh.points])
+    both = np.arange(len(points)).reshape(-1, node.shape[1])
+    quads = np.stack((both[:-1, :-1], both[:-1, 1:], both[1:, 1:], both[1:, :-1]), axis=-1).reshape(-1, 4)
+    mesh = made(points, quads, cells)
+    (block,) = mesh.cells
+    regions = (points[block.nodes].mean(axis=1)[:, 1] > 0.0).astype(int)
+    mesh = Mesh(points, (CellBlock(block.kind, block.nodes, regions),))
+    assert are_kept(mesh, both[20:], 15)
+    assert are_kept(mesh, both[20::-1], 15)
+
+
+@pytest.mark.parametrize("cells", ["quad", "triangle"])
+def test_layers_that_are_thicker_downstream(cells):
+    """As laminar boundary layers are: all rows grow by one factor, from a height that differs along the wall."""
+    mesh, node = plate(cells, 50.0, 1.2, 25, 80)
+    x, y = mesh.points.T
+    assert are_kept(mesh.with_points(np.column_stack([x, y * np.sqrt(x + 0.05)])), node, 15)
+
+
+def test_rows_that_do_not_grow_alike_are_smoothed():
+    """Pressed towards the wall, by more at one end of it than at the other."""
+    mesh, _ = plate("quad", 1.5, 1.0, 30, 30)
+    x, y = mesh.points[:, 0], mesh.points[:, 1] / mesh.points[:, 1].max()
+    pressed = mesh.with_points(np.column_stack([x, 0.7 * y ** (1.05 + x)]))
+    assert LAYER not in gmsnet.smooth(pressed).held
