@@ -61,6 +61,8 @@ NO_LAYERS = {
     "sheared along a part of a wall": lambda: sheared_mesh(49, 89, amplitude=0.709, waves=0.83),
     "sheared along a part of a short wall": lambda: sheared_mesh(24, 48, amplitude=0.803, waves=0.65),
     "sheared along parts of walls": lambda: sheared_mesh(34, 71, amplitude=0.831, waves=1.17),
+    "sheared along a side": lambda: sheared_mesh(27, 56, amplitude=0.87, waves=0.73),
+    "sheared in columns of one width": lambda: sheared_mesh(29, 60, amplitude=0.771, waves=0.32),
     "sheared by a third of a wave": lambda: sheared_mesh(84, 47, amplitude=0.92, waves=0.34),
     "sheared and long": lambda: sheared_mesh(76, 50, amplitude=0.5, waves=0.3),
     "sheared by a fine grid": lambda: sheared_mesh(150, 210, amplitude=0.9, waves=0.6),

@@ -28,7 +28,8 @@ FLAT, STILL_FLAT = (
 )  # the length over the height: of a cell at a wall; of a row's, in the median
 FEWEST = 12  # nodes of a row
 REGULAR = 1.1  # times as many nodes as the first row has, at most, and as the least
-ROWS = 3
+ROWS, FLAT_ROWS = 3, 2
+MOST = 0.6  # of the nodes of a mesh
 THIN, GROWN = math.log(2.5), math.log(1.25)  # of the first row, how flat; of the last one, over the first, how high
 ALIKE = 0.15  # between the growth of most nodes of a row (in logarithms): the median over the rows
 STEADY = math.log(1.25)  # between most heights, or most ratios of length and height, of the first row
@@ -83,8 +84,16 @@ class Courses(NamedTuple):
 
     @property
     def ordered(self) -> Flags:
-        """(N,) the nodes of walls over which there are ROWS or more, of which the first is flat."""
-        return np.isin(self.label, [w for w, rows in self.rows.items() if len(rows) >= ROWS and _last(rows)])
+        """(N,) the nodes of walls over which there are ROWS or more, of which the first ones are flat.
+
+        Not if rows of one height are most of the mesh: those of a grid.
+        """
+        some = {wall: rows for wall, rows in self.rows.items() if len(rows) >= ROWS and _last(rows) >= FLAT_ROWS}
+        plain = {
+            wall: sum(len(row.nodes) for row in rows) for wall, rows in some.items() if _height_spans(rows) < GROWN
+        }
+        grid = sum(plain.values()) >= MOST * len(self.points)
+        return np.isin(self.label, [wall for wall in some if not (grid and wall in plain)])
 
     def whole(self, inside: Flags) -> Flags:
         """(N,) the nodes of rows that are layers, or of which most are inside of one; of their walls as well."""
@@ -130,6 +139,11 @@ def _are_layers(rows: list[Course]) -> bool:
     ):
         return steady <= UNSTEADY
     return alike <= ALIKE and grown >= GROWN and steady <= STEADY
+
+
+def _height_spans(rows: list[Course]) -> float:
+    """From the lowest row to the highest one."""
+    return float(np.ptp([np.median(row.height) for row in rows]))
 
 
 def _last(rows: list[Course]) -> int:
