@@ -9,6 +9,11 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+# Before NumPy is imported: where processes share the cores, threads of linear algebra wait for each other, and small
+# matrices take fifty times as long.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
 # The first example may compile kernels: no deadline. Plain runs draw the same examples each time, so that a change
 # is judged by what it changes; GMSNET_RANDOM_EXAMPLES=1 draws new ones.
 settings.register_profile("gmsnet", deadline=None, derandomize=not os.environ.get("GMSNET_RANDOM_EXAMPLES"))

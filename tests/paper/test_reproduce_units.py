@@ -99,7 +99,9 @@ def test_a_process_that_is_killed_is_told_plainly(store):
     assert not store.holds("dies")
 
 
-def test_processes_use_one_thread(store):
+def test_processes_use_one_thread(store, monkeypatch):
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        monkeypatch.setenv(name, "2")
     assert do([Batch("first", [Unit("threads", work.threads)])], store)[0]
     assert store.load("threads") == {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
