@@ -46,7 +46,8 @@ def same(mesh, options, parts, ranks, fixed=None):
         mesh, options.method, guard=options.guard, max_sweeps=options.max_sweeps, preserve=options.preserve,
         variant=options.variant, objective=options.objective, threads=1, fixed=fixed,
         target_quality=options.target_quality, target_angle=options.target_angle,
-        target_dihedral=options.target_dihedral,
+        target_dihedral=options.target_dihedral, slide=options.slide, feature_angle=options.feature_angle,
+        surface_tolerance=options.surface_tolerance, hausdorff=options.hausdorff,
     )  # fmt: skip
     points, results = spread(mesh, options, parts, ranks, fixed)
     assert points.tobytes() == serial.points.tobytes()
@@ -76,8 +77,8 @@ def nodes_lent(monkeypatch, module, name):
 
 
 def _of_stages(notes):
-    """What is said of inverted cells and of walls."""
-    return [note for note in notes if note.startswith(("untangling", "the mesh is refined"))]
+    """What is said of inverted cells, of walls and of nodes that slide."""
+    return [note for note in notes if note.startswith(("untangling", "the mesh is refined", "slide:", "surface:"))]
 
 
 def _figures(result):

@@ -13,11 +13,19 @@ from gmsnet.constraints.constraints import constraint_of
 from gmsnet.constraints.features import Curves, curves_of
 from gmsnet.constraints.geometry import Geometry
 from gmsnet.kernels.star.constraint import Constraint
+from gmsnet.kernels.star.surface import Surface
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import planar_points
 
 Flags = NDArray[np.bool_]
 REASON = "node of a curve that slides"  # why such nodes stand still while cells are untangled
+
+
+@dataclass(frozen=True, eq=False)
+class Rails:
+    """What nodes slide on, for kernels alone: what that changes is told elsewhere."""
+
+    constraint: Constraint | Surface
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from gmsnet.distributed.library import mpi
 from gmsnet.distributed.loan import SHARE, Loan, around, read_alike
 from gmsnet.distributed.numbering import NO_NUMBERS, Numbers
 from gmsnet.distributed.part import Part
+from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.methods.base import Field
 from gmsnet.parallel.executor import Executor, Figure, Figures, Result
 from gmsnet.parallel.threads import serial
@@ -53,9 +54,9 @@ class Ranks:
 
     def after_colour(self, colour: int, points: Floats) -> None:
         """See Executor."""
-        topology = self.part.topology
+        topology, rail = self.part.topology, self.part.rail
         if not isinstance(topology, MixedVolume):
-            self.halo.after(colour, points)
+            self.halo.after(colour, points, rail.parameter if isinstance(rail, Constraint) else None)
             return
         others = self.halo.of_others(colour)
         before = points[others, :3]

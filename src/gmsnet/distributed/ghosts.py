@@ -17,6 +17,8 @@ from gmsnet.distributed.agreement import agreed, raise_everywhere
 from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.piece import Cells, Ids, Piece
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -55,6 +57,12 @@ class Surrounded:
         first = np.cumsum([0, *self.sizes])[:-1]
         numbers = [low + block.numbers for low, block in zip(first, self.blocks, strict=True)]
         return np.concatenate([*numbers, np.empty(0, dtype=np.int64)])
+
+    def mesh(self, single: bool) -> Mesh:
+        """All of it, nodes by ascending ids."""
+        ids = self.nodes.ids
+        cells = [CellBlock(block.kind, np.searchsorted(ids, block.nodes), block.regions) for block in self.blocks]
+        return Mesh(self.nodes.points, tuple(cells), single=single)
 
     def halo(self, comm: Any, places: NDArray[Any]) -> Halo:
         """Of all nodes that are here and elsewhere. places: (n,) of each in memory."""

@@ -83,6 +83,7 @@ class Halo:
         self.graph = comm.Create_dist_graph_adjacent(self.neighbours, self.neighbours)
         self.whole = Messages(self.graph, self.give, self.take, 1)
         self.by_colour: list[Messages] = []
+        self.rows_by_colour: list[Messages] = []
         self.messages = self.bytes = 0
 
     def coloured(self, colours: NDArray[np.int32], count: int, columns: int) -> None:
@@ -93,14 +94,27 @@ class Halo:
             )  # fmt: skip
             self.by_colour.append(Messages(self.graph, give, take, columns))
 
+    def sliding(self, colours: NDArray[np.int32], count: int, row: NDArray[np.int32]) -> None:
+        """Likewise for a number of each node that has a row (n,), where −1 is none."""
+        for colour in range(count):
+            give, take = (
+                [row[places[(colours[places] == colour) & (row[places] >= 0)]] for places in each]
+                for each in (self.give, self.take)
+            )
+            self.rows_by_colour.append(Messages(self.graph, give, take, 1))
+
     def of_others(self, colour: int) -> Places:
         """The places of the nodes that come after a colour."""
         return self.by_colour[colour].into
 
-    def after(self, colour: int, points: Floats) -> None:
-        """The nodes of a colour are where they will be."""
-        messages = self.by_colour[colour]
-        messages.exchange(points)
+    def after(self, colour: int, points: Floats, along: Floats | None = None) -> None:
+        """The nodes of a colour are where they will be. along: (R,) the numbers of those that slide."""
+        self._send(self.by_colour[colour], points)
+        if along is not None:
+            self._send(self.rows_by_colour[colour], along.reshape(-1, 1))
+
+    def _send(self, messages: Messages, values: Floats) -> None:
+        messages.exchange(values)
         self.messages += messages.messages
         self.bytes += messages.bytes
 
@@ -112,6 +126,6 @@ class Halo:
 
     def free(self) -> None:
         """Gives back what MPI keeps."""
-        for messages in (self.whole, *self.by_colour):
+        for messages in (self.whole, *self.by_colour, *self.rows_by_colour):
             messages.free()
         self.graph.Free()

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.distributed.part import Known, Part
+from gmsnet.distributed.along import Rail, put_on, where_on
+from gmsnet.distributed.part import Known, Part, connected
 from gmsnet.distributed.piece import Ids
 from gmsnet.distributed.winding import Winding
-from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.base import Field
@@ -33,7 +33,8 @@ SHARE = 0.5  # of the free nodes: where they would be more, all cells are gather
 class Parcel(NamedTuple):
     """Nodes and cells of one rank. ids: (n,). places: (n, dim) in the input, by which they are ordered. points: as they
     are, (n, 2), of volumes (n, 4). moves: (n,) bool, which are free. starred: (n,) bool, which have a star in the whole
-    mesh. colours: (n,). cells: for each block, nodes by their ids and the numbers of cells.
+    mesh. colours: (n,). where: (n,) on the rail, of those that slide. cells: for each block, of those that are
+    meant the nodes by their ids, the numbers and the regions.
     """
 
     ids: Ids
@@ -42,7 +43,8 @@ class Parcel(NamedTuple):
     moves: Flags
     starred: Flags
     colours: NDArray[np.int32]
-    cells: list[tuple[Ids, Ids]]
+    where: Floats
+    cells: list[tuple[Ids, Ids, Ids]]
 
 
 class Loan(NamedTuple):
@@ -104,6 +106,19 @@ class Loan(NamedTuple):
         points[self._places(part)] = part.comm.scatter(parcels)
         for axis in range(points.shape[1]):  # to those, too, that have sent no cell of a node
             points[:, axis] = part.halo.spread(points[:, axis])
+        if part.rail is not None:
+            self._slid_back(part, part.rail)
+
+    def _slid_back(self, part: Part, rail: Rail) -> None:
+        """So do the places on the rail."""
+        parcels: list[Floats] | None = None
+        if self.field is not None and self.all is not None and self.sent is not None:
+            assert self.field.constraint is not None
+            now = where_on(self.field.constraint)[self.field.topology.places]
+            parcels = [now[np.searchsorted(self.all, ids)] for ids in self.sent]
+        now = where_on(rail)
+        now[self._places(part)] = part.comm.scatter(parcels)
+        put_on(rail, part.halo.spread(now))
 
 
 def gathered_field(part: Part, field: Field, active: Flags | None) -> Loan:
@@ -120,25 +135,34 @@ def gathered_field(part: Part, field: Field, active: Flags | None) -> Loan:
     moves = np.zeros(len(ids), dtype=bool)
     for each in came:
         moves[np.searchsorted(ids, each.ids[each.moves])] = True
-    blocks = []
+    blocks, all_numbers = [], [ids[:0]]
+    starts = np.cumsum([0, *part.around.sizes])
     for kind, cells in zip(_faces(part), zip(*(each.cells for each in came), strict=True), strict=True):
-        nodes, numbers = (np.concatenate(each) for each in zip(*cells, strict=True))
+        nodes, numbers, regions = (np.concatenate(each) for each in zip(*cells, strict=True))
         _, once = np.unique(numbers, return_index=True)
+        all_numbers.append(starts[kind[0]] + numbers[once])
         nodes = np.searchsorted(ids, nodes[once])
-        blocks.append(CellBlock(kind[1], nodes, np.zeros(len(nodes), dtype=np.int64)))
+        blocks.append(CellBlock(kind[1], nodes, regions[once]))
     whole = part.mesh
     assert whole.box is not None
     mesh = Mesh(places, tuple(blocks), single=whole.single).as_part(
         whole.plane, whole.kinds_there, whole.exponent, whole.box
     )
-    topology = connectivity_of(mesh, ~moves)
+    topology = connected(mesh, ~moves, ids, np.concatenate(all_numbers), part.along)
     starred, colours = (
         np.concatenate([each[k] for each in came])[first][topology.memory] for k in (4, 5)
     )  # fmt: skip
     known = topology.colouring
     colouring = Known(known.places, known.start, known.ring, colours, fewest=part.topology.colouring.fewest)
     topology, points = replace(topology, colouring=colouring, starred=starred), points[topology.memory]
-    return Loan(parcel.ids, Field(points, topology, field.precision, field.level), ids, [each.ids for each in came])
+    rail = None if part.along is None else part.along.at(topology, ids, moves[topology.memory])
+    if rail is not None:
+        where = np.concatenate([each.where for each in came])[first]
+        for each in came:  # who moves a node knows where it is
+            where[np.searchsorted(ids, each.ids[each.moves])] = each.where[each.moves]
+        put_on(rail, where[topology.memory])
+    lent = Field(points, topology, field.precision, field.level, constraint=rail)
+    return Loan(parcel.ids, lent, ids, [each.ids for each in came])
 
 
 def read_alike(part: Part, field: Field, active: Flags | None) -> Loan:
@@ -169,10 +193,11 @@ def _parcel(part: Part, field: Field, active: Flags | None) -> Parcel:
         block, nodes = part.around.blocks[k], part.mesh.cells[k].nodes
         chosen = part.around.own[k] if active is None else moves[nodes].any(axis=1)
         used[nodes[chosen]] = True
-        cells.append((block.nodes[chosen], block.numbers[chosen]))
+        cells.append((block.nodes[chosen], block.numbers[chosen], block.regions[chosen]))
     near = topology.places[np.flatnonzero(used)]
     starred, colours = part.halo.spread(topology.near_ringed)[near], topology.colouring.colours[near]
-    return Parcel(ids[used], part.mesh.points[used], field.points[near], moves[used], starred, colours, cells)
+    where = np.zeros(len(near)) if part.rail is None else where_on(part.rail)[near]
+    return Parcel(ids[used], part.mesh.points[used], field.points[near], moves[used], starred, colours, where, cells)
 
 
 def around(part: Part, topology: Topology | Volume, chosen: Flags, rings: int) -> Flags:

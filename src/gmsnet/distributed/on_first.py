@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.agreement import raise_everywhere
+from gmsnet.distributed.along import Along
 from gmsnet.distributed.gathered import Whole, brought, gathered, scattered
+from gmsnet.distributed.part import connected
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.result import RankResult
 from gmsnet.errors import GmsnetError
-from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.banded import Kept
@@ -43,7 +44,8 @@ class Intent(NamedTuple):
 
 
 def intent_of(
-    piece: Piece, options: SmoothOptions, comm: Any, known: Whole | None, mended: Floats | None, *, firm: bool
+    piece: Piece, options: SmoothOptions, comm: Any, known: Whole | None, mended: Floats | None, along: Along | None, *,
+    firm: bool,
 ) -> Intent:  # fmt: skip
     """What is there on purpose, told by the first rank of the whole mesh. known: see ``gathered``.
 
@@ -53,7 +55,8 @@ def intent_of(
     whole, layers, kept, told = gathered(piece, comm, known), None, None, None
     now = None if mended is None else brought(whole, mended, piece, comm)
     if whole is not None:
-        topology = connectivity_of(whole.mesh, whole.fixed)
+        cells = np.arange(sum(len(block.nodes) for block in whole.mesh.cells))
+        topology = connected(whole.mesh, whole.fixed, whole.ids, cells, along)
         near = near_points(whole.mesh, topology) if now is None else now[topology.memory]
         if isinstance(topology, Volume):
             found = protected_volume(topology, options.preserved, options.fix_layers, near, firm=firm)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.distributed.frame import framed
+from gmsnet.distributed.along import Along, Rail
 from gmsnet.distributed.ghosts import Surrounded, owners_beside
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.library import mpi
@@ -22,17 +22,19 @@ from gmsnet.distributed.winding import Winding
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
+from gmsnet.kernels.star.constraint import Constraint
+from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.kernels.topology.layout import morton_codes
 from gmsnet.kernels.topology.ready import colour_ready
-from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.topology.mixed_volume import volume_of, wound_of
 from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.stars import Colouring, Ints
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
+Rows = Simplices | Tetrahedra | ShellSimplices
 Flags = NDArray[np.bool_]
 Ids = NDArray[np.int64]
 
@@ -56,7 +58,8 @@ class Part:
     mesh: its cells, and those around. topology: with the nodes free that it moves. points: in memory order. codes: (n,)
     places on the curve, in memory order. moves: (n,) by places in memory, the nodes that this rank has to move or hold.
     own_rows: of ``topology.simplices``, those of its own cells: each cell is one rank's.
-    forth: the cells of the whole mesh are read forwards.
+    forth: the cells of the whole mesh are read forwards. along: what nodes of the mesh slide on, if any do or it is a
+    surface in space; rail: the same, and where these nodes are on it.
     """
 
     comm: Any
@@ -69,29 +72,36 @@ class Part:
     moves: Flags
     own_rows: Ints
     forth: bool
+    along: Along | None = None
+    rail: Rail | None = None
 
     @classmethod
-    def of(cls, around: Surrounded, comm: Any, single: bool) -> Part:
-        """Of what a rank has and what lies around."""
+    def of(cls, around: Surrounded, mesh: Mesh, comm: Any, along: Along | None) -> Part:
+        """Of what a rank has and what lies around, ``mesh`` as a part of the mesh of all."""
         ids = around.nodes.ids
-        cells = [CellBlock(block.kind, np.searchsorted(ids, block.nodes), block.regions) for block in around.blocks]
-        mesh = framed(comm, Mesh(around.nodes.points, tuple(cells), single=single))
         moves = around.nodes.owner == comm.rank
         held = around.nodes.fixed | ~moves
-        topology = volume_of(wound_of(mesh, held)) if mesh.has_volumes else Topology.of(mesh, held)
+        topology = connected(mesh, held, ids, around.numbers, along)
         near = taken(planar_points(mesh) if mesh.plane else space_points(mesh), topology.memory)
         halo = around.halo(comm, topology.places)
         topology = _coloured(comm, topology, halo)
+        if along is not None:
+            topology = along.holding_others(topology, ids)
+        rail = None if along is None else along.at(topology, ids, moves[topology.memory])
+        if isinstance(rail, Constraint):
+            halo.sliding(topology.colouring.colours, topology.colouring.fewest, rail.row)
         codes = np.empty(len(near), dtype=np.int64)
         morton_codes(near, mesh.box, codes)
         own = np.concatenate([*around.own, np.empty(0, dtype=bool)])
         rows = np.arange(len(topology.simplices.rows), dtype=np.int32)
         own_rows = rows[own[topology.cells_of(rows.astype(np.intp))]]
         forth = bool(comm.allreduce(bool(Winding.of(topology).forth), mpi().LOR))
-        return cls(comm, around, mesh, topology, near, halo, codes, moves[topology.memory], own_rows, forth)
+        return cls(
+            comm, around, mesh, topology, near, halo, codes, moves[topology.memory], own_rows, forth, along, rail
+        )  # fmt: skip
 
     @property
-    def simplices(self) -> Simplices | Tetrahedra:
+    def simplices(self) -> Rows:
         """Those of its own cells."""
         return self.topology.simplices.take(self.own_rows)
 
@@ -177,6 +187,11 @@ class Part:
         return place, known
 
 
+def connected(mesh: Mesh, held: Flags, ids: Ids, numbers: Ids, along: Along | None) -> Topology | Volume:
+    """The connectivity of some cells. ids, numbers: see ``Along.connectivity``."""
+    return connectivity_of(mesh, held) if along is None else along.connectivity(mesh, held, ids, numbers)
+
+
 def _coloured(comm: Any, topology: Topology | Volume, halo: Halo) -> Topology | Volume:
     """The same with the colours of the whole mesh, as many as there are of them."""
     places, free = topology.colouring.places, halo.spread(topology.near_free)
@@ -188,20 +203,21 @@ def _coloured(comm: Any, topology: Topology | Volume, halo: Halo) -> Topology | 
         if not comm.allreduce(int(np.count_nonzero(colours[places] < 0))):
             break
     count = int(comm.allreduce(int(colours.max(initial=-1)) + 1, mpi().MAX))
-    axes = 2 if isinstance(topology, Topology) else 3
+    axes = 2 if isinstance(topology, Topology) and topology.plane is not None else 3
     halo.coloured(colours, count, axes)
     return replace(topology, colouring=Known(places, start, ring, colours, fewest=count))
 
 
-def _with_a_free_node(simplices: Simplices | Tetrahedra, free: Flags) -> Flags:
-    """(S,) bool, the rows that have a free node, of volumes all rows of a cell that has one."""
+def _with_a_free_node(simplices: Rows, free: Flags) -> Flags:
+    """(S,) bool, the rows that have a free node, in space all rows of a cell that has one."""
     if isinstance(simplices, Tetrahedra) and simplices.solids is not None:
         of_cell: Flags = np.asarray(free[simplices.solids.nodes].any(axis=1))
         return of_cell[simplices.cells]
-    return np.asarray(free[simplices.rows].any(axis=1))
+    found: Flags = np.asarray(free[simplices.rows].any(axis=1))
+    return _of_whole_cells(simplices, found) if isinstance(simplices, ShellSimplices) else found
 
 
-def _of_whole_cells(simplices: Simplices | Tetrahedra, chosen: Flags) -> Flags:
+def _of_whole_cells(simplices: Rows, chosen: Flags) -> Flags:
     """(S,) bool, the rows of the cells that have a chosen row."""
     if simplices.cells is None:
         return chosen
@@ -210,7 +226,7 @@ def _of_whole_cells(simplices: Simplices | Tetrahedra, chosen: Flags) -> Flags:
     return np.asarray(cells[simplices.cells])
 
 
-def _lowest(simplices: Simplices | Tetrahedra) -> Ids:
+def _lowest(simplices: Rows) -> Ids:
     """(S,) the lowest place in memory among the nodes of the cell of each row."""
     if isinstance(simplices, Tetrahedra) and simplices.solids is not None:
         found: Ids = simplices.solids.nodes.min(axis=1).astype(np.int64)[simplices.cells]

@@ -10,10 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.sliding import REASON
 from gmsnet.distributed.agreement import everywhere
+from gmsnet.distributed.along import Found, found_on_first
 from gmsnet.distributed.answered import Answered
 from gmsnet.distributed.executor import Ranks
-from gmsnet.distributed.gathered import Whole
+from gmsnet.distributed.frame import framed
+from gmsnet.distributed.gathered import Whole, gathered
 from gmsnet.distributed.ghosts import surrounded
 from gmsnet.distributed.intent import may_be_meant
 from gmsnet.distributed.library import mpi
@@ -36,6 +39,7 @@ from gmsnet.run.outcome import factors_of, rank_by
 from gmsnet.run.set_up import check_options, check_target
 from gmsnet.run.state import State
 from gmsnet.topology.ordering import planar_points, space_points, taken
+from gmsnet.topology.shell import Shell
 from gmsnet.topology.solids import KINDS
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
@@ -56,7 +60,13 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
     why = _not_shared(counts, smoother, options)
     if why:
         return smoothed_on_first(piece, options, comm, why, began, known)
-    part = Part.of(around, comm, piece.single)
+    mesh, found = framed(comm, around.mesh(piece.single)), None
+    if options.slides or (mesh.plane is None and not mesh.has_volumes):
+        known = gathered(piece, comm, known)
+        found = found_on_first(known, smoother, options, comm)
+        if found.why:
+            return smoothed_on_first(piece, options, comm, found.why, began, known)
+    part = Part.of(around, mesh, comm, None if found is None else found.along)
     try:
         everywhere(comm, lambda: check_target(part.mesh, options.target))
         everywhere(comm, lambda: check_options(part.mesh, options, counts))
@@ -64,7 +74,7 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
         ready = _ready(piece, part, options, before, known)
         if ready.why:
             return smoothed_on_first(piece, options, comm, ready.why, began, known)
-        return _shared(piece, part, smoother, options, ready, before, began)
+        return _shared(piece, part, smoother, options, ready, before, began, found)
     finally:
         part.halo.free()
 
@@ -81,8 +91,6 @@ def _not_shared(counts: Mapping[str, int], smoother: Smoother, options: SmoothOp
     """Why this call cannot be shared out, whatever the coordinates; "" if it can."""
     if not smoother.shared_out:
         return f"{options.method_name} has steps that follow one another"
-    if options.slides:
-        return "curves to slide on are those of the whole mesh"
     if options.adapts:
         return "a metric is one of the whole mesh"
     others = sorted(set(counts) - set(SHARED))
@@ -92,8 +100,6 @@ def _not_shared(counts: Mapping[str, int], smoother: Smoother, options: SmoothOp
 def _not_plain(part: Part, before: Totals | None) -> str:
     """Why the mesh cannot be shared out as it is; "" if it can."""
     topology, comm = part.topology, part.comm
-    if isinstance(topology, Topology) and topology.plane is None:
-        return "surfaces in space are not shared out"
     if before is None:
         return "no cell can be smoothed"
     winding = Winding(*comm.allreduce(np.array(Winding.of(topology))).tolist())
@@ -103,10 +109,13 @@ def _not_plain(part: Part, before: Totals | None) -> str:
 
 
 class _Ready(NamedTuple):
-    """What comes before the sweeps. why: they cannot be shared out, "" if they can. mended: inverted cells, if any."""
+    """What comes before the sweeps. why: they cannot be shared out, "" if they can. inverted: how many cells are;
+    mended: what they have become, where they are mended first.
+    """
 
     why: str
     intent: Intent = Intent()
+    inverted: int = 0
     mended: Mended | None = None
 
 
@@ -117,15 +126,22 @@ def _ready(
     if why or before is None:
         return _Ready(why)
     inverted = inverted_in(part) if before.uncertain else 0
+    if isinstance(part.topology, Shell):  # sweeps bring back what shows the other side
+        if inverted and options.target:
+            return _Ready("which cells miss the target is seen whole where some are inverted")
+        return _Ready("", inverted=inverted)
     intent = _intent(piece, part, options, known, None, firm=inverted > 0)
     if not inverted:
         return _Ready("", intent)
     if not options.untangle:
         return _Ready("inverted cells are to stay as they are")
-    done = mended(part, _meant(intent, piece, part).held, inverted)
+    topology = _meant(intent, piece, part).held
+    if part.along is not None:
+        topology = topology.holding(part.along.slides_at(part.around.nodes.ids), REASON)
+    done = mended(part, topology, inverted)
     if done is None:
         return _Ready("inverted cells could not be mended with what lies around them")
-    return _Ready("", _intent(piece, part, options, known, done.points, firm=False), done)
+    return _Ready("", _intent(piece, part, options, known, done.points, firm=False), inverted, done)
 
 
 def _intent(
@@ -139,7 +155,7 @@ def _intent(
     if points is not None:
         at = part.topology.places[np.searchsorted(part.around.nodes.ids, piece.ids)]
         now = points[at]
-    return intent_of(piece, options, part.comm, known, now, firm=firm)
+    return intent_of(piece, options, part.comm, known, now, part.along, firm=firm)
 
 
 def _meant(intent: Intent, piece: Piece, part: Part) -> Meant:
@@ -163,14 +179,19 @@ def _meant(intent: Intent, piece: Piece, part: Part) -> Meant:
 
 def _shared(
     piece: Piece, part: Part, smoother: Smoother, options: SmoothOptions, ready: _Ready, before: Totals | None,
-    began: float,
+    began: float, found: Found | None,
 ) -> RankResult:  # fmt: skip
     at = np.searchsorted(part.around.nodes.ids, piece.ids)
     intent, done = ready.intent, ready.mended
     asked = part.comm.bcast(options.callback is not None)
     options = replace(options, callback=Answered(part.comm, options.callback) if asked else None)
-    state = swept(part, _meant(intent, piece, part), smoother, options, done)
-    points, moved, after, missed = _written(part, state, options, _Judged(0 if done is None else done.cells, before))
+    state = swept(part, _meant(intent, piece, part), smoother, options, done, ready.inverted)
+    if found is not None and isinstance(part.topology, Shell):
+        before = found.before
+    points, moved, after, missed = _written(piece, part, state, options, _Judged(ready.inverted, before), found)
+    notes = [*intent.notes, *intent.of_walls[state.released :][:1], *([] if done is None else [done.note])]
+    if found is not None:
+        notes += found.note(points[at], moved[at], piece, part.comm)
     return RankResult(
         points=points[at],
         moved=moved[at],
@@ -179,7 +200,7 @@ def _shared(
         sweeps=state.history[-1].index if state.history else 0,
         stop_reason=state.stop_reason,
         history=[*state.history],
-        notes=[*intent.notes, *intent.of_walls[state.released :][:1], *([] if done is None else [done.note])],
+        notes=notes,
         held=_held(part, state.protection.base),
         nodes=int(part.comm.allreduce(int(part.moves.sum()))),
         cells=sum(part.around.sizes),
@@ -211,7 +232,7 @@ class _Judged(NamedTuple):
 
 
 def _written(
-    part: Part, state: State, options: SmoothOptions, before: _Judged
+    piece: Piece, part: Part, state: State, options: SmoothOptions, before: _Judged, found: Found | None
 ) -> tuple[Floats, NDArray[np.bool_], Totals | None, int | None]:
     """The best mesh by global ids, that of the input if it is the better one as it is written; which nodes moved; its
     figures; and how many cells miss the target, None without one."""
@@ -219,6 +240,10 @@ def _written(
     points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
     plane = mesh.plane or (0, 1, 2)
     put_back(state.points, part.points, topology.memory, plane, *factors_of(mesh.exponent), points, moved)
+    if found is not None and isinstance(topology, Shell):  # whose figures are added up in the order of the cells
+        at = np.searchsorted(part.around.nodes.ids, piece.ids)
+        better, after, missing = found.judged(points[at], piece, options, part.comm)
+        return *((points, moved) if better else (mesh.points, np.zeros_like(moved))), after, missing
     assert mesh.box is not None
     written = replace(mesh, points=points).as_part(mesh.plane, mesh.kinds_there, mesh.exponent, mesh.box)
     near = taken(planar_points(written) if mesh.plane else space_points(written), topology.memory)

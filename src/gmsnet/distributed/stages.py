@@ -7,6 +7,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from gmsnet.constraints.sliding import Rails
 from gmsnet.distributed.executor import Ranks
 from gmsnet.distributed.mending import Mended
 from gmsnet.distributed.part import Part
@@ -39,18 +40,21 @@ class Meant(NamedTuple):
     walls: Kept | None = None
 
 
-def swept(part: Part, meant: Meant, smoother: Smoother, options: SmoothOptions, mended: Mended | None) -> State:
-    """The state after them, points in memory order. mended: where some cells were inverted.
+def swept(
+    part: Part, meant: Meant, smoother: Smoother, options: SmoothOptions, mended: Mended | None, inverted: int
+) -> State:
+    """The state after them, points in memory order. mended: where some cells were inverted; inverted: how many were.
 
     ``base`` of its protection has the nodes held that are held at the end.
     """
     executor, topology = _ready(part, meant.held)
-    nothing, before = np.empty(0, dtype=np.float32), cast(QualityReport, _Input(0 if mended is None else mended.cells))
+    nothing, before = np.empty(0, dtype=np.float32), cast(QualityReport, _Input(inverted))
     if options.target and mended is None:  # it tells which cells miss the target
         before = replace(measure(part.mesh, part.topology, part.points), signs=None)
     state = State(
-        part.mesh, lambda points: points, smoother, before, Protection(topology, []), part.points, part.points, nothing
-    )
+        part.mesh, lambda points: points, smoother, before, Protection(topology, []), part.points, part.points, nothing,
+        sliding=None if part.rail is None else Rails(part.rail),
+    )  # fmt: skip
     if mended is not None:
         state = replace(state, points=mended.points, untangled=mended.points)
     state = carry_out_all(state, options, executor)

@@ -10,13 +10,13 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import ranking
 from gmsnet.kernels.methods.barrier3 import K3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.simplex.shell_measures import mean_shape_of_shell
+from gmsnet.kernels.simplex.shell_measures import shell_shapes_of
+from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.measure.dihedral import ratios_of
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods.base import Field
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
-from gmsnet.topology.shell import Shell
 
 SAMPLE = 32  # blocks of cells
 OF_QUADS = 256  # blocks of corners of planar quads and mixed cells, which gain less a sweep: fewer do not show it
@@ -29,12 +29,11 @@ def mean_shape(field: Field, executor: Executor = serial) -> float:
         taken = simplices.take(executor.every(_stride(len(simplices.rows), executor), len(simplices.rows)))
         totals = totals_of(field.points, taken, executor)
         return math.nan if totals is None else totals.shape_mean
-    if isinstance(field.topology, Shell):
-        return float(mean_shape_of_shell(field.points, simplices, _stride(len(simplices.rows), executor)))
-    blocks = SAMPLE if field.planar.near_shapes is None else OF_QUADS
+    on_surface = isinstance(simplices, ShellSimplices)
+    blocks = SAMPLE if on_surface or simplices.shapes is None else OF_QUADS
     some = executor.every(_stride(len(simplices.rows), executor, blocks), len(simplices.rows), LANES)
     shape = np.empty(len(some))
-    ranking.shapes_of(field.points, simplices, some, shape)
+    (shell_shapes_of if on_surface else ranking.shapes_of)(field.points, simplices, some, shape)
     shape = executor.in_order(executor.row_numbers(some), shape)
     return float(np.cumsum(shape)[-1] / len(shape)) if len(shape) else math.nan  # added up in their order
 

@@ -226,15 +226,24 @@ class WholeMesh(Smoother):
         """The same once more with the nodes that slide."""
         if field.constraint is None:
             return
+        floor = max(field.guard(executor).floor, 0.0)
+        whole = executor.gathered(field, None)  # on one process
+        inner = executor if whole is field else serial
+        taken = whole is not None and self._slid(whole, doublings, floor, inner)
+        if executor.returned(field, whole, taken):
+            field.floor.forget()
+
+    def _slid(self, field: Field, doublings: int, floor: float, executor: Executor) -> bool:
+        """Whether these nodes are where that was found to be better."""
         problem = Problem.of(field, doublings, slide=True)
         if problem.sliders is None:
-            return
-        floor = max(field.guard(executor).floor, 0.0)
+            return False
         found = self._allowed(minimise(problem, field.points, CLOSE), floor, field, executor)
-        if found is not None and problem.is_better(found, field.points):
+        taken = found is not None and problem.is_better(found, field.points)
+        if taken:
             field.points[:] = found
-            field.floor.forget()
         problem.sliders.back(field.points)
+        return taken
 
     def _allowed(self, points: Floats, floor: float, field: Field, executor: Executor) -> Floats | None:
         """The points as they can be taken, perhaps after cycles on the worst cells; None if they cannot be."""

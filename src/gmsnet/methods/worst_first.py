@@ -30,6 +30,7 @@ from gmsnet.methods.worst_on_surface import cycles_on_surface
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 from gmsnet.topology.shell import Shell
+from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
 
@@ -103,14 +104,11 @@ class WorstFirst(Smoother):
         count = executor.cell_count(simplices)
         plan = [(max(FEWEST, math.ceil(cycle.share * count)), cycle.power, cycle.sweeps) for cycle in chosen]
         guard = field.guard(executor)
-        if isinstance(topology, Shell):
-            before, late, after = cycles_on_surface(field, topology, self.cells, guard, plan, tally)
-        else:
-            part = executor.gathered(field, self.cells)  # on one process
-            if isinstance(guard, StarGuard):
-                guard = guard._replace(floors=executor.lent(guard.floors))
-            found = (0.0, 0.0, 0.0, tally) if part is None else self._cycles(part, field, guard, plan)
-            before, late, after, tally = executor.returned(field, part, found)
+        part = executor.gathered(field, self.cells)  # on one process
+        if isinstance(guard, StarGuard):
+            guard = guard._replace(floors=executor.lent(guard.floors))
+        found = (0.0, 0.0, 0.0, tally) if part is None else self._cycles(part, field, guard, plan)
+        before, late, after, tally = executor.returned(field, part, found)
         self.next += len(chosen)
         self.converged = goes_on and after < before + GAIN
         self.least, self.gained = after, after - late
@@ -123,11 +121,16 @@ class WorstFirst(Smoother):
 
         The candidates of these are the same cells, for they are all that were up to a limit.
         """
-        topology, tally, cells = part.planar, np.zeros(3, dtype=np.int64), self.cells
+        topology, tally, cells = part.topology, np.zeros(3, dtype=np.int64), self.cells
+        assert isinstance(topology, Topology)
+        assert cells is not None
         if part is not field:
+            guard = guard._replace(constraint=part.constraint)
             if self.next == 0 or self.next >= len(self.cycles):
                 self.gathered = up_to(self.limit, shapes_in(part, serial))
             cells = self.gathered
+        if isinstance(topology, Shell):
+            return *cycles_on_surface(part, topology, cells, guard, plan, tally), tally
         figures = kernels.cycles(
             part.points, topology.changeable, cells, topology.near_free, topology.memory, topology.links, guard,
             np.array(plan), tally,

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gmsnet.constraints.sliding import REASON
+from gmsnet.constraints.sliding import REASON, Sliding
+from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.kernels.simplex.mean_ratio2 import WEIGHTS
 from gmsnet.kernels.simplex.mean_ratio3 import REGULAR
 from gmsnet.kernels.star.guard import Precision
@@ -73,7 +74,7 @@ class Journey:
         self.base = base = state.protection.base
         self.rails = rails_of(state.constraint, base.near_free)
         self.dimension = prescribed.dimension
-        self.slides = None if state.sliding is None else state.sliding.nodes
+        self.slides = state.sliding.nodes if isinstance(state.sliding, Sliding | SurfaceSliding) else None
         self.held = base if self.slides is None else base.holding(self.slides, REASON)
         self.precision = state.precision
         bytes_per_node = BYTES_PER_NODE[self.dimension]

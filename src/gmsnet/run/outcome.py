@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.sliding import Sliding
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.report import ASPECT, QualityReport, measure, measured_again
@@ -126,7 +127,7 @@ def _notes(state: State) -> list[str]:
         carried = carried_note(len(protection.topology.held.get(WALL, ())))
         near_walls.append(carried if state.motion else _wall_note(protection, moved=state.released))
     slid = []
-    if state.sliding is not None and state.final is not None:
+    if isinstance(state.sliding, Sliding | SurfaceSliding) and state.final is not None:
         slid.append(state.sliding.note(state.mesh.with_points(state.final.points), state.final.moved))
     given = state.second_order
     if given is not None and given.sign is not None and state.final is not None:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.constraints.sliding import Sliding
+from gmsnet.constraints.sliding import Rails, Sliding
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.kernels.curved.stars3 import CurvedSolids
 from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES
@@ -161,7 +161,7 @@ class State:
     released: bool = False
     interruption: KeyboardInterrupt | None = None
     final: Final | None = None
-    sliding: Sliding | SurfaceSliding | None = None
+    sliding: Sliding | SurfaceSliding | Rails | None = None
     second_order: SecondOrder | None = None
     curved: Curved | None = None
     motion: Motion | None = None

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.sliding import Rails
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.kernels.topology.patch import around
 from gmsnet.measure.target import Target
@@ -104,14 +105,17 @@ def _round(
     state: State, options: SmoothOptions, executor: Executor, aim: Aim, left: Left, rings: int
 ) -> tuple[State, Left]:  # fmt: skip
     """After sweeps over one set of patches. Of several processes one makes them, with what lies around."""
-    field = Field(state.points, state.topology, state.precision)
+    field = Field(state.points, state.topology, state.precision, constraint=state.constraint)
     part, corners = executor.gathered_around(field, left.corners, rings)
     if part is field:
         return _on_patches(state, options, executor, aim, left, rings)
     found: Any = None
     after = left
     if part is not None:
-        inner = replace(state, protection=Protection(part.topology, []), start=part.points, points=part.points)
+        sliding = None if part.constraint is None else Rails(part.constraint)
+        inner = replace(
+            state, protection=Protection(part.topology, []), start=part.points, points=part.points, sliding=sliding
+        )
         alone = replace(options, callback=executor.called_alone(options.callback))
         done, after = _on_patches(inner, alone, serial, aim, left._replace(corners=corners), rings)
         moved, interrupted = done.points is not part.points, done.interruption is not None

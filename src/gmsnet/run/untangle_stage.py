@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.constraints.sliding import REASON
+from gmsnet.constraints.sliding import REASON, Sliding
+from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.measure.report import QualityReport
 from gmsnet.parallel.executor import Executor
 from gmsnet.preserve.protection import protected, protected_volume
@@ -72,7 +73,7 @@ def protect_untangled(state: State, options: SmoothOptions, executor: Executor) 
 
 def _untangled(state: State, executor: Executor) -> State:
     topology = state.topology
-    if state.sliding is not None:
+    if isinstance(state.sliding, Sliding | SurfaceSliding):
         topology = topology.holding(state.sliding.nodes, REASON)
     if isinstance(topology, Volume):
         from gmsnet.untangle.space import untangle_volume

@@ -106,7 +106,7 @@ class Shell(Topology):
         free = np.flatnonzero(self.near_free).astype(np.int32)
         colour = self.near_colours[free]
         order = np.argsort(colour, kind="stable")
-        count = np.bincount(colour, minlength=int(colour.max(initial=-1)) + 1)
+        count = np.bincount(colour, minlength=max(int(colour.max(initial=-1)) + 1, self.colouring.fewest))
         first = np.zeros(len(count) + 1, dtype=np.int32)
         np.cumsum(count, out=first[1:])
         return Stars(self.stars_of(free[order]), first)

@@ -68,21 +68,26 @@ class Topology(Connectivity):
     sliding: dict[str, NDArray[np.int64]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1, sliding: Flags | None = None) -> Topology:
+    def of(
+        cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1, sliding: Flags | None = None, *,
+        linked: bool = False,
+    ) -> Topology:  # fmt: skip
         """The topology of a mesh; ``fixed`` (N,) bool holds further nodes ("fixed by the user").
 
         sliding: (N,) bool, nodes of boundaries, interfaces and line cells that may move all the same, along curves.
+        linked: some do in the mesh that this is a part of, whose stars are told by links.
 
         threads: one or two; more have nothing to do.
 
         Raises InputError for more nodes or faces than int32 can number, and where memory does not suffice.
         """
-        return cls.and_points(mesh, fixed, threads, sliding)[0]
+        return cls.and_points(mesh, fixed, threads, sliding, linked=linked)[0]
 
     @classmethod
     def and_points(
-        cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1, sliding: Flags | None = None
-    ) -> tuple[Topology, NDArray[np.float64]]:
+        cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1, sliding: Flags | None = None, *,
+        linked: bool = False,
+    ) -> tuple[Topology, NDArray[np.float64]]:  # fmt: skip
         """The same, and the mesh's ``near_points``, which were needed for it."""
         nodes, corners = len(mesh.points), check_size(mesh)
         refuse_unless_free(nodes * PER_NODE + corners * PER_CORNER, f"the connectivity of {nodes:,} nodes")
@@ -122,7 +127,7 @@ class Topology(Connectivity):
             near_origin=faces.origin[whole],
             sliding=slid,
         )
-        if near_sliding.any() or mesh.has_quads:
+        if linked or near_sliding.any() or mesh.has_quads:
             topology = topology.linked(Links.of(faces, near_orientation, start, topology.near_ring, near_sliding))
             four, quads = written.with_corners(4)
             topology = replace(

@@ -94,7 +94,7 @@ def smooth_some(points, blocks, first, last, guard, power, relaxation, workspace
         restrict3(guard.constraint, blocks, block, power.isotropic, workspace)
         propose3(workspace.sums, power, relaxation, workspace.step)
         for trial in range(power.trials):
-            judge3(blocks, block, power, None, floor, workspace, guard.constraint)
+            judge3(blocks, block, power, None, floor, workspace, guard.constraint, trial)
             if settle3(workspace, guard.unit, guard.grain, trial == power.trials - 1, blocks.mixture) == 0:
                 break
         if store3(points, blocks, block, workspace, guard, tally):

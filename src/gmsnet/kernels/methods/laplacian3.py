@@ -43,7 +43,7 @@ def smooth_some(points, blocks, first, last, guard, power, smart, workspace, tal
         derive3(blocks, block, power, None, workspace)
         to_mean(blocks, block, workspace)
         for trial in range(TRIALS):
-            judge3(blocks, block, power, None, floor, workspace, guard.constraint)
+            judge3(blocks, block, power, None, floor, workspace, guard.constraint, trial)
             if not smart:
                 certify3(workspace, guard.unit, guard.grain, blocks.mixture)
                 break

@@ -100,17 +100,6 @@ def summarise_shell_cells(points, simplices, first, last, coarse, fine):
 
 
 @kernel
-def mean_shape_of_shell(points, simplices, stride):
-    """The mean 1/q over every stride-th block of LANES corner simplices."""
-    total, count = 0.0, 0
-    for start in range(0, len(simplices.rows), stride * LANES):
-        for t in range(start, min(start + LANES, len(simplices.rows))):
-            total += shape_of_row(points, simplices, t)
-            count += 1
-    return total / count
-
-
-@kernel
 def per_quad_in_space(points, quads, orientation, columns):
     """As cell_measures.per_quad, of points (N, 3); the normal of its diagonals says which corners are inverted."""
     for q in range(len(quads)):

@@ -59,7 +59,10 @@ def double_of_row(points, rows, shapes, cells, t, cx, cy, cz):
         first = t
         while first > 0 and cells[first - 1] == cells[t]:
             first -= 1
-        p, q, s, r = rows[first, 0], rows[first, 1], rows[first, 2], rows[first + 2, 0]
+        p, q, s, opposite = rows[first, 0], rows[first, 1], rows[first, 2], first + 2
+        while rows[opposite, 0] == p or rows[opposite, 0] == q:  # where rows stand more than once, as those of a rank do (distributed.part)
+            opposite += 1
+        r = rows[opposite, 0]
         ax, ay, az = points[r, 0] - points[p, 0], points[r, 1] - points[p, 1], points[r, 2] - points[p, 2]
         bx, by, bz = points[s, 0] - points[q, 0], points[s, 1] - points[q, 1], points[s, 2] - points[q, 2]
         return facing(cx, cy, cz, ax, ay, az, bx, by, bz, largest6(ax, ay, az, bx, by, bz), 1.0)

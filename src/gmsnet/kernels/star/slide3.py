@@ -71,9 +71,22 @@ def restrict3(surface, blocks, block, isotropic, workspace):
             sums[ISO * LANES3 + lane] = 0.0
 
 
+@inlined
+def is_there(star, target, step, inverse, lane):
+    """Does the step of a lane lead to the target that is kept of it?"""
+    there = True
+    for k in range(3):
+        there &= np.float32((target[4 * lane + k] - star[4 * lane + k]) * inverse) == step[k * LANES3 + lane]
+    return there
+
+
 @part
-def land3(surface, blocks, block, workspace):
-    """Turns steps of nodes that slide into those to their places, which are kept in ``target`` and ``place``."""
+def land3(surface, blocks, block, trial, workspace):
+    """Turns steps of nodes that slide into those to their places, which are kept in ``target`` and ``place``.
+
+    trial: of this block. Steps that are as the trial before left them are not landed once more: so what a node does
+    does not hang on the nodes of other lanes.
+    """
     if surface is not None and find_rows(surface.row, blocks.centre, block, workspace.row):
         star, step = workspace.star, workspace.step
         for lane in range(LANES3):
@@ -81,6 +94,8 @@ def land3(surface, blocks, block, workspace):
             if row < 0:
                 continue
             inverse = np.float64(workspace.inverse[lane])
+            if trial > 0 and is_there(star, workspace.target, step, inverse, lane):
+                continue
             dx, dy, dz = step[lane] / inverse, step[LANES3 + lane] / inverse, step[2 * LANES3 + lane] / inverse
             x, y, z, place = star[4 * lane], star[4 * lane + 1], star[4 * lane + 2], np.int64(surface.place[row])
             if (dx != 0.0 or dy != 0.0 or dz != 0.0) and np.isfinite(dx) and np.isfinite(dy) and np.isfinite(dz):

@@ -112,9 +112,9 @@ def _derive(mixture, blocks, block, power, soft, workspace):
 
 
 @part
-def judge3(blocks, block, power, soft, floor, workspace, surface=None):
-    """What follows of them after the step. floor: c, of D/S^(3/2). surface: what nodes slide on."""
-    land3(surface, blocks, block, workspace)
+def judge3(blocks, block, power, soft, floor, workspace, surface=None, trial=0):
+    """What follows of them after the step. floor: c, of D/S^(3/2). surface: what nodes slide on; trial: see land3."""
+    land3(surface, blocks, block, trial, workspace)
     _judge(blocks.mixture, blocks, block, power, soft, floor, workspace)
 
 

@@ -1,0 +1,198 @@
+"""What nodes slide on, over ranks: the first one finds it in the whole mesh, and all have it.
+
+Its shape is one for all ranks, while each has the places of its own nodes on it. On a surface in space it tells also on
+which side each cell shows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.constraints.shell import FEATURE
+from gmsnet.constraints.sliding import Sliding
+from gmsnet.constraints.sliding_in_space import SurfaceSliding
+from gmsnet.distributed.agreement import raise_everywhere
+from gmsnet.distributed.gathered import Whole, brought
+from gmsnet.distributed.piece import Ids, Piece
+from gmsnet.distributed.winding import Winding
+from gmsnet.errors import GmsnetError
+from gmsnet.kernels.star.constraint import Constraint
+from gmsnet.kernels.star.surface import Surface
+from gmsnet.measure.report import measure
+from gmsnet.measure.totals import Totals
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.methods import Smoother
+from gmsnet.parallel.threads import serial
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.outcome import rank_by
+from gmsnet.run.set_up import first_state
+from gmsnet.run.state import State
+from gmsnet.topology.mixed_volume import volume_of, wound_of
+from gmsnet.topology.shell import Shell
+from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Rail = Constraint | Surface
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """What nodes of the whole mesh slide on.
+
+    rail: it, without the nodes; None where none slides. ids: (R,) the global id of the node of each of its rows;
+    slides: (R,) bool, which of them do. ring: (M, 2) of a Surface, by global ids. linked: the stars in a plane, or of a
+    surface, are told by links. sides: of a surface (C, 3) float32, the vector n of each cell of the mesh.
+    """
+
+    rail: Rail | None
+    ids: Ids
+    slides: Flags
+    ring: Ids
+    linked: bool
+    sides: NDArray[np.float32] | None
+
+    @classmethod
+    def of(cls, state: State, ids: Ids) -> Along:
+        """Of the first state of the whole mesh. ids: (N,) of its nodes, ascending."""
+        base, sliding = state.protection.base, state.sliding
+        linked = isinstance(base, Topology) and base.patterns is not None
+        sides = None
+        if isinstance(base, Shell):
+            cells = base.cells_of(np.arange(len(base.near), dtype=np.intp))
+            sides = np.zeros((int(cells.max(initial=-1)) + 1, 3), dtype=np.float32)
+            sides[cells] = base.near_side
+        rail = None if sliding is None else sliding.constraint
+        if rail is None or not isinstance(sliding, Sliding | SurfaceSliding):
+            nothing = np.empty(0, dtype=np.int64)
+            return cls(None, nothing, nothing > 0, nothing.reshape(0, 2), linked, sides)
+        at = np.flatnonzero(rail.row >= 0)
+        node = np.empty(len(at), dtype=np.int64)
+        node[rail.row[at]] = base.memory[at]
+        ring = np.empty((0, 2), dtype=np.int64)
+        if isinstance(rail, Surface):
+            ring = ids[base.memory[rail.ring]]
+            rail = rail._replace(ring=rail.ring[:0])
+        rail = rail._replace(row=rail.row[:0])
+        return cls(rail, ids[node], sliding.nodes[node], ring, linked, sides)
+
+    def slides_at(self, ids: Ids) -> Flags:
+        """(n,) bool, which of these nodes slide."""
+        return np.isin(ids, self.ids[self.slides])
+
+    def connectivity(self, mesh: Mesh, held: Flags, ids: Ids, numbers: Ids) -> Topology | Volume:
+        """That of some cells. ids: (n,) of their nodes, ascending; numbers: (C,) their places among all cells."""
+        slides = self.slides_at(ids)
+        if mesh.has_volumes:
+            return volume_of(wound_of(mesh, held), slides)
+        topology = Topology.of(mesh, held, sliding=slides, linked=self.linked)
+        if self.sides is None:
+            return topology
+        cells = topology.cells_of(np.arange(len(topology.near), dtype=np.intp))
+        return Shell.made(topology, self.sides[numbers[cells]])
+
+    def holding_others(self, topology: Topology | Volume, ids: Ids) -> Topology | Volume:
+        """Of a surface, the connectivity with those nodes held that do not slide. ids: (n,) as above."""
+        return topology.holding(~self.slides_at(ids), FEATURE) if isinstance(topology, Shell) else topology
+
+    def at(self, topology: Topology | Volume, ids: Ids, moves: Flags) -> Rail | None:
+        """The rail of some nodes. ids: (n,) ascending. moves: (n,) by places in memory, those whose stars are here."""
+        rail = self.rail
+        if rail is None:
+            return None
+        order = np.argsort(self.ids)
+        place = np.minimum(np.searchsorted(self.ids[order], ids), len(order) - 1)
+        row = np.where(self.ids[order][place] == ids, order[place], -1).astype(np.int32)[topology.memory]
+        if isinstance(rail, Constraint):
+            return rail._replace(row=row, parameter=rail.parameter.copy())
+        here = np.zeros(len(self.ids), dtype=bool)
+        here[row[moves & (row >= 0)]] = True
+        count = np.diff(rail.start)
+        chosen = np.repeat(here, count)
+        start = np.zeros_like(rail.start)
+        np.cumsum(np.where(here, count, 0), out=start[1:])
+        ring = topology.places[np.searchsorted(ids, self.ring[chosen])].astype(np.int32)
+        return rail._replace(row=row, place=rail.place.copy(), start=start, ring=ring, own=rail.own[chosen])
+
+
+def where_on(rail: Rail) -> Floats:
+    """(N,) by places in memory, where on it each node is, a parameter, facet or piece; 0 of nodes that are not."""
+    now = rail.parameter if isinstance(rail, Constraint) else rail.place
+    found: Floats = np.where(rail.row >= 0, now[rail.row], 0).astype(np.float64)
+    return found
+
+
+def put_on(rail: Rail, where: Floats) -> None:
+    """Takes note of these (N,)."""
+    on = rail.row >= 0
+    now = rail.parameter if isinstance(rail, Constraint) else rail.place
+    now[rail.row[on]] = where[on]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What the first rank has found. why: it cannot be shared out, "" if it can. before: the figures of the input.
+    whole, state: on the first rank.
+    """
+
+    along: Along
+    before: Totals | None
+    remarks: tuple[str, ...]
+    why: str
+    whole: Whole | None
+    state: State | None
+
+    def judged(
+        self, points: Floats, piece: Piece, options: SmoothOptions, comm: Any
+    ) -> tuple[bool, Totals | None, int | None]:
+        """Of a surface: is the mesh with these points (n, dim) of the piece no worse than the input? And the figures of
+        the better one, and how many of its cells miss the target. All ranks call it."""
+        every, told = brought(self.whole, points, piece, comm), None
+        if self.state is not None and every is not None:
+            before, target = self.state.before, options.target
+            after = measure(self.state.mesh.with_points(every), self.state.protection.base)
+            rank = target.rank if target else rank_by(options.best_by)
+            better = rank(after) <= rank(before)
+            final = after if better else before
+            told = better, final.totals, len(target.missed_in(final)) if target else None
+        found: tuple[bool, Totals | None, int | None] = comm.bcast(told)
+        return found
+
+    def note(self, points: Floats, moved: Flags, piece: Piece, comm: Any) -> list[str]:
+        """What to say of nodes that have slid. points, moved: of the piece. All ranks call it."""
+        every = brought(self.whole, points, piece, comm)
+        which = brought(self.whole, moved, piece, comm)
+        said = None
+        if self.whole is not None and self.state is not None:
+            sliding = self.state.sliding
+            assert every is not None
+            assert which is not None
+            said = []
+            if isinstance(sliding, Sliding | SurfaceSliding):
+                said = [sliding.note(self.whole.mesh.with_points(every), which)]
+        found: list[str] = comm.bcast(said)
+        return [*found, *self.remarks]
+
+
+def found_on_first(whole: Whole | None, smoother: Smoother, options: SmoothOptions, comm: Any) -> Found:
+    """What nodes slide on. whole: on the first rank. All ranks call it; InputError on all for what cannot be."""
+    state, told, wrong = None, None, ""
+    if whole is not None:
+        try:
+            state = first_state(whole.mesh, whole.fixed, smoother, replace(options, preserve="none"), serial)
+        except GmsnetError as error:
+            wrong = str(error)
+    raise_everywhere(comm, wrong)
+    if whole is not None and state is not None:
+        topology = state.protection.base
+        why = ""
+        if isinstance(topology, Shell) and not Winding.of(topology).reads(forth=True):
+            why = "cells are wound in both directions"
+        told = Along.of(state, whole.ids), state.before.totals, state.remarks, why
+    along, before, remarks, why = comm.bcast(told)
+    return Found(along, before, remarks, why, whole, state)

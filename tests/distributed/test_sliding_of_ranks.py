@@ -1,0 +1,126 @@
+"""Nodes that slide, and surfaces in space, over ranks: the bits of the serial run, whatever they slide on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import gmsnet
+import gmsnet.generate
+
+pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+
+from support.blocks import block
+from support.ranks import parts_at_random, same, spread
+from support.surface_meshes import ball, wavy
+
+from gmsnet.errors import InputError
+from gmsnet.run.options import SmoothOptions
+
+IN_PLANE = {
+    "square": gmsnet.random_mesh(900, seed=3),
+    "circle": gmsnet.random_mesh(900, "circle", seed=3),
+    "quads": gmsnet.generate.random_quad_mesh(900, seed=3),
+    "mixed": gmsnet.generate.random_quad_mesh(900, seed=4, cells="mixed"),
+}
+VOLUMES = {
+    "cube": gmsnet.generate.random_volume(800, seed=2),
+    "ball": gmsnet.generate.ball_volume(700).mesh,
+    "hexahedra": block(6, 6, 6, jitter=0.2, seed=1),
+    "solids": block(6, 6, 6, wedges=np.ndindex(2, 5), pyramids=np.ndindex(2, 3, 5), jitter=0.15, seed=2),
+}
+SURFACES = {
+    "sphere": ball(500, 1),
+    "bracket": gmsnet.generate.bracket(600).mesh,
+    "sheet of quads": wavy(14, 1),
+    "mixed sheet": wavy(20, 2, kind="mixed"),
+}
+MESHES = {**IN_PLANE, **VOLUMES, **SURFACES}
+
+
+def slid(**options):
+    return SmoothOptions(**{"preserve": "none", "threads": 1, "slide": "all", **options})
+
+
+def cut(mesh, ranks=3, how="strips", seed=1):
+    return parts_at_random(mesh, ranks, np.random.default_rng(seed), how)
+
+
+@pytest.mark.parametrize("guard", ["valid", "worst", "star"])
+@pytest.mark.parametrize("method", ["barrier", "laplacian", "worst-first"])
+@pytest.mark.parametrize("kind", MESHES)
+def test_sweeps(kind, method, guard):
+    mesh = MESHES[kind]
+    told = same(mesh, slid(method=method, guard=guard, max_sweeps=4), cut(mesh), 3)
+    assert told.gathered == ""
+    assert any(sweep.moved for sweep in told.history)
+
+
+@pytest.mark.parametrize("kind", MESHES)
+def test_the_default_with_all_its_stages(kind):
+    mesh = MESHES[kind]
+    told = same(mesh, slid(), cut(mesh, 3, "interleaved"), 3)
+    assert told.gathered == ""
+    assert told.notes[0].startswith("surface:" if kind in SURFACES else "slide:")
+
+
+@pytest.mark.parametrize("kind", MESHES)
+def test_targets(kind):
+    mesh = MESHES[kind]
+    shapes = np.sort(gmsnet.quality(mesh).shape)
+    for method, cell in (("auto", 2), ("auto", len(shapes) // 6), ("barrier", 6)):
+        options = slid(method=method, target_quality=float(shapes[cell]), max_sweeps=30)
+        assert same(mesh, options, cut(mesh), 3).gathered == ""
+
+
+@pytest.mark.parametrize("kind", ["sphere", "mixed sheet"])
+def test_nodes_of_features_stay_where_nothing_else_is_asked(kind):
+    mesh = SURFACES[kind]
+    assert same(mesh, slid(slide=None), cut(mesh, 2), 2).gathered == ""
+
+
+@pytest.mark.parametrize("kind", ["circle", "quads", "cube", "hexahedra", "sphere", "sheet of quads"])
+def test_inverted_cells(kind):
+    mesh, rng = MESHES[kind], np.random.default_rng(7)
+    points = mesh.points.copy()
+    inner = np.argsort(np.linalg.norm(points - points.mean(axis=0), axis=1))[:3]
+    points[inner] += 0.15 * np.ptp(points) * rng.normal(size=(3, points.shape[1]))
+    same(replace(mesh, points=points), slid(), cut(mesh), 3)
+
+
+def test_a_surface_with_turned_triangles_is_seen_by_the_first_rank():
+    mesh = SURFACES["sphere"]
+    nodes = mesh.cells[0].nodes.copy()
+    nodes[:100] = nodes[:100, [0, 2, 1]]
+    turned = replace(mesh, cells=(replace(mesh.cells[0], nodes=nodes),))
+    assert "wound" in same(turned, slid(method="barrier", max_sweeps=3), cut(mesh, 2), 2).gathered
+
+
+def test_options_that_cannot_be_had_are_named_on_all_ranks():
+    mesh = IN_PLANE["square"]
+    with pytest.raises(InputError, match="nowhere"):
+        spread(mesh, slid(slide=["nowhere"]), cut(mesh, 2), 2)
+
+
+@pytest.mark.parametrize("how", [{"surface_tolerance": 0.02}, {"hausdorff": 0.001}])
+def test_how_far_nodes_of_surfaces_may_go(how):
+    mesh = SURFACES["bracket"]
+    assert same(mesh, slid(**how), cut(mesh), 3).gathered == ""
+
+
+@settings(max_examples=20)
+@given(
+    kind=st.sampled_from(sorted(MESHES)),
+    seed=st.integers(0, 10**6),
+    ranks=st.integers(1, 4),
+    how=st.sampled_from(["interleaved", "strips", "lopsided"]),
+    method=st.sampled_from(["auto", "barrier"]),
+)
+def test_any_partition(kind, seed, ranks, how, method):
+    mesh, rng = MESHES[kind], np.random.default_rng(seed)
+    fixed = rng.random(len(mesh.points)) < 0.05
+    same(mesh, slid(method=method, max_sweeps=40), cut(mesh, ranks, how, seed), ranks, fixed)
