@@ -163,10 +163,12 @@ class Found:
         found: tuple[bool, Totals | None, int | None] = comm.bcast(told)
         return found
 
-    def note(self, points: Floats, moved: Flags, piece: Piece, comm: Any) -> list[str]:
-        """What to say of nodes that have slid. points, moved: of the piece. All ranks call it."""
+    def note(self, points: Floats, moved: Flags, where: Floats | None, piece: Piece, comm: Any) -> list[str]:
+        """What to say of nodes that have slid. points, moved: of the piece; where: (n,) likewise, see ``where_on``. All
+        ranks call it."""
         every = brought(self.whole, points, piece, comm)
         which = brought(self.whole, moved, piece, comm)
+        on = None if where is None else brought(self.whole, where, piece, comm)
         said = None
         if self.whole is not None and self.state is not None:
             sliding = self.state.sliding
@@ -174,6 +176,8 @@ class Found:
             assert which is not None
             said = []
             if isinstance(sliding, Sliding | SurfaceSliding):
+                if sliding.constraint is not None and on is not None:
+                    put_on(sliding.constraint, on[self.state.protection.base.memory])
                 said = [sliding.note(self.whole.mesh.with_points(every), which)]
         found: list[str] = comm.bcast(said)
         return [*found, *self.remarks]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.sliding import REASON
 from gmsnet.distributed.agreement import everywhere
-from gmsnet.distributed.along import Found, found_on_first
+from gmsnet.distributed.along import Found, found_on_first, where_on
 from gmsnet.distributed.answered import Answered
 from gmsnet.distributed.executor import Ranks
 from gmsnet.distributed.frame import framed
@@ -191,7 +191,8 @@ def _shared(
     points, moved, after, missed = _written(piece, part, state, options, _Judged(ready.inverted, before), found)
     notes = [*intent.notes, *intent.of_walls[state.released :][:1], *([] if done is None else [done.note])]
     if found is not None:
-        notes += found.note(points[at], moved[at], piece, part.comm)
+        where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
+        notes += found.note(points[at], moved[at], where, piece, part.comm)
     return RankResult(
         points=points[at],
         moved=moved[at],

@@ -60,7 +60,7 @@ def double_of_row(points, rows, shapes, cells, t, cx, cy, cz):
         while first > 0 and cells[first - 1] == cells[t]:
             first -= 1
         p, q, s, opposite = rows[first, 0], rows[first, 1], rows[first, 2], first + 2
-        while rows[opposite, 0] == p or rows[opposite, 0] == q:  # where rows stand more than once, as those of a rank do (distributed.part)
+        while rows[opposite, 0] == p or rows[opposite, 0] == q:  # rows of a rank may stand there twice
             opposite += 1
         r = rows[opposite, 0]
         ax, ay, az = points[r, 0] - points[p, 0], points[r, 1] - points[p, 1], points[r, 2] - points[p, 2]
