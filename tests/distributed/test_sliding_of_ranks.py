@@ -28,9 +28,9 @@ IN_PLANE = {
     "mixed": gmsnet.generate.random_quad_mesh(900, seed=4, cells="mixed"),
 }
 VOLUMES = {
-    "cube": gmsnet.generate.random_volume(800, seed=2),
-    "ball": gmsnet.generate.ball_volume(700).mesh,
-    "hexahedra": block(6, 6, 6, jitter=0.2, seed=1),
+    "cube": gmsnet.generate.random_volume(400, seed=2),
+    "ball": gmsnet.generate.ball_volume(500).mesh,
+    "hexahedra": block(5, 5, 5, jitter=0.2, seed=1),
     "solids": block(6, 6, 6, wedges=np.ndindex(2, 5), pyramids=np.ndindex(2, 3, 5), jitter=0.15, seed=2),
 }
 SURFACES = {
@@ -50,12 +50,14 @@ def cut(mesh, ranks=3, how="strips", seed=1):
     return parts_at_random(mesh, ranks, np.random.default_rng(seed), how)
 
 
-@pytest.mark.parametrize("guard", ["valid", "worst", "star"])
-@pytest.mark.parametrize("method", ["barrier", "laplacian", "worst-first"])
+@pytest.mark.parametrize(
+    ("method", "guard"),
+    [("barrier", "valid"), ("barrier", "worst"), ("barrier", "star"), ("laplacian", "worst"), ("worst-first", "star")],
+)
 @pytest.mark.parametrize("kind", MESHES)
 def test_sweeps(kind, method, guard):
     mesh = MESHES[kind]
-    told = same(mesh, slid(method=method, guard=guard, max_sweeps=4), cut(mesh), 3)
+    told = same(mesh, slid(method=method, guard=guard, max_sweeps=3), cut(mesh), 3)
     assert told.gathered == ""
     assert any(sweep.moved for sweep in told.history)
 
@@ -112,7 +114,7 @@ def test_how_far_nodes_of_surfaces_may_go(how):
     assert same(mesh, slid(**how), cut(mesh), 3).gathered == ""
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(
     kind=st.sampled_from(sorted(MESHES)),
     seed=st.integers(0, 10**6),
