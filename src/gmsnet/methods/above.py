@@ -33,6 +33,7 @@ FEW, APART, BELOW = 0.005, 1.3, 1.1
 
 class Above(StarSmoother):
     """lift: where the wall is between the least η, 0, and the mean, 1. squarings: k of P = 3·2^k. weight: w.
+    relaxation: ω of the steps.
 
     Where there are inverted cells, which have no wall, the steps are those of Σq^(3/2).
     """
@@ -41,8 +42,8 @@ class Above(StarSmoother):
     low: float | None = None
     floor: float | None = None
 
-    def __init__(self, lift: float, squarings: int, weight: float) -> None:
-        self.lift, self.squarings, self.weight = lift, squarings, weight
+    def __init__(self, lift: float, squarings: int, weight: float, relaxation: float = RELAXATION) -> None:
+        self.lift, self.squarings, self.weight, self.relaxation = lift, squarings, weight, relaxation
 
     def visit(
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
@@ -55,7 +56,7 @@ class Above(StarSmoother):
     ) -> None:
         """See StarSmoother."""
         power = self._above(guard.floor if self.floor is None else self.floor)
-        sweep3(points, blocks, first, last, guard, power, RELAXATION, tally)
+        sweep3(points, blocks, first, last, guard, power, self.relaxation, tally)
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""

@@ -91,7 +91,7 @@ VOLUME_PLAN = (
     ON_Q,
     IN_SPACE_WORST,
     ROOM,
-    Phase("mean, worst kept", lambda: Above(0.0, 4, 0.05), 1, rounds=10, gain=0.0002, looks=False),
+    Phase("mean, worst kept", lambda: Above(0.0, 5, 0.03, 1.6), 1, rounds=40, gain=0.00002, looks=False),
 )
 LARGE_VOLUME_PLAN = (
     ON_Q._replace(first=2, rounds=1),
@@ -100,7 +100,7 @@ LARGE_VOLUME_PLAN = (
     ROOM._replace(between=False),
     IN_SPACE_WORST._replace(create=lambda: WorstFirst(share=0.5)),
     ROOM,
-    VOLUME_PLAN[-1]._replace(gain=0.0015),
+    VOLUME_PLAN[-1]._replace(create=lambda: Above(0.0, 4, 0.05), rounds=10, gain=0.0015),
 )
 # Of surfaces; what high powers take from the mean comes back last.
 SURFACE_PLAN = (
