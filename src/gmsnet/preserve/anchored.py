@@ -144,19 +144,22 @@ def _at_walls(
         thin = float(np.median((np.log(length) - height)[along]))
         grown = float(np.median(cells[row[along], stretch.LENGTH]) - np.median(cells[own, stretch.LENGTH]))
         higher = np.median(across[own]) - np.median(across[row[along]]) >= HIGHER
-        lies = _along_nearest(triangles[own], points, cells[own], one[along], two[along])
-        lie = float(lies.mean())
         change = _change(height[along], one[along], two[along])
         varies = min(_spread(height[along]), _spread((np.log(length) - height)[along]))
         regular = change <= EVEN and varies <= ALL_EVEN
         even = regular and len(own) <= PART * of_all
+        if change > UNEVEN or (varies > STEADY and grown < GROWN_BY_MUCH):
+            return own[:0]
+        if thin < THIN or not ((higher and grown >= GROWN) or even):
+            return own[:0]
         if change <= EVEN and ordered[one[along]].mean() < ORDERED:
             return own[:0]
+        lies = _along_nearest(triangles[own], points, cells[own], one[along], two[along])  # takes most of the time
+        lie = float(lies.mean())
         most = lie >= OF_PIECE or (lie >= SOME and np.count_nonzero(along) >= OF_EDGES * np.count_nonzero(some))
-        clear = thin >= CLEARLY_THIN and higher and grown >= (CLEARLY_GROWN if most else GROWN_BY_MUCH)
-        rows = np.median(off[along]) >= OVER
-        orderly = clear or (thin >= THIN and lie >= MOSTLY and ((higher and grown >= GROWN and rows) or even))
-        if orderly and change <= UNEVEN and (varies <= STEADY or grown >= GROWN_BY_MUCH):
+        if thin >= CLEARLY_THIN and higher and grown >= (CLEARLY_GROWN if most else GROWN_BY_MUCH):
+            return own
+        if lie >= MOSTLY and (even or np.median(off[along]) >= OVER):
             return own
         return own[lies] if regular and thin >= CLEARLY_THIN and higher and grown >= CLEARLY_GROWN else own[:0]
 
