@@ -22,10 +22,8 @@ Ints = NDArray[np.int64]
 Edges = NDArray[np.int32]
 Graph = tuple[Ints, NDArray[np.int32]]  # neighbours in CSR form
 
-FLAT, STILL_FLAT = (
-    math.log(2.0),
-    math.log(1.8),
-)  # the length over the height: of a cell at a wall; of a row's, in the median
+# Length over height: of a cell at a wall; of those of a row, in the median.
+FLAT, STILL_FLAT = math.log(2.0), math.log(1.8)
 FEWEST = 12  # nodes of a row
 REGULAR = 1.1  # times as many nodes as the first row has, at most, and as the least
 ROWS, FLAT_ROWS = 3, 2
@@ -205,7 +203,7 @@ def _lengths(graph: Graph, points: Floats, nodes: Ints, height: Floats, label: I
 
 
 def _distance(points: Floats, one: Ints, two: Ints) -> Floats:
-    """The logarithm."""
+    """The logarithm of how far nodes (n,) are from others (n,)."""
     way = points[two] - points[one]
     return np.asarray(np.log(np.maximum(np.hypot(way[:, 0], way[:, 1]), np.finfo(float).tiny)))
 
