@@ -50,7 +50,7 @@ def test_cells_get_room_where_the_straight_ones_are_at_their_best(kind, guard):
     assert result.after.inverted == 0
 
 
-@pytest.mark.parametrize("seed", [1, 2, 4])
+@pytest.mark.parametrize("seed", [1, 8, 9, 11, 12])
 def test_corners_stay_where_their_moves_would_have_the_input_taken(seed):
     """The worst straight cell cannot become better, so that a lower mean would."""
     mesh = best_but_bent("tetra10", seed)

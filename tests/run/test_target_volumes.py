@@ -207,7 +207,7 @@ def test_where_not_all_can_reach_it_no_more_miss_it_than_after_a_full_run(share,
 
 
 def test_the_last_cells_may_need_all_others():
-    mesh = random_volume(2000, seed=6)
+    mesh = random_volume(2000, seed=2)
     least = float(gmsnet.smooth(mesh).after.shape.min())
     result = gmsnet.smooth(mesh, target_quality=1.01 * least)
     assert result.stop_reason == stop.TARGET_REACHED
