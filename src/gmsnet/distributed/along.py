@@ -166,19 +166,14 @@ class Found:
     def note(self, points: Floats, moved: Flags, where: Floats | None, piece: Piece, comm: Any) -> list[str]:
         """What to say of nodes that have slid. points, moved: of the piece; where: (n,) likewise, see ``where_on``. All
         ranks call it."""
-        every = brought(self.whole, points, piece, comm)
-        which = brought(self.whole, moved, piece, comm)
-        on = None if where is None else brought(self.whole, where, piece, comm)
-        said = None
-        if self.whole is not None and self.state is not None:
-            sliding = self.state.sliding
-            assert every is not None
-            assert which is not None
-            said = []
+        on = np.zeros(len(points)) if where is None else where
+        every, said = brought(self.whole, np.column_stack([points, moved, on]), piece, comm), None
+        if self.whole is not None and self.state is not None and every is not None:
+            sliding, said = self.state.sliding, []
             if isinstance(sliding, Sliding | SurfaceSliding):
-                if sliding.constraint is not None and on is not None:
-                    put_on(sliding.constraint, on[self.state.protection.base.memory])
-                said = [sliding.note(self.whole.mesh.with_points(every), which)]
+                if sliding.constraint is not None:
+                    put_on(sliding.constraint, every[self.state.protection.base.memory, -1])
+                said = [sliding.note(self.whole.mesh.with_points(every[:, :-2]), every[:, -2] > 0.0)]
         found: list[str] = comm.bcast(said)
         return [*found, *self.remarks]
 

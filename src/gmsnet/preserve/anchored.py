@@ -184,9 +184,8 @@ def _on_walls(
 
     equal: (S,) which are triangles; of the corner of a quad, only its own edges count.
     """
-    edges = ((0, 1, np.ones(len(triangles), dtype=bool)), (0, 2, np.ones(len(triangles), dtype=bool)), (1, 2, equal))
-    found = []
-    for a, b, some in edges:
+    every, found = np.ones(len(triangles), dtype=bool), []
+    for a, b, some in ((0, 1, every), (0, 2, every), (1, 2, equal)):
         row = np.flatnonzero(rim[triangles[:, a]] & rim[triangles[:, b]] & some)
         found.append((row, triangles[row, a], triangles[row, b], triangles[row, 3 - a - b]))
     row, one, two, third = (np.concatenate(each) for each in zip(*found, strict=True))

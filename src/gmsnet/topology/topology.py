@@ -75,9 +75,7 @@ class Topology(Connectivity):
         """The topology of a mesh; ``fixed`` (N,) bool holds further nodes ("fixed by the user").
 
         sliding: (N,) bool, nodes of boundaries, interfaces and line cells that may move all the same, along curves.
-        linked: some do in the mesh that this is a part of, whose stars are told by links.
-
-        threads: one or two; more have nothing to do.
+        linked: some do in the mesh that this is a part of, whose stars are told by links. threads: one or two.
 
         Raises InputError for more nodes or faces than int32 can number, and where memory does not suffice.
         """
@@ -103,8 +101,7 @@ class Topology(Connectivity):
         if sliding is not None:
             near_sliding, slid = released(marks, sliding[memory], position)
         held, free, places = sorted_out(marks, position)
-        three, triangles = written.with_corners(3)
-        whole, near = faces.with_corners(3)
+        (three, triangles), (whole, near) = written.with_corners(3), faces.with_corners(3)
         orientation = near_orientation
         if (orientation != orientation[:1]).any():
             orientation = np.empty_like(near_orientation)
