@@ -1,6 +1,6 @@
 """Grids that were deformed as a whole, at three sizes: how near to the even grid a call comes, and in what time.
 
-    python benchmarks/deformed.py [--columns 100 316 1000] [--kinds sheared gently swirled zigzag]
+    python benchmarks/deformed.py [--columns 100 316 1000] [--kinds sheared gently swirled zigzag Kershaw]
         [--cells triangle quad]
 
 Triangles are halves of squares: q̂ can come to 0.3720 and the least 1/q to 0.8660; of quads the least 1/q to 1. Time is
@@ -19,7 +19,7 @@ from machine import describe
 from scipy.sparse import csr_array
 
 import gmsnet
-from gmsnet.generate import sheared_mesh, swirled_mesh, zigzag_mesh
+from gmsnet.generate import kershaw_mesh, sheared_mesh, swirled_mesh, zigzag_mesh
 from gmsnet.topology.topology import Topology
 
 KINDS = {
@@ -27,6 +27,7 @@ KINDS = {
     "gently": lambda columns, cells: sheared_mesh(columns, amplitude=0.5, waves=1, cells=cells),
     "swirled": lambda columns, cells: swirled_mesh(columns, cells=cells),
     "zigzag": lambda columns, cells: zigzag_mesh(columns, cells=cells),
+    "Kershaw": lambda columns, cells: kershaw_mesh(columns, columns),  # of quads, whatever cells are asked for
 }
 ROW, SMALL = 10, 20
 

@@ -83,12 +83,13 @@ def split(mesh: Mesh, topology: Topology, survey: Survey, layers: Layers) -> tup
     nodes = np.zeros(len(layers.nodes), dtype=bool)
     nodes[part[kept]] = True
     gaps = in_gaps(triangles, orientation, equal, points, rim, nodes, points[wall].mean(axis=1)) if len(wall) else False
-    damaged = np.zeros(len(nodes), dtype=bool)
-    damaged[part] = True
-    damaged &= ~layers.nodes
-    rows = courses.whole(nodes) & ~damaged
-    at_walls |= _all_of(np.asarray(rows[triangles].all(axis=1)), first)
-    nodes |= rows
+    rows = courses.whole(nodes)
+    if rows.any():
+        damaged = np.zeros(len(nodes), dtype=bool)
+        damaged[part] = True
+        rows &= layers.nodes | ~damaged
+        at_walls |= _all_of(np.asarray(rows[triangles].all(axis=1)), first)
+        nodes |= rows
     return (
         replace(layers, nodes=layers.nodes & nodes | gaps | rows, cells=at_walls),
         replace(layers, nodes=layers.nodes & ~nodes, cells=layers.cells & ~at_walls, damaged=0),
@@ -107,7 +108,8 @@ def _edges(triangles: NDArray[np.int32], equal: Flags) -> NDArray[np.int32]:
 
 def _walls(topology: Topology, survey: Survey, points: Floats, rim: Flags) -> Walls:
     """All edges of cells on walls."""
-    beside = np.flatnonzero(np.count_nonzero((survey.rim > 0)[topology.near], axis=1) >= 2)
+    on_rim = np.take((survey.rim > 0).astype(np.int8), topology.near)
+    beside = np.flatnonzero(on_rim[:, 0] + on_rim[:, 1] + on_rim[:, 2] >= 2)
     corners, shapes = topology.memory[topology.near[beside]], topology.near_shapes
     equal = np.ones(len(corners), dtype=bool) if shapes is None else shapes[beside] == EQUILATERAL
     cells = np.empty((len(corners), stretch.COLUMNS))
@@ -142,15 +144,17 @@ def _at_walls(
         if np.count_nonzero(along) < FEWEST:
             return own[:0]
         thin = float(np.median((np.log(length) - height)[along]))
-        grown = float(np.median(cells[row[along], stretch.LENGTH]) - np.median(cells[own, stretch.LENGTH]))
-        higher = np.median(across[own]) - np.median(across[row[along]]) >= HIGHER
         change = _change(height[along], one[along], two[along])
+        if thin < THIN or change > UNEVEN:
+            return own[:0]
         varies = min(_spread(height[along]), _spread((np.log(length) - height)[along]))
         regular = change <= EVEN and varies <= ALL_EVEN
         even = regular and len(own) <= PART * of_all
-        if change > UNEVEN or (varies > STEADY and grown < GROWN_BY_MUCH):
+        grown = float(np.median(cells[row[along], stretch.LENGTH]) - np.median(cells[own, stretch.LENGTH]))
+        if (varies > STEADY and grown < GROWN_BY_MUCH) or not (grown >= GROWN or even):
             return own[:0]
-        if thin < THIN or not ((higher and grown >= GROWN) or even):
+        higher = np.median(across[own]) - np.median(across[row[along]]) >= HIGHER
+        if not (even or higher):
             return own[:0]
         if change <= EVEN and ordered[one[along]].mean() < ORDERED:
             return own[:0]

@@ -175,10 +175,12 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:
         chosen = whole[of_cell]
     area, around = cells[:, stretch.AREA], _area_around(triangles, cells, number)
     damaged = chosen & (area <= BROKEN * around)
-    calm = chosen & (area <= CALM * around) & (around <= CALM * area)
-    all_around, calm_around = (np.bincount(triangles[some].ravel(), minlength=len(layer)) for some in (chosen, calm))
-    nodes = all_around > 0
-    nodes[triangles[damaged]] &= 2 * calm_around[triangles[damaged]] >= all_around[triangles[damaged]]
+    nodes = np.zeros(len(layer), dtype=bool)
+    nodes[triangles[chosen]] = True
+    if damaged.any():
+        calm = chosen & (area <= CALM * around) & (around <= CALM * area)
+        all_around, calm_around = (np.bincount(triangles[some].ravel(), minlength=len(layer)) for some in (chosen, calm))
+        nodes[triangles[damaged]] &= 2 * calm_around[triangles[damaged]] >= all_around[triangles[damaged]]
     if not chosen.any():
         return None
     lengths = np.exp(cells[chosen, stretch.LENGTH])

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.topology import winding
+from gmsnet.kernels.topology.components import pieces
 from gmsnet.topology.polygons import Offsets, offset_type
 
 Flags = NDArray[np.bool_]
@@ -37,34 +38,39 @@ def followed(quads: NDArray[np.int32], points: Floats, inside: Flags) -> Flags:
     if not len(rows):
         return inside
     twin = _twins(quads, len(points))
+    rows = rows[((twin[rows] >= 0) & ~inside[twin[rows] // 4]).any(axis=1)]  # those with something beside them to add
     pair, _, _ = _measured(quads[rows], points)
-    along = np.full(len(quads), -1, dtype=np.int8)  # which edges of a quad lie along the row: 0 and 2, or 1 and 3
-    next_along = along.copy()  # the same of quads that may begin a next row
-    along[rows] = np.argmax(pair, axis=1)
+    # Which edges of a quad lie along the row, 0 and 2, or 1 and 3, and its thickness; the same in a next row, where so.
+    along, next_along = np.full((2, len(quads)), -1, dtype=np.int8)
+    across, next_across = np.zeros((2, len(quads)))
+    along[rows], across[rows] = np.argmax(pair, axis=1), pair.min(axis=1)
     rows = rows[pair.max(axis=1) >= CLEAR * pair.min(axis=1)]
+    waiting = rows[:0]  # what may begin a next row
     while len(rows):
         one, k = np.repeat(rows, 4), np.tile(np.arange(4), len(rows))
         edge = twin[one, k]
         new = (edge >= 0) & ~inside[edge // 4]
         one, k, two, there = one[new], k[new], edge[new] // 4, edge[new] % 4
         pair, length, square = _measured(quads[two], points)
-        before, _, _ = _measured(quads[one], points)
         every = np.arange(len(two))
         ahead = (k - along[one]) % 2 == 1  # over a short edge, to the next quad of the row
         lies = np.where(ahead, there + 1, there) % 2
-        thick, long, before = pair[every, 1 - lies], pair[every, lies], before[every, 1 - along[one]]
+        thick, long, before = pair[every, 1 - lies], pair[every, lies], across[one]
         ends = length[every, (lies + 1) % 4], length[every, (lies + 3) % 4]
         in_row = ahead & square & (long >= ROW * thick) & (np.maximum(*ends) <= FAR_END * np.minimum(*ends))
         next_row = ~ahead & square & (long >= NEXT_ROW * thick)
         next_row &= (thick <= THICKNESS * before) & (before <= THICKNESS * thick)
-        next_along[two[next_row]] = lies[next_row]
+        next_along[two[next_row]], next_across[two[next_row]] = lies[next_row], thick[next_row]
         # What is reached in both directions lies along its longer edges: written last.
         taken = np.flatnonzero(in_row)
         taken = taken[np.argsort((long / thick)[taken], kind="stable")]
-        inside[two[taken]], along[two[taken]] = True, lies[taken]
-        ready = np.flatnonzero((next_along >= 0) & ~inside) if next_row.any() else two[:0]
-        begun = ready[_many_beside(ready, next_along[ready].astype(np.int64), twin)]
-        inside[begun], along[begun] = True, next_along[begun]
+        inside[two[taken]], along[two[taken]], across[two[taken]] = True, lies[taken], thick[taken]
+        begun = two[:0]
+        if next_row.any():
+            waiting = np.union1d(waiting, two[next_row])
+            waiting = waiting[~inside[waiting]]
+            begun = waiting[_many_beside(waiting, next_along[waiting].astype(np.int64), twin)]
+        inside[begun], along[begun], across[begun] = True, next_along[begun], next_across[begun]
         rows = np.unique(np.concatenate([two[taken], begun]))
     return inside
 
@@ -81,17 +87,14 @@ def _measured(quads: NDArray[np.int32], points: Floats) -> tuple[Floats, Floats,
 
 def _many_beside(chosen: Ints, lies: Ints, twin: Offsets) -> Flags:
     """Which of the chosen quads (ascending) are among RUN or more of them that are beside one another in a row."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     if len(chosen) < RUN:
         return np.zeros(len(chosen), dtype=bool)
-    one = np.tile(np.arange(len(chosen)), 2)
+    one = np.tile(np.arange(len(chosen), dtype=np.int32), 2)
     edge = np.concatenate([twin[chosen, (lies + 1) % 4], twin[chosen, (lies + 3) % 4]])
-    two = np.minimum(np.searchsorted(chosen, edge // 4), len(chosen) - 1)
+    two = np.minimum(np.searchsorted(chosen, edge // 4), len(chosen) - 1).astype(np.int32)
     beside = (edge >= 0) & (chosen[two] == edge // 4)
-    graph = coo_array((np.ones(beside.sum()), (one[beside], two[beside])), shape=(len(chosen), len(chosen)))
-    _, label = connected_components(graph, directed=False)
+    edges = np.column_stack([one[beside], two[beside]])
+    label = pieces(edges, np.ones(len(chosen), dtype=bool))
     many: Flags = np.bincount(label)[label] >= RUN
     return many
 
