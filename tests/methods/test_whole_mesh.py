@@ -169,6 +169,17 @@ def test_coherent_shifts_are_creep_and_others_are_not():
     assert Creep.of(field_of(gmsnet.random_mesh(100, seed=1))) is None
 
 
+def test_harmonic_places_are_made_more_exact_only_where_cells_are_inverted(monkeypatch):
+    """Of a mesh at its optimum they are worse, and would be as exact ones."""
+    mesh = gmsnet.smooth(gmsnet.random_mesh(300, seed=1)).mesh
+    field, exact, tried = field_of(mesh), Problem.harmonic, []
+    problem, points = Problem.of(field), field.points
+    monkeypatch.setattr(Problem, "harmonic", lambda self, at: (tried.append(each) or each for each in exact(self, at)))
+    assert problem.start(points) is points
+    assert len(tried) == 1
+    assert problem.value(tried[0], np.empty_like(points)) < np.inf
+
+
 def test_the_level_star_does_without():
     mesh = sheared_mesh(40, amplitude=0.9)
     assert not any(WHOLE in sweep.stage for sweep in gmsnet.smooth(mesh, guard="star", preserve="none").history)

@@ -152,8 +152,11 @@ class Problem:
         gradient = np.empty_like(points)
         value = self.value(points, gradient)
         for harmonic in self.harmonic(points):
-            if self.value(harmonic, gradient) < value:
+            there = self.value(harmonic, gradient)
+            if there < value:
                 return harmonic
+            if there < math.inf:  # more exact ones are about as good
+                break
         return points
 
     def is_better(self, points: Floats, before: Floats) -> bool:

@@ -179,8 +179,8 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:
     nodes[triangles[chosen]] = True
     if damaged.any():
         calm = chosen & (area <= CALM * around) & (around <= CALM * area)
-        all_around, calm_around = (np.bincount(triangles[some].ravel(), minlength=len(layer)) for some in (chosen, calm))
-        nodes[triangles[damaged]] &= 2 * calm_around[triangles[damaged]] >= all_around[triangles[damaged]]
+        every, still = (np.bincount(triangles[some].ravel(), minlength=len(layer)) for some in (chosen, calm))
+        nodes[triangles[damaged]] &= 2 * still[triangles[damaged]] >= every[triangles[damaged]]
     if not chosen.any():
         return None
     lengths = np.exp(cells[chosen, stretch.LENGTH])
