@@ -13,6 +13,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from support.choices import CHOICES, name_of
+from support.exact import whole
 from support.surface_meshes import ball, box, surface_mesh, wavy
 from support.surfaces import turned
 
@@ -74,7 +75,8 @@ def minus(a, b):
 
 def worth(points, simplices):
     """Of each cell: is it upright at all corners, and the least signed square of 1/q of them: Fractions."""
-    exact = [list(map(Fraction, row)) for row in points[:, :3].tolist()]
+    numbers, _ = whole(points[:, :3].ravel().tolist())
+    exact = [numbers[k : k + 3] for k in range(0, len(numbers), 3)]
     cells = simplices.cells if simplices.cells is not None else np.arange(len(simplices.rows))
     found = {}
     for cell in np.unique(cells):
@@ -86,16 +88,17 @@ def worth(points, simplices):
                 p, q = q, p
             a, b = minus(p, v), minus(q, v)
             c = cross(a, b)
-            upright = upright and dot(c, list(map(Fraction, simplices.side[t].tolist()))) > 0
+            upright = upright and dot(c, whole(simplices.side[t].tolist())[0]) > 0
             if len(own) == 1:
                 edges = dot(a, a) + dot(b, b) + dot(minus(b, a), minus(b, a))
-                value = 12 * dot(c, c) / edges**2 if edges else Fraction(0)
+                value = Fraction(12 * dot(c, c), edges**2) if edges else Fraction(0)
             else:
                 first, after, before = simplices.rows[own[0]].tolist()
                 (opposite,) = set(simplices.rows[own].ravel().tolist()) - {first, after, before}
                 d = cross(minus(exact[opposite], exact[first]), minus(exact[before], exact[after]))
                 area, edges = dot(d, d), dot(a, a) + dot(b, b)
-                value = 4 * dot(c, d) * abs(dot(c, d)) / (area * edges**2) if area * edges else Fraction(0)
+                square = dot(c, d) * abs(dot(c, d))
+                value = Fraction(4 * square, area * edges**2) if area * edges else Fraction(0)
             least = value if least is None else min(least, value)
         found[int(cell)] = (upright, least)
     return found

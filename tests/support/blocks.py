@@ -9,6 +9,7 @@ import numpy as np
 from gmsnet.cells.table import CELLS
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from support.exact import whole
 
 # η³ is this times D²/S³, with S the sum of the squared edges of a corner simplex by the weights.
 FACTOR = {"tetra": 432, "hexahedron": 27, "wedge": 36, "pyramid": 54}
@@ -73,7 +74,8 @@ def inner_nodes(mesh):
 def cubed_shapes(mesh, points, sense=1):
     """[(nodes, η³ of the worst corner with the sign of D)] of each cell, read in a sense of ±1, in exact arithmetic."""
     found = []
-    exact = [[Fraction(float(v)) for v in row] for row in points]
+    numbers, _ = whole(np.ravel(points).tolist())
+    exact = [numbers[k : k + 3] for k in range(0, len(numbers), 3)]
     for cells in mesh.cells:
         for nodes in cells.nodes.tolist():
             worst = min(sense * _cubed_shape([exact[nodes[k]] for k in simplex], cells.kind)
@@ -83,10 +85,11 @@ def cubed_shapes(mesh, points, sense=1):
 
 
 def _cubed_shape(corners, kind):
+    """Of whole numbers."""
     a, b, c = ([p - q for p, q in zip(end, corners[0], strict=True)] for end in corners[1:])
     d = a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
     s = sum(
-        Fraction(weight) * sum((p - q) ** 2 for p, q in zip(corners[i], corners[j], strict=True))
+        int(6 * weight) * sum((p - q) ** 2 for p, q in zip(corners[i], corners[j], strict=True))
         for weight, (i, j) in zip(WEIGHTS[kind], EDGES, strict=True)
     )
-    return FACTOR[kind] * d * abs(d) / s**3
+    return Fraction(FACTOR[kind] * 6**3 * d * abs(d), s**3)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import itertools
 from fractions import Fraction
 from functools import cache
-from math import comb, factorial, lcm
+from math import comb, factorial
 
 import numpy as np
+
+from support import exact
+from support.exact import whole
 
 PLACES = {  # reference coordinates of the nodes, doubled
     "triangle6": [(0, 0), (2, 0), (0, 2), (1, 0), (1, 1), (0, 1)],
@@ -77,19 +80,18 @@ def pairs(kind):
 
 def determinant(nodes, kind):
     """det J as exponents → Fraction. nodes: floats or fractions."""
-    p = [(Fraction(x), Fraction(y)) for x, y in nodes]
-    common = lcm(*(v.denominator for q in p for v in q))
-    whole = [(int(x * common), int(y * common)) for x, y in p]  # sums of fractions would be slow
+    numbers, common = whole(v for node in nodes for v in node)
+    x, y = numbers[::2], numbers[1::2]
     total = {}
     for (i, j), polynomial in pairs(kind).items():
-        cross = whole[i][0] * whole[j][1] - whole[i][1] * whole[j][0]
+        cross = x[i] * y[j] - y[i] * x[j]
         for e, v in polynomial.items():
             total[e] = total.get(e, 0) + cross * v
     return {e: Fraction(v, SCALE * common**2) for e, v in total.items()}
 
 
 def value(polynomial, x, y):
-    return sum(v * Fraction(x) ** m * Fraction(y) ** n for (m, n), v in polynomial.items())
+    return exact.value(polynomial, (x, y))
 
 
 @cache
@@ -114,6 +116,14 @@ def bernstein(polynomial, kind):
     return [sum(v * row[e] for e, v in polynomial.items() if v and row.get(e)) for row in conversion(kind)]
 
 
+@cache
+def whole_conversion(kind):
+    """``conversion`` times a number that makes all weights whole ones."""
+    rows = conversion(kind)
+    numbers = iter(whole(weight for row in rows for weight in row.values())[0])
+    return [dict(zip(row, numbers, strict=False)) for row in rows]
+
+
 def falling(a, m):
     return factorial(a) // factorial(a - m) if a >= m else 0
 
@@ -129,25 +139,36 @@ def substituted(polynomial, sx, tx, sy, ty):
     return total
 
 
+def places_of_quarters(kind):
+    """A sign and two shifts each: quarters have the points ((sign·x + one) / 2, (sign·y + other) / 2)."""
+    last = (-1, 1, 1) if kind == "triangle6" else (1, 1, 1)
+    return [(1, 0, 0), (1, 1, 0), (1, 0, 1), last]
+
+
 def quarters(polynomial, kind):
     half = Fraction(1, 2)
-    places = [(0, 0), (1, 0), (0, 1)] + [(1, 1)] * (kind != "triangle6")
-    made = [substituted(polynomial, half, half * x, half, half * y) for x, y in places]
-    return made + [substituted(polynomial, -half, half, -half, half)] * (kind == "triangle6")
+    return [
+        substituted(polynomial, sign * half, half * x, sign * half, half * y) for sign, x, y in places_of_quarters(kind)
+    ]
 
 
 def exact_sign(nodes, kind, depth=10, budget=2000):
-    """+1: det J > 0 everywhere; −1: somewhere not; 0: not decided by so many halvings."""
-    todo = [determinant(nodes, kind)]
+    """+1: det J > 0 everywhere; −1: somewhere not; 0: not decided by so many halvings.
+
+    All numbers are whole: a polynomial times a positive one has the same sign.
+    """
+    polynomial = determinant(nodes, kind)
+    todo = [dict(zip(polynomial, whole(polynomial.values())[0], strict=True))]
     corners = [0, 1, 2] if kind == "triangle6" else [0, 3, 12, 15]
     for _ in range(depth + 1):
         parts = []
         for polynomial in todo:
-            c = bernstein(polynomial, kind)
+            c = [sum(v * row.get(e, 0) for e, v in polynomial.items()) for row in whole_conversion(kind)]
             if min(c[k] for k in corners) <= 0:
                 return -1
             if min(c) <= 0:
-                parts += quarters(polynomial, kind)
+                doubled = {(m, n): v << (6 - m - n) for (m, n), v in polynomial.items()}
+                parts += [substituted(doubled, sign, x, sign, y) for sign, x, y in places_of_quarters(kind)]
         if not parts:
             return 1
         if len(parts) > budget:

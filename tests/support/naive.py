@@ -8,16 +8,25 @@ from fractions import Fraction
 
 import numpy as np
 
+from support.exact import whole
+
 
 def exact_area_sign(a, b, c) -> int:
     """Sign of the area of a triangle, in rational arithmetic."""
-    (ax, ay), (bx, by), (cx, cy) = ([Fraction(float(v)) for v in p] for p in (a, b, c))
+    return area_sign(*([Fraction(float(v)) for v in p] for p in (a, b, c)))
+
+
+def area_sign(a, b, c) -> int:
+    """In the arithmetic of the coordinates."""
+    (ax, ay), (bx, by), (cx, cy) = a, b, c
     area = (ax - cx) * (by - cy) - (ay - cy) * (bx - cx)
     return (area > 0) - (area < 0)
 
 
 def signs(points, triangles, turn) -> list[int]:
-    return [int(w) * exact_area_sign(*(points[i] for i in t)) for t, w in zip(triangles, turn, strict=True)]
+    numbers, _ = whole(np.ravel(points).tolist())
+    exact = np.array(numbers, dtype=object).reshape(np.shape(points)).tolist()
+    return [int(w) * area_sign(*(exact[i] for i in t)) for t, w in zip(triangles, turn, strict=True)]
 
 
 def quality(a, b, c) -> tuple[float, float, float, float]:

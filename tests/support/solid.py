@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import cache
 from itertools import product
 from math import comb, factorial
 
 import numpy as np
+
+from support import exact
+from support.exact import whole
 
 F = Fraction
 HALF = F(1, 2)
@@ -45,8 +49,7 @@ def derivative(p, axis):
 
 
 def value(p, place):
-    x, y, z = place
-    return sum(v * x**a * y**b * z**c for (a, b, c), v in p.items())
+    return exact.value(p, place)
 
 
 ONE = {(0, 0, 0): F(1)}
@@ -119,12 +122,23 @@ def fraction(nodes):
     return [[F(float(v)) for v in node] for node in nodes]
 
 
-def mapping(nodes, name):
-    """x, y, z of a cell as polynomials, by interpolation of its nodes."""
+@cache
+def interpolation(name):
+    """For each power, the weights of the nodes, as whole numbers, and what they are to be divided by."""
     keys = monomials(name)
     matrix = [[F(p[0]) ** a * F(p[1]) ** b * F(p[2]) ** c for a, b, c in keys] for p in REFERENCE[name]]
-    found = solve(matrix, fraction(nodes))
-    return [{key: found[k][axis] for k, key in enumerate(keys)} for axis in range(3)]
+    inverse = solve(matrix, [[i == j for j in range(len(keys))] for i in range(len(keys))])
+    numbers, common = whole(v for row in inverse for v in row)
+    return [numbers[k : k + len(keys)] for k in range(0, len(numbers), len(keys))], common
+
+
+def mapping(nodes, name):
+    """x, y, z of a cell as polynomials in whole numbers, by interpolation of its nodes, and what to divide them by."""
+    rows, below = interpolation(name)
+    numbers, common = whole(np.ravel(nodes).tolist())
+    axes = [numbers[axis::3] for axis in range(3)]
+    maps = [[sum(w * v for w, v in zip(row, axis, strict=True) if w) for row in rows] for axis in axes]
+    return [dict(zip(monomials(name), numbers, strict=True)) for numbers in maps], below * common
 
 
 def determinant(nodes, name):
@@ -137,16 +151,18 @@ def determinant(nodes, name):
         base = [add(*(times(points[k][axis], shape[k]) for k in range(4))) for axis in range(3)]
         columns = [[derivative(p, 0) for p in base], [derivative(p, 1) for p in base],
                    [add(times(points[4][axis], ONE), times(-1, base[axis])) for axis in range(3)]]  # fmt: skip
+        divisor = 1
     else:
-        maps = mapping(nodes, name)
+        maps, divisor = mapping(nodes, name)
         columns = [[derivative(p, axis) for p in maps] for axis in range(3)]
     (a, b, c), total = columns, {}
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         minor = add(multiply(b[j], c[k]), times(-1, multiply(b[k], c[j])))
         total = add(total, multiply(a[i], minor))
-    return total
+    return {key: F(v) / divisor**3 for key, v in total.items()}
 
 
+@cache
 def basis(name, index):
     """A Bernstein polynomial by its multi-index over the factors of the reference cell."""
     family = name.rstrip("0123456789")

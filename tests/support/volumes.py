@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, Delaunay
 
 from gmsnet import CellBlock, Mesh
+from support.exact import whole
 
 FACETS = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))  # seen from outside of a cell of positive volume
 
@@ -101,9 +102,9 @@ def globe(nodes, seed=0):
 
 def integers(points, number=Fraction):
     """Coordinates as whole numbers of one common unit, as an object array. number: how a float is to be read."""
-    exact = [[number(v) for v in row] for row in np.asarray(points)[:, :3].tolist()]
-    unit = math.lcm(*{v.denominator for row in exact for v in row})
-    return np.array([[v.numerator * (unit // v.denominator) for v in row] for row in exact], dtype=object)
+    rows = np.asarray(points)[:, :3]
+    numbers, _ = whole(number(v) for v in rows.ravel().tolist())
+    return np.array(numbers, dtype=object).reshape(rows.shape)
 
 
 def as_written(value):

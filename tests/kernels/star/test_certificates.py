@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.exact import whole
 from support.patterns import FAN, Linked
 from support.random_stars import star
 
@@ -24,7 +25,7 @@ READINGS = 6
 
 
 def exact_least(place, ring, star=FAN):
-    return read_least(*([[Fraction(float(v)) for v in point] for point in points] for points in ([place], ring)), star)
+    return read_least(np.ravel(place).tolist(), np.asarray(ring).tolist(), star)
 
 
 def readings(rng, place, ring, guard):
@@ -38,13 +39,16 @@ def readings(rng, place, ring, guard):
 
 
 def read_least(place, ring, star=FAN):
-    """The minimum D/L, in the arithmetic of the coordinates; floats of weights are what they are."""
-    (x, y), ratios = place[0] if len(place) == 1 else place, []
+    """The minimum D/L, exactly; floats of weights are what they are."""
+    place, ratios = place[0] if len(place) == 1 else place, []
+    numbers, _ = whole(v for point in (place, *ring) for v in point)
+    (x, y), *ring = zip(numbers[::2], numbers[1::2], strict=True)
     for i, j, weights in star.simplices(len(ring)):
         ax, ay, bx, by = ring[i][0] - x, ring[i][1] - y, ring[j][0] - x, ring[j][1] - y
         squares = ax**2 + ay**2, bx**2 + by**2, (ax - bx) ** 2 + (ay - by) ** 2
-        lengths = sum(Fraction(w) * square for w, square in zip(weights, squares, strict=True))
-        ratios.append((ax * by - ay * bx) / lengths)
+        parts, common = whole(weights)
+        lengths = sum(w * square for w, square in zip(parts, squares, strict=True))
+        ratios.append(Fraction(common * (ax * by - ay * bx), lengths))
     return min(ratios)
 
 
