@@ -144,7 +144,7 @@ def test_a_section_of_several_kinds_that_is_cut_is_for_the_reader_of_the_whole(t
     [
         (made.cgns(), "cgns"), (made.cgns(kind=np.float32), "cgns"), (made.cgns(mixed=True), "cgns"),
         (made.cgns(packed=True), "cgns"), (made.cgns_zones(), "cgns"), (made.cgns_zones(packed=True), "cgns"),
-        (made.cgns_zones(packed=True, mixed=True), "cgns"), (made.cgns_structured(), ""), (b"no HDF5", ""),
+        (made.cgns_zones(packed=True, mixed=True), "cgns"), (made.cgns_structured(), "cgns"), (b"no HDF5", ""),
     ],
 )  # fmt: skip
 def test_which_files_are_shared(data: bytes, shared: str, tmp_path: Path) -> None:

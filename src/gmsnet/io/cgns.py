@@ -7,22 +7,23 @@ Source: CGNS Standard Interface Data Structures, and its SIDS-to-HDF5 mapping.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS
 from gmsnet.errors import FormatError
-from gmsnet.io.cgns_elements import DATA, section, structured, tables_of, title
+from gmsnet.io.cgns_elements import DATA, grid, section, structured, tables_of, title
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
-from gmsnet.io.hdf5_rows import rows_of, stored_points
+from gmsnet.io.hdf5_rows import numbers_of, stored_points
 from gmsnet.io.merge import Part, merged
 from gmsnet.io.ranges import Column, Plan, Table
-from gmsnet.io.rows import Ranges
+from gmsnet.io.rows import Ranges, Rows
 from gmsnet.io.splice import Share
 from gmsnet.io.stored import Part as Axis
 from gmsnet.io.stored import coordinates, shared
@@ -73,8 +74,7 @@ def _zone(zone: Node, data: Data, number: int, prefix: str) -> Parsed:
     if len(axes) < 2:
         raise FormatError(f"{shown(grids[0].path)}: CoordinateX and CoordinateY are missing")
     points, slots, single = coordinates([Axis(node, (k,)) for k, node in enumerate(axes)], data)
-    kind = zone.get("ZoneType/" + DATA)
-    if kind is not None and kind.text() == "Structured":
+    if _is_grid(zone):
         sections, prefix = [structured(zone, points)], ""
     else:
         sections = [section(node, len(points)) for node in _labelled(zone, "Elements_t")]
@@ -94,6 +94,11 @@ def _labelled(node: Node, label: str) -> list[Node]:
     return [child for child in node.members() if not child.is_data and child.attribute("label") == label]
 
 
+def _is_grid(zone: Node) -> bool:
+    kind = zone.get("ZoneType/" + DATA)
+    return kind is not None and kind.text() == "Structured"
+
+
 def _conditions(zone: Node, count: int) -> Iterator[tuple[str, Ints]]:
     """The nodes of boundary conditions that list nodes."""
     for group in _labelled(zone, "ZoneBC_t"):
@@ -107,7 +112,7 @@ def _conditions(zone: Node, count: int) -> Iterator[tuple[str, Ints]]:
 
 
 def plan(file: Ranges) -> Plan | None:
-    """How the numbers of unstructured zones lie; None where some are structured or of polyhedra."""
+    """How the numbers of all zones lie; None where some have polyhedra."""
     columns, tables, nodes, region = list[dict[str, Column]](), list[Table](), [0], 1
     with File.opened(file.path) as opened:
         for zone in (zone for base in _labelled(opened.root, "CGNSBase_t") for zone in _labelled(base, "Zone_t")):
@@ -119,7 +124,7 @@ def plan(file: Ranges) -> Plan | None:
             nodes.append(nodes[-1] + next(iter(found[0].values())).rows.rows)
             region = 1 + max([region - 1, *(table.region for table in found[1])])
     points = [column for of in columns for column in of.values()]
-    if not tables or len({len(of) for of in columns}) > 1:
+    if not tables or len({len(of) for of in columns}) > 1 or not _are_apart(points):
         return None
     single = any(all(column.rows.dtype[1:] == "f4" for column in of.values()) for of in columns)
     blocks, zones = [[table] for table in tables], list[int]()
@@ -130,22 +135,34 @@ def plan(file: Ranges) -> Plan | None:
     return Plan(points, blocks, single, encoded=stored_points(columns), zones=zones)
 
 
+def _are_apart(points: Sequence[Column]) -> bool:
+    """Whether no two columns have the same numbers."""
+    begins = [column.rows.start for column in points if isinstance(column.rows, Rows)]
+    return len({*begins}) == len(begins)
+
+
 def _planned(zone: Node, file: Ranges, first: int, region: int) -> tuple[dict[str, Column], list[Table]] | None:
     """The coordinates of a zone by their paths, and its cells. first: of all nodes the first of the zone. region: the
     number of its first one."""
-    grids, kind = _labelled(zone, "GridCoordinates_t"), zone.get("ZoneType/" + DATA)
-    if len(grids) != 1 or (kind is not None and kind.text() == "Structured"):
+    grids = _labelled(zone, "GridCoordinates_t")
+    if len(grids) != 1:
         return None
     columns, axes = dict[str, Column](), [grids[0].get(f"Coordinate{axis}/{DATA}") for axis in "XYZ"]
     for axis, node in enumerate(node for node in axes if node is not None):
-        rows = rows_of(node)
-        if rows is None or rows.width != 1 or rows.dtype[1] != "f":
+        rows = numbers_of(node)
+        if rows is None or rows.dtype[1] != "f":
             return None
         columns[node.path] = Column(rows, first, axis)
     counts = [*{column.rows.rows for column in columns.values()}]
+    if len(columns) < 2 or len(counts) > 1:
+        return None
+    if _is_grid(zone):
+        points = Plan([column._replace(first=0) for column in columns.values()], (), single=False)
+        cells = grid(zone, (counts[0], len(columns)), partial(points.places, file))
+        return columns, [Table(cells.kind, cells, 0, region=region, zone=(first, counts[0]))]
     sections = [tables_of(node, file) for node in _labelled(zone, "Elements_t")]
     listed = sorted((each for each in sections if each is not None), key=lambda each: each[0])
-    if len(columns) < 2 or len(counts) > 1 or len(listed) < len(sections):
+    if len(listed) < len(sections):
         return None
     return columns, [
         table._replace(region=number, zone=(first, counts[0]))

@@ -5,7 +5,9 @@ Source: CGNS Standard Interface Data Structures, "Element connectivity" and "Str
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,15 +19,18 @@ from gmsnet.io.cell_table import check_range
 from gmsnet.io.cells import distinct
 from gmsnet.io.exodus_elements import ORDERS
 from gmsnet.io.hdf5 import Node, shown
-from gmsnet.io.hdf5_rows import rows_of
+from gmsnet.io.hdf5_rows import numbers_of
 from gmsnet.io.ranges import Table
 from gmsnet.io.rows import AnyRows, Ranges
 from gmsnet.io.typed_rows import typed_rows
 from gmsnet.kernels.text.typed import typed_starts
 
 Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+Places = Callable[[int, int], Floats]
 
 DATA = " data"
+AT_ONCE = 1 << 18  # points that are looked at together
 KINDS = {
     2: "vertex", 3: "line", 4: "line3", 5: "triangle", 6: "triangle6", 7: "quad", 8: "quad8", 9: "quad9",
     10: "tetra", 11: "tetra10", 12: "pyramid", 13: "pyramid14", 14: "wedge", 15: "wedge15", 16: "wedge18",
@@ -75,10 +80,10 @@ def tables_of(node: Node, file: Ranges) -> tuple[int, list[Table]] | None:
     """The number of the first element of a section, and where its elements of each kind stand; None where only a reader
     of the whole can tell."""
     head, bounds = (node.need(path).integers().reshape(-1) for path in (DATA, f"ElementRange/{DATA}"))
-    found = rows_of(node.need(f"ElementConnectivity/{DATA}"))
-    if len(head) < 1 or len(bounds) != 2 or found is None or found.dtype[1] not in "iu":
+    listed = numbers_of(node.need(f"ElementConnectivity/{DATA}"))
+    if len(head) < 1 or len(bounds) != 2 or listed is None or listed.dtype[1] not in "iu":
         return None
-    number, listed = int(bounds[1]) - int(bounds[0]) + 1, found.cut(0, found.rows * found.width, 1, 1)
+    number = int(bounds[1]) - int(bounds[0]) + 1
     if int(head[0]) == MIXED:
         parts = typed_rows(file, listed, SIZES)
         if parts is None or sum(rows.rows for rows in parts.values()) != number:
@@ -117,28 +122,85 @@ def _ordered(node: Node, kind: str, nodes: Ints, count: int) -> Ints:
     return np.ascontiguousarray(nodes[:, CGNS_ORDERS[kind]]) if kind in CGNS_ORDERS else nodes
 
 
-def structured(zone: Node, points: NDArray[np.float64]) -> Section:
-    """The quads or hexahedra of a structured zone, whose points (N, dim) are listed along i first, then j, then k.
+@dataclass(frozen=True)
+class GridCells:
+    """The cells of a structured zone, along i first, then j, then k. sizes: how many points the grid has along each
+    axis. corners: the points of its first cell, counted from 0."""
+
+    sizes: tuple[int, ...]
+    corners: tuple[int, ...]
+    dtype: str = "<i8"
+
+    @property
+    def rows(self) -> int:
+        """How many there are."""
+        return math.prod(size - 1 for size in self.sizes)
+
+    @property
+    def width(self) -> int:
+        """Points of each."""
+        return len(self.corners)
+
+    @property
+    def kind(self) -> str:
+        """Of the cells."""
+        return "quad" if len(self.sizes) == 2 else "hexahedron"
+
+    def between(self, first: int, last: int) -> Ints:
+        """(last − first, width) the points of some of them."""
+        cells, begin, step = np.arange(first, last), np.zeros(last - first, dtype=np.int64), 1
+        for size in self.sizes:
+            cells, at = np.divmod(cells, size - 1)
+            begin += step * at
+            step *= size
+        found: Ints = begin[:, None] + np.array(self.corners)
+        return found
+
+    def of(self, file: Ranges, first: int, last: int) -> Ints:
+        """See AnyRows: no file lists them."""
+        return self.between(first, last)
+
+    def where(self, row: int) -> str:
+        """Of a cell, for messages."""
+        return f"cell {row} of a grid (counted from 0)"
+
+
+def structured(zone: Node, points: Floats) -> Section:
+    """The cells of a structured zone, whose points are (N, dim). Raises FormatError as ``grid``."""
+    cells = grid(zone, points.shape, lambda first, last: points[first:last])
+    return Section(title(zone), 1, [(cells.kind, cells.between(0, cells.rows))])
+
+
+def grid(zone: Node, shape: tuple[int, ...], places: Places) -> GridCells:
+    """The cells of a structured zone. shape: of all its points. places: some of them.
 
     Hexahedra of a grid whose axes are left-handed are listed the other way round. Raises FormatError where the points
     are none of such a grid.
     """
     sizes = zone.need(DATA).integers()
-    axes = sizes[0].tolist() if sizes.ndim == 2 and len(sizes) == 3 else []
-    if len(axes) not in (2, 3) or min(axes) < 2 or int(np.prod(axes, dtype=object)) != len(points):
+    axes = tuple(sizes[0].tolist()) if sizes.ndim == 2 and len(sizes) == 3 else ()
+    if len(axes) not in (2, 3) or min(axes) < 2 or math.prod(axes) != shape[0]:
         raise FormatError(
-            f"{shown(zone.path)}: {len(points)} points are no grid of two or three axes, each of two or more points"
+            f"{shown(zone.path)}: {shape[0]} points are no grid of two or three axes, each of two or more points"
         )
-    steps = [1, axes[0], axes[0] * axes[1]]
-    first = np.zeros(1, dtype=np.int64)
-    for size, step in zip(axes, steps, strict=False):
-        first = (step * np.arange(size - 1)[:, None] + first).reshape(-1)
-    around = np.array([0, steps[0], steps[0] + steps[1], steps[1]])
+    around = (0, 1, 1 + axes[0], axes[0])
     if len(axes) == 2:
-        return Section(title(zone), 1, [("quad", first[:, None] + around)])
-    if points.shape[1] < 3:
+        return GridCells(axes, around)
+    if shape[1] < 3:
         raise FormatError(f"{shown(zone.path)}: CoordinateZ of a grid of three axes is missing")
-    with np.errstate(over="ignore", invalid="ignore"):
-        volume = np.linalg.det(np.stack([points[first + step] - points[first] for step in steps], axis=1)).sum()
-    around = around[::-1] if volume < 0 else around
-    return Section(title(zone), 1, [("hexahedron", first[:, None] + np.concatenate([around, steps[2] + around]))])
+    around = around[::-1] if _volume(axes, places) < 0 else around
+    return GridCells(axes, (*around, *(axes[0] * axes[1] + corner for corner in around)))
+
+
+def _volume(sizes: tuple[int, ...], places: Places) -> float:
+    """The volume of the parallelepipeds at the first corners of all cells, negative where axes are left-handed."""
+    plane, total = sizes[0] * sizes[1], 0.0
+    step = max(1, AT_ONCE // plane)
+    for first in range(0, sizes[2] - 1, step):
+        last = min(first + step, sizes[2] - 1) + 1
+        at = places(plane * first, plane * last).reshape(last - first, sizes[1], sizes[0], 3)
+        corner = at[:-1, :-1, :-1]
+        with np.errstate(over="ignore", invalid="ignore"):
+            i, j, k = at[:-1, :-1, 1:] - corner, at[:-1, 1:, :-1] - corner, at[1:, :-1, :-1] - corner
+            total += float((np.cross(i, j) * k).sum())
+    return total

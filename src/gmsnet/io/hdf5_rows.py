@@ -24,8 +24,8 @@ from gmsnet.io.temporary import Temporary
 
 @dataclass(frozen=True)
 class Stored:
-    """The numbers of a data set, which the library reads. path: within the file. width: of a row, 0 where there is but
-    one axis."""
+    """The numbers of a data set, which the library reads. path: within the file. width: how many have the same place
+    along the first axis."""
 
     path: str
     dtype: str
@@ -33,13 +33,12 @@ class Stored:
 
     def numbers(self, file: Ranges, first: int, last: int) -> NDArray[np.generic]:
         """See Source."""
-        width = self.width or 1
-        begin, end = first // width, -(-last // width)
+        begin, end = first // self.width, -(-last // self.width)
         with File.opened(file.path) as opened:
             data = opened.root.need(self.path)
             with said_of(self.path):
                 found = np.asarray(data.thing[begin:end]).reshape(-1)
-        return found[first - begin * width : last - begin * width]
+        return found[first - begin * self.width : last - begin * self.width]
 
     def where(self, number: int) -> str:
         """See Source."""
@@ -96,26 +95,38 @@ def _refill(stream: _Stream, columns: Mapping[str, Column], moves: Moves) -> Non
         for path, column in columns.items():
 
             def fill(begin: int, values: NDArray[Any], column: Column = column) -> bool:
-                return put(values.reshape(len(values), -1), moves, column.first + begin, column.axis)
+                rows = values.reshape(-1, column.rows.width)
+                return put(rows, moves, column.first + begin * len(rows) // len(values), column.axis)
 
             _fill(handle[path], fill)
 
 
 def rows_of(node: Node) -> Listed | None:
-    """The numbers of a data set, one in a row or several; None where they are in another file, or are no numbers."""
+    """The numbers of a data set, one in a row or several; None where they are in another file, are no numbers, or have
+    more than two axes."""
+    return _listed(node) if len(node.shape()) <= 2 else None
+
+
+def numbers_of(node: Node) -> Listed | None:
+    """The same, one in a row whatever the axes."""
+    found = _listed(node)
+    return None if found is None else found.cut(0, found.rows * found.width, 1, 1)
+
+
+def _listed(node: Node) -> Listed | None:
+    """A row has the numbers of one place along the first axis."""
     shape = node.shape()
-    begin = 0 if 0 in shape else node.offset()
+    begin, width = 0 if 0 in shape else node.offset(), math.prod(shape[1:])
     with said_of(node.path):
-        if len(shape) not in (1, 2) or node.thing.external or node.thing.is_virtual:
+        if not shape or node.thing.external or node.thing.is_virtual:
             return None
         kind = node.thing.dtype
-    width = 1 if len(shape) == 1 else shape[1]
     if not node.numeric() or not width:
         return None
     if begin is not None:
         return Rows(begin, shape[0], width * kind.itemsize, kind.str, width)
     node.file.take(node.path, math.prod(shape))
-    return EncodedRows(Stored(node.path, kind.str, 0 if len(shape) == 1 else width), 0, shape[0], width, width)
+    return EncodedRows(Stored(node.path, kind.str, width), 0, shape[0], width, width)
 
 
 class _Stream(io.FileIO):
