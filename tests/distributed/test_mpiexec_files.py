@@ -18,6 +18,7 @@ from gmsnet.generate import random_volume
 from gmsnet.mesh.mesh import Mesh
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+from distributed.test_cgns_grids_ranges import save_grids
 from distributed.test_cgns_zones_ranges import save_zones
 from distributed.test_file_ranges import mixed, save_vtkhdf
 from distributed.test_hdf5_ranges import packed
@@ -196,3 +197,22 @@ def test_a_binary_file_that_ranks_share_has_the_bytes_of_one_process(tmp_path, r
     assert done.returncode == 0, done.stderr
     assert "inverted" in str(json.loads(done.stdout)["after"])
     assert (tmp_path / "serial.lb8.ugrid").read_bytes() == (tmp_path / "ranks.lb8.ugrid").read_bytes()
+
+
+@pytest.mark.parametrize("dry", [True, False])
+def test_several_files_that_ranks_share_go_into_a_folder(tmp_path, dry):
+    save_grids(tmp_path / "a.cgns", zones=2)
+    gmsnet.write(mixed(), tmp_path / "b.lb8.ugrid")
+    (tmp_path / "serial").mkdir()
+    for name, fixed in (("a.cgns", [33]), ("b.lb8.ugrid", [33])):
+        serial = gmsnet.smooth(gmsnet.read(tmp_path / name), fixed=fixed, max_sweeps=3)
+        gmsnet.write(serial.mesh, tmp_path / "serial" / name)
+    before = saved(tmp_path)
+    more = ["--out-dir", "out", "--fix", "33,", "--max-sweeps", "3", "--json", *(["--dry-run"] * dry)]
+    done = smooth(2, "a.cgns", "b.lb8.ugrid", *more, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = [json.loads(line) for line in done.stdout.splitlines()]
+    assert ["gathered" in each for each in told] == [True, True]  # of all ranks
+    assert [each["output"] for each in told] == ([None, None] if dry else ["out/a.cgns", "out/b.lb8.ugrid"])
+    written = {} if dry else {f"out/{name}": before[f"serial/{name}"] for name in ("a.cgns", "b.lb8.ugrid")}
+    assert saved(tmp_path) == {**before, **written}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 from array import array
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from gmsnet.errors import InputError
@@ -31,14 +31,35 @@ def fixed_nodes(mesh: Mesh, given: Sequence[str]) -> NDArray[np.bool_]:
     from gmsnet.mesh.selection import fixed_mask
 
     mask = np.zeros(len(mesh.points), dtype=bool)
+    for each in chosen(given, len(mask), mesh.markers if names_markers(given) else ()):
+        mask |= fixed_mask(mesh, each)
+    return mask
+
+
+def names_markers(given: Sequence[str]) -> bool:
+    """Whether any of the values of ``--fix`` may be the name of a marker."""
+    return not all(value.startswith("@") for value in given)
+
+
+def chosen(given: Sequence[str], count: int, markers: Collection[str]) -> list[str | NDArray[np.int64]]:
+    """What the values of ``--fix`` name in a mesh of so many nodes with such markers: of each the marker or node ids.
+
+    Raises InputError as ``fixed_nodes``.
+    """
+    import numpy as np
+
+    from gmsnet.mesh.selection import check_marker
+
+    found: list[str | NDArray[np.int64]] = []
     for value in given:
         if value.startswith("@"):
-            mask |= fixed_mask(mesh, _from_file(value[1:], len(mask)))
-        elif value not in mesh.markers and re.fullmatch(r"\s*\d+\s*(,\s*\d+\s*)*,?\s*", value):
-            mask |= fixed_mask(mesh, [_node(text, len(mask), "--fix") for text in value.split(",") if text.strip()])
+            found.append(_from_file(value[1:], count))
+        elif value not in markers and re.fullmatch(r"\s*\d+\s*(,\s*\d+\s*)*,?\s*", value):
+            found.append(np.array([_node(text, count, "--fix") for text in value.split(",") if text.strip()]))
         else:
-            mask |= fixed_mask(mesh, value)
-    return mask
+            check_marker(value, markers)
+            found.append(value)
+    return found
 
 
 def _from_file(path: str, count: int) -> NDArray[np.int64]:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import typer
 
 from gmsnet.cli import output as printed
 from gmsnet.cli.file_work import FileWork
+from gmsnet.cli.fix import chosen, names_markers
 from gmsnet.cli.ranks import rank_of
+from gmsnet.constraints.options import ALL
 from gmsnet.mesh.display import amount, miss_it, visible
 from gmsnet.parallel.interrupts import interruptible
 
@@ -16,38 +20,45 @@ if TYPE_CHECKING:
     from gmsnet.run.options import SmoothOptions
 
 
-def shared_format(source: str, target: str, read_as: str | None, write_as: str | None) -> str:
+def shared_format(
+    source: str, target: str, read_as: str | None, write_as: str | None, fix: Sequence[str], slide: Sequence[str]
+) -> str:
     """The format of files that several ranks read and write part by part; "" where one process does it.
 
-    read_as, write_as: the formats that are asked for.
+    read_as, write_as: the formats that are asked for. fix, slide: see ``smooth``.
     """
     if rank_of()[1] == 1:
         return ""
     from gmsnet.distributed import layouts
 
-    return layouts.shared_format(source, target, read_as, write_as)
+    named = names_markers(fix) or not {*slide} <= {ALL}
+    return layouts.shared_format(source, target, read_as, write_as, named=named)
 
 
-def smooth_in_pieces(work: FileWork, options: SmoothOptions, target: str, format: str) -> int:
+def smooth_in_pieces(work: FileWork, options: SmoothOptions, format: str, fix: Sequence[str]) -> int:
     """Smooths the file, prints the figures of all ranks, and returns the exit code: 1 where cells are inverted
     or miss the target."""
     from gmsnet.distributed.file_run import FileTask
     from gmsnet.distributed.first import smooth_file_from_first
 
-    task = FileTask(work.input, target, format, options)
+    target = None if work.destination is None or work.dry_run else work.destination.path
+    task = FileTask(work.input, target, format, options, partial(chosen, fix) if fix else None)
     with interruptible(), work.progress, work.interruption:
-        work.progress.begin(visible(f"smoothing {work.input}"))
+        work.progress.begin(visible(f"{work.number}smoothing {work.input}"))
         found = smooth_file_from_first(task)
         work.interruption.end()
     if work.json:
         named = {"input": work.input, "output": target, "method": options.method_name}
-        printed.print_json({**named, **found.summary(), "notes": found.notes})
+        printed.print_json({**named, **found.summary(), "notes": found.notes}, line=bool(work.number))
     elif not work.quiet:
-        for line in [*repr(found).splitlines(), f"mesh written to {target}"]:
-            typer.echo(visible(line))
+        written = "not written" if target is None else f"mesh written to {target}"
+        lines = [f"{work.input}: {'; '.join(found.lines())}; {written}"]
+        for line in lines if work.number else [*repr(found).splitlines(), written]:
+            typer.echo(visible(f"{work.number}{line}"))
     inverted = 0 if found.after is None else found.after.inverted
     if inverted:
-        typer.echo(f"gmsnet: {amount(inverted, 'cell')} inverted still", err=True)
+        typer.echo(f"gmsnet: {work.number}{amount(inverted, 'cell')} inverted still", err=True)
     if found.missed:
-        typer.echo(f"gmsnet: target not met: {amount(found.missed, 'cell')} {miss_it(found.missed)}", err=True)
+        missed = f"target not met: {amount(found.missed, 'cell')} {miss_it(found.missed)}"
+        typer.echo(f"gmsnet: {work.number}{missed}", err=True)
     return 1 if inverted or found.missed else 0

@@ -220,13 +220,7 @@ def smooth(
         **values_at_nodes(metric, size),
     )  # fmt: skip
 
-    plain = not any((fix, slide, plot, report, dry_run, metric, size))
-    if whole is not None and plain and (kind := shared_format(input, whole.path, format, output_format)):
-        work = FileWork(
-            input, None, whole, in_place=in_place, plot=None, report=None, most_sweeps=max_sweeps, json=json,
-            quiet=quiet, command=command_of(context),
-        )  # fmt: skip
-        raise typer.Exit(smooth_in_pieces(work, replace(asked, callback=work.after_sweep), whole.path, kind))
+    held, whole_on_first = fix or [], any((plot, report, metric, size))
 
     def one(job: Job, destination: Destination | None) -> tuple[int, bool]:
         work = FileWork(
@@ -234,9 +228,13 @@ def smooth(
             json=json, quiet=quiet, command=command_of(context), number=job.number, dry_run=dry_run,
         )  # fmt: skip
         options = replace(asked, callback=work.after_sweep)
+        target = job.source if destination is None else destination.path
+        kind = "" if whole_on_first else shared_format(job.source, target, format, output_format, held, slide or [])
+        if kind:
+            return smooth_in_pieces(work, options, kind, held), work.interruption.caught
 
         def make(mesh: Mesh) -> Callable[[], SmoothResult]:
-            return partial(smooth_function(), mesh, options, fixed_nodes(mesh, fix) if fix else None)
+            return partial(smooth_function(), mesh, options, fixed_nodes(mesh, held) if held else None)
 
         def told(done: Done) -> Outcome:
             return Outcome(done.mesh, done.result, done.compiled, job.source, done.written, done.lost, plot, report)

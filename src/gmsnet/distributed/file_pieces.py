@@ -149,7 +149,9 @@ def _piece(comm: Any, parts: Sequence[Part], nodes: Joined) -> Piece:
     own = (ids >= nodes.starts[comm.rank]) & (ids < nodes.starts[comm.rank + 1])  # of others the points are copies
     fixed = np.isin(ids, np.concatenate(held)) | (own & _fixed(comm, parts)[first])
     single = any(comm.allgather(any(part.parsed.single for part in parts)))
-    return everywhere(comm, lambda: Piece(ids, nodes.points[first], fixed, tuple(blocks), single))
+    told = {key: name for part in parts for key, name in part.parsed.region_names.items()}
+    called = {key: name for each in comm.allgather(told) for key, name in each.items()}
+    return everywhere(comm, lambda: Piece(ids, nodes.points[first], fixed, tuple(blocks), single, called))
 
 
 def _fixed(comm: Any, parts: Sequence[Part]) -> Flags:

@@ -178,7 +178,7 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     ids = np.sort(np.concatenate([ids, lonely]))
     points, fixed = (asked(comm, nodes.rows, mine, ids) for mine in (nodes.points, nodes.held))
     everywhere(comm, file.check)
-    piece = everywhere(comm, lambda: Piece(ids, points, fixed, tuple(blocks), plan.single))
+    piece = everywhere(comm, lambda: Piece(ids, points, fixed, tuple(blocks), plan.single, plan.names or {}))
     return FileRanges(file, plan, piece, nodes.rows, zones)
 
 
@@ -263,12 +263,12 @@ def _shared_out(comm: Any, blocks: Sequence[Cells], ids: Ids, points: Floats) ->
     return found
 
 
-def planned_format(source: str, format: str) -> str:
-    """The format where a file of it can be shared by ranks, "" where not."""
+def planned_format(source: str, format: str, *, named: bool = False) -> str:
+    """The format where a file of it can be shared by ranks, "" where not. named: markers are asked for by name."""
     if format not in PLANNED or not os.path.isfile(source):
         return ""
     try:
         plan = plan_of(Ranges(source), format)
     except GmsnetError:  # told by the reader of the whole
         return ""
-    return format if plan is not None else ""
+    return format if plan is not None and not (named and plan.names is None) else ""

@@ -6,6 +6,7 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
+from gmsnet.distributed.chosen import Chosen, holding
 from gmsnet.distributed.file_pieces import read_pieces
 from gmsnet.distributed.file_ranges import PLANNED, read_ranges
 from gmsnet.distributed.result import RankResult
@@ -15,12 +16,14 @@ from gmsnet.run.options import SmoothOptions
 
 @dataclass(frozen=True)
 class FileTask:
-    """What all ranks do. source, target: paths. format: of both."""
+    """What all ranks do. source, target: paths, None where nothing is written. format: of both. chosen: nodes that are
+    to be held, besides; the first rank tells."""
 
     source: str
-    target: str
+    target: str | None
     format: str
     options: SmoothOptions
+    chosen: Chosen | None = None
 
 
 def smooth_file(task: FileTask, comm: Any) -> RankResult:
@@ -28,8 +31,9 @@ def smooth_file(task: FileTask, comm: Any) -> RankResult:
     then nothing is written."""
     read = read_ranges if task.format in PLANNED else read_pieces
     given = read(task.source, task.format, comm)
-    found = smoothed(given.piece, task.options, comm)
-    moved = bool(comm.allreduce(int((found.points != given.piece.points).any())))
-    if moved or os.path.abspath(task.source) != os.path.abspath(task.target):
-        given.write(task.target, found.points, comm)
+    found = smoothed(holding(given.piece, task.chosen, comm), task.options, comm)
+    if task.target is not None:
+        moved = bool(comm.allreduce(int((found.points != given.piece.points).any())))
+        if moved or os.path.abspath(task.source) != os.path.abspath(task.target):
+            given.write(task.target, found.points, comm)
     return found

@@ -93,7 +93,7 @@ def smooth_file_from_first(task: FileTask, comm: Any = None) -> RankResult:
     """``smooth_file`` while the others ``follow``. Errors: see there."""
     comm = mpi().COMM_WORLD if comm is None else comm
     with _TOGETHER:
-        comm.bcast(replace(task, options=replace(task.options, callback=None)))
+        comm.bcast(replace(task, options=replace(task.options, callback=None), chosen=None))
         return smooth_file(task, comm)
 
 

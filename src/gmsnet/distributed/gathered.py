@@ -43,7 +43,7 @@ def gathered(piece: Piece, comm: Any, known: Whole | None = None) -> Whole | Non
         nodes = np.concatenate([block.nodes for block in cells])[order]
         regions = np.concatenate([block.regions for block in cells])[order]
         blocks.append(CellBlock(cells[0].kind, np.searchsorted(ids, nodes), regions))
-    return Whole(Mesh(points, tuple(blocks), single=piece.single), ids, fixed)
+    return Whole(Mesh(points, tuple(blocks), piece.names, single=piece.single), ids, fixed)
 
 
 def brought(whole: Whole | None, values: NDArray[Any], piece: Piece, comm: Any) -> NDArray[Any] | None:

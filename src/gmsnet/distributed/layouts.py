@@ -150,10 +150,12 @@ class Unlisted:
         return {}
 
 
-def shared_format(source: str, target: str, read_as: str | None = None, write_as: str | None = None) -> str:
+def shared_format(
+    source: str, target: str, read_as: str | None = None, write_as: str | None = None, *, named: bool = False
+) -> str:
     """The format of two meshes that ranks read and write part by part; "" where they do not.
 
-    read_as, write_as: the formats that are asked for.
+    read_as, write_as: the formats that are asked for. named: markers are asked for by name.
     """
     if (group := group_of(source, read_as)) is not None:
         return group.format if write_as in (None, group.format) and takes_parts(target, group.format) else ""
@@ -165,7 +167,8 @@ def shared_format(source: str, target: str, read_as: str | None = None, write_as
     if first in KINDS:
         return first
     alike = FORMATS[first].form_of(source) == FORMATS[first].form_of(target)
-    return planned_format(source, first) if alike and not (is_packed(source) or is_packed(target)) else ""
+    plain = alike and not (is_packed(source) or is_packed(target))
+    return planned_format(source, first, named=named) if plain else ""
 
 
 def layout_of(name: str, format: str) -> Layout:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,7 @@ class Piece:
     """Some cells of a mesh and their nodes.
 
     ids: (n,) the global id of each node, each once. points: (n, dim). fixed: (n,) bool, to be held. blocks: the same on
-    all ranks, though some may be empty. single: as of the Mesh.
+    all ranks, though some may be empty. single, names: as of the Mesh, the same on all ranks.
 
     Raises InputError for ids that are negative or come twice, points that are not finite, and cells of other nodes.
     """
@@ -48,6 +48,7 @@ class Piece:
     fixed: Flags
     blocks: tuple[Cells, ...]
     single: bool = False
+    names: Mapping[tuple[int, int], str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         ids = whole_numbers(self.ids, "the global ids of nodes")

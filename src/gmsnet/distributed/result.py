@@ -56,14 +56,16 @@ class RankResult:
 
     def __repr__(self) -> str:
         """What was done, on a screen."""
-        before, after = (_figures(totals) for totals in (self.before, self.after))
-        lines = [
-            f"RankResult: {self.nodes:,} nodes, {self.sweeps} sweeps in {plain(self.seconds)} s, {self.stop_reason}"
-        ]
-        lines += [f"{name}: {before[name]:.6g} → {after[name]:.6g}" for name in before]
+        first, *lines = self.lines()
         if self.missed:
             lines.append(f"target not met: {amount(self.missed, 'cell')} {miss_it(self.missed)}")
-        return "\n".join([*lines, *self.notes])
+        return "\n".join([f"RankResult: {first}", *lines, *self.notes])
+
+    def lines(self) -> list[str]:
+        """What was done, and what has become of each figure."""
+        before, after = (_figures(totals) for totals in (self.before, self.after))
+        done = f"{self.nodes:,} nodes, {self.sweeps} sweeps in {plain(self.seconds)} s, {self.stop_reason}"
+        return [done, *(f"{name}: {before[name]:.6g} → {after[name]:.6g}" for name in before)]
 
 
 def _figures(totals: Totals | None) -> dict[str, float]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,15 +115,19 @@ def _conditions(zone: Node, count: int) -> Iterator[tuple[str, Ints]]:
 def plan(file: Ranges) -> Plan | None:
     """How the numbers of all zones lie; None where some have polyhedra."""
     columns, tables, nodes, region = list[dict[str, Column]](), list[Table](), [0], 1
+    names: dict[tuple[int, int], str] | None = {}
     with File.opened(file.path) as opened:
-        for zone in (zone for base in _labelled(opened.root, "CGNSBase_t") for zone in _labelled(base, "Zone_t")):
-            found = _planned(zone, file, nodes[-1], region)
+        several = [zone for base in _labelled(opened.root, "CGNSBase_t") for zone in _labelled(base, "Zone_t")]
+        for zone in several:
+            found = _planned(zone, file, nodes[-1], region, f"{title(zone)}/" if len(several) > 1 else "")
             if found is None:
                 return None
-            columns.append(found[0])
-            tables += found[1]
-            nodes.append(nodes[-1] + next(iter(found[0].values())).rows.rows)
-            region = 1 + max([region - 1, *(table.region for table in found[1])])
+            columns.append(found.columns)
+            tables += found.tables
+            count = next(iter(found.columns.values())).rows.rows
+            nodes.append(nodes[-1] + count)
+            names = None if names is None or any(_conditions(zone, count)) else names | found.names
+            region = 1 + max([region - 1, *(table.region for table in found.tables)])
     points = [column for of in columns for column in of.values()]
     if not tables or len({len(of) for of in columns}) > 1 or not _are_apart(points):
         return None
@@ -132,7 +137,7 @@ def plan(file: Ranges) -> Plan | None:
         blocks = [[table for table in tables if table.kind == kind]
                   for kind in dict.fromkeys(table.kind for table in tables)]  # fmt: skip
         zones = nodes
-    return Plan(points, blocks, single, encoded=stored_points(columns), zones=zones)
+    return Plan(points, blocks, single, encoded=stored_points(columns), zones=zones, names=names)
 
 
 def _are_apart(points: Sequence[Column]) -> bool:
@@ -141,9 +146,16 @@ def _are_apart(points: Sequence[Column]) -> bool:
     return len({*begins}) == len(begins)
 
 
-def _planned(zone: Node, file: Ranges, first: int, region: int) -> tuple[dict[str, Column], list[Table]] | None:
-    """The coordinates of a zone by their paths, and its cells. first: of all nodes the first of the zone. region: the
-    number of its first one."""
+class _Zone(NamedTuple):
+    """The coordinates of a zone by their paths, its cells, and the names of its regions."""
+
+    columns: dict[str, Column]
+    tables: list[Table]
+    names: dict[tuple[int, int], str]
+
+
+def _planned(zone: Node, file: Ranges, first: int, region: int, prefix: str) -> _Zone | None:
+    """first: of all nodes the first of the zone. region: the number of its first one. prefix: of names."""
     grids = _labelled(zone, "GridCoordinates_t")
     if len(grids) != 1:
         return None
@@ -159,17 +171,19 @@ def _planned(zone: Node, file: Ranges, first: int, region: int) -> tuple[dict[st
     if _is_grid(zone):
         points = Plan([column._replace(first=0) for column in columns.values()], (), single=False)
         cells = grid(zone, (counts[0], len(columns)), partial(points.places, file))
-        return columns, [Table(cells.kind, cells, 0, region=region, zone=(first, counts[0]))]
-    sections = [tables_of(node, file) for node in _labelled(zone, "Elements_t")]
-    listed = sorted((each for each in sections if each is not None), key=lambda each: each[0])
-    if len(listed) < len(sections):
-        return None
-    return columns, [
-        table._replace(region=number, zone=(first, counts[0]))
-        for number, (_, tables) in enumerate(listed, region)
-        for table in tables
-        if table.nodes.rows
-    ]
+        sections, prefix = [(title(zone), (1, [Table(cells.kind, cells, 0)]))], ""
+    else:
+        found = [(title(node), tables_of(node, file)) for node in _labelled(zone, "Elements_t")]
+        sections = [(name, each) for name, each in found if each is not None]
+        if len(sections) < len(found):
+            return None
+    tables, names = list[Table](), dict[tuple[int, int], str]()
+    for number, (name, (_, some)) in enumerate(sorted(sections, key=lambda each: each[1][0]), region):
+        for table in some:
+            if table.nodes.rows:
+                tables.append(table._replace(region=number, zone=(first, counts[0])))
+                names[CELLS[table.kind].dimension, number] = prefix + name
+    return _Zone(columns, tables, names)
 
 
 def write(mesh: Mesh) -> Written:

@@ -121,7 +121,8 @@ def plan(file: Ranges) -> Plan | None:
     first = np.cumsum([0, *(each.rows for each in nodes[1])]).tolist()
     points = [Column(rows_of(each, f"{order}f8"), begin) for each, begin in zip(nodes[1], first[:-1], strict=True)]
     tags = [rows_of(each, order + ("i4" if old else "u8")) for each in nodes[0]]
-    return Plan(points, blocks, False, tags, images=np.concatenate(images))
+    names = {(dim, tag): name for (dim, other), name in found.names.items() for tag in (other, -other)} | found.names
+    return Plan(points, blocks, False, tags, images=np.concatenate(images), names=names)
 
 
 def _old_nodes(words: RangeWords, count: int) -> tuple[list[Lattice], list[Lattice]]:
@@ -147,7 +148,8 @@ def _new_tables(
     """Cells of version 4.1; None where some are copies of those of other partitions."""
     codes, each = heads[:, 2].astype(np.int8), np.ones(len(heads), dtype=np.int64)
     blocks = Elements(codes, heads[:0, 0], Places(), words, entity=heads[:, :2], number=each)  # as if of one cell
-    regions = group_numbers(found, blocks, merge_groups(found, blocks))
+    found.names = merge_groups(found, blocks)
+    regions = group_numbers(found, blocks, found.names)
     kept, _ = without_interfaces(found, blocks)
     if ghost_marks(found, blocks):
         return None

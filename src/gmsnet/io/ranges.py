@@ -7,7 +7,7 @@ a plan is the mesh that the format's reader makes of the whole file.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
@@ -65,7 +65,8 @@ class Plan:
     of one kind. single: see Mesh. tags: those of all nodes, where cells name these by tags. fixed: numbers of all
     nodes; those that are not 0 are to be held. encoded: where the rows of some points are not bytes of the file.
     images: (n, 2) tags of nodes and of those that they are images of; these are to be held, too. zones: (k + 1,) first
-    nodes of zones; those of different zones that are at one place are one node. None where there is but one."""
+    nodes of zones; those of different zones that are at one place are one node. None where there is but one. names: of
+    regions and markers, see Mesh; None where only a reader of the whole can tell."""
 
     points: Sequence[Column]
     blocks: Sequence[Sequence[Table]]
@@ -75,6 +76,7 @@ class Plan:
     encoded: Encoded | None = None
     images: NDArray[np.int64] = field(default_factory=lambda: NO_IMAGES)
     zones: Sequence[int] = ()
+    names: Mapping[tuple[int, int], str] | None = field(default_factory=dict)
 
     @property
     def nodes(self) -> int:

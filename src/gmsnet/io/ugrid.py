@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.ranges import Column, Plan, Table
-from gmsnet.io.rows import Ranges, Rows
+from gmsnet.io.rows import AT_ONCE, Ranges, Rows
 from gmsnet.io.text import Text
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 from gmsnet.mesh.cell_block import CellBlock
@@ -79,10 +79,15 @@ def read(files: Mapping[str, Data]) -> Parsed:
     regions = [*surfaces, *zeros]
     cells = [CellBlock(of, *pair) for of, *pair in zip(KINDS, tables, regions, strict=True) if len(pair[0])]
     volumes = any(len(table) for table in tables[FACES:])
-    names = {(2, number): str(number) for number in distinct(numbers) if volumes}  # so that --fix may name them
+    names = _names(distinct(numbers)) if volumes else {}
     end = len(data) - 4 if key and FORMS[key].records else words.end
     unread = ["what follows the volumes"] * (words.at < end)
     return Parsed(points, cells, slots, names, single=kind == "f4", unread=unread, form=key)
+
+
+def _names(numbers: Iterable[int]) -> dict[tuple[int, int], str]:
+    """Of surfaces, so that ``--fix`` may name them."""
+    return {(2, number): str(number) for number in numbers}
 
 
 def _words(data: Data, key: str) -> Words:
@@ -124,7 +129,15 @@ def plan(file: Ranges) -> Plan | None:
     for k in range(FACES):
         tables[k] = tables[k]._replace(regions=Rows(surfaces, counts[1 + k], 4, whole))
         surfaces += 4 * counts[1 + k]
-    return Plan([Column(points)], [[table] for table in tables if table.nodes.rows], form.real == 4)
+    faces = Rows(surfaces - 4 * (counts[1] + counts[2]), counts[1] + counts[2], 4, whole)
+    names = _names(_distinct(file, faces)) if any(counts[1 + FACES :]) else {}
+    return Plan([Column(points)], [[table] for table in tables if table.nodes.rows], form.real == 4, names=names)
+
+
+def _distinct(file: Ranges, rows: Rows) -> set[int]:
+    """The whole numbers that occur, some looked at at a time."""
+    parts = (rows.of(file, at, min(at + AT_ONCE, rows.rows)) for at in range(0, rows.rows, AT_ONCE))
+    return {number for part in parts for number in distinct(part[:, 0])}
 
 
 def form_of(data: Data, size: int | None = None) -> str:

@@ -240,13 +240,19 @@ class Mesh:
         nodes: dict[str, list[NDArray[np.int64]]] = {name: [ids] for name, ids in self.node_sets.items()}
         for block in self.cells:
             for region in np.unique(block.regions).tolist():
-                name = str(region) if block.dimension in (0, 1) else None
-                if block.dimension is not None:
-                    name = self.region_names.get((block.dimension, region), name)
-                if name is None:  # most often 0, the region of all cells: holding it would hold the whole mesh
+                name = marker_name(self.region_names, block.dimension, region)
+                if name is None:
                     continue
                 nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
         return {name: np.unique(np.concatenate(ids)) for name, ids in nodes.items()}
+
+
+def marker_name(names: Mapping[tuple[int, int], str], dimension: int | None, region: int) -> str | None:
+    """By which a region of cells goes as a marker. names: see Mesh. None where it has none: most often 0, the region of
+    all cells, to hold which would be to hold the whole mesh."""
+    if dimension is None:
+        return None
+    return names.get((dimension, region), str(region) if dimension in (0, 1) else None)
 
 
 def counts(mesh: Mesh) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Set
+from collections.abc import Collection, Set
 from typing import Any
 
 import numpy as np
@@ -126,8 +126,14 @@ def _values(fixed: Any, what: str) -> NDArray[Any]:
 
 def _nodes_of(mesh: Mesh, name: str) -> NDArray[np.int64]:
     markers = mesh.markers
+    check_marker(name, markers)
+    return markers[name]
+
+
+def check_marker(name: str, markers: Collection[str]) -> None:
+    """Raises InputError where a name is not one of the markers of a mesh."""
     if name in markers:
-        return markers[name]
+        return
     if not markers:
         raise InputError(f"there is no marker {name!r}: the mesh has no markers")
     near = difflib.get_close_matches(name, markers, n=3)
