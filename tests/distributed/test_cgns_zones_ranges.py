@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.distributed.file_ranges import planned_format, read_ranges
-from gmsnet.distributed.gathered import gathered
+from gmsnet.distributed.file_ranges import planned_format
 from gmsnet.generate import random_mesh, random_volume
 from gmsnet.io.cgns_elements import CGNS_ORDERS
 from gmsnet.mesh.mesh import Mesh
@@ -19,7 +18,6 @@ pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 from distributed.test_cgns_ranges import CODES, MESHES, in_one
 from distributed.test_file_pieces import saved
 from distributed.test_file_ranges import assert_bytes_of_one_process, assert_read_alike, heard
-from support.comm import together
 
 GZIP = {"chunks": (19,), "compression": "gzip"}
 
@@ -105,11 +103,7 @@ def test_points_that_are_twice_in_a_zone_are_held(ranks: int, tmp_path: Path) ->
     path = save_zones(random_volume(200, seed=1), tmp_path / "a.cgns", twice=40)
     mesh = gmsnet.read(path)
     assert mesh.cells[-1].kind == "vertex"
-    assert planned_format(str(path), "cgns") == "cgns"
-    whole = together(ranks, lambda comm: gathered(read_ranges(str(path), "cgns", comm).piece, comm))[0]
-    assert whole.mesh.points.tobytes() == mesh.points.tobytes()
-    assert np.flatnonzero(whole.fixed).tolist() == mesh.cells[-1].nodes.ravel().tolist()
-    assert whole.fixed.any()
+    assert_read_alike(path, "cgns", ranks)
     assert_bytes_of_one_process(path, "cgns", ranks, "barrier")
 
 

@@ -46,6 +46,7 @@ FILES: dict[str, Callable[[Path], Path]] = {
     "surface of ugrid": lambda folder: save_ugrid(flat(), folder / "a.lb8.ugrid"),
     "grids": lambda folder: save_grids(folder / "a.cgns", zones=3, listed=(1,)),
     "zones": lambda folder: save_zones(mixed(), folder / "a.cgns", mixed=(1,)),
+    "doubled": lambda folder: save_zones(random_mesh(100, seed=1), folder / "a.cgns", twice=40),
     "vtkhdf": lambda folder: save_vtkhdf(random_volume(100, seed=1), folder / "a.vtkhdf"),
     "split": lambda folder: save_split(random_volume(100, seed=1), folder, 3, ghosts=True),
     "pieces": lambda folder: save_pieces(flat(), folder, 3),
@@ -79,7 +80,7 @@ def held(path: Path, given: list[str], ranks: int) -> Whole:
 def test_markers_are_those_of_one_process(name: str, tmp_path: Path) -> None:
     path = FILES[name](tmp_path)
     mesh = gmsnet.read(path)
-    markers = {key: nodes for key, nodes in mesh.markers.items() if key != "coincident points and ghost cells"}
+    markers = mesh.markers
     assert bool(markers) == (name not in ("vtkhdf", "surface of ugrid", "pieces"))
     for marker in markers:
         assert np.array_equal(held(path, [marker], 3).fixed, fixed_mask(mesh, marker))
@@ -112,6 +113,7 @@ def test_sets_of_nodes_are_for_the_reader_of_the_whole(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("name", "ranks", "given", "more"), [
     ("grids", 2, ["Zone1/cells"], {"method": "barrier"}), ("ugrid", 3, ["3", "60,"], {"method": "barrier"}),
+    ("doubled", 2, [], {"slide": ["all"], "method": "barrier"}),
     ("pieces", 2, [], {"slide": ["all"], "method": "barrier"}),
     ("grids", 3, [], {"slide": ["Zone0/cells", "Zone2"], "method": "barrier"}),
     ("surface of ugrid", 2, ["50,"], {"slide": ["all"], "method": "laplacian"}),

@@ -94,6 +94,44 @@ def test_vtu_and_vtkhdf_with_regions_and_held_nodes(tmp_path: Path) -> None:
     assert_bytes_of_one_process(path, "vtkhdf", 2, "barrier")
 
 
+def with_ghosts(mesh: Mesh, names: tuple[str, ...] = ("vtkGhostType",)) -> Mesh:
+    """Some cells at one side are copies of cells of others; of some the mark says something else."""
+    x = [mesh.points[block.nodes].mean(axis=1)[:, 0] for block in mesh.cells]
+    high = np.quantile(np.concatenate(x), 0.9)
+    marks = tuple(np.where(each > high, 1, 4 * (np.arange(len(each)) % 3 == 1)).astype(np.uint8) for each in x)
+    return replace(mesh, cell_data={**mesh.cell_data, **dict.fromkeys(names, marks)})
+
+
+@pytest.mark.parametrize("names", [("vtkGhostType",), ("vtkGhostLevels", "vtkGhostType")])
+@pytest.mark.parametrize("kind", ["runs", "in turn"])
+def test_ghost_cells_of_vtu(kind: str, names: tuple[str, ...], tmp_path: Path, monkeypatch) -> None:
+    """Their nodes are held, as by one process, where they hang together with other cells or not."""
+    monkeypatch.setattr(vtk_runs, "AT_ONCE", 100)
+    path, mesh = tmp_path / "a.vtu", with_ghosts(alternating(1500) if kind == "in turn" else with_data(mixed()), names)
+    variants = dict(vtu_variants(grid_of(mesh)))
+    for ranks, variant in enumerate(
+        ("raw, header 32, order 1, compress False", "binary, header 64, order 1, compress True"), 2
+    ):
+        path.write_bytes(variants[variant])
+        assert gmsnet.read(path).cells[-1].kind == "vertex"
+        assert_read_alike(path, "vtu", ranks)
+        if kind == "runs":
+            assert_bytes_of_one_process(path, "vtu", ranks, "barrier")
+
+
+@pytest.mark.parametrize("suffix", ["vtk", "vtkhdf"])
+def test_files_of_one_piece_have_no_ghosts(suffix: str, tmp_path: Path) -> None:
+    mesh = with_ghosts(random_volume(100, seed=1))
+    if suffix == "vtk":
+        path = legacy(mesh, tmp_path, 51)
+    else:
+        path = save_vtkhdf(mesh, tmp_path / "a.vtkhdf")
+        with h5py.File(path, "a") as file:
+            file["VTKHDF/CellData/vtkGhostType"] = np.concatenate(mesh.cell_data["vtkGhostType"])
+    assert_read_alike(path, suffix, 2)
+    assert_bytes_of_one_process(path, suffix, 2, "barrier")
+
+
 def alternating(runs: int) -> Mesh:
     """Cells of all kinds of volumes in turn, so often, and regions of them that alternate otherwise."""
     mesh = mixed()
@@ -168,7 +206,7 @@ def test_which_files_are_shared(tmp_path: Path) -> None:
         assert shared(data) == "vtk"
         assert shared(data.replace(b"UNSTRUCTURED_GRID", b"POLYDATA")) == ""
         assert shared(data.replace(b"weights", b"regions")) == "vtk"  # three numbers a cell are no regions
-        assert shared(data.replace(b"material", b"vtkGhostType").replace(b"weights", b"material")) == ""
+        assert shared(data.replace(b"material", b"vtkGhostType").replace(b"weights", b"material")) == "vtk"
         assert shared(data.replace(b"\nCELL_TYPES ", b"\nCELL_TYPES 1")) == ""
         assert shared(data.replace(b"CELL_DATA ", b"CELL_DATA 1")) == ""
         assert shared(data.replace(b"CELL_TYPES", b"CELL_KINDS")) == ""

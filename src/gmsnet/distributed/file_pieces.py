@@ -14,9 +14,10 @@ from gmsnet.distributed.joining import Joined, joined, orphans
 from gmsnet.distributed.layouts import Layout, Opened, layout_of
 from gmsnet.distributed.piece import Cells, Piece
 from gmsnet.distributed.together import replace_together
+from gmsnet.distributed.zones import Names, named_here, with_vertices
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io.contents import Data
-from gmsnet.io.merge import Part
+from gmsnet.io.merge import HELD, Part
 from gmsnet.io.packed import is_packed, packed
 from gmsnet.io.pieces import Pieces
 from gmsnet.io.stamps import Stamps
@@ -122,7 +123,7 @@ def _checked(name: str, layout: Layout, told: Sequence[Any]) -> None:
 
 
 def _piece(comm: Any, parts: Sequence[Part], nodes: Joined) -> Piece:
-    """The cells of the parts but copies of others, by global ids; nodes whose cells nobody has are held."""
+    """The cells of the parts but copies of others, by global ids, with vertices at nodes that are held."""
     mine = [(block.kind, block.nodes.shape[1]) for part in parts for block in part.parsed.cells]
     kinds = list(dict.fromkeys(key for each in comm.allgather(mine) for key in each))
     names = [kind for kind, _ in kinds]
@@ -130,7 +131,7 @@ def _piece(comm: Any, parts: Sequence[Part], nodes: Joined) -> Piece:
         raise InputError("cells of one kind have different numbers of nodes: smooth this file without ranks")
     cuts = np.cumsum([0, *(len(part.parsed.points) for part in parts)])
     images = [nodes.node[start + part.parsed.images] for part, start in zip(parts, cuts[:-1], strict=True)]
-    blocks, held = [], [nodes.node[nodes.unsure], *images]
+    blocks, stay = list[Cells](), [nodes.node[nodes.unsure]]
     for kind, width in kinds:
         own, copies = [np.empty((0, width), dtype=np.int64)], [np.empty((0, width), dtype=np.int64)]
         regions = [np.empty(0, dtype=np.int64)]
@@ -144,14 +145,16 @@ def _piece(comm: Any, parts: Sequence[Part], nodes: Joined) -> Piece:
         cells, ghost_cells = np.concatenate(own), np.concatenate(copies)
         number = (comm.exscan(len(cells)) or 0) + np.arange(len(cells))
         blocks.append(Cells(kind, cells, np.concatenate(regions), number))
-        held.append(ghost_cells[orphans(comm, ghost_cells, cells)].ravel())
+        stay.append(ghost_cells[orphans(comm, ghost_cells, cells)].ravel())
     ids, first = np.unique(nodes.node, return_index=True)
     own = (ids >= nodes.starts[comm.rank]) & (ids < nodes.starts[comm.rank + 1])  # of others the points are copies
-    fixed = np.isin(ids, np.concatenate(held)) | (own & _fixed(comm, parts)[first])
+    fixed = np.isin(ids, np.concatenate([nodes.node[:0], *images])) | (own & _fixed(comm, parts)[first])
     single = any(comm.allgather(any(part.parsed.single for part in parts)))
     told = {key: name for part in parts for key, name in part.parsed.region_names.items()}
-    called = {key: name for each in comm.allgather(told) for key, name in each.items()}
-    return everywhere(comm, lambda: Piece(ids, nodes.points[first], fixed, tuple(blocks), single, called))
+    called: Names = {key: name for each in comm.allgather(told) for key, name in each.items()}
+    here = named_here(comm, nodes.starts, np.concatenate(stay))
+    every, called = with_vertices(comm, blocks, called, here, HELD)
+    return everywhere(comm, lambda: Piece(ids, nodes.points[first], fixed, tuple(every), single, called))
 
 
 def _fixed(comm: Any, parts: Sequence[Part]) -> Flags:

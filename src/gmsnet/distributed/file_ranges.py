@@ -18,7 +18,7 @@ from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.partition import along_curve
 from gmsnet.distributed.piece import Cells, Piece
 from gmsnet.distributed.tags import nodes_of
-from gmsnet.distributed.zones import Shared, Zones, asked, homes, in_zones
+from gmsnet.distributed.zones import Shared, Zones, asked, homes, in_zones, named_here, with_vertices
 from gmsnet.errors import FormatError, GmsnetError, InputError
 from gmsnet.io.atomic import replace_files
 from gmsnet.io.formats import FORMATS
@@ -26,6 +26,7 @@ from gmsnet.io.pieces import Piece as Bytes
 from gmsnet.io.ranges import Column, Plan, put
 from gmsnet.io.rows import AT_ONCE, Ranges, Rows
 from gmsnet.io.stamps import Stamps
+from gmsnet.io.vtk_ghosts import GHOST_CELLS
 
 PLANNED = ("cgns", "gmsh", "ugrid", "vtk", "vtkhdf", "vtu")  # formats whose files can tell how their numbers lie
 Floats = NDArray[np.float64]
@@ -160,17 +161,21 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     rows = np.array([plan.nodes * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
     first, last = rows[comm.rank : comm.rank + 2].tolist()
     read = everywhere(comm, lambda: _said(file, lambda: _blocks(file, plan, comm)))
+    ghosts = everywhere(comm, lambda: _said(file, lambda: _ghosts(file, plan, comm)))
     images = np.empty(0, dtype=np.int64)
     if plan.tags:
         read, images = _renumbered(comm, file, plan, read, first, last)
     nodes = everywhere(comm, lambda: _said(file, lambda: _nodes(file, plan, rows, comm.rank)))
     nodes = nodes._replace(held=nodes.held | nodes.marked(comm, images))
-    zones = None
+    zones, stay = None, _ids_of([block.nodes[marks] for block, marks in zip(read, ghosts, strict=True)])
     if plan.zones:
         named = _ids_of([block.nodes for block in read])
-        zones, nodes = in_zones(comm, plan.zones, nodes, named)
+        zones, nodes, stay = in_zones(comm, plan.zones, nodes, named)
         node = zones.of_points(comm, named)
         read = [replace(block, nodes=node[np.searchsorted(named, block.nodes)]) for block in read]
+    read, names = with_vertices(
+        comm, read, plan.names or {}, named_here(comm, nodes.rows, stay), "coincident points" if zones else GHOST_CELLS
+    )
     ids = _ids_of([block.nodes[:, 0] for block in read])
     blocks = _shared_out(comm, read, ids, asked(comm, nodes.rows, nodes.points, ids))
     ids = _ids_of([block.nodes for block in blocks])
@@ -178,7 +183,7 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     ids = np.sort(np.concatenate([ids, lonely]))
     points, fixed = (asked(comm, nodes.rows, mine, ids) for mine in (nodes.points, nodes.held))
     everywhere(comm, file.check)
-    piece = everywhere(comm, lambda: Piece(ids, points, fixed, tuple(blocks), plan.single, plan.names or {}))
+    piece = everywhere(comm, lambda: Piece(ids, points, fixed, tuple(blocks), plan.single, names))
     return FileRanges(file, plan, piece, nodes.rows, zones)
 
 
@@ -203,6 +208,11 @@ def _blocks(file: Ranges, plan: Plan, comm: Any) -> list[Cells]:
         Cells(tables[0].kind, *plan.cells(file, block, comm.rank, comm.size))
         for block, tables in enumerate(plan.blocks)
     ]
+
+
+def _ghosts(file: Ranges, plan: Plan, comm: Any) -> list[NDArray[np.bool_]]:
+    """Which of the same cells are copies of others."""
+    return [plan.ghosts(file, block, comm.rank, comm.size) for block in range(len(plan.blocks))]
 
 
 def _renumbered(

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import CELLS
 from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.joining import joined_points
+from gmsnet.distributed.library import mpi
+from gmsnet.distributed.piece import Cells
 
 Ids = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
+Names = Mapping[tuple[int, int], str]
 
 
 class Shared(NamedTuple):
@@ -28,9 +32,29 @@ class Shared(NamedTuple):
     def marked(self, comm: Any, nodes: Ids) -> Flags:
         """All ranks call it: which of the nodes of this rank any rank names."""
         found = np.zeros(len(self.points), dtype=bool)
-        for some in comm.alltoall([nodes[rows] for rows in by_rank(homes(self.rows, nodes), comm.size)]):
-            found[some - self.rows[comm.rank]] = True
+        found[named_here(comm, self.rows, nodes) - self.rows[comm.rank]] = True
         return found
+
+
+def named_here(comm: Any, rows: Ids, nodes: Ids) -> Ids:
+    """All ranks call it: those of the nodes that this rank keeps that any rank names, ascending. rows: see Shared."""
+    lists = by_rank(homes(rows, nodes), comm.size)
+    return np.unique(np.concatenate(comm.alltoall([nodes[some] for some in lists])))
+
+
+def with_vertices(
+    comm: Any, blocks: Sequence[Cells], names: Names, nodes: Ids, called: str
+) -> tuple[list[Cells], Names]:  # fmt: skip
+    """All ranks call it: cells, and names of regions, with a vertex at each of some nodes; see
+    ``gmsnet.io.vtk_ghosts.with_vertices``. nodes: of those that this rank keeps, ascending."""
+    counts = comm.allgather(len(nodes))
+    if not any(counts):
+        return [*blocks], names
+    regions = [int(block.regions.max(initial=0)) for block in blocks if CELLS[block.kind].dimension == 0]
+    region = 1 + int(comm.allreduce(max(regions, default=0), mpi().MAX))
+    numbers = sum(counts[: comm.rank]) + np.arange(len(nodes))
+    vertices = Cells("vertex", nodes[:, None], np.full(len(nodes), region), numbers)
+    return [*blocks, vertices], {**names, (0, region): called}
 
 
 def homes(rows: Ids, nodes: Ids) -> Ids:
@@ -73,9 +97,11 @@ class Zones:
         return self.rows[comm.rank] + there, told[there, 1:]
 
 
-def in_zones(comm: Any, first: Sequence[int], points: Shared, named: Ids) -> tuple[Zones, Shared]:
-    """All ranks call it: the nodes that points of zones are. first: of all zones the first point. named: points of
-    cells that this rank has read. See ``gmsnet.io.merge.merged``."""
+def in_zones(comm: Any, first: Sequence[int], points: Shared, named: Ids) -> tuple[Zones, Shared, Ids]:
+    """All ranks call it: the nodes that points of zones are, and those of them at the place of others of their zone.
+
+    See ``gmsnet.io.merge.merged``. first: of all zones the first point. named: points of cells that this rank has read.
+    """
     used = points.marked(comm, named)
     start = int(points.rows[comm.rank])
     zone = np.searchsorted(np.asarray(first), start + np.arange(len(used)), side="right") - 1
@@ -83,5 +109,5 @@ def in_zones(comm: Any, first: Sequence[int], points: Shared, named: Ids) -> tup
     ids, at = np.unique(found.node, return_index=True)
     own = at[(ids >= found.starts[comm.rank]) & (ids < found.starts[comm.rank + 1])]
     nodes = Shared(found.starts, found.points[own], np.zeros(len(own), dtype=bool))
-    held = nodes.marked(comm, found.node[points.held | found.unsure])
-    return Zones(points.rows, found.node), nodes._replace(held=held)
+    nodes = nodes._replace(held=nodes.marked(comm, found.node[points.held]))
+    return Zones(points.rows, found.node), nodes, found.node[found.unsure]

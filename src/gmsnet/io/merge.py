@@ -17,6 +17,8 @@ from gmsnet.mesh.cell_block import CellBlock
 
 Ints = NDArray[np.int64]
 
+HELD = "coincident points and ghost cells"  # the region of vertices that hold them
+
 
 @dataclass(frozen=True)
 class Part:
@@ -76,7 +78,7 @@ def one_mesh(parts: Mapping[str, Part], files: int) -> Parsed:
     shares = {key: Share(part.parsed.slots, node) for (key, part), node in zip(parts.items(), whole.nodes, strict=True)}
     unread = dict.fromkeys([f"the division into {files} files", *whole.parsed.unread])
     parsed = replace(whole.parsed, shares=shares, unread=list(unread))
-    return with_vertices(parsed, whole.held, "coincident points and ghost cells")
+    return with_vertices(parsed, whole.held, HELD)
 
 
 def _joined(parts: Sequence[Part]) -> tuple[Ints, NDArray[np.bool_]]:

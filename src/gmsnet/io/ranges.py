@@ -18,6 +18,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io.cells import MOST_BLOCKS
 from gmsnet.io.pieces import Piece
 from gmsnet.io.rows import AnyRows, Listed, Ranges, Rows
+from gmsnet.io.vtk_ghosts import marked
 
 
 class Column(NamedTuple):
@@ -44,7 +45,8 @@ class Encoded(Protocol):
 class Table(NamedTuple):
     """Cells of one kind. nodes: of each, counted from ``base``. order: see Kind. region: of all of them, where
     ``regions`` does not tell that of each. counts: numbers of nodes that the file tells of each, if it does. zone: the
-    first of the nodes that are meant, and how many these are, where not all are."""
+    first of the nodes that are meant, and how many these are, where not all are. ghosts: numbers of each, with bits of
+    which one tells that it is a copy of a cell elsewhere, whose nodes are to be held."""
 
     kind: str
     nodes: AnyRows
@@ -54,6 +56,7 @@ class Table(NamedTuple):
     regions: AnyRows | None = None
     counts: AnyRows | None = None
     zone: tuple[int, int] | None = None
+    ghosts: Sequence[tuple[AnyRows, int]] = ()
 
 
 NO_IMAGES = np.empty((0, 2), dtype=np.int64)
@@ -129,25 +132,45 @@ class Plan:
         Nodes are told by their tags where they have any. Raises FormatError where a cell names one that is not there,
         and where it has another number of nodes than its kind.
         """
-        tables = self.blocks[block]
-        total, before = sum(table.nodes.rows for table in tables), 0
-        first, last = (total * part // ranks for part in (rank, rank + 1))
-        nodes, regions = [np.empty((0, tables[0].nodes.width), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
-        for table in tables:
+        first, last = self._share(block, rank, ranks)
+        nodes = [np.empty((0, self.blocks[block][0].nodes.width), dtype=np.int64)]
+        regions = [np.empty(0, dtype=np.int64)]
+        for table, begin, end in self._parts(block, first, last):
+            self._check_counts(file, table, begin, end)
+            listed = table.nodes.of(file, begin, end).astype(np.int64) - table.base
+            if not self.tags:
+                self._check(listed, table, begin)
+            if table.zone is not None:
+                listed += table.zone[0]
+            nodes.append(listed if table.order is None else listed[:, table.order])
+            own = None if table.regions is None else table.regions.of(file, begin, end)
+            alike = np.full(end - begin, table.region, dtype=np.int64)
+            regions.append(alike if own is None else own[:, 0].astype(np.int64))
+        return np.concatenate(nodes), np.concatenate(regions), np.arange(first, last)
+
+    def ghosts(self, file: Ranges, block: int, rank: int, ranks: int) -> NDArray[np.bool_]:
+        """(n,) which of these cells are copies of cells elsewhere."""
+        found = [np.empty(0, dtype=np.bool_)]
+        for table, begin, end in self._parts(block, *self._share(block, rank, ranks)):
+            marks = np.zeros(end - begin, dtype=np.bool_)
+            for rows, bits in table.ghosts:
+                marks |= marked(rows.of(file, begin, end)[:, 0], bits)
+            found.append(marks)
+        return np.concatenate(found)
+
+    def _share(self, block: int, rank: int, ranks: int) -> tuple[int, int]:
+        """The first cell of a block that is the share of one of so many, and the one behind the last."""
+        total = sum(table.nodes.rows for table in self.blocks[block])
+        return total * rank // ranks, total * (rank + 1) // ranks
+
+    def _parts(self, block: int, first: int, last: int) -> Iterator[tuple[Table, int, int]]:
+        """The tables in which some cells of a block are, each with its first one and the one behind the last."""
+        before = 0
+        for table in self.blocks[block]:
             begin, end = max(first - before, 0), min(last - before, table.nodes.rows)
             if begin < end:
-                self._check_counts(file, table, begin, end)
-                listed = table.nodes.of(file, begin, end).astype(np.int64) - table.base
-                if not self.tags:
-                    self._check(listed, table, begin)
-                if table.zone is not None:
-                    listed += table.zone[0]
-                nodes.append(listed if table.order is None else listed[:, table.order])
-                own = None if table.regions is None else table.regions.of(file, begin, end)
-                alike = np.full(end - begin, table.region, dtype=np.int64)
-                regions.append(alike if own is None else own[:, 0].astype(np.int64))
+                yield table, begin, end
             before += table.nodes.rows
-        return np.concatenate(nodes), np.concatenate(regions), np.arange(first, last)
 
     def _check_counts(self, file: Ranges, table: Table, first: int, last: int) -> None:
         if table.counts is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from gmsnet.mesh.cell_block import CellBlock
 
 TYPES, LEVELS = "vtkGhostType", "vtkGhostLevels"  # the latter until VTK 7
 DUPLICATE = 1  # the bit of a cell that another piece owns
+GHOST_CELLS = "ghost cells"  # the region of vertices that hold their nodes
+BITS = {TYPES: DUPLICATE, LEVELS: ~0}  # of which one tells that a cell is a copy
 
 
 def ghosts(parsed: Parsed) -> list[NDArray[np.bool_]]:
@@ -19,18 +22,24 @@ def ghosts(parsed: Parsed) -> list[NDArray[np.bool_]]:
     found = []
     for k, block in enumerate(parsed.cells):
         marks = np.zeros(len(block.nodes), dtype=bool)
-        for name, bits in ((TYPES, DUPLICATE), (LEVELS, ~0)):
+        for name, bits in BITS.items():
             values = parsed.cell_data[name][k] if name in parsed.cell_data else marks
             if values.ndim == 1 and values.dtype.kind in "iu":
-                marks = marks | ((values.astype(np.int64) & bits) != 0)
+                marks = marks | marked(values, bits)
         found.append(marks)
+    return found
+
+
+def marked(values: NDArray[Any], bits: int) -> NDArray[np.bool_]:
+    """Which whole numbers have any of some bits."""
+    found: NDArray[np.bool_] = (values.astype(np.int64) & bits) != 0
     return found
 
 
 def held(parsed: Parsed) -> Parsed:
     """The same file with the nodes of its ghost cells held: a piece by itself must not move what others move, too."""
     nodes = [block.nodes[marks].ravel() for block, marks in zip(parsed.cells, ghosts(parsed), strict=True)]
-    return with_vertices(parsed, np.unique(np.concatenate(nodes)), "ghost cells")
+    return with_vertices(parsed, np.unique(np.concatenate(nodes)), GHOST_CELLS)
 
 
 def with_vertices(parsed: Parsed, nodes: NDArray[np.int64], name: str) -> Parsed:

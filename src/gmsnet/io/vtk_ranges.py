@@ -135,6 +135,6 @@ def _plan(file: Ranges, arrays: dict[str, Rows], counts: dict[str, int], fields:
     told = told_by(file, fields.get("POINT_DATA", []), fields.get("CELL_DATA", []), (points.rows, cells))
     if told is None or nodes.dtype[1] not in "iu" or (offsets is not None and offsets.dtype[1] not in "iu"):
         return None
-    tables = tables_of(file, types, nodes, None if offsets is None else begins, told.regions)
+    tables = tables_of(file, types, nodes, None if offsets is None else begins, told.without_ghosts)
     blocks = [[table] for table in tables]
     return Plan([Column(points)], blocks, points.dtype == ">f4", fixed=told.fixed) if tables else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from gmsnet.io import vtk_cells
 from gmsnet.io.cells import MOST_BLOCKS
 from gmsnet.io.ranges import Table
 from gmsnet.io.rows import Listed, Ranges
-from gmsnet.io.vtk_ghosts import LEVELS, TYPES
+from gmsnet.io.vtk_ghosts import BITS
 from gmsnet.mesh.region_fields import NUMBERED, names_a_region
 from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX
 
@@ -34,26 +34,36 @@ class Field(NamedTuple):
 
 
 class Told(NamedTuple):
-    """regions: of cells; fixed: of nodes, those that are not 0 are held. None where the file has no such numbers."""
+    """regions: of cells; fixed: of nodes, those that are not 0 are held. None where the file has no such numbers.
+    ghosts: of cells, and the bits that tell copies of cells of others."""
 
-    regions: Listed | None
-    fixed: Listed | None
+    regions: Listed | None = None
+    fixed: Listed | None = None
+    ghosts: Sequence[tuple[Listed, int]] = ()
+
+    @property
+    def without_ghosts(self) -> Told:
+        """For formats whose files are no pieces of others, and hold no cells for them."""
+        return self._replace(ghosts=())
 
 
 def told_by(file: Ranges, points: Iterable[Field], cells: Iterable[Field], counts: tuple[int, int]) -> Told | None:
     """What the data of points and cells tell, of which there are so many. None where only a reader of them all can tell
-    (see ``region_fields.regions_of``), and where they mark copies of cells of others."""
+    (see ``region_fields.regions_of``)."""
     held = [field.rows for field in points if field.name == "fixed"][-1:]
     cells = list(cells)
     found = [field.rows for field in cells if names_a_region(field.name)]
+    marks = {field.name: field.rows for field in cells if field.name in BITS}
     if any(rows is None or rows.rows != counts[0] for rows in held):
         return None
-    if any(rows is None or rows.rows != counts[1] for rows in found) or any(f.name in (TYPES, LEVELS) for f in cells):
+    if any(rows is None or rows.rows != counts[1] for rows in [*found, *marks.values()]):
         return None
     single = [rows for rows in found if rows is not None and rows.width == 1]
     if len(single) > 1 or any(rows.dtype[1] not in "iu" or _may_number(file, rows) for rows in single):
         return None
-    return Told(single[0] if single else None, held[0] if held else None)
+    ghosts = [(rows, BITS[name]) for name, rows in marks.items()
+              if rows is not None and rows.width == 1 and rows.dtype[1] in "iu"]  # fmt: skip
+    return Told(single[0] if single else None, held[0] if held else None, ghosts)
 
 
 def _may_number(file: Ranges, rows: Listed) -> bool:
@@ -61,39 +71,39 @@ def _may_number(file: Ranges, rows: Listed) -> bool:
     return rows.rows >= NUMBERED and len(np.unique(rows.of(file, 0, NUMBERED))) == NUMBERED
 
 
-def tables_of(
-    file: Ranges, types: Listed, nodes: Listed, offsets: Some | None = None, regions: Listed | None = None
-) -> list[Table]:
+def tables_of(file: Ranges, types: Listed, nodes: Listed, offsets: Some | None, told: Told) -> list[Table]:
     """A table for each run of cells of one type, or where runs are many for each type; none where that cannot be told.
 
     types: VTK's of the cells. nodes: of all cells. offsets: some of where the nodes of each cell begin, with the end of
     the last one (cells + 1 in all); without, each cell has its number of nodes in front, which counts as one of them.
-    regions: of the cells.
+    told: by the data of the cells.
     """
     lead = int(offsets is None)
     walk = _walked(file, types, offsets, nodes.rows)
     if walk is None:
         return []
     if walk.runs is None:
-        return [_scattered(code, walk, types, nodes, lead, regions) for code in walk.codes]
+        return [_scattered(code, walk, types, nodes, lead, told) for code in walk.codes]
     tables = list[Table]()
     for first, last, code, start in walk.runs:
         kind, width = vtk_cells.KINDS[code], int(SIZES[code])
         rows = nodes.cut(start + lead, last - first, width + lead, width)
         counts = nodes.cut(start, last - first, width + lead, 1) if lead else None
-        own = None if regions is None else regions.cut(first, last - first, 1, 1)
-        tables.append(Table(kind.name, rows, 0, kind.order, 0, own, counts))
+        own = None if told.regions is None else told.regions.cut(first, last - first, 1, 1)
+        ghosts = [(values.cut(first, last - first, 1, 1), bits) for values, bits in told.ghosts]
+        tables.append(Table(kind.name, rows, 0, kind.order, 0, own, counts, ghosts=ghosts))
     return tables
 
 
-def _scattered(code: int, walk: Walk, types: Listed, nodes: Listed, lead: int, regions: Listed | None) -> Table:
+def _scattered(code: int, walk: Walk, types: Listed, nodes: Listed, lead: int, told: Told) -> Table:
     """All cells of one type."""
     kind, width = vtk_cells.KINDS[code], int(SIZES[code])
     before = walk.before[:, code].copy()
     among = Among(types, code, lead, walk.cells, walk.starts, before)
     counts = KindNodes(among, nodes, 0, 1) if lead else None
-    own = None if regions is None else KindValues(among, regions)
-    return Table(kind.name, KindNodes(among, nodes, lead, width), 0, kind.order, 0, own, counts)
+    own = None if told.regions is None else KindValues(among, told.regions)
+    ghosts = [(KindValues(among, values), bits) for values, bits in told.ghosts]
+    return Table(kind.name, KindNodes(among, nodes, lead, width), 0, kind.order, 0, own, counts, ghosts=ghosts)
 
 
 class Walk(NamedTuple):

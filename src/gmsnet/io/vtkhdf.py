@@ -57,8 +57,8 @@ def read(files: Mapping[str, Data]) -> Parsed:
 
 
 def plan(file: Ranges) -> Plan | None:
-    """How the numbers of a file lie; None of grids with ghost cells, with regions by several fields, and with cells of
-    no certain number of nodes."""
+    """How the numbers of a file lie; None of grids with regions by several fields, and with cells of no certain number
+    of nodes."""
     with File.opened(file.path) as opened:
         root = opened.root.need("VTKHDF")
         if root.attribute("Type") != "UnstructuredGrid" or root.get("Steps") is not None:
@@ -77,7 +77,7 @@ def plan(file: Ranges) -> Plan | None:
         told = told_by(file, _fields_in(root.get("PointData")), _fields_in(root.get("CellData")), (count, cells))
         if told is None:
             return None
-        blocks = [[each] for each in tables_of(file, codes, nodes, offsets.some, told.regions)]
+        blocks = [[each] for each in tables_of(file, codes, nodes, offsets.some, told.without_ghosts)]
         column = Column(points)
         encoded = stored_points([{place.path: column}])
         return Plan([column], blocks, points.dtype[1:] == "f4", (), told.fixed, encoded) if blocks else None

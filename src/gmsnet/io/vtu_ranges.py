@@ -50,7 +50,7 @@ def plan(file: Ranges) -> Plan | None:
         found = ends.of(file, max(first - 1, 0), last - 1)[:, 0].astype(np.int64)
         return found if first else np.append(0, found)
 
-    tables = tables_of(file, types, nodes, offsets, told.regions)
+    tables = tables_of(file, types, nodes, offsets, told)
     if not tables:
         return None
     column = Column(at.cut(0, points, 3, 3))
