@@ -74,7 +74,7 @@ def deform(
             help="What sweeps keep, as for 'gmsnet smooth'.", autocompletion=lambda: ["valid", "worst", "star"]
         ),
     ] = "worst",
-    max_sweeps: Annotated[int, typer.Option(min=0, help="Make at most so many sweeps where shapes suffered.")] = 100,
+    max_sweeps: Annotated[int, typer.Option(min=0, help="Make at most so many sweeps where shapes suffered.")] = 200,
     threads: Annotated[
         int | None,
         typer.Option(min=1, help="Use at most so many processors (default: all). Same result for any number."),

@@ -43,7 +43,7 @@ def smooth(
     objective: Annotated[str | None, typer.Option(help="What 'optimize' minimises; see 'gmsnet methods'.")] = None,
     max_sweeps: Annotated[
         int, typer.Option(min=0, help="Make at most so many sweeps (untangling comes before).")
-    ] = 100,
+    ] = 200,
     target_quality: Annotated[
         float | None,
         typer.Option(

@@ -53,7 +53,7 @@ def smooth(
         if cad is not None and cad.curves and live.planar:  # else the mesh itself tells where they slide
             options["geometry"] = cad
         held = _held(gmsh, live, fixed, on_geometry)
-        with Progress(options.get("max_sweeps", 100), bar=progress_bar) as progress:
+        with Progress(options.get("max_sweeps", 200), bar=progress_bar) as progress:
             options["callback"] = progress.before(options.get("callback"))
             result = smooth_mesh(live.mesh, method, fixed=held, **options)
         if cad is not None or live.curved:

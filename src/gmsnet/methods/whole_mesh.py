@@ -45,7 +45,7 @@ HARMONIC_ITERATIONS = 30
 ACCURATE = (1e-2, 1e-4, 1e-6)  # of the first residual: the next one is for harmonic places with inverted cells
 # A smaller share of Σq, or of a power of q, gained in an iteration is little; and of Σq where the minimum is near.
 SETTLED, CLOSE, CLOSEST = 1e-4, 1e-6, 1e-12
-TRADE, LEAST_GAIN = 0.5, 1e-4  # in 1/q; most of the mean comes back in the sweeps that follow
+TRADE, LEAST_GAIN = 0.2, 1e-4  # in 1/q; most of the mean comes back in the sweeps that follow
 REPAIRS = 3  # lists of cycles on the worst cells, where they are worse than the guard allows
 
 

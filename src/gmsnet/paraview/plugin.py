@@ -44,7 +44,7 @@ class GmsnetSmooth(VTKPythonAlgorithmBase):
 
     def __init__(self) -> None:
         super().__init__(nInputPorts=1, nOutputPorts=1, inputType="vtkPointSet", outputType="vtkPointSet")
-        self._method, self._preserve, self._target, self._slide, self._sweeps = "auto", "shape", 0.0, 0, 100
+        self._method, self._preserve, self._target, self._slide, self._sweeps = "auto", "shape", 0.0, 0, 200
 
     @smproperty.stringvector(name="Methods", information_only="1")
     def GetMethods(self) -> list[str]:  # noqa: D102
@@ -75,7 +75,7 @@ class GmsnetSmooth(VTKPythonAlgorithmBase):
         self._target = value
         self.Modified()
 
-    @smproperty.intvector(name="MaxSweeps", default_values=100)
+    @smproperty.intvector(name="MaxSweeps", default_values=200)
     @smdomain.intrange(min=0, max=1000)
     def SetMaxSweeps(self, value: int) -> None:
         """At most so many sweeps."""

@@ -52,7 +52,7 @@ class Accessor(Generic[DataSet]):
 
     def report(self, method: str = "auto", *, progress_bar: bool = False, **options: Any) -> SmoothResult:
         """The same with all that there is to tell: measures before and after, held nodes, and ``mesh``, the result."""
-        with Progress(options.get("max_sweeps", 100), bar=progress_bar) as progress:
+        with Progress(options.get("max_sweeps", 200), bar=progress_bar) as progress:
             options["callback"] = progress.before(options.get("callback"))
             return smooth(self._dataset, method, **options)
 

@@ -78,7 +78,7 @@ def deform(
     slide: Any = None,
     feature_angle: float = 30.0,
     guard: str = "worst",
-    max_sweeps: int = 100,
+    max_sweeps: int = 200,
     threads: int | None = None,
     callback: Callable[[Sweep], bool | None] | None = None,
 ) -> DeformResult:

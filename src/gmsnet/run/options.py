@@ -37,7 +37,7 @@ class SmoothOptions:
     method: str = "auto"
     variant: str | None = None
     objective: str | None = None
-    max_sweeps: int = 100
+    max_sweeps: int = 200
     threads: int | None = None
     target_quality: float | None = None
     target_angle: float | None = None
