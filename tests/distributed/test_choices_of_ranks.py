@@ -23,6 +23,7 @@ from gmsnet.mesh.selection import fixed_mask
 from gmsnet.run.options import SmoothOptions
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+from distributed import test_exodus_ranges
 from distributed.test_cgns_grids_ranges import save_grids
 from distributed.test_cgns_zones_ranges import save_zones
 from distributed.test_file_ranges import mixed, save_ugrid, save_vtkhdf
@@ -46,6 +47,7 @@ FILES: dict[str, Callable[[Path], Path]] = {
     "surface of ugrid": lambda folder: save_ugrid(flat(), folder / "a.lb8.ugrid"),
     "grids": lambda folder: save_grids(folder / "a.cgns", zones=3, listed=(1,)),
     "zones": lambda folder: save_zones(mixed(), folder / "a.cgns", mixed=(1,)),
+    "exodus": lambda folder: test_exodus_ranges.save(random_volume(100, seed=1), folder / "a.e"),
     "doubled": lambda folder: save_zones(random_mesh(100, seed=1), folder / "a.cgns", twice=40),
     "vtkhdf": lambda folder: save_vtkhdf(random_volume(100, seed=1), folder / "a.vtkhdf"),
     "split": lambda folder: save_split(random_volume(100, seed=1), folder, 3, ghosts=True),

@@ -6,12 +6,13 @@ Source: L. A. Schoof and V. R. Yarberry, EXODUS II: A Finite Element Data Model,
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import CELLS
 from gmsnet.errors import FormatError
-from gmsnet.mesh.cell_block import CellBlock
 
 Ints = NDArray[np.int64]
 
@@ -66,31 +67,40 @@ def kind_of(called: str, nodes: int, dimension: int) -> str:
     raise FormatError(f"elements of type {called[:24]!r} are not known in a mesh of {dimension} dimensions")
 
 
-def side_cells(
-    first: Sequence[tuple[int, CellBlock]], elements: Ints, sides: Ints, dimension: int
-) -> tuple[dict[str, Ints], int]:
-    """Sides as cells (kind → nodes), and how many are not kept: those of elements of fewer dimensions than the mesh.
+class Sides(NamedTuple):
+    """One side of some elements of a block. block: its number, from 0. rows: (n,) the elements, by their places in it.
+    corners: those of an element that the side has."""
 
-    first: the number of the first element of each block. elements, sides: (n,) counted from 0. Raises FormatError for
+    block: int
+    rows: Ints
+    corners: tuple[int, ...]
+
+
+def sides_of(
+    blocks: Sequence[tuple[str, int]], elements: Ints, sides: Ints, dimension: int
+) -> tuple[dict[str, list[Sides]], int]:
+    """Sides by the kind of cell that they are, and how many are not kept: elements have fewer dimensions than the mesh.
+
+    blocks: the kind of the elements of each, and how many. elements, sides: (n,) counted from 0. Raises FormatError for
     elements and sides that do not exist.
     """
-    count = first[-1][0] + len(first[-1][1].nodes) if first else 0
+    count = sum(number for _, number in blocks)
     if len(elements) and not 0 <= elements.min() <= elements.max() < count:
         raise FormatError(f"a side set names an element that is none of {count}")
-    found: dict[str, list[Ints]] = {}
-    kept = 0
-    for start, block in first:
-        kind = _FIRST_ORDER.get(block.kind, block.kind)
-        here = np.flatnonzero((elements >= start) & (elements < start + len(block.nodes)))
-        if block.dimension != dimension or kind not in SIDES or not len(here):
+    found: dict[str, list[Sides]] = {}
+    kept, end = 0, 0
+    for block, (whole, number) in enumerate(blocks):
+        kind, start = _FIRST_ORDER.get(whole, whole), end
+        end += number
+        here = np.flatnonzero((elements >= start) & (elements < end))
+        if CELLS[whole].dimension != dimension or kind not in SIDES or not len(here):
             continue
         if not 0 <= sides[here].min() <= sides[here].max() < len(SIDES[kind]):
             # Faces of shells come before their edges: sides 1 and 2, which are the elements themselves.
             raise FormatError(f"a side set names a side that a {kind} does not have")
-        for number, corners in enumerate(SIDES[kind]):
-            some = here[sides[here] == number]
+        for side, corners in enumerate(SIDES[kind]):
+            some = here[sides[here] == side]
             if len(some):
-                nodes = block.nodes[elements[some] - start][:, list(corners)]
-                found.setdefault(_SIDE_KINDS[len(corners)], []).append(nodes)
+                found.setdefault(_SIDE_KINDS[len(corners)], []).append(Sides(block, elements[some] - start, corners))
                 kept += len(some)
-    return {kind: np.concatenate(parts) for kind, parts in found.items()}, len(elements) - kept
+    return found, len(elements) - kept

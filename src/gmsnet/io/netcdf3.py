@@ -122,12 +122,17 @@ class Header:
 
     def array(self, name: str) -> NDArray[Any]:
         """The values of a variable without records, in its shape. Raises FormatError where the file ends before."""
-        variable = self.variables[name]
+        variable = self.placed(name)
         size = variable.size
-        if variable.record or not 0 <= variable.begin <= len(self.data) - size or min(variable.shape, default=0) < 0:
-            raise FormatError(f"the variable {name[:40]!r} is not wholly in the file: is it cut off?")
         found: NDArray[Any] = np.ndarray(variable.shape, variable.dtype, bytes(
             self.data[variable.begin : variable.begin + size]))  # fmt: skip
+        return found
+
+    def placed(self, name: str) -> Variable:
+        """A variable without records. Raises as ``array``."""
+        found = self.variables[name]
+        if found.record or not 0 <= found.begin <= len(self.data) - found.size or min(found.shape, default=0) < 0:
+            raise FormatError(f"the variable {name[:40]!r} is not wholly in the file: is it cut off?")
         return found
 
     def check_apart(self, names: Sequence[str]) -> None:

@@ -18,6 +18,7 @@ from gmsnet.io.contents import refuse_unless_regular
 from gmsnet.io.stamps import Stamp
 
 AT_ONCE = 1 << 22  # bytes that are copied together
+HEAD = 1 << 16  # bytes at the beginning that are read together
 
 
 class Ranges:
@@ -70,6 +71,24 @@ class Ranges:
     def _check(self, file: FileIO) -> None:
         if Stamp.of(os.fstat(file.fileno())) != self.stamp:
             raise InputError(f"{self.path}: the file changed while it was read: read it again once it is finished")
+
+
+class Head:
+    """The bytes of a file where they are asked for: of its head, and of few numbers behind it. Serves as Data."""
+
+    def __init__(self, file: Ranges) -> None:
+        self._file, self._begin = file, bytes(file.read(0, min(file.size, HEAD)))
+
+    def __len__(self) -> int:
+        return self._file.size
+
+    def __getitem__(self, place: int | slice) -> Any:
+        if isinstance(place, int):
+            return self[place : place + 1][0]
+        first, last, _ = place.indices(len(self))
+        if last <= len(self._begin):
+            return self._begin[first:last]
+        return bytes(self._file.read(first, max(last - first, 0)))
 
 
 @dataclass(frozen=True)
