@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from gmsnet.cells.jacobian import form_of
 from gmsnet.cells.table import CELLS
@@ -197,6 +196,8 @@ def remembered(points: NDArray[np.float64], linked: CurvedSolids) -> CurvedSolid
 
 def _by_node(nodes: Ints, items: NDArray[np.int64], count: int) -> tuple[NDArray[np.int64], Ints]:
     """CSR: for each node the items that stand beside it, in ascending order."""
+    from scipy.sparse import csr_array  # it takes a tenth of a second to import
+
     rows = csr_array((np.ones(len(nodes), dtype=bool), nodes, np.arange(len(nodes) + 1)), shape=(len(nodes), count))
     columns = rows.tocsc()
     return columns.indptr.astype(np.int64), items[columns.indices].astype(np.int32)
