@@ -119,4 +119,4 @@ def _by_pairs(gradient: Floats, pairs: deque[Pair]) -> Floats:
 
 def _sum(a: Floats, b: Floats) -> float:
     """Of products, not by BLAS."""
-    return float((a * b).sum())
+    return float(np.add.reduce(a * b))
