@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -18,6 +20,17 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 # is judged by what it changes; GMSNET_RANDOM_EXAMPLES=1 draws new ones.
 settings.register_profile("gmsnet", deadline=None, derandomize=not os.environ.get("GMSNET_RANDOM_EXAMPLES"))
 settings.load_profile("gmsnet")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Without looking for garbage, over and over, among a million objects that stay."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 def pytest_runtest_teardown() -> None:
