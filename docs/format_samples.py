@@ -7,14 +7,21 @@ be that file, byte for byte.
 from __future__ import annotations
 
 import base64
+import lzma
 import struct
 import zlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+import lz4.block
+
 from gmsnet.io.nastran_numbers import fitted
 
+PACKERS: dict[str, Callable[[bytes], bytes]] = {
+    "zlib": zlib.compress, "LZMA": partial(lzma.compress, check=lzma.CHECK_CRC32, preset=5),
+    "LZ4": partial(lz4.block.compress, store_size=False),
+}  # fmt: skip
 Row = Sequence[str]  # the decimals of a point
 Files = dict[str, bytes]  # suffix → bytes
 
@@ -543,8 +550,8 @@ def _vtk_offsets(out: Sample, title: str, cells: list[Cell]) -> None:
 VTU_TYPES = {"f": "Float32", "d": "Float64", "i": "Int32", "q": "Int64", "B": "UInt8"}
 
 
-def vtu(out: Sample, encoding: str, compressed: bool = False) -> Files:
-    """encoding: ``ascii``, ``binary`` (base64), ``raw`` or ``base64`` (both appended)."""
+def vtu(out: Sample, encoding: str, packer: str = "") -> Files:
+    """encoding: ``ascii``, ``binary`` (base64), ``raw`` or ``base64`` (both appended). packer: of PACKERS, or none."""
     order = out.order
     appended = bytearray()
 
@@ -557,7 +564,7 @@ def vtu(out: Sample, encoding: str, compressed: bool = False) -> Files:
                 out.row((code, values))
         else:
             numbers = [float(v) if code in "fd" else v for values in table for v in values]  # type: ignore[arg-type]
-            block = _encoded(struct.pack(f"{order}{len(numbers)}{code}", *numbers), order, encoding, compressed)
+            block = _encoded(struct.pack(f"{order}{len(numbers)}{code}", *numbers), order, encoding, packer)
             if encoding == "binary":
                 out.line(head + 'format="binary">')
                 out.line(block.decode())
@@ -568,7 +575,9 @@ def vtu(out: Sample, encoding: str, compressed: bool = False) -> Files:
 
     out.line('<?xml version="1.0"?>')
     out.line("<!-- made by hand -->", out.has("comments"))
-    compressor = ' header_type="UInt32" compressor="vtkZLibDataCompressor"' if compressed else ' header_type="UInt32"'
+    compressor = ' header_type="UInt32"'
+    if packer:
+        compressor += f' compressor="vtk{"ZLib" if packer == "zlib" else packer}DataCompressor"'
     name = "BigEndian" if order == ">" else "LittleEndian"
     out.line(f'<VTKFile type="UnstructuredGrid" version="0.1" byte_order="{name}"{compressor}>')
     out.line("<UnstructuredGrid>")
@@ -603,14 +612,14 @@ def vtu(out: Sample, encoding: str, compressed: bool = False) -> Files:
     return {".vtu": bytes(out.bytes)}
 
 
-def _encoded(data: bytes, order: str, encoding: str, compressed: bool) -> bytes:
+def _encoded(data: bytes, order: str, encoding: str, packer: str) -> bytes:
     head, body = struct.pack(f"{order}I", len(data)), data
-    if compressed:
-        body = zlib.compress(data)
+    if packer:
+        body = PACKERS[packer](data)
         head = struct.pack(f"{order}4I", 1, len(data), 0, len(body))
     if encoding == "raw":
         return head + body
-    if compressed:
+    if packer:
         return base64.b64encode(head) + base64.b64encode(body)
     return base64.b64encode(head + body)
 
@@ -649,10 +658,12 @@ VARIANTS = [
       for how, order in (("text", ""), ("binary", ">"))),
     Variant("vtk", "VTK 4.2, binary, single", partial(vtk, version="4.2"), ">", True),
     Variant("vtu", "VTU, text", partial(vtu, encoding="ascii")),
-    *(Variant("vtu", f"VTU, {how}{', zlib' * compressed}, {end}", partial(vtu, encoding=code, compressed=compressed),
+    *(Variant("vtu", f"VTU, {how}{', ' * bool(packer)}{packer}, {end}", partial(vtu, encoding=code, packer=packer),
               order)
       for how, code in (("base64", "binary"), ("appended raw", "raw"), ("appended base64", "base64"))
-      for compressed in (False, True) for end, order in ((_LITTLE, "<"), (_BIG, ">"))),
+      for packer in ("", "zlib") for end, order in ((_LITTLE, "<"), (_BIG, ">"))),
+    Variant("vtu", "VTU, base64, LZMA", partial(vtu, encoding="binary", packer="LZMA"), "<"),
+    Variant("vtu", "VTU, appended raw, LZ4", partial(vtu, encoding="raw", packer="LZ4"), "<"),
     Variant("vtu", "VTU, appended raw, single", partial(vtu, encoding="raw"), "<", True),
     Variant("medit", "Medit, 2D", partial(medit, dimension=2)),
     Variant("medit", "Medit, 3D", partial(medit, dimension=3)),

@@ -15,7 +15,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 TARGET = Path(__file__).with_name("licences.md")
-EXTRAS = ("train", "view", "hdf5", "convert", "docs")
+EXTRAS = ("train", "view", "hdf5", "lz4", "convert", "docs")
 PERMISSIVE = re.compile(
     r"(MIT(-CMU)?|(3-clause )?0?BSD(-[23]-Clause)?|Apache(-2\.0)?|ISC|Zlib|CC0-1\.0|PSF-2\.0|HPND|BSL-1\.0|Unlicense"
     r"|Python Software Foundation)\b.*"

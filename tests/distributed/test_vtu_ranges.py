@@ -15,6 +15,7 @@ import gmsnet
 from gmsnet.distributed.file_ranges import planned_format
 from gmsnet.distributed.file_run import FileTask, smooth_file
 from gmsnet.io import vtu_skeleton, vtu_sources
+from gmsnet.io.vtu_compressors import COMPRESSORS
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.run.options import SmoothOptions
 
@@ -61,7 +62,7 @@ def test_the_bytes_do_not_depend_on_how_much_is_read_at_once(at_once: int, tmp_p
             assert_bytes_of_one_process(tmp_path / "a.vtu", "vtu", 3, "laplacian")
 
 
-@pytest.mark.parametrize("compression", [None, "zlib"])
+@pytest.mark.parametrize("compression", [None, "zlib", "lzma"])
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_as_meshio_writes_it(compression: str | None, ranks: int, tmp_path: Path) -> None:
     """Inline, with the header and the numbers in one where they are not compressed."""
@@ -166,14 +167,15 @@ def test_many_tags_are_for_the_reader_of_the_whole(tmp_path: Path, monkeypatch) 
     assert planned_format(str(path), "vtu") == ""
 
 
+def full(part, block):
+    raise OSError(28, "No space left on device")
+
+
 def test_a_failure_leaves_the_file(tmp_path: Path, monkeypatch) -> None:
     path = tmp_path / "a.vtu"
     path.write_bytes(WHOLE["raw, header 32, order 1, compress True"])
-
-    def full(block, part):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(vtu_sources, "compressed_like", full)
+    packer = COMPRESSORS["vtkZLibDataCompressor"]._replace(pack=full)
+    monkeypatch.setitem(COMPRESSORS, "vtkZLibDataCompressor", packer)
     before = saved(tmp_path)
     assert heard(3, path, "vtu")[0] == f"{path}: cannot be written: no space left on device"
     assert saved(tmp_path) == before

@@ -90,8 +90,8 @@ def _add_fields(grid: Any, mesh: Mesh) -> None:
         grid.GetCellData().AddArray(array)
 
 
-def vtu_variants(grid: Any) -> Iterator[tuple[str, bytes]]:
-    """(description, file) for each way in which VTK writes a VTU file."""
+def vtu_variants(grid: Any, packer: str = "ZLib") -> Iterator[tuple[str, bytes]]:
+    """(description, file) for each way in which VTK writes a VTU file. packer: ZLib, LZMA or LZ4."""
     modes = {"ascii": 0, "binary": 1, "raw": 2, "base64": 2}
     for mode, header, order, compress in itertools.product(modes, (32, 64), (0, 1), (False, True)):
         writer = vtk.vtkXMLUnstructuredGridWriter()
@@ -101,7 +101,7 @@ def vtu_variants(grid: Any) -> Iterator[tuple[str, bytes]]:
         writer.SetByteOrder(order)
         writer.SetBlockSize(192)  # several blocks, of which the last is shorter
         if compress:
-            writer.SetCompressorTypeToZLib()
+            getattr(writer, f"SetCompressorTypeTo{packer}")()
         else:
             writer.SetCompressorTypeToNone()
         writer.SetInputData(grid)

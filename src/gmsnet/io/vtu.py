@@ -136,7 +136,7 @@ def _points(reader: Reader, place: DataArray, count: int) -> tuple[NDArray[np.fl
     if encoded is None:  # no points, nothing to write
         return points, BinarySlots(Places(), kind)
     encoding, size = encoded.encoding, np.dtype(kind).itemsize
-    if not encoding.compressed and not encoding.base64:
+    if encoding.compressor is None and not encoding.base64:
         lattice = Lattice(found.start + encoding.width, count, 3 * size, (0, size, 2 * size))
         return points, BinarySlots(Places(lattice), kind)
     document = replace(reader.document, data=b"")  # the file itself is handed over with each call

@@ -9,23 +9,21 @@ from __future__ import annotations
 
 import base64
 import binascii
-import zlib
 from dataclasses import dataclass
 
 import numpy as np
 
 from gmsnet.errors import FormatError
-
-MOST_INFLATED = 1100  # times its length: more than zlib can reach (1032)
-_LEVELS = (1, 5, 6, 9)  # of compression, by the two bits in which zlib notes how hard it tried
+from gmsnet.io.vtu_compressors import Compressor
 
 
 @dataclass(frozen=True)
 class Encoding:
-    """How a file encodes its arrays. header: the type of the numbers in headers, with the byte order."""
+    """How a file encodes its arrays. header: the type of the numbers in headers, with the byte order. compressor: None
+    where they are not compressed."""
 
     header: str
-    compressed: bool
+    compressor: Compressor | None
     base64: bool
 
     @property
@@ -52,14 +50,15 @@ class Encoded:
     def written(self, old: bytes | memoryview, new: bytes) -> bytes:
         """The array with other numbers (as many bytes) in the same encoding; blocks without a change stay."""
         kind = self.encoding.header
-        if not self.encoding.compressed:
+        compressor = self.encoding.compressor
+        if compressor is None:
             return self._text(np.array([len(new)], dtype=kind).tobytes(), new)
         size = self.head[1]
         blocks = []
         for k, block in enumerate(self.blocks):
             part = new[k * size : (k + 1) * size]
             same = part == old[k * size : (k + 1) * size]
-            blocks.append(block if same else compressed_like(block, part))
+            blocks.append(block if same else compressor.pack(part, block))
         return self._text(np.array([*self.head, *map(len, blocks)], dtype=kind).tobytes(), b"".join(blocks))
 
     def _text(self, header: bytes, body: bytes) -> bytes:
@@ -76,7 +75,9 @@ def decode(data: memoryview, encoding: Encoding, expected: int) -> tuple[Encoded
     Raises FormatError where it ends early, has another size or cannot be unpacked; no more memory is taken than the
     length of the data allows.
     """
-    return _compressed(data, encoding, expected) if encoding.compressed else _plain(data, encoding, expected)
+    if encoding.compressor is None:
+        return _plain(data, encoding, expected)
+    return _compressed(data, encoding, encoding.compressor, expected)
 
 
 def _plain(data: memoryview, encoding: Encoding, expected: int) -> tuple[Encoded, memoryview]:
@@ -91,7 +92,9 @@ def _plain(data: memoryview, encoding: Encoding, expected: int) -> tuple[Encoded
     return Encoded(encoding, end, apart), both[skip : skip + size]
 
 
-def _compressed(data: memoryview, encoding: Encoding, expected: int) -> tuple[Encoded, memoryview]:
+def _compressed(
+    data: memoryview, encoding: Encoding, compressor: Compressor, expected: int
+) -> tuple[Encoded, memoryview]:
     width = encoding.width
     start, _ = taken(data, 0, 3 * width, encoding.base64)
     count, block_size, last = np.frombuffer(start, dtype=encoding.header, count=3).tolist()
@@ -101,7 +104,7 @@ def _compressed(data: memoryview, encoding: Encoding, expected: int) -> tuple[En
     head, at = taken(data, 0, (3 + count) * width, encoding.base64)
     lengths = np.frombuffer(head, dtype=encoding.header, count=3 + count)[3:].tolist()
     stored = sum(lengths)
-    if stored > len(data) or expected > MOST_INFLATED * stored:
+    if stored > len(data) or expected > compressor.most * stored:
         raise FormatError(f"{expected} bytes cannot come from {stored} compressed bytes")
     body, end = taken(data, at, stored, encoding.base64)
     payload, filled, blocks, at = np.empty(expected, dtype=np.uint8).data, 0, [], 0
@@ -109,28 +112,11 @@ def _compressed(data: memoryview, encoding: Encoding, expected: int) -> tuple[En
         block = bytes(body[at : at + length])
         at += length
         size = last if last and k == count - 1 else block_size
-        part = decompressed(block, k, size)
+        part = compressor.unpacked(block, k, size)
         payload[filled : filled + size] = part
         filled += size
         blocks.append(block)
     return Encoded(encoding, end, True, tuple(blocks), (count, block_size, last)), payload
-
-
-def compressed_like(block: bytes, part: bytes) -> bytes:
-    """Other bytes, compressed as hard as a block was."""
-    return zlib.compress(part, _LEVELS[block[1] >> 6])
-
-
-def decompressed(block: bytes, number: int, size: int) -> bytes:
-    """The bytes of a block, which must be so many. Raises FormatError, naming its number, where it is damaged."""
-    unpacker = zlib.decompressobj()
-    try:
-        found = unpacker.decompress(block, size + 1)
-    except zlib.error as error:
-        raise FormatError(f"block {number} cannot be decompressed: {error}") from None
-    if len(found) != size or not unpacker.eof or unpacker.unused_data:
-        raise FormatError(f"block {number} does not decompress to the {size} bytes that its header announces")
-    return found
 
 
 def taken(data: memoryview, at: int, size: int, in_base64: bool) -> tuple[memoryview, int]:

@@ -106,7 +106,7 @@ def _arrays(file: Ranges, reader: Reader, text: Skeleton, stop: int) -> dict[tup
         elif how == "binary" and (word := _inline(reader, text, array)) is not None:
             (begin, end), in_base64 = word, True
         if 0 <= begin < end:
-            encoding = Encoding(reader.header, reader.compressed, in_base64)
+            encoding = Encoding(reader.header, reader.compressor, in_base64)
             there = rows_at(file, begin, end, encoding, reader.order + (kind or "u1"))
         if there is not None and how == "binary" and there[1] != end:
             return None

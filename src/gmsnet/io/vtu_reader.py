@@ -13,6 +13,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
 from gmsnet.io.text import Text, fail
 from gmsnet.io.vtu_arrays import Encoded, Encoding, decode
+from gmsnet.io.vtu_compressors import Compressor, compressor_of
 from gmsnet.io.vtu_xml import DataArray, Document, parse
 from gmsnet.io.words import TextWords, typed
 
@@ -47,7 +48,7 @@ class Reader:
     stored: int
     order: str
     header: str
-    compressed: bool
+    compressor: Compressor | None
 
     def __init__(self, data: Data, kind: str = "UnstructuredGrid") -> None:
         self.data, self.document = data, parse(data, kind)
@@ -56,15 +57,11 @@ class Reader:
         root = self.document.root
         orders = {"LittleEndian": "<", "BigEndian": ">"}
         headers = {"UInt32": "u4", "UInt64": "u8"}
-        compressor = root.get("compressor", "")
-        if compressor not in ("", "vtkZLibDataCompressor"):
-            raise FormatError(
-                f"the compressor {compressor[:40]!r} is not supported: write the file with zlib or without"
-            )
+        self.compressor = compressor_of(root.get("compressor", ""))
         order, header = root.get("byte_order", "LittleEndian"), root.get("header_type", "UInt32")
         if order not in orders or header not in headers:
             raise FormatError(f"unknown byte_order {order[:24]!r} or header_type {header[:24]!r}")
-        self.order, self.header, self.compressed = orders[order], orders[order] + headers[header], bool(compressor)
+        self.order, self.header = orders[order], orders[order] + headers[header]
 
     def count(self, attribute: str) -> int:
         """A number of the one piece."""
@@ -108,7 +105,7 @@ class Reader:
         if not count:
             return Numbers(np.empty(0, dtype=kind), None, None, start)
         try:
-            found, payload = decode(stored, Encoding(self.header, self.compressed, in_base64), count * int(kind[1]))
+            found, payload = decode(stored, Encoding(self.header, self.compressor, in_base64), count * int(kind[1]))
         except FormatError as error:
             self.fail(array, str(error))
         if how == "binary" and found.length != len(stored):

@@ -14,7 +14,8 @@ from gmsnet.errors import FormatError
 from gmsnet.io.ranges import Moves, put
 from gmsnet.io.rows import AT_ONCE, EncodedRows, Listed, Ranges, Rows
 from gmsnet.io.temporary import Temporary
-from gmsnet.io.vtu_arrays import MOST_INFLATED, Encoding, compressed_like, decompressed, taken
+from gmsnet.io.vtu_arrays import Encoding, taken
+from gmsnet.io.vtu_compressors import Compressor
 
 
 @dataclass(frozen=True)
@@ -106,13 +107,14 @@ class Plain:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """A compressed array. begin: of its header in the file. encoding: of the file. head: the first three numbers of the
-    header (blocks, bytes of a block, bytes of the last one, 0 where it is a whole one). starts: (blocks + 1,) where
-    each begins in the stretch."""
+    """A compressed array. begin: of its header in the file. encoding, compressor: of the file. head: the first three
+    numbers of the header (blocks, bytes of a block, bytes of the last one, 0 where it is a whole one). starts:
+    (blocks + 1,) where each begins in the stretch."""
 
     dtype: str
     begin: int
     encoding: Encoding
+    compressor: Compressor
     head: tuple[int, int, int]
     starts: NDArray[np.int64]
     stretch: Stretch
@@ -155,7 +157,7 @@ class Blocks:
         """The bytes of numbers in some blocks."""
         count, size, last = self.head
         try:
-            return [decompressed(block, number, last if last and number == count - 1 else size)
+            return [self.compressor.unpacked(block, number, last if last and number == count - 1 else size)
                     for number, block in enumerate(blocks, first)]  # fmt: skip
         except FormatError as error:
             raise FormatError(f"the array at byte {self.begin}: {error}") from None
@@ -184,7 +186,7 @@ class Blocks:
             whole = self._bytes(file, rows[0] * row, begin) + old + self._bytes(file, end, rows[1] * row)
             moved = _moved(np.frombuffer(whole, dtype=self.dtype), moves, rows[0])[begin - rows[0] * row :]
             new = (moved[at : at + len(part)] for at, part in zip(range(0, len(old), size), parts, strict=True))
-            yield [block if part == other else compressed_like(block, other)
+            yield [block if part == other else self.compressor.pack(other, block)
                    for block, part, other in zip(blocks, parts, new, strict=True)]  # fmt: skip
 
 
@@ -247,10 +249,10 @@ def rows_at(file: Ranges, begin: int, stop: int, encoding: Encoding, dtype: str)
     """
     found: Plain | Blocks | None
     try:
-        if encoding.compressed:
-            found = _compressed(file, begin, stop, encoding, dtype)
-        else:
+        if encoding.compressor is None:
             found = _plain(file, begin, encoding, dtype)
+        else:
+            found = _compressed(file, begin, stop, encoding, encoding.compressor, dtype)
     except FormatError:
         return None
     size = np.dtype(dtype).itemsize
@@ -271,7 +273,9 @@ def _plain(file: Ranges, begin: int, encoding: Encoding, dtype: str) -> Plain:
     return Plain(dtype, begin, Stretch(begin + at if apart else begin, skip + size, encoding.base64, skip))
 
 
-def _compressed(file: Ranges, begin: int, stop: int, encoding: Encoding, dtype: str) -> Blocks | None:
+def _compressed(
+    file: Ranges, begin: int, stop: int, encoding: Encoding, compressor: Compressor, dtype: str
+) -> Blocks | None:
     width = encoding.width
     start = Stretch(begin, 3 * width, encoding.base64).read(file, 0, 3 * width)
     count, block, last = np.frombuffer(start, dtype=encoding.header, count=3).tolist()
@@ -280,7 +284,7 @@ def _compressed(file: Ranges, begin: int, stop: int, encoding: Encoding, dtype: 
         return None
     lengths = np.frombuffer(header.read(file, 3 * width, (3 + count) * width), dtype=encoding.header)
     starts = np.append(0, np.cumsum(lengths.astype(np.float64)))
-    if starts[-1] > stop - header.end or count * block > MOST_INFLATED * starts[-1] + block:
+    if starts[-1] > stop - header.end or count * block > compressor.most * starts[-1] + block:
         return None
     stretch = Stretch(header.end, int(starts[-1]), encoding.base64)
-    return Blocks(dtype, begin, encoding, (count, block, last), starts.astype(np.int64), stretch)
+    return Blocks(dtype, begin, encoding, compressor, (count, block, last), starts.astype(np.int64), stretch)
