@@ -43,6 +43,7 @@ Ints = NDArray[np.int32]
 
 HARMONIC_ITERATIONS = 30
 ACCURATE = (1e-2, 1e-4, 1e-6)  # of the first residual: the next one is for harmonic places with inverted cells
+ALIKE = 1.1  # times Σq of the points; where a cell is inverted it is far more
 # A smaller share of Σq, or of a power of q, gained in an iteration is little; and of Σq where the minimum is near.
 SETTLED, CLOSE, CLOSEST = 1e-4, 1e-6, 1e-12
 TRADE, LEAST_GAIN = 0.2, 1e-4  # in 1/q; most of the mean comes back in the sweeps that follow
@@ -155,7 +156,7 @@ class Problem:
             there = self.value(harmonic, gradient)
             if there < value:
                 return harmonic
-            if there < math.inf:  # more exact ones are about as good
+            if there < ALIKE * value:  # no cell is inverted there, and more exact ones are about as good
                 break
         return points
 
