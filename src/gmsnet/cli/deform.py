@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gmsnet.errors import InputError
+from gmsnet.run.sweep import MOST_SWEEPS
 
 if TYPE_CHECKING:
     from gmsnet.mesh.mesh import Mesh
@@ -74,7 +75,9 @@ def deform(
             help="What sweeps keep, as for 'gmsnet smooth'.", autocompletion=lambda: ["valid", "worst", "star"]
         ),
     ] = "worst",
-    max_sweeps: Annotated[int, typer.Option(min=0, help="Make at most so many sweeps where shapes suffered.")] = 200,
+    max_sweeps: Annotated[
+        int, typer.Option(min=0, help="Make at most so many sweeps where shapes suffered.")
+    ] = MOST_SWEEPS,
     threads: Annotated[
         int | None,
         typer.Option(min=1, help="Use at most so many processors (default: all). Same result for any number."),

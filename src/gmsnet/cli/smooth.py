@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gmsnet.run.sweep import MOST_SWEEPS
+
 if TYPE_CHECKING:
     from gmsnet.cli.destination import Destination
     from gmsnet.mesh.mesh import Mesh
@@ -43,7 +45,7 @@ def smooth(
     objective: Annotated[str | None, typer.Option(help="What 'optimize' minimises; see 'gmsnet methods'.")] = None,
     max_sweeps: Annotated[
         int, typer.Option(min=0, help="Make at most so many sweeps (untangling comes before).")
-    ] = 200,
+    ] = MOST_SWEEPS,
     target_quality: Annotated[
         float | None,
         typer.Option(

@@ -28,15 +28,8 @@ from gmsnet.io.rows import AT_ONCE, Ranges, Rows
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.vtk_ghosts import GHOST_CELLS
 
-PLANNED = (
-    "cgns",
-    "exodus",
-    "gmsh",
-    "ugrid",
-    "vtk",
-    "vtkhdf",
-    "vtu",
-)  # formats whose files can tell how their numbers lie
+# Formats whose files can tell how their numbers lie.
+PLANNED = ("cgns", "exodus", "gmsh", "ugrid", "vtk", "vtkhdf", "vtu")
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
 Value = TypeVar("Value")

@@ -18,6 +18,7 @@ from gmsnet.mesh.selection import chosen_nodes
 from gmsnet.run.api import smooth as smooth_mesh
 from gmsnet.run.progress import Progress
 from gmsnet.run.result import SmoothResult
+from gmsnet.run.sweep import MOST_SWEEPS
 
 HOLD, SLIDE = "hold", "slide"
 
@@ -53,7 +54,7 @@ def smooth(
         if cad is not None and cad.curves and live.planar:  # else the mesh itself tells where they slide
             options["geometry"] = cad
         held = _held(gmsh, live, fixed, on_geometry)
-        with Progress(options.get("max_sweeps", 200), bar=progress_bar) as progress:
+        with Progress(options.get("max_sweeps", MOST_SWEEPS), bar=progress_bar) as progress:
             options["callback"] = progress.before(options.get("callback"))
             result = smooth_mesh(live.mesh, method, fixed=held, **options)
         if cad is not None or live.curved:

@@ -91,10 +91,11 @@ def _lz4() -> Any:
     return lz4.block
 
 
+LZ4 = "vtkLZ4DataCompressor"
 COMPRESSORS = {
     "vtkZLibDataCompressor": Compressor(_inflated, _deflated, 1100),  # 1032 at most
     "vtkLZMADataCompressor": Compressor(_from_xz, _to_xz, 10_000),  # about 7,000
-    "vtkLZ4DataCompressor": Compressor(_from_lz4, _to_lz4, 256),  # 255
+    LZ4: Compressor(_from_lz4, _to_lz4, 256),  # 255
 }
 
 
@@ -107,6 +108,6 @@ def compressor_of(name: str) -> Compressor | None:
     if name not in COMPRESSORS:
         known = ", ".join(COMPRESSORS)
         raise FormatError(f"the compressor {name[:40]!r} is not supported: write the file with one of {known}, or none")
-    if COMPRESSORS[name].unpack is _from_lz4:
+    if name == LZ4:  # before ranks share the file
         _lz4()
     return COMPRESSORS[name]

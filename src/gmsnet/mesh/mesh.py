@@ -241,9 +241,8 @@ class Mesh:
         for block in self.cells:
             for region in np.unique(block.regions).tolist():
                 name = marker_name(self.region_names, block.dimension, region)
-                if name is None:
-                    continue
-                nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
+                if name is not None:
+                    nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
         return {name: np.unique(np.concatenate(ids)) for name, ids in nodes.items()}
 
 

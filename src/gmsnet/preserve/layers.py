@@ -173,6 +173,8 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:
         if len(topology.quads):
             whole = _followed(topology, points, whole)
         chosen = whole[of_cell]
+    if not chosen.any():
+        return None
     area, around = cells[:, stretch.AREA], _area_around(triangles, cells, number)
     damaged = chosen & (area <= BROKEN * around)
     nodes = np.zeros(len(layer), dtype=bool)
@@ -181,8 +183,6 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:
         calm = chosen & (area <= CALM * around) & (around <= CALM * area)
         every, still = (np.bincount(triangles[some].ravel(), minlength=len(layer)) for some in (chosen, calm))
         nodes[triangles[damaged]] &= 2 * still[triangles[damaged]] >= every[triangles[damaged]]
-    if not chosen.any():
-        return None
     lengths = np.exp(cells[chosen, stretch.LENGTH])
     first = np.ones(len(chosen), dtype=bool) if of_cell is None else np.append(True, np.diff(of_cell) != 0)
     broken = damaged.sum() if of_cell is None else len(np.unique(of_cell[damaged]))

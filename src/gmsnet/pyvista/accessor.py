@@ -13,6 +13,7 @@ from gmsnet.mesh.adapters import to_mesh
 from gmsnet.run.api import smooth
 from gmsnet.run.progress import Progress
 from gmsnet.run.result import SmoothResult
+from gmsnet.run.sweep import MOST_SWEEPS
 
 PREFIX = "gmsnet_"  # of cell arrays: PyVista's own measures have some of these names
 CELL = f"{PREFIX}cell"
@@ -52,7 +53,7 @@ class Accessor(Generic[DataSet]):
 
     def report(self, method: str = "auto", *, progress_bar: bool = False, **options: Any) -> SmoothResult:
         """The same with all that there is to tell: measures before and after, held nodes, and ``mesh``, the result."""
-        with Progress(options.get("max_sweeps", 200), bar=progress_bar) as progress:
+        with Progress(options.get("max_sweeps", MOST_SWEEPS), bar=progress_bar) as progress:
             options["callback"] = progress.before(options.get("callback"))
             return smooth(self._dataset, method, **options)
 

@@ -18,7 +18,7 @@ from gmsnet.run.result import SmoothResult
 from gmsnet.run.set_up import first_state
 from gmsnet.run.stages import carry_out
 from gmsnet.run.state import State
-from gmsnet.run.sweep import Sweep
+from gmsnet.run.sweep import MOST_SWEEPS, Sweep
 
 
 def smooth(
@@ -27,7 +27,7 @@ def smooth(
     *,
     variant: str | None = None,
     objective: str | None = None,
-    max_sweeps: int = 200,
+    max_sweeps: int = MOST_SWEEPS,
     threads: int | None = None,
     target_quality: float | None = None,
     target_angle: float | None = None,

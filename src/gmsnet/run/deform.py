@@ -25,7 +25,7 @@ from gmsnet.run.result import SmoothResult
 from gmsnet.run.set_up import check_mesh, first_state
 from gmsnet.run.stages import carry_out
 from gmsnet.run.state import Motion, State
-from gmsnet.run.sweep import Sweep
+from gmsnet.run.sweep import MOST_SWEEPS, Sweep
 from gmsnet.run.untangle_stage import untangle_all
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def deform(
     slide: Any = None,
     feature_angle: float = 30.0,
     guard: str = "worst",
-    max_sweeps: int = 200,
+    max_sweeps: int = MOST_SWEEPS,
     threads: int | None = None,
     callback: Callable[[Sweep], bool | None] | None = None,
 ) -> DeformResult:

@@ -20,7 +20,7 @@ from gmsnet.methods import METHODS, Method, MethodOptions, Smoother, chosen
 from gmsnet.parallel.threads import available_threads
 from gmsnet.preserve.protection import METRIC, PRESERVE, method_for
 from gmsnet.run.metric_options import check_adapting
-from gmsnet.run.sweep import Sweep
+from gmsnet.run.sweep import MOST_SWEEPS, Sweep
 
 MOST_DIHEDRAL = 70.5  # degrees; those of a regular tetrahedron are 70.53
 
@@ -37,7 +37,7 @@ class SmoothOptions:
     method: str = "auto"
     variant: str | None = None
     objective: str | None = None
-    max_sweeps: int = 200
+    max_sweeps: int = MOST_SWEEPS
     threads: int | None = None
     target_quality: float | None = None
     target_angle: float | None = None

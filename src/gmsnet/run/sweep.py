@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
+MOST_SWEEPS = 200  # by default
+
 
 @dataclass(frozen=True)
 class Sweep:
