@@ -139,6 +139,13 @@ def smooth(
         int | None,
         typer.Option(min=1, help="Use at most so many processors (default: all). Same result for any number."),
     ] = None,
+    device: Annotated[
+        str,
+        typer.Option(
+            help="cpu, or cuda: a GPU of NVIDIA does the sweeps that it can. Same result.",
+            autocompletion=lambda: ["cpu", "cuda"],
+        ),
+    ] = "cpu",
     seed: Annotated[int, typer.Option(min=0, help="For methods that draw random numbers.")] = 0,
     weights: Annotated[
         str | None, typer.Option(metavar="FILE", help="Weights of your own, as 'gmsnet train' writes them.")
@@ -218,7 +225,7 @@ def smooth(
         preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, weights=weights,
         best_by=best_by,
         slide=slide or None, feature_angle=feature_angle,
-        surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles,
+        surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles, device=device,
         **values_at_nodes(metric, size),
     )  # fmt: skip
 

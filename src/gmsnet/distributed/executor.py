@@ -52,6 +52,14 @@ class Ranks:
         """See Executor."""
         return self.inner.map(work, first, last)
 
+    def swept(self, visit: Any, stars: Any, points: Floats, guard: Any) -> NDArray[np.int64] | None:
+        """See Executor."""
+        return None
+
+    def remarks(self) -> tuple[str, ...]:
+        """See Executor."""
+        return ()
+
     def after_colour(self, colour: int, points: Floats) -> None:
         """See Executor."""
         topology, rail = self.part.topology, self.part.rail

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gmsnet.kernels.methods import angle as kernels
-from gmsnet.kernels.star.block import Blocks
-from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
+from gmsnet.kernels.star.block import Visit
+from gmsnet.methods.base import TRIANGLES, Method, StarSmoother
 
 
 class AngleBased(StarSmoother):
     """Each node turned onto the bisectors of the angles at its neighbours, on average."""
 
-    def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    @property
+    def in_plane(self) -> Visit:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, guard, tally)
+        return Visit(kernels.sweep)
 
 
 METHOD = Method(

@@ -25,7 +25,7 @@ from gmsnet.kernels.methods import shell
 from gmsnet.kernels.methods.barrier3 import Power3, sweep3
 from gmsnet.kernels.methods.barrier_star import Power
 from gmsnet.kernels.methods.shell_lanes import sweep_lanes
-from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.block import Visit
 from gmsnet.kernels.star.guard import Guard
 from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
 from gmsnet.kernels.star.space_blocks import SpaceBlocks
@@ -62,11 +62,10 @@ class Barrier(StarSmoother):
         self.relaxation, self.relaxed, self.means = relaxation, relaxed, means
         self.sweeps = 0
 
-    def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    @property
+    def in_plane(self) -> Visit:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, guard, self.power, *self._pace, tally)
+        return Visit(kernels.sweep, (self.power, *self._pace))
 
     def visit_in_space(
         self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally

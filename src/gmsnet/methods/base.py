@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.block import Blocks, Visit
 from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.guard import (
     STAR,
@@ -120,11 +120,19 @@ class StarSmoother(Smoother):
 
     shared_out = True
 
-    @abstractmethod
+    @property
+    def in_plane(self) -> Visit | None:
+        """What visits stars in a plane in this sweep; None where ``visit`` says it otherwise."""
+        return None
+
     def visit(
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
         """Visits the stars of the blocks first…last, all of one colour, once; without the GIL. Adds to the tally."""
+        if self.in_plane is None:
+            raise NotImplementedError
+        kernel, arguments, _ = self.in_plane
+        kernel(points, blocks, first, last, guard, *arguments, tally)
 
     def visit_in_space(
         self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
@@ -166,7 +174,11 @@ class StarSmoother(Smoother):
                 self.visit(field.points, blocks, first, last, guard, counts)
             return counts
 
-        tally = by_colour(executor, visit, stars, field.points)
+        tally = None
+        if isinstance(blocks, Blocks) and self.in_plane is not None:
+            tally = executor.swept(self.in_plane, stars, field.points, guard)
+        if tally is None:
+            tally = by_colour(executor, visit, stars, field.points)
         field.floor.swept(tally)
         return tally
 

@@ -6,23 +6,18 @@ region, from which CVT has its name, weights otherwise.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gmsnet.kernels.methods import cvt as kernels
-from gmsnet.kernels.star.block import Blocks
-from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
+from gmsnet.kernels.star.block import Visit
+from gmsnet.methods.base import TRIANGLES, Method, StarSmoother
 
 
 class Circumcentres(StarSmoother):
     """Each node to the mean of its triangles' circumcentres by area."""
 
-    def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    @property
+    def in_plane(self) -> Visit:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, guard, True, tally)
+        return Visit(kernels.sweep, (True,))
 
 
 METHOD = Method(

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from gmsnet import weights
 from gmsnet.kernels.methods import gmsnet as kernels
-from gmsnet.kernels.star.block import Blocks
-from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
+from gmsnet.kernels.star.block import Visit
+from gmsnet.methods.base import TRIANGLES, Method, StarSmoother
 
 
 class GmsNet(StarSmoother):
@@ -24,11 +23,10 @@ class GmsNet(StarSmoother):
         self.hidden = trained.hidden
         self.folded = fold(trained)
 
-    def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    @property
+    def in_plane(self) -> Visit:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, guard, self.folded, self.hidden, tally)
+        return Visit(kernels.sweep, (self.folded, self.hidden), kernels.room_of(self.hidden))
 
 
 def fold(trained: weights.Weights) -> NDArray[np.float32]:

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from gmsnet import weights
 from gmsnet.kernels.methods import gmsnet2 as kernels
-from gmsnet.kernels.star.block import Blocks
-from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
+from gmsnet.kernels.star.block import Visit
+from gmsnet.methods.base import TRIANGLES, Method, StarSmoother
 
 ACTIVATIONS = {"silu": kernels.SILU, "relu": kernels.RELU}
 
@@ -23,11 +22,10 @@ class GmsNet2(StarSmoother):
     def __init__(self, trained: weights.Weights) -> None:
         self.network = fold(trained)
 
-    def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    @property
+    def in_plane(self) -> Visit:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, guard, self.network, tally)
+        return Visit(kernels.sweep, (self.network,), None)
 
 
 def fold(trained: weights.Weights) -> kernels.Network:

@@ -24,7 +24,7 @@ from gmsnet.kernels.methods import laplacian as kernels
 from gmsnet.kernels.methods import laplacian_plain, shell_laplacian
 from gmsnet.kernels.methods.barrier3 import Power3
 from gmsnet.kernels.methods.laplacian3 import sweep3
-from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.block import Visit
 from gmsnet.kernels.star.guard import Guard
 from gmsnet.kernels.star.shell import ShellStars
 from gmsnet.kernels.star.space_blocks import SpaceBlocks
@@ -47,14 +47,10 @@ class Laplacian(StarSmoother):
     def __init__(self, variant: str) -> None:
         self.variant: int | None = VARIANTS[variant]
 
-    def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    @property
+    def in_plane(self) -> Visit:
         """See StarSmoother."""
-        if self.variant is None:
-            laplacian_plain.sweep(points, blocks, first, last, guard, tally)
-        else:
-            kernels.sweep(points, blocks, first, last, guard, self.variant, tally)
+        return Visit(laplacian_plain.sweep) if self.variant is None else Visit(kernels.sweep, (self.variant,))
 
     def visit_in_space(
         self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally

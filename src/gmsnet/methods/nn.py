@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from gmsnet import weights
 from gmsnet.kernels.methods import nn as kernels
-from gmsnet.kernels.star.block import Blocks
-from gmsnet.kernels.star.guard import Guard
-from gmsnet.methods.base import TRIANGLES, Method, StarSmoother, Tally
+from gmsnet.kernels.star.block import Visit
+from gmsnet.methods.base import TRIANGLES, Method, StarSmoother
 from gmsnet.weights.shapes import NN_HIDDEN
 
 
@@ -30,11 +29,10 @@ class NNSmoothing(StarSmoother):
     def __init__(self, trained: weights.Weights) -> None:
         self.table, self.flat = fold(trained)
 
-    def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    @property
+    def in_plane(self) -> Visit:
         """See StarSmoother."""
-        kernels.sweep(points, blocks, first, last, guard, self.table, self.flat, tally)
+        return Visit(kernels.sweep, (self.table, self.flat), None)
 
 
 def fold(trained: weights.Weights) -> tuple[NDArray[np.int64], NDArray[np.float32]]:

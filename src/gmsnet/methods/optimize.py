@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.methods import adam, descent3, newton
 from gmsnet.kernels.simplex import objectives
 from gmsnet.kernels.simplex.objectives3 import Aim3
-from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.block import Blocks, Visit
 from gmsnet.kernels.star.guard import LARGEST, Guard
 from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, TRIANGLES, Method, MethodOptions, StarSmoother, Tally
@@ -37,11 +37,10 @@ class Adam(StarSmoother):
         self.objective = objectives.NAMES.index(objective)
         self.sizes = step_sizes() if sizes is None else sizes
 
-    def visit(
-        self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    @property
+    def in_plane(self) -> Visit:
         """See StarSmoother."""
-        adam.sweep(points, blocks, first, last, guard, self.objective, self.sizes, tally)
+        return Visit(adam.sweep, (self.objective, self.sizes), None)
 
     def visit_in_space(
         self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally

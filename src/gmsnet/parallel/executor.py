@@ -36,6 +36,13 @@ class Executor(Protocol):
         """
         ...
 
+    def swept(self, visit: Any, stars: Any, points: NDArray[np.float64], guard: Any) -> NDArray[np.int64] | None:
+        """A sweep over all stars in a plane by other means than ``map``: what happened to the shifts.
+
+        None where there are none. visit: a kernels.star.block.Visit. stars: with ``blocks`` and ``first``.
+        """
+        ...
+
     def after_colour(self, colour: int, points: NDArray[np.float64]) -> None:
         """All nodes of a colour are where they will be; points: (N, 2) of all nodes, in memory order."""
         ...
@@ -146,4 +153,8 @@ class Executor(Protocol):
 
     def for_blocks(self, blocks: int) -> Executor:
         """The executor for a mesh of so many blocks: one that is sequential where sharing them out does not pay."""
+        ...
+
+    def remarks(self) -> tuple[str, ...]:
+        """What there is to say of who did the work."""
         ...

@@ -23,6 +23,14 @@ Other = TypeVar("Other")
 class Process:
     """What executors of a single process have in common: the figures of the whole mesh are its own."""
 
+    def swept(self, visit: Any, stars: Any, points: NDArray[np.float64], guard: Any) -> NDArray[np.int64] | None:
+        """See Executor."""
+        return None
+
+    def remarks(self) -> tuple[str, ...]:
+        """See Executor."""
+        return ()
+
     def after_colour(self, colour: int, points: NDArray[np.float64]) -> None:
         """See Executor. All threads see the same points."""
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import Any
 
+from gmsnet.cuda.executor import gpu
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.mesh.adapters import to_mesh
+from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import workers
 from gmsnet.run.call import ended
-from gmsnet.run.options import SmoothOptions
+from gmsnet.run.options import CUDA, SmoothOptions
 from gmsnet.run.outcome import result_of
 from gmsnet.run.result import SmoothResult
 from gmsnet.run.set_up import first_state
@@ -47,6 +51,7 @@ def smooth(
     surface_tolerance: float | None = None,
     hausdorff: float | None = None,
     free_needles: bool = False,
+    device: str = "cpu",
     metric: Any = None,
     size: Any = None,
 ) -> SmoothResult:
@@ -81,6 +86,7 @@ def smooth(
     the input's facets nodes of surfaces may go, over the mean length of their edges (default: 0.05; with a geometry
     without a bound). hausdorff: how far their facets may go from the input's, over the diagonal of the box around it
     (default: no bound). free_needles: edges that look sharp only because a facet of a surface is thin are no features.
+    device: "cpu", or "cuda": a GPU of NVIDIA does what it can, sweeps in a plane, with the same bits (docs/cuda.md).
     metric: the tensors of which the cells are to be unit cells, by shape and size (docs/metric.md): an array (N, 3) of
     m11, m12, m22 at the nodes, or a function from points (n, 2) to such an array. size: the same for lengths h of
     edges: an array (N,), or a function from points (n, 2) to one (n,); its metric is h⁻²·I.
@@ -94,7 +100,8 @@ def smooth(
         target_quality=target_quality, target_angle=target_angle, target_dihedral=target_dihedral,
         preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, callback=callback,
         weights=weights, best_by=best_by, slide=slide, feature_angle=feature_angle, geometry=geometry,
-        surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles, metric=metric, size=size,
+        surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles, device=device,
+        metric=metric, size=size,
     )  # fmt: skip
     return smooth_with(mesh, options, fixed)
 
@@ -105,10 +112,16 @@ def smooth_with(mesh: Any, options: SmoothOptions, fixed: Any = None) -> SmoothR
 
     def work() -> State:
         smoother = options.smoother()
-        with interruptible(), workers(options.thread_count) as executor:
-            return carry_out(first_state(mesh, fixed, smoother, options, executor), options, executor)
+        with interruptible(), executor_for(options) as executor:
+            state = carry_out(first_state(mesh, fixed, smoother, options, executor), options, executor)
+            return replace(state, remarks=(*state.remarks, *executor.remarks()))
 
     return ended(work, lambda state: result_of(state, options, began))
+
+
+def executor_for(options: SmoothOptions) -> AbstractContextManager[Executor]:
+    """Who carries out the work, until the context ends."""
+    return gpu(options.thread_count) if options.device == CUDA else workers(options.thread_count)
 
 
 @interruptible()

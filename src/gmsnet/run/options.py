@@ -12,6 +12,7 @@ import numpy as np
 
 from gmsnet.constraints.geometry import Geometry
 from gmsnet.constraints.options import FEATURE_ANGLE, TOLERANCE, SlideChoice, check_sliding
+from gmsnet.cuda.library import checked as gpu_library
 from gmsnet.errors import InputError
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.measure.report import ASPECT, SHAPE
@@ -22,6 +23,7 @@ from gmsnet.preserve.protection import METRIC, PRESERVE, method_for
 from gmsnet.run.metric_options import check_adapting
 from gmsnet.run.sweep import MOST_SWEEPS, Sweep
 
+DEVICES = CPU, CUDA = "cpu", "cuda"
 MOST_DIHEDRAL = 70.5  # degrees; those of a regular tetrahedron are 70.53
 
 
@@ -56,6 +58,7 @@ class SmoothOptions:
     surface_tolerance: float | None = None
     hausdorff: float | None = None
     free_needles: bool = False
+    device: str = CPU
     metric: Any = field(default=None, compare=False)
     size: Any = field(default=None, compare=False)
 
@@ -99,6 +102,9 @@ class SmoothOptions:
                 f"it, and must lie in (0, 1], got {self.hausdorff!r}"
             )
         _check_flag("free_needles", self.free_needles)
+        _check_name("device", self.device, DEVICES)
+        if self.device == CUDA:
+            gpu_library()  # whether there is one is told before a file is read
         self._method()
         check_adapting(self)
 

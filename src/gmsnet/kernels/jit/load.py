@@ -11,6 +11,8 @@ from typing import Any
 from numba.core import types
 from numba.extending import intrinsic
 
+from gmsnet.kernels.jit.compile import inlined
+
 
 @intrinsic
 def load(_context: Any, kind: Any, address: Any, index: Any) -> Any:
@@ -26,3 +28,9 @@ def load(_context: Any, kind: Any, address: Any, index: Any) -> Any:
         return builder.load(builder.gep(pointer, [arguments[2]]))
 
     return number(kind, types.int64, types.int64), generate
+
+
+@inlined
+def address(table):
+    """Where the numbers of an array begin."""
+    return table.ctypes.data

@@ -21,6 +21,11 @@ EPSILON = np.float32(1e-5)  # of both norms, as in PyTorch and PyTorch Geometric
 ZERO, ONE, TWO = np.float32(0.0), np.float32(1.0), np.float32(2.0)
 
 
+def room_of(hidden: int) -> int:
+    """How many numbers the longest array of ``sweep`` has for one star: two features of each channel, padded."""
+    return 8 * ((hidden + 3) // 4)
+
+
 @part
 def moments(local, n, m):
     """Mean (rows 0, 1) and covariance xx, xy, yy (rows 2–4) of the n + 1 nodes of each star, the centre at 0."""
@@ -151,7 +156,7 @@ def sweep(points, blocks, first, last, guard, weights, hidden, tally):
     local = np.empty(2 * blocks.most * LANES, dtype=np.float32)
     shift, row = np.empty(2 * LANES, dtype=np.float32), np.empty(4 * LANES, dtype=np.float32)
     m, decoded = np.empty(5 * LANES, dtype=np.float32), np.empty(hidden * LANES, dtype=np.float32)
-    features = np.zeros(8 * ((hidden + 3) // 4) * LANES, dtype=np.float32)
+    features = np.zeros(8 * ((hidden + 3) // 4) * LANES, dtype=np.float32)  # see room_of
     for block in range(first, last):
         n = stars.fetch(points, blocks, block, workspace, local)
         propose(local, n, weights, hidden, m, row, features, decoded, shift)

@@ -6,7 +6,8 @@ once. Stars of one colour share no cell.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ MOVED, TRUNCATED, DROPPED = range(3)  # what a sweep counts
 COUNTERS = 32  # room for them on cache lines of their own, so that threads do not wait for each other's counts
 # Rows of a block's work array. CENTRE, TARGET and KEPT have two, one an axis; PAIRS four, two [lane][axis]; FLOORS n.
 SIZE, REACH, CENTRE, TARGET, MARGIN, SHARE, KEPT, PAIRS, FLOORS = 0, 1, 2, 4, 6, 7, 8, 10, 14
+CORNERS = 12  # numbers behind all rows: the corners of a simplex, before a move and after it
 LOWEST_MARGIN, WIDTH = range(2)  # rows of what a certificate is made of
 FAR = 2**18  # nodes: the coordinates of more (4 MiB) do not stay in the second-level cache
 
@@ -42,8 +44,20 @@ class Blocks(NamedTuple):
     patterns: Patterns | None = None
 
 
+class Visit(NamedTuple):
+    """A kernel that visits blocks of stars: called with points, blocks, first, last, guard, *arguments and tally.
+
+    room: how many numbers for one star the longest of its own arrays has, but for those of its workspace and its ring;
+    None where that is not told.
+    """
+
+    kernel: Callable[..., None]
+    arguments: tuple[Any, ...] = ()
+    room: int | None = 0
+
+
 class Workspace(NamedTuple):
-    """The arrays that a sweep works in. star: coordinates. work: rows of LANES. sums: for a certificate."""
+    """The arrays that a sweep works in. star: coordinates. work: rows of LANES, and CORNERS. sums: to certify."""
 
     star: NDArray[np.float64]
     work: NDArray[np.float64]
@@ -57,7 +71,7 @@ def workspace_for(most):
     counts = np.empty(COUNTERS, dtype=np.int64)
     for k in range(COUNTERS):
         counts[k] = 0
-    star, work = np.empty(2 * (1 + most) * LANES), np.empty((FLOORS + most) * LANES)
+    star, work = np.empty(2 * (1 + most) * LANES), np.empty((FLOORS + most) * LANES + CORNERS)
     return Workspace(star, work, np.empty(2 * LANES, dtype=np.float32), counts)
 
 

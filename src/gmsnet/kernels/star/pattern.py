@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import inlined
-from gmsnet.kernels.jit.load import load
+from gmsnet.kernels.jit.load import address, load
 from gmsnet.kernels.simplex.mean_ratio2 import Weights
 
 
@@ -81,8 +81,7 @@ def pattern_at(patterns, numbers, at):
     first = np.int64(patterns.first[number])
     return Link(
         first, patterns.first[number + 1] - first, np.int64(patterns.row[number]), patterns.neighbours[number],
-        patterns.pair.ctypes.data, patterns.other.ctypes.data,
-        patterns.weight.ctypes.data, patterns.neighbour.ctypes.data,
+        address(patterns.pair), address(patterns.other), address(patterns.weight), address(patterns.neighbour),
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from gmsnet.kernels.jit.compile import LANES, part
 from gmsnet.kernels.star.block import (
     CENTRE,
+    CORNERS,
     DROPPED,
     FLOORS,
     KEPT,
@@ -133,9 +134,10 @@ def clear(tx, ty, star, n, pattern, lane, delta, floor):
 def allowed(tx, ty, star, n, pattern, lane, delta, work):
     """May the free node of one lane move to (tx, ty)? The scalar form of the rule, which also knows inverted cells.
 
-    Rows of work: reads those from FLOORS on; KEPT's are overwritten.
+    Rows of work: reads those from FLOORS on.
     """
-    was, now = work[KEPT * LANES : KEPT * LANES + 6], work[(KEPT + 1) * LANES : (KEPT + 1) * LANES + 6]
+    half, end = len(work) - CORNERS // 2, len(work)
+    was, now = work[half - CORNERS // 2 : half], work[half:end]
     was[4], was[5], now[4], now[5] = star[2 * lane], star[2 * lane + 1], tx, ty
     for k in range(count_of(pattern, n)):
         i, j = pair_of(pattern, n, k)

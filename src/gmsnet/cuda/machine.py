@@ -1,0 +1,51 @@
+"""A GPU of NVIDIA: its memory, and kernels that it starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.cuda.launch import check_rounding, entry
+from gmsnet.cuda.library import checked
+
+
+class Card:
+    """See executor.Machine."""
+
+    name: str
+
+    def __init__(self) -> None:
+        self._cuda = checked()
+        check_rounding()
+        name = self._cuda.get_current_device().name
+        self.name = name.decode() if isinstance(name, bytes) else str(name)
+        self._pinned, self._points = ExitStack(), np.empty(0)
+
+    def there(self, values: NDArray[Any]) -> Any:
+        """See Machine."""
+        return self._cuda.to_device(np.ascontiguousarray(values))
+
+    def send(self, values: NDArray[Any], there: Any) -> None:
+        """See Machine. The array is kept from being swapped out until another one is sent: so copies take a third."""
+        if values is not self._points:
+            self.close()
+            self._points = values
+            self._pinned.enter_context(self._cuda.pinned(values))
+        there.copy_to_device(values)
+
+    def fetch(self, there: Any, values: NDArray[Any]) -> None:
+        """See Machine."""
+        there.copy_to_host(values)
+
+    def start(self, kernel: Callable[..., None], room: int, stars: int, arguments: tuple[Any, ...]) -> None:
+        """See Machine."""
+        entry(kernel, room)(stars, *arguments)
+
+    def close(self) -> None:
+        """See Machine."""
+        self._pinned.close()
+        self._points = np.empty(0)

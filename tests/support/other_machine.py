@@ -1,0 +1,63 @@
+"""A machine of its own memory that is this processor: kernels compiled anew for one star, as for a GPU."""
+
+from __future__ import annotations
+
+from functools import cache
+from types import ModuleType
+
+import numba
+import numpy as np
+
+from gmsnet.kernels.jit.retarget import Retarget
+
+MODE = {"error_model": "numpy"}
+
+
+@cache
+def parts_for(room):
+    """As gmsnet.cuda.parts.parts_for, for the processor; longer arrays are an error."""
+
+    @numba.njit(**MODE)
+    def checked(size):
+        if size > room:
+            raise MemoryError
+        return size
+
+    def empty(size, dtype=np.float64):
+        return np.empty(checked(size), dtype=dtype)
+
+    def zeros(size, dtype=np.float64):
+        return np.zeros(checked(size), dtype=dtype)
+
+    module = ModuleType("numpy")
+    vars(module).update({name: getattr(np, name) for name in dir(np) if not name.startswith("_")})
+    module.empty, module.zeros = (numba.njit(**MODE)(each) for each in (empty, zeros))
+    return Retarget(numba.njit(**MODE), {"LANES": 1, "np": module}, {})
+
+
+class Processor:
+    """See gmsnet.cuda.executor.Machine. started: of which kernels, for how many stars."""
+
+    name = "another processor"
+
+    def __init__(self):
+        self.started = []
+
+    def there(self, values):
+        return np.array(values, order="C")
+
+    def send(self, values, there):
+        there[:] = values
+
+    def fetch(self, there, values):
+        values[:] = there
+
+    def start(self, kernel, room, stars, arguments):
+        points, blocks, first, guard, own, tally = arguments
+        assert np.diff(first).max() == stars
+        self.started.append((kernel, stars))
+        for colour in range(len(first) - 1):
+            parts_for(room).of(kernel)(points, blocks, first[colour], first[colour + 1], guard, *own, tally)
+
+    def close(self):
+        pass
