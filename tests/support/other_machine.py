@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 from types import ModuleType
 
 import numba
@@ -58,6 +59,14 @@ class Processor:
         self.started.append((kernel, stars))
         for colour in range(len(first) - 1):
             parts_for(room).of(kernel)(points, blocks, first[colour], first[colour + 1], guard, *own, tally)
+
+    def summarise(self, summary, rows, arguments):
+        points, cells, rest = arguments
+        ends = np.linspace(0, rows, 8).astype(int)
+        figures = np.full((len(ends) - 1, summary.figures), np.nan)
+        for part, (first, last) in zip(figures, pairwise(ends), strict=True):
+            parts_for(32).of(summary.part)(points, *cells, first, last, *rest, part)
+        return figures
 
     def close(self):
         pass

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.topology.layout import one_by_one
 
 
 class Singles(NamedTuple):
@@ -20,22 +20,17 @@ class Singles(NamedTuple):
 
 def singles(blocks: Blocks, first: NDArray[np.integer[Any]]) -> Singles:
     """first: (C + 1,) of the blocks. What lanes hold that repeat a star is left out."""
-    lanes = np.arange(LANES)
-    used = lanes < blocks.filled[:, None]
-    begin = np.concatenate([[0], np.cumsum(blocks.filled, dtype=np.int64)])  # (B + 1,) of the stars of each block
-    degree = np.repeat(blocks.degree, blocks.filled)
-    offset = np.cumsum(degree, dtype=np.int64) - degree
-    rings = np.empty(int(degree.sum()), dtype=np.int32)
-    for n in np.unique(blocks.degree):
-        some = np.flatnonzero(blocks.degree == n)
-        rows = blocks.offset[some, None] + LANES * np.arange(n)
-        nodes = blocks.rings[rows[:, :, None] + lanes]  # (some, n, LANES)
-        stars = np.flatnonzero(degree == n)
-        rings[offset[stars, None] + np.arange(n)] = nodes.transpose(0, 2, 1)[used[some]]
+    begin = np.zeros(len(blocks.filled) + 1, dtype=np.int64)
+    np.cumsum(blocks.filled, out=begin[1:])
+    count, around = int(begin[-1]), int(blocks.filled.astype(np.int64) @ blocks.degree)
+    centre, degree = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
+    offset = np.empty(count, dtype=np.int64)
+    ring, pattern = np.empty(around, dtype=np.int32), blocks.pattern
+    one_by_one(blocks.centre, blocks.rings, blocks.offset, blocks.degree, blocks.filled, centre, ring, offset, degree)
     return Singles(
         Blocks(
-            blocks.centre.reshape(-1, LANES)[used], rings, offset, degree, np.ones(len(degree), dtype=np.int32),
-            blocks.most, None if blocks.pattern is None else np.repeat(blocks.pattern, blocks.filled), blocks.patterns,
+            centre, ring, offset, degree, np.ones(count, dtype=np.int32), blocks.most,
+            None if pattern is None else np.repeat(pattern, blocks.filled), blocks.patterns,
         ),
         begin[first],
     )  # fmt: skip

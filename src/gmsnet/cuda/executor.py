@@ -7,7 +7,7 @@ places that it finds on the processor.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple, Protocol
 from weakref import WeakKeyDictionary
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from gmsnet.cuda.blocks import singles
 from gmsnet.cuda.parts import room_for
 from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.simplex.summary import Summary
 from gmsnet.kernels.star.block import Blocks, Visit
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import Threads, serial
@@ -51,18 +52,21 @@ class Machine(Protocol):
         """
         ...
 
+    def summarise(self, summary: Summary, rows: int, arguments: tuple[Any, ...]) -> NDArray[np.float64]:
+        """The figures (P, F) of parts of so many corner simplices. arguments: points, cells, rest."""
+        ...
+
     def close(self) -> None:
         """Lets go of what it holds of the processor's memory."""
         ...
 
 
 class OnMachine(NamedTuple):
-    """Stars in the memory of a machine, and room for points. most: stars of one colour."""
+    """Stars in the memory of a machine. first: where those of each colour begin, most: how many one has at most."""
 
     blocks: Blocks
     first: Any
     most: int
-    points: Any
 
 
 class Gpu(Threads):
@@ -75,23 +79,34 @@ class Gpu(Threads):
         super().__init__(threads)
         self.machine, self.sweeps = machine, 0
         self._stars: WeakKeyDictionary[Any, OnMachine] = WeakKeyDictionary()
+        self._points: dict[int, Any] = {}
+        self._cells: dict[int, tuple[Any, Any]] = {}  # by the number of an array of theirs: that array, and the copies
 
     def swept(self, visit: Visit, stars: Any, points: NDArray[np.float64], guard: Any) -> NDArray[np.int64] | None:
         """See Executor."""
         if visit.room is None:
             return None
-        machine, on = self.machine, self._on_machine(stars, points)
-        machine.send(points, on.points)
+        machine, on, near = self.machine, self._on_machine(stars), self._sent(points)
         tally = np.zeros(3, dtype=np.int64)
         counts, guarded, own = machine.there(tally), self._copied(guard), self._copied(visit.arguments)
         room = room_for(on.blocks.most, visit.room)
-        machine.start(visit.kernel, room, on.most, (on.points, on.blocks, on.first, guarded, own, counts))
-        machine.fetch(on.points, points)
+        machine.start(visit.kernel, room, on.most, (near, on.blocks, on.first, guarded, own, counts))
+        machine.fetch(near, points)
         machine.fetch(counts, tally)
         if guard.constraint is not None:  # nodes have gone on along their curves
             machine.fetch(guarded.constraint.parameter, guard.constraint.parameter)
         self.sweeps += 1
         return tally
+
+    def figures(
+        self, summary: Summary, points: NDArray[np.float64], cells: tuple[Any, ...], rest: tuple[Any, ...]
+    ) -> Iterable[NDArray[np.float64]]:
+        """See Executor."""
+        first = cells[0] if isinstance(cells[0], np.ndarray) else cells[0].rows
+        if id(first) not in self._cells:
+            self._cells = {id(first): (first, self._copied(cells))}  # while the array is kept, its number is its own
+        near, (_, copies) = self._sent(points), self._cells[id(first)]
+        return self.machine.summarise(summary, len(first), (near, copies, self._copied(rest)))
 
     def for_blocks(self, blocks: int) -> Executor:
         """See Executor."""
@@ -110,18 +125,25 @@ class Gpu(Threads):
         """See Threads; and what the machine holds."""
         super().close()
         self._stars.clear()
+        self._points, self._cells = {}, {}
         self.machine.close()
 
-    def _on_machine(self, stars: Any, points: NDArray[np.float64]) -> OnMachine:
+    def _sent(self, points: NDArray[np.float64]) -> Any:
+        """Points as they are now, where all of so many have their place."""
+        if len(points) not in self._points:
+            self._points = {len(points): self.machine.there(points)}
+        near = self._points[len(points)]
+        self.machine.send(points, near)
+        return near
+
+    def _on_machine(self, stars: Any) -> OnMachine:
         if stars not in self._stars:
             blocks, first = singles(stars.blocks, stars.first)
             if blocks.patterns is not None:  # its tables are read as they lie in memory
                 flat: Any = (each.ravel() for each in blocks.patterns)
                 blocks = blocks._replace(patterns=type(blocks.patterns)(*flat))
             most = int(np.diff(first).max(initial=0))
-            self._stars[stars] = OnMachine(
-                self._copied(blocks), self.machine.there(first), most, self.machine.there(points)
-            )
+            self._stars[stars] = OnMachine(self._copied(blocks), self.machine.there(first), most)
         return self._stars[stars]
 
     def _copied(self, value: Any) -> Any:

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from gmsnet.cuda.library import FUSED, as_written, cuda, inside, version
-from gmsnet.cuda.parts import parts_for
+from gmsnet.cuda.parts import FEWEST, parts_for
 from gmsnet.errors import InputError
+from gmsnet.kernels.simplex.summary import Summary
 
 THREADS = 128  # in a block of the GPU
 COUNTS = 3  # of a tally
@@ -38,15 +39,22 @@ class Launch:
         self._function = cuda().jit(function, extensions=[Nothing()], lto=False)
         self._compiled: dict[Any, tuple[Any, int]] = {}  # by the kinds of arguments, and how many blocks at a time
 
+    def blocks(self, threads: int, *arguments: Any) -> int:
+        """How many blocks are started for so many threads."""
+        return min(-(-threads // THREADS), self._for(arguments)[1])
+
     def __call__(self, threads: int, *arguments: Any) -> None:
         """Starts so many threads, or as many as work at a time."""
-        kinds = tuple(map(kind_of, arguments))
-        if kinds not in self._compiled:
-            self._compiled[kinds] = self._compile(arguments)
-        compiled, most = self._compiled[kinds]
+        compiled, most = self._for(arguments)
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message=".*low occupancy")  # of a small mesh
             compiled[min(-(-threads // THREADS), most), THREADS](*arguments)
+
+    def _for(self, arguments: tuple[Any, ...]) -> tuple[Any, int]:
+        kinds = tuple(map(kind_of, arguments))
+        if kinds not in self._compiled:
+            self._compiled[kinds] = self._compile(arguments)
+        return self._compiled[kinds]
 
     def _compile(self, arguments: tuple[Any, ...]) -> tuple[Any, int]:
         with as_written():
@@ -88,6 +96,35 @@ def entry(kernel: Callable[..., None], room: int) -> Launch:
         module.syncthreads()
         if own < COUNTS:
             module.atomic.add(tally, own, shared[own])
+
+    return Launch(run)
+
+
+@cache
+def summary_entry(summary: Summary) -> Launch:
+    """What says of each block of the GPU what the corner simplices that its threads have looked at are like."""
+    module, parts, count = cuda(), parts_for(FEWEST), summary.figures
+    look, zeros, less, more = parts.of(summary.part), parts.names["np"].zeros, parts.names["min"], parts.names["max"]
+    kinds = tuple(-1 if k in summary.least else int(k in summary.most) for k in range(count))
+
+    def run(points, cells, rows, rest, out):
+        each = (rows + module.gridsize(1) - 1) // module.gridsize(1)
+        first = min(each * module.grid(1), rows)
+        figures = zeros(count)
+        look(points, *cells, first, min(first + each, rows), *rest, figures)
+        shared, own = module.shared.array((THREADS, count), np.float64), module.threadIdx.x
+        for k in range(count):
+            shared[own, k] = figures[k]
+        module.syncthreads()
+        if own < count:
+            value = shared[0, own]
+            for other in range(1, THREADS):
+                found = shared[other, own]
+                if kinds[own] == 0:
+                    value += found
+                else:
+                    value = less(value, found) if kinds[own] < 0 else more(value, found)
+            out[module.blockIdx.x, own] = value
 
     return Launch(run)
 

@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.cuda.launch import check_rounding, entry
+from gmsnet.cuda.launch import check_rounding, entry, summary_entry
 from gmsnet.cuda.library import checked
+from gmsnet.kernels.simplex.summary import Summary
+
+ROWS_EACH = 4  # corner simplices that a thread looks at, at least
 
 
 class Card:
@@ -24,6 +27,7 @@ class Card:
         name = self._cuda.get_current_device().name
         self.name = name.decode() if isinstance(name, bytes) else str(name)
         self._pinned, self._points = ExitStack(), np.empty(0)
+        self._figures = self.there(np.empty((1, 1)))
 
     def there(self, values: NDArray[Any]) -> Any:
         """See Machine."""
@@ -44,6 +48,16 @@ class Card:
     def start(self, kernel: Callable[..., None], room: int, stars: int, arguments: tuple[Any, ...]) -> None:
         """See Machine."""
         entry(kernel, room)(stars, *arguments)
+
+    def summarise(self, summary: Summary, rows: int, arguments: tuple[Any, ...]) -> NDArray[np.float64]:
+        """See Machine."""
+        launch, (points, cells, rest) = summary_entry(summary), arguments
+        threads = max(rows // ROWS_EACH, 1)
+        out = np.empty((launch.blocks(threads, points, cells, rows, rest, self._figures), summary.figures))
+        there = self._cuda.device_array_like(out)
+        launch(threads, points, cells, rows, rest, there)
+        self.fetch(there, out)
+        return out
 
     def close(self) -> None:
         """See Machine."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -59,6 +59,12 @@ class Ranks:
     def remarks(self) -> tuple[str, ...]:
         """See Executor."""
         return ()
+
+    def figures(
+        self, summary: Any, points: Floats, cells: tuple[Any, ...], rest: tuple[Any, ...]
+    ) -> Iterable[Floats] | None:
+        """See Executor."""
+        return None
 
     def after_colour(self, colour: int, points: Floats) -> None:
         """See Executor."""

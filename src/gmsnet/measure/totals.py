@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.simplex.shell_measures import summarise_shell, summarise_shell_cells
 from gmsnet.kernels.simplex.solid_measures import summarise_solids
+from gmsnet.kernels.simplex.summary import CELLS, TRIANGLES, Summary
 from gmsnet.kernels.simplex.tetra_measures import summarise_tetrahedra
 from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.parallel.executor import Executor
@@ -137,15 +139,21 @@ def totals_of(
         parts = executor.map(part_of_surface, 0, blocks)
         return Totals.of(parts, count, executor) if simplices.shapes is None else Totals.of_cells(parts, executor)
     if simplices.shapes is not None:
+        return Totals.of_cells(_parts(CELLS, points, (simplices,), blocks, grids, executor), executor)
+    triangles = simplices.rows, simplices.orientation
+    return Totals.of(_parts(TRIANGLES, points, triangles, blocks, (*grids, shapes), executor), count, executor)
 
-        def part_of_cells(first: int, last: int) -> Floats:
-            figures: Floats = cells.summarise_cells(points, simplices, first, last, *grids)
-            return figures
 
-        return Totals.of_cells(executor.map(part_of_cells, 0, blocks), executor)
+def _parts(
+    summary: Summary, points: Floats, cells: tuple[Any, ...], blocks: int, rest: tuple[Any, ...], executor: Executor
+) -> Iterable[Floats]:
+    """The figures of parts of a mesh in a plane of so many blocks. rest: grids; and room for 1/q of each, or none."""
 
     def part(first: int, last: int) -> Floats:
-        figures: Floats = kernels.summarise(points, simplices.rows, simplices.orientation, first, last, *grids, shapes)
+        figures: Floats = summary.kernel(points, *cells, first, last, *rest)
         return figures
 
-    return Totals.of(executor.map(part, 0, blocks), count, executor)
+    found = None
+    if all(value is NOWHERE or not isinstance(value, np.ndarray) for value in rest):
+        found = executor.figures(summary, points, cells, rest)
+    return executor.map(part, 0, blocks) if found is None else found

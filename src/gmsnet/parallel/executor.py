@@ -7,7 +7,7 @@ have moved after each colour, and forms the figures with the other processes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -40,6 +40,15 @@ class Executor(Protocol):
         """A sweep over all stars in a plane by other means than ``map``: what happened to the shifts.
 
         None where there are none. visit: a kernels.star.block.Visit. stars: with ``blocks`` and ``first``.
+        """
+        ...
+
+    def figures(
+        self, summary: Any, points: NDArray[np.float64], cells: tuple[Any, ...], rest: tuple[Any, ...]
+    ) -> Iterable[NDArray[np.float64]] | None:
+        """The figures of parts of a mesh by other means than ``map``; None where there are none.
+
+        summary: a kernels.simplex.summary.Summary; cells, rest: what its kernel is called with.
         """
         ...
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, TypeVar
@@ -30,6 +30,12 @@ class Process:
     def remarks(self) -> tuple[str, ...]:
         """See Executor."""
         return ()
+
+    def figures(
+        self, summary: Any, points: NDArray[np.float64], cells: tuple[Any, ...], rest: tuple[Any, ...]
+    ) -> Iterable[NDArray[np.float64]] | None:
+        """See Executor."""
+        return None
 
     def after_colour(self, colour: int, points: NDArray[np.float64]) -> None:
         """See Executor. All threads see the same points."""

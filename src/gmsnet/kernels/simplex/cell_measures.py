@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from gmsnet.kernels.jit.compile import LANES, inlined, kernel
+from gmsnet.kernels.jit.compile import LANES, inlined, kernel, part
 from gmsnet.kernels.simplex.mean_ratio2 import TINY, same_cell, shape_of, weights_at_first
 from gmsnet.kernels.simplex.measures import degrees
 from gmsnet.kernels.simplex.predicates import SHEWCHUK, UNDERFLOW
@@ -22,6 +22,7 @@ from gmsnet.kernels.simplex.predicates import SHEWCHUK, UNDERFLOW
 # What ``summarise_cells`` says: the sum of 1/q on the coarse and on the fine grid, its minimum, how many cells are
 # inverted and how many are not certainly positive at all corners, and how many cells there are.
 COARSE, FINE, MINIMUM, INVERTED, UNCERTAIN, COUNT = range(6)
+FIGURES = 6
 # Columns of ``per_quad``.
 LOW, HIGH, SHAPE, SCALED_JACOBIAN = range(4)
 
@@ -44,8 +45,16 @@ def summarise_cells(points, simplices, first, last, coarse, fine):
 
     coarse, fine: see ``measures.grids``; the sums of parts are exact in any order.
     """
-    out = np.zeros(6)
-    out[MINIMUM] = np.inf
+    out = np.empty(FIGURES)
+    summarise_cells_into(points, simplices, first, last, coarse, fine, out)
+    return out
+
+
+@part
+def summarise_cells_into(points, simplices, first, last, coarse, fine, out):
+    """The same into out (FIGURES,)."""
+    for k in range(FIGURES):
+        out[k] = np.inf if k == MINIMUM else 0.0
     rows = len(simplices.rows)
     t, end = first * LANES, min(last * LANES, rows)
     while 0 < t < rows and same_cell(simplices.cells, t - 1, t):  # a cell that another part has begun
@@ -65,7 +74,6 @@ def summarise_cells(points, simplices, first, last, coarse, fine):
         out[INVERTED] += 1.0 if shape <= 0.0 else 0.0
         out[UNCERTAIN] += 1.0 if doubtful else 0.0
         out[COUNT] += 1.0
-    return out
 
 
 @kernel

@@ -23,8 +23,9 @@ LOW, HIGH, SHAPE, ASPECT = range(4)
 COARSE, FINE, EXTREME, INVERTED, UNCERTAIN = 0, 4, 8, 12, 13
 FIGURES = 14
 
-SIGN, TOTALS = 6 * LANES, 7 * LANES  # in a workspace of doubles, after the edge vectors
-ROOM = (7 + FIGURES) * LANES
+SIGN, TOTALS = 6, 7  # rows of a workspace of doubles, after the edge vectors
+ROWS = TOTALS + FIGURES
+LEAST, MOST = (EXTREME + LOW, EXTREME + SHAPE, EXTREME + ASPECT), (EXTREME + HIGH,)  # figures that are no sums
 
 
 @inlined
@@ -92,7 +93,7 @@ def planar_figures(work, lane):
     qx, qy = work[2 * LANES + lane], work[3 * LANES + lane]
     rx, ry = work[4 * LANES + lane], work[5 * LANES + lane]
     left, right = px * qy, py * qx
-    double = work[SIGN + lane] * (left - right)
+    double = work[SIGN * LANES + lane] * (left - right)
     error_bound = not double > SHEWCHUK * (abs(left) + abs(right)) + UNDERFLOW
     at_a, at_b, at_c = px * qx + py * qy, -(px * rx + py * ry), qx * rx + qy * ry
     low, high, shape, aspect = figures(
@@ -114,7 +115,7 @@ def gather(points, triangles, orientation, start, count, work):
         work[3 * LANES + lane] = points[c, 1] - points[a, 1]
         work[4 * LANES + lane] = points[c, 0] - points[b, 0]
         work[5 * LANES + lane] = points[c, 1] - points[b, 1]
-        work[SIGN + lane] = orientation[t]
+        work[SIGN * LANES + lane] = orientation[t]
 
 
 @inlined
@@ -162,18 +163,18 @@ def figures_in_space(work, lane):
 @part
 def begin(work):
     """Totals of no triangle, in a workspace."""
-    for k in range(ROOM):
+    for k in range(ROWS * LANES):
         work[k] = 0.0
     for lane in range(LANES):
-        work[TOTALS + (EXTREME + LOW) * LANES + lane] = np.inf
-        work[TOTALS + (EXTREME + SHAPE) * LANES + lane] = np.inf
-        work[TOTALS + (EXTREME + ASPECT) * LANES + lane] = np.inf
+        work[(TOTALS + EXTREME + LOW) * LANES + lane] = np.inf
+        work[(TOTALS + EXTREME + SHAPE) * LANES + lane] = np.inf
+        work[(TOTALS + EXTREME + ASPECT) * LANES + lane] = np.inf
 
 
 @inlined
 def count_in(work, lane, low, high, shape, aspect, uncertain, coarse, fine):
     """Adds the figures of the triangle in a lane to its totals."""
-    at = TOTALS + lane
+    at = TOTALS * LANES + lane
     add(work, at + LOW * LANES, low, coarse, fine)
     add(work, at + HIGH * LANES, high, coarse, fine)
     add(work, at + SHAPE * LANES, shape, coarse, fine)
@@ -188,13 +189,12 @@ def count_in(work, lane, low, high, shape, aspect, uncertain, coarse, fine):
 
 
 @part
-def total(work):
-    """The totals of all lanes together, (FIGURES,)."""
-    out = np.empty(FIGURES)
+def total(work, out):
+    """The totals of all lanes together into out (FIGURES,)."""
     for figure in range(FIGURES):
-        value = work[TOTALS + figure * LANES]
+        value = work[(TOTALS + figure) * LANES]
         for lane in range(1, LANES):
-            other = work[TOTALS + figure * LANES + lane]
+            other = work[(TOTALS + figure) * LANES + lane]
             if figure == EXTREME + HIGH:
                 value = max(value, other)
             elif EXTREME <= figure < INVERTED:
@@ -202,7 +202,6 @@ def total(work):
             else:
                 value += other
         out[figure] = value
-    return out
 
 
 @kernel
@@ -213,7 +212,15 @@ def summarise(points, triangles, orientation, first, last, coarse, fine, shapes)
     nor on the order of the triangles, or of a triangle's corners but for the rounding of its own measures. shapes: (T,)
     float32, for 1/q of each triangle, or (0,).
     """
-    work = np.empty(ROOM)
+    out = np.empty(FIGURES)
+    summarise_into(points, triangles, orientation, first, last, coarse, fine, shapes, out)
+    return out
+
+
+@part
+def summarise_into(points, triangles, orientation, first, last, coarse, fine, shapes, out):
+    """The same into out (FIGURES,)."""
+    work = np.empty(ROWS * LANES)
     begin(work)
     for start in range(first * LANES, min(last * LANES, len(triangles)), LANES):
         count = min(LANES, len(triangles) - start)
@@ -225,31 +232,31 @@ def summarise(points, triangles, orientation, first, last, coarse, fine, shapes)
         if len(shapes):
             for lane in range(count):
                 shapes[start + lane] = work[lane]
-    return total(work)
+    total(work, out)
 
 
 @kernel
 def per_cell(points, triangles, orientation, columns):
     """LOW, HIGH, SHAPE and ASPECT of each triangle into columns (4, T); angles in degrees."""
-    work = np.zeros(ROOM)
+    work = np.zeros(ROWS * LANES)
     for start in range(0, len(triangles), LANES):
         count = min(LANES, len(triangles) - start)
         gather(points, triangles, orientation, start, count, work)
         for lane in range(count):
             low, high, shape, aspect, _ = planar_figures(work, lane)
-            work[TOTALS + LOW * LANES + lane] = low
-            work[TOTALS + HIGH * LANES + lane] = high
-            work[TOTALS + SHAPE * LANES + lane] = shape
-            work[TOTALS + ASPECT * LANES + lane] = aspect
+            work[(TOTALS + LOW) * LANES + lane] = low
+            work[(TOTALS + HIGH) * LANES + lane] = high
+            work[(TOTALS + SHAPE) * LANES + lane] = shape
+            work[(TOTALS + ASPECT) * LANES + lane] = aspect
         for column in range(4):
             for lane in range(count):
-                columns[column, start + lane] = work[TOTALS + column * LANES + lane]
+                columns[column, start + lane] = work[(TOTALS + column) * LANES + lane]
 
 
 @kernel
 def per_surface_cell(points, triangles, columns):
     """The same for triangles in space (points N×3), unsigned: a surface has no orientation of its own."""
-    work = np.empty(ROOM)
+    work = np.empty(ROWS * LANES)
     for start in range(0, len(triangles), LANES):
         count = min(LANES, len(triangles) - start)
         for lane in range(count):
@@ -262,9 +269,9 @@ def per_surface_cell(points, triangles, columns):
             )  # fmt: skip
         for lane in range(count):
             low, high, shape, aspect = figures_in_space(work, lane)
-            at = TOTALS + lane
+            at = TOTALS * LANES + lane
             work[at + LOW * LANES], work[at + HIGH * LANES] = low, high
             work[at + SHAPE * LANES], work[at + ASPECT * LANES] = shape, aspect
         for column in range(4):
             for lane in range(count):
-                columns[column, start + lane] = work[TOTALS + column * LANES + lane]
+                columns[column, start + lane] = work[(TOTALS + column) * LANES + lane]

@@ -58,7 +58,7 @@ def shell_shapes_of(points, simplices, chosen, shape):
 @kernel
 def summarise_shell(points, simplices, first, last, coarse, fine):
     """As measures.summarise, of the triangles in the blocks first…last of LANES."""
-    work = np.empty(triangles.ROOM)
+    work = np.empty(triangles.ROWS * LANES)
     triangles.begin(work)
     for start in range(first * LANES, min(last * LANES, len(simplices.rows)), LANES):
         count = min(LANES, len(simplices.rows) - start)
@@ -71,7 +71,9 @@ def summarise_shell(points, simplices, first, last, coarse, fine):
         for lane in range(count):
             low, high, shape, aspect = triangles.figures_in_space(work, lane)
             triangles.count_in(work, lane, low, high, shape, aspect, shape <= 0.0, coarse, fine)
-    return triangles.total(work)
+    out = np.empty(triangles.FIGURES)
+    triangles.total(work, out)
+    return out
 
 
 @kernel
