@@ -58,16 +58,17 @@ def bandwidth(module) -> float:
     return 2 * 8 * 2**27 / (1e-3 * milliseconds(copy))
 
 
-def sweeps(kind: str, nodes: int) -> None:
-    module = checked()
-    mesh = mesh_of(kind, nodes, 1)
+def sweeps(mesh: gmsnet.Mesh) -> None:
+    module, kind = checked(), mesh.cells[0].kind
     topology = Topology.of(mesh, threads=2)
     start, free, stars = Start.of(mesh, topology), len(topology.free), topology.stars
     rate = bandwidth(module)
-    print(f"\n{kind}, {free:,} free nodes, {stars.colours} colours; the card copies {rate / 1e12:.2f} TB/s", flush=True)
+    print(
+        f"\n{kind}s, {free:,} free nodes, {stars.colours} colours; the card copies {rate / 1e12:.2f} TB/s", flush=True
+    )
     counts = [1 << k for k in range(20) if 1 << k <= len(os.sched_getaffinity(0))]
     for name, chosen in WAYS:
-        if kind != "triangles" and name == "gmsnet":
+        if kind != "triangle" and name == "gmsnet":
             continue
         with accelerated.gpu(1) as card:
             results = []
@@ -145,10 +146,10 @@ def bits(count: int) -> None:
     print(f"{done} runs of {len(cases)} ways, {different} with other bits or counts")
 
 
-def calls(kind: str, nodes: int) -> None:
-    mesh = mesh_of(kind, nodes, 1)
+def calls(mesh: gmsnet.Mesh) -> None:
+    kind = mesh.cells[0].kind
     for name in ("auto", "barrier", "laplacian", "gmsnet"):
-        if kind != "triangles" and name == "gmsnet":
+        if kind != "triangle" and name == "gmsnet":
             continue
         seconds: dict[str, list[float]] = {"cpu": [], "cuda": []}
         points = {}
@@ -160,7 +161,7 @@ def calls(kind: str, nodes: int) -> None:
                 points[device] = result.points.tobytes()
         cpu, cuda = (float(np.median(times[1:])) for times in seconds.values())
         print(
-            f"{kind}, {len(mesh.points):,} nodes, {name}: {cpu:.2f} s on all processors, {cuda:.2f} s with the card "
+            f"{kind}s, {len(mesh.points):,} nodes, {name}: {cpu:.2f} s on all processors, {cuda:.2f} s with the card "
             f"({result.sweeps} sweeps; {result.notes[-1]}); same bits: {points['cpu'] == points['cuda']}", flush=True,
         )  # fmt: skip
 
@@ -170,10 +171,14 @@ if __name__ == "__main__":
     parser.add_argument("--nodes", type=float, nargs="*", default=[1e5, 1e6])
     parser.add_argument("--bits", action="store_true")
     parser.add_argument("--calls", action="store_true")
+    parser.add_argument("files", nargs="*")
     asked = parser.parse_args()
     if asked.bits:
         bits(200)
-    for nodes in [] if asked.bits else asked.nodes:
-        (calls if asked.calls else sweeps)("triangles", int(nodes))
-        if nodes <= 1e6:
-            (calls if asked.calls else sweeps)("quads", int(nodes) // 2)
+        raise SystemExit
+    measure = calls if asked.calls else sweeps
+    for file in asked.files:
+        measure(gmsnet.read(file))
+    for nodes in [] if asked.files else asked.nodes:
+        measure(mesh_of("triangles", int(nodes), 1))
+        measure(mesh_of("quads", int(nodes) // 2, 1))

@@ -37,12 +37,13 @@ def parts_for(room):
 
 
 class Processor:
-    """See gmsnet.cuda.executor.Machine. started: of which kernels, for how many stars."""
+    """See gmsnet.cuda.executor.Machine. sweeps, summaries: how many it has done. closed: it was told to let go."""
 
     name = "another processor"
 
     def __init__(self):
-        self.started = []
+        self.sweeps = self.summaries = 0
+        self.closed = False
 
     def there(self, values):
         return np.array(values, order="C")
@@ -56,12 +57,13 @@ class Processor:
     def start(self, kernel, room, stars, arguments):
         points, blocks, first, guard, own, tally = arguments
         assert np.diff(first).max() == stars
-        self.started.append((kernel, stars))
+        self.sweeps += 1
         for colour in range(len(first) - 1):
             parts_for(room).of(kernel)(points, blocks, first[colour], first[colour + 1], guard, *own, tally)
 
     def summarise(self, summary, rows, arguments):
         points, cells, rest = arguments
+        self.summaries += 1
         ends = np.linspace(0, rows, 8).astype(int)
         figures = np.full((len(ends) - 1, summary.figures), np.nan)
         for part, (first, last) in zip(figures, pairwise(ends), strict=True):
@@ -69,4 +71,4 @@ class Processor:
         return figures
 
     def close(self):
-        pass
+        self.closed = True

@@ -8,7 +8,7 @@ places that it finds on the processor.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any, NamedTuple, Protocol
 from weakref import WeakKeyDictionary
 
@@ -157,12 +157,17 @@ class Gpu(Threads):
 
 
 @contextmanager
-def gpu(threads: int) -> Iterator[Gpu]:
-    """An executor with the GPU and at most so many threads. Raises MissingExtraError and InputError."""
-    from gmsnet.cuda.machine import Card
-
-    executor = Gpu(Card(), threads)
+def on(machine: Machine, threads: int) -> Iterator[Gpu]:
+    """An executor with a machine and at most so many threads, until the context ends."""
+    executor = Gpu(machine, threads)
     try:
         yield executor
     finally:
         executor.close()
+
+
+def gpu(threads: int) -> AbstractContextManager[Gpu]:
+    """The same with the GPU. Raises MissingExtraError, or InputError where there is none."""
+    from gmsnet.cuda.machine import Card
+
+    return on(Card(), threads)

@@ -35,8 +35,9 @@ class Launch:
     """
 
     def __init__(self, function: Any) -> None:
+        self.function = function
         # What is optimized as it is linked is fused again. numba-cuda heeds ``lto`` only where it has the function.
-        self._function = cuda().jit(function, extensions=[Nothing()], lto=False)
+        self._dispatcher = cuda().jit(function, extensions=[Nothing()], lto=False)
         self._compiled: dict[Any, tuple[Any, int]] = {}  # by the kinds of arguments, and how many blocks at a time
 
     def blocks(self, threads: int, *arguments: Any) -> int:
@@ -58,7 +59,7 @@ class Launch:
 
     def _compile(self, arguments: tuple[Any, ...]) -> tuple[Any, int]:
         with as_written():
-            compiled = self._function.specialize(*arguments)
+            compiled = self._dispatcher.specialize(*arguments)
             (kernel,) = compiled.overloads.values()
             if any(FUSED in text for text in compiled.inspect_asm().values()):
                 raise fused()

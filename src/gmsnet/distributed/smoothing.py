@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +28,7 @@ from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.stages import Meant, swept
 from gmsnet.distributed.winding import Winding
+from gmsnet.errors import InputError
 from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.measure.totals import Totals, totals_of
@@ -34,7 +36,7 @@ from gmsnet.methods import Smoother
 from gmsnet.methods.banded import Kept
 from gmsnet.methods.base import CELLS
 from gmsnet.preserve.protection import LAYER, WALL
-from gmsnet.run.options import SmoothOptions
+from gmsnet.run.options import CPU, SmoothOptions
 from gmsnet.run.outcome import factors_of, rank_by
 from gmsnet.run.set_up import check_options, check_target
 from gmsnet.run.state import State
@@ -55,7 +57,7 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
     known: the whole mesh, if the first rank has it anyway.
     """
     began = time.perf_counter()
-    smoother = everywhere(comm, options.smoother)
+    smoother = everywhere(comm, partial(_smoother, options))
     around, counts = surrounded(piece, comm), _counts(piece, comm)
     why = _not_shared(counts, smoother, options)
     if why:
@@ -77,6 +79,12 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
         return _shared(piece, part, smoother, options, ready, before, began, found)
     finally:
         part.halo.free()
+
+
+def _smoother(options: SmoothOptions) -> Smoother:
+    if options.device != CPU:
+        raise InputError("device='cuda' is for one process: with several ranks, leave device out")
+    return options.smoother()
 
 
 def _counts(piece: Piece, comm: Any) -> dict[str, int]:

@@ -1,0 +1,137 @@
+"""Sweeps with kernels compiled anew for one star, in memory of their own: the bits of the processor's lanes.
+
+The machine is this processor (support.other_machine); what a GPU does of it: test_on_a_gpu.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.other_machine import Processor
+
+import gmsnet
+from gmsnet.cuda import executor
+from gmsnet.cuda.blocks import singles
+from gmsnet.generate import random_mesh, random_quad_mesh, random_volume, sphere_surface
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.star.guard import LEVELS
+from gmsnet.methods import METHODS
+from gmsnet.run import api
+from gmsnet.topology.topology import Topology
+
+MESHES = {"triangle": random_mesh(1500, seed=1), "quad": random_quad_mesh(800, seed=2)}
+WAYS = [  # benchmarks/gpu.py has all others
+    (kind, name, choice, level, slide)
+    for kind, name in itertools.product(MESHES, executor.METHODS)
+    for choice in (METHODS[name].objectives or METHODS[name].variants or ("",))
+    for level in LEVELS
+    for slide in ((None, "all") if METHODS[name].slides else (None,))
+    if METHODS[name].moves(kind, choice or None)
+    and (level == "worst" or (slide is None and name != "auto" and choice == METHODS[name].default))
+]
+
+
+@pytest.fixture
+def machine(monkeypatch):
+    """What does the sweeps of calls with device="cuda"."""
+    made = Processor()
+    monkeypatch.setattr("gmsnet.run.options.gpu_library", lambda: None)
+    monkeypatch.setattr(executor, "FEWEST", 0)
+    monkeypatch.setattr(api, "gpu", lambda threads: executor.on(made, threads))
+    return made
+
+
+def both(mesh, name, choice, **options):
+    """The results of two calls that must be alike."""
+    if choice:
+        options["objective" if METHODS[name].objectives else "variant"] = choice
+    one, other = (gmsnet.smooth(mesh, name, device=device, max_sweeps=4, **options) for device in ("cpu", "cuda"))
+    assert one.points.tobytes() == other.points.tobytes()
+    assert repr(one.history) == repr(other.history)
+    assert other.notes[: len(one.notes)] == one.notes
+    return other
+
+
+@pytest.mark.parametrize(("kind", "name", "choice", "level", "slide"), WAYS)
+def test_the_bits_are_the_same(machine, kind, name, choice, level, slide):
+    result = both(MESHES[kind], name, choice, guard=level, slide=slide)
+    assert machine.sweeps > 0
+    assert machine.summaries > 0
+    assert result.notes[-1] == f"another processor did {machine.sweeps} sweep{'s' * (machine.sweeps > 1)}"
+
+
+@pytest.mark.parametrize("kind", MESHES)
+@pytest.mark.parametrize("level", LEVELS)
+def test_among_inverted_cells_the_bits_are_the_same(machine, kind, level):
+    mesh = MESHES[kind]
+    rng = np.random.default_rng(3)
+    thrown = mesh.with_points(mesh.points + rng.normal(0.0, 0.01, mesh.points.shape))
+    for name in ("barrier", "laplacian"):
+        both(thrown, name, "", guard=level, untangle=False)
+    both(thrown, "auto", "", guard=level)
+
+
+@given(st.integers(3, 400), st.integers(0, 50), st.booleans())
+@settings(max_examples=20)
+def test_stars_one_by_one_are_those_of_the_blocks(nodes, seed, quads):
+    mesh = (random_quad_mesh if quads else random_mesh)(nodes, seed=seed)
+    stars = Topology.of(mesh).stars
+    blocks, (one, first) = stars.blocks, singles(stars.blocks, stars.first)
+    star = 0
+    for colour in range(stars.colours):
+        assert first[colour] == star
+        for block in range(stars.first[colour], stars.first[colour + 1]):
+            for lane in range(blocks.filled[block]):
+                n, low, here = one.degree[star], one.offset[star], blocks.offset[block] + lane
+                assert one.centre[star] == blocks.centre[block * LANES + lane]
+                assert n == blocks.degree[block]
+                assert (one.rings[low : low + n] == blocks.rings[here : here + n * LANES : LANES]).all()
+                assert blocks.pattern is None or one.pattern[star] == blocks.pattern[block]
+                star += 1
+    assert star == first[-1] == len(one.centre)
+
+
+def test_what_it_does_not_do_is_said(machine):
+    for mesh, method in ((random_volume(300, seed=1), "auto"), (sphere_surface(300).mesh, "barrier")):
+        one, other = (gmsnet.smooth(mesh, method, device=device, max_sweeps=3) for device in ("cpu", "cuda"))
+        assert one.points.tobytes() == other.points.tobytes()
+        assert machine.sweeps == 0
+        assert "another processor did no sweep" in other.notes[-1]
+        assert "in a plane" in other.notes[-1]
+
+
+def test_small_meshes_stay_on_the_processor(machine, monkeypatch):
+    monkeypatch.setattr(executor, "FEWEST", 64)
+    result = gmsnet.smooth(MESHES["triangle"], "barrier", device="cuda")
+    assert machine.sweeps == 0
+    assert "over 4,096 free nodes or more" in result.notes[-1]
+
+
+def test_a_fault_of_the_machine_reaches_the_caller_and_nothing_is_left_open(machine, monkeypatch):
+    def fail(*_):
+        raise MemoryError("no room")
+
+    monkeypatch.setattr(machine, "start", fail)
+    with pytest.raises(MemoryError):
+        gmsnet.smooth(MESHES["triangle"], "barrier", device="cuda")
+    assert machine.closed
+
+
+def test_an_interrupted_call_gives_the_best_mesh_so_far(machine):
+    seen = []
+
+    def stop(sweep):
+        seen.append(sweep)
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        gmsnet.smooth(MESHES["triangle"], "barrier", device="cuda", callback=stop)
+    best = caught.value.result
+    assert best.sweeps == 2
+    assert best.after.qhat > best.before.qhat
+    assert machine.closed
