@@ -11,8 +11,8 @@ from support.other_machine import Processor
 
 import gmsnet
 from gmsnet.cuda import executor, launch
-from gmsnet.cuda.library import FUSED, as_written, checked
-from gmsnet.errors import GmsnetError
+from gmsnet.cuda.library import FUSED, as_written, at_work, checked
+from gmsnet.errors import GmsnetError, InputError
 from gmsnet.generate import random_mesh, random_quad_mesh
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.run import api
@@ -99,3 +99,10 @@ def test_what_is_compiled_rounds_as_it_is_written(machine, kind, options):
     for text in machine.texts.values():
         assert "mul.rn.f" in text
         assert FUSED not in text
+
+
+def test_what_a_gpu_cannot_do_is_an_error_of_the_input():
+    library("numba_cuda")
+    fault = library("numba.cuda.cudadrv.driver").CudaAPIError
+    with pytest.raises(InputError, match=r"the GPU has failed .*out of memory.*leave device out"), at_work():
+        raise fault(2, "out of memory")

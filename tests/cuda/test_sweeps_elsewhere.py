@@ -111,6 +111,20 @@ def test_small_meshes_stay_on_the_processor(machine, monkeypatch):
     assert "over 4,096 free nodes or more" in result.notes[-1]
 
 
+@pytest.mark.parametrize("spokes", [127, 128])
+def test_nodes_of_many_neighbours_stay_on_the_processor(machine, spokes):
+    angle = np.linspace(0.0, 2.0 * np.pi, spokes, endpoint=False)
+    points = np.vstack([[[0.2, 0.1]], np.column_stack([np.cos(angle), np.sin(angle)])])
+    ring = 1 + np.arange(spokes)
+    triangles = np.column_stack([np.zeros_like(ring), ring, np.roll(ring, -1)])
+    one, other = (
+        gmsnet.smooth((points, triangles), "laplacian", variant="plain", device=device) for device in ("cpu", "cuda")
+    )
+    assert one.points.tobytes() == other.points.tobytes()
+    assert (machine.sweeps > 0) == (spokes == 127)
+    assert ("at most 127 neighbours" in other.notes[-1]) == (spokes == 128)
+
+
 def test_a_fault_of_the_machine_reaches_the_caller_and_nothing_is_left_open(machine, monkeypatch):
     def fail(*_):
         raise MemoryError("no room")

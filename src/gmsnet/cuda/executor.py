@@ -24,6 +24,7 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import Threads, serial
 
 METHODS = ("auto", "barrier", "laplacian", "gmsnet", "angle", "cvt", "cpt")  # that have such sweeps
+LONGEST = 256  # numbers in an array of one star: each thread of the GPU has memory for some of them
 FEWEST = 64  # blocks of LANES stars: of a smaller mesh the processor has done a sweep before the GPU has begun
 
 
@@ -84,12 +85,12 @@ class Gpu(Threads):
 
     def swept(self, visit: Visit, stars: Any, points: NDArray[np.float64], guard: Any) -> NDArray[np.int64] | None:
         """See Executor."""
-        if visit.room is None:
+        room = LONGEST + 1 if visit.room is None else room_for(stars.blocks.most, visit.room)
+        if room > LONGEST:
             return None
         machine, on, near = self.machine, self._on_machine(stars), self._sent(points)
         tally = np.zeros(3, dtype=np.int64)
         counts, guarded, own = machine.there(tally), self._copied(guard), self._copied(visit.arguments)
-        room = room_for(on.blocks.most, visit.room)
         machine.start(visit.kernel, room, on.most, (near, on.blocks, on.first, guarded, own, counts))
         machine.fetch(near, points)
         machine.fetch(counts, tally)
@@ -118,7 +119,7 @@ class Gpu(Threads):
             return (f"{self.machine.name} did {self.sweeps:,} sweep{'' if self.sweeps == 1 else 's'}",)
         return (
             f"{self.machine.name} did no sweep: it does those of the methods {', '.join(METHODS)} in a plane, over "
-            f"{FEWEST * LANES:,} free nodes or more",
+            f"{FEWEST * LANES:,} free nodes or more with at most 127 neighbours each",
         )
 
     def close(self) -> None:

@@ -70,6 +70,8 @@ def kind_of(value: Any) -> Any:
     """What a kernel is compiled for: values of one kind have one type."""
     if isinstance(value, tuple):
         return type(value), *map(kind_of, value)
+    if isinstance(value, float):  # NumPy's among them
+        return float
     return (value.dtype, value.ndim) if hasattr(value, "dtype") else type(value)
 
 

@@ -60,6 +60,15 @@ def checked() -> Any:
 
 
 @contextmanager
+def at_work() -> Iterator[None]:
+    """What the GPU cannot do raises InputError, with its words."""
+    try:
+        yield
+    except inside("cudadrv.driver").CudaAPIError as error:
+        raise InputError(f"the GPU has failed ({' '.join(str(error).split())}): leave device out") from error
+
+
+@contextmanager
 def as_written() -> Iterator[None]:
     """What this thread compiles meanwhile rounds each product and each sum, as it is written."""
     _tell_nvvm()

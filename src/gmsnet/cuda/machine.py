@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.cuda.launch import check_rounding, entry, summary_entry
-from gmsnet.cuda.library import checked
+from gmsnet.cuda.library import at_work, checked
 from gmsnet.kernels.simplex.summary import Summary
 
 ROWS_EACH = 4  # corner simplices that a thread looks at, at least
@@ -31,31 +31,37 @@ class Card:
 
     def there(self, values: NDArray[Any]) -> Any:
         """See Machine."""
-        return self._cuda.to_device(np.ascontiguousarray(values))
+        with at_work():
+            return self._cuda.to_device(np.ascontiguousarray(values))
 
     def send(self, values: NDArray[Any], there: Any) -> None:
         """See Machine. The array is kept from being swapped out until another one is sent: so copies take a third."""
-        if values is not self._points:
-            self.close()
-            self._points = values
-            self._pinned.enter_context(self._cuda.pinned(values))
-        there.copy_to_device(values)
+        with at_work():
+            if values is not self._points:
+                self.close()
+                self._points = values
+                if values.flags.c_contiguous:
+                    self._pinned.enter_context(self._cuda.pinned(values))
+            there.copy_to_device(np.ascontiguousarray(values))
 
     def fetch(self, there: Any, values: NDArray[Any]) -> None:
         """See Machine."""
-        there.copy_to_host(values)
+        with at_work():
+            there.copy_to_host(values)
 
     def start(self, kernel: Callable[..., None], room: int, stars: int, arguments: tuple[Any, ...]) -> None:
         """See Machine."""
-        entry(kernel, room)(stars, *arguments)
+        with at_work():
+            entry(kernel, room)(stars, *arguments)
 
     def summarise(self, summary: Summary, rows: int, arguments: tuple[Any, ...]) -> NDArray[np.float64]:
         """See Machine."""
         launch, (points, cells, rest) = summary_entry(summary), arguments
         threads = max(rows // ROWS_EACH, 1)
-        out = np.empty((launch.blocks(threads, points, cells, rows, rest, self._figures), summary.figures))
-        there = self._cuda.device_array_like(out)
-        launch(threads, points, cells, rows, rest, there)
+        with at_work():
+            out = np.empty((launch.blocks(threads, points, cells, rows, rest, self._figures), summary.figures))
+            there = self._cuda.device_array_like(out)
+            launch(threads, points, cells, rows, rest, there)
         self.fetch(there, out)
         return out
 
