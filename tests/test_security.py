@@ -25,6 +25,7 @@ MODULES = {  # that nothing imports
 }  # fmt: skip
 EXCEPTIONS = {
     ("kernels/jit/cache.py", "pickle"),  # to know how an index of Numba's begins: it makes bytes, and reads none
+    ("cuda/library.py", "import_module"),  # of numba.cuda alone
     ("io/formats.py", "import_module"),  # of the formats in its own table alone
     ("io/linked.py", "import_module"),  # the same
     ("paper/units.py", "multiprocessing"),  # ``gmsnet reproduce`` shares its work among processes of its own
