@@ -101,9 +101,11 @@ class Gpu(Threads):
 
     def figures(
         self, summary: Summary, points: NDArray[np.float64], cells: tuple[Any, ...], rest: tuple[Any, ...]
-    ) -> Iterable[NDArray[np.float64]]:
+    ) -> Iterable[NDArray[np.float64]] | None:
         """See Executor."""
         first = cells[0] if isinstance(cells[0], np.ndarray) else cells[0].rows
+        if len(first) < FEWEST * LANES:
+            return None
         if id(first) not in self._cells:
             self._cells = {id(first): (first, self._copied(cells))}  # while the array is kept, its number is its own
         near, (_, copies) = self._sent(points), self._cells[id(first)]
