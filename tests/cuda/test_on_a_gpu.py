@@ -12,7 +12,7 @@ from support.other_machine import Processor
 import gmsnet
 from gmsnet.cuda import executor, launch
 from gmsnet.cuda.library import FUSED, as_written, at_work, checked
-from gmsnet.errors import GmsnetError, InputError
+from gmsnet.errors import GmsnetError, InputError, MissingExtraError
 from gmsnet.generate import random_mesh, random_quad_mesh
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.run import api
@@ -106,3 +106,10 @@ def test_what_a_gpu_cannot_do_is_an_error_of_the_input():
     fault = library("numba.cuda.cudadrv.driver").CudaAPIError
     with pytest.raises(InputError, match=r"the GPU has failed .*out of memory.*leave device out"), at_work():
         raise fault(2, "out of memory")
+
+
+def test_without_the_compiler_of_nvidia_the_command_is_named():
+    library("numba_cuda")
+    fault = library("numba.cuda.cudadrv.error").NvvmSupportError
+    with pytest.raises(MissingExtraError, match=r"libnvvm.*pip install 'gmsnet\[cuda\]'"), as_written():
+        raise fault("libNVVM cannot be found: libnvvm.so")

@@ -70,11 +70,18 @@ def at_work() -> Iterator[None]:
 
 @contextmanager
 def as_written() -> Iterator[None]:
-    """What this thread compiles meanwhile rounds each product and each sum, as it is written."""
+    """What this thread compiles meanwhile rounds each product and each sum, as it is written.
+
+    Raises MissingExtraError where numba-cuda is installed without NVIDIA's compiler.
+    """
     _tell_nvvm()
     _compiling.ours = True
+    errors, missing = inside("cudadrv.error"), import_module("cuda.pathfinder").DynamicLibNotFoundError
     try:
         yield
+    except (missing, errors.NvvmSupportError, errors.NvrtcSupportError) as error:
+        reason = " ".join(str(error).split())
+        raise MissingExtraError(f"a GPU needs NVIDIA's compiler, which is not found ({reason}): {NEEDED}") from error
     finally:
         _compiling.ours = False
 
