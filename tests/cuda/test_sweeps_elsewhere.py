@@ -19,7 +19,7 @@ from gmsnet.cuda.blocks import singles
 from gmsnet.generate import random_mesh, random_quad_mesh, random_volume, sphere_surface
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.star.guard import LEVELS
-from gmsnet.methods import METHODS
+from gmsnet.methods import METHODS, MethodOptions
 from gmsnet.run import api
 from gmsnet.topology.topology import Topology
 
@@ -102,6 +102,18 @@ def test_what_it_does_not_do_is_said(machine):
         assert machine.sweeps == 0
         assert "another processor did no sweep" in other.notes[-1]
         assert "in a plane" in other.notes[-1]
+
+
+def test_the_methods_are_those_with_a_kernel_that_a_gpu_can_start():
+    smoothers = {
+        name: method.create(MethodOptions(variant=method.default, objective=method.default))
+        for name, method in METHODS.items()
+        if not method.weighted
+    }
+    found = {
+        name for name, each in smoothers.items() if getattr(each, "in_plane", None) and each.in_plane.room is not None
+    }
+    assert found | {"auto", "gmsnet"} == set(executor.METHODS)
 
 
 def test_small_meshes_stay_on_the_processor(machine, monkeypatch):

@@ -25,9 +25,8 @@ def cuda() -> Any:
     try:
         import numba_cuda  # noqa: F401 (without it, numba.cuda is another module)
         from numba import cuda
-        from numba.cuda import extending  # noqa: F401
     except ModuleNotFoundError as error:
-        if error.name not in ("numba_cuda", "numba.cuda", "numba.cuda.extending"):
+        if error.name != "numba_cuda":
             raise  # it is there, but something that it needs is not
         raise MissingExtraError(f"a GPU needs numba-cuda, which is not installed: {NEEDED}") from error
     return cuda
