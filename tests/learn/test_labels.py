@@ -48,9 +48,10 @@ def test_optimised_meshes_are_those_of_the_engine(mesh):
     same = gmsnet.smooth(mesh, "optimize", variant="adam", objective="metric", max_sweeps=3, threads=1, guard="valid")
     assert same.sweeps == 3
     for sweeps, state in zip((1, 3), states[1:], strict=True):
-        found, wanted = gmsnet.quality(state), same.history[sweeps - 1]
-        assert found.shape.mean() == pytest.approx(wanted.mean_shape, rel=1e-13)
-        assert found.shape.min() == pytest.approx(wanted.min_shape, rel=1e-10)
+        wanted = same.history[sweeps - 1]
+        shape = gmsnet.quality(state).shape[np.isin(mesh.cells[0].nodes, same.topology.free).any(axis=1)]
+        assert shape.mean() == pytest.approx(wanted.mean_shape, rel=1e-13)
+        assert shape.min() == pytest.approx(wanted.min_shape, rel=1e-10)
 
 
 def test_labels_of_a_mesh_are_where_its_nodes_lie_in_the_end(mesh):

@@ -85,7 +85,9 @@ def test_nothing_valid_is_inverted_and_nothing_held_moves(method, seed, nodes, t
     assert mesh.points[still].tobytes() == result.points[still].tobytes()
     assert result.moved.tolist() == (result.points != mesh.points).any(axis=1).tolist()
     better = (after <= 0).sum() < (before <= 0).sum()
-    assert better or result.after.qhat >= result.before.qhat
+    judged = result.judged
+    assert (judged.before is None) == (len(result.topology.free) == 0)
+    assert better or judged.before is None or judged.after.qhat >= judged.before.qhat
     np.testing.assert_array_equal(result.mesh.cells[0].nodes, mesh.cells[0].nodes)
 
 

@@ -66,7 +66,7 @@ def test_one_raised_by_the_callback(square, kind):
     result = error.result
     assert result.stop_reason == stop.INTERRUPTED
     assert result.sweeps == 5
-    assert result.after.qhat == pytest.approx(max(s.qhat for s in result.history), abs=1e-12)
+    assert result.judged.after.qhat == pytest.approx(max(s.qhat for s in result.history), abs=1e-12)
     assert result.after.qhat > result.before.qhat
     assert result.points.tobytes() == gmsnet.smooth(square, "gmsnet", max_sweeps=5).points.tobytes()
 

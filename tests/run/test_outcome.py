@@ -31,7 +31,7 @@ def test_nodes_that_do_not_move_keep_their_bits(size, axis):
     best = start.copy()
     chosen = np.flatnonzero(topology.near_free)[5:50]
     best[chosen, 1] += 0.01
-    points, moved, after = outcome(mesh, topology, best, measure(mesh, topology), lambda report: 0)
+    points, moved, after, _ = outcome(mesh, topology, best, measure(mesh, topology), lambda report, totals: 0)
     ids = topology.memory[chosen]
     assert sorted(np.flatnonzero(moved)) == sorted(ids)
     assert points[~moved].tobytes() == mesh.points[~moved].tobytes()
@@ -52,7 +52,7 @@ def test_what_is_not_better_is_not_taken():
     start = near_points(mesh, topology)
     worse = start.copy()
     worse[topology.near_free] += 0.3 * np.random.default_rng(0).random((len(topology.free), 2))
-    points, moved, after = outcome(mesh, topology, worse, before, BEST, start)
+    points, moved, after, _ = outcome(mesh, topology, worse, before, BEST, start)
     assert points is mesh.points
     assert not moved.any()
     assert after is before
@@ -61,7 +61,33 @@ def test_what_is_not_better_is_not_taken():
 def test_nothing_moved():
     mesh, topology = case()
     before = measure(mesh, topology)
-    points, moved, after = outcome(mesh, topology, near_points(mesh, topology), before, BEST)
+    points, moved, after, _ = outcome(mesh, topology, near_points(mesh, topology), before, BEST)
     assert points is mesh.points
     assert not moved.any()
     assert after is before
+
+
+def test_cells_whose_nodes_are_held_do_not_decide_which_mesh_is_the_better_one():
+    """The worst cell is held, and what the others gain in the least is a loss in the mean."""
+    mesh = gmsnet.smooth(gmsnet.random_mesh(600, seed=2)).mesh
+    held = mesh.cells[0].nodes[np.random.default_rng(3).integers(len(mesh.cells[0].nodes))]
+    points = mesh.points.copy()
+    centre = points[held].mean(axis=0)
+    points[held] = centre + (points[held] - centre) * (1.0, 0.25)
+    result = gmsnet.smooth(mesh.with_points(points), fixed=held.tolist())
+    before, after = result.judged
+    assert result.moved.any()
+    assert after.qhat > before.qhat
+    assert after.shape_min > before.shape_min + 0.1
+    assert result.after.shape.min() == result.before.shape.min() < before.shape_min
+    assert sum(note.startswith("of the cells with a free node: 1/q, least ") for note in result.notes) == 1
+
+
+def test_figures_of_the_cells_with_a_free_node_are_those_of_all_where_no_cell_is_held():
+    mesh = gmsnet.random_mesh(50, seed=1)
+    result = gmsnet.smooth(mesh)
+    held = ~np.isin(mesh.cells[0].nodes, result.topology.free).any(axis=1)
+    for judged, report in zip(result.judged, (result.before, result.after), strict=True):
+        assert judged.shape_min == pytest.approx(report.shape[~held].min(), abs=1e-12)
+        assert judged.shape_mean == pytest.approx(report.shape[~held].mean(), abs=1e-12)
+    assert not any("free node:" in note for note in result.notes) or held.any()

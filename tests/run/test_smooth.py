@@ -54,9 +54,9 @@ def test_a_long_run_ends_when_nothing_is_gained(square):
     assert result.stop_reason == stop.NO_PROGRESS
     assert result.sweeps < 300
     best = max(s.qhat for s in result.history)
-    assert result.after.qhat == pytest.approx(best, abs=1e-12)  # the best on the way, not the last
+    assert result.judged.after.qhat == pytest.approx(best, abs=1e-12)  # the best on the way, not the last
     worse = [b for a, b in pairwise(result.history) if b.qhat < a.qhat]
-    assert worse or result.after.qhat >= result.history[-1].qhat - 1e-12
+    assert worse or result.judged.after.qhat >= result.history[-1].qhat - 1e-12
 
 
 def test_a_target_that_is_met_stops_the_run(square):
@@ -237,4 +237,5 @@ def test_the_best_mesh_is_chosen_by_the_metric_that_is_asked_for():
     assert results["shape"].after.qhat >= results["aspect"].after.qhat
     for by, result in results.items():
         best = max(sweep.qhat for sweep in result.history)
-        assert best == pytest.approx(result.after.qhat if by == "shape" else result.after.qhat_aspect, abs=1e-12)
+        after = result.judged.after
+        assert best == pytest.approx(after.qhat if by == "shape" else after.qhat_aspect, abs=1e-12)

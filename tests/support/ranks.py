@@ -54,6 +54,7 @@ def same(mesh, options, parts, ranks, fixed=None):
     told = results[0]
     assert _of_stages(told.notes) == _of_stages(serial.notes)
     assert repr(told.after) == repr(serial.after.totals)
+    assert repr(told.judged) == repr(serial.judged)
     assert told.stop_reason == serial.stop_reason
     assert [sweep.moved for sweep in told.history] == [sweep.moved for sweep in serial.history]
     if options.target:

@@ -22,16 +22,18 @@ from gmsnet.distributed.winding import Winding
 from gmsnet.errors import GmsnetError
 from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.surface import Surface
+from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import measure
-from gmsnet.measure.totals import Totals
+from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.parallel.threads import serial
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.outcome import rank_by
+from gmsnet.run.outcome import ranking
 from gmsnet.run.set_up import first_state
 from gmsnet.run.state import State
 from gmsnet.topology.mixed_volume import volume_of, wound_of
+from gmsnet.topology.ordering import near_points
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
@@ -149,18 +151,21 @@ class Found:
 
     def judged(
         self, points: Floats, piece: Piece, options: SmoothOptions, comm: Any
-    ) -> tuple[bool, Totals | None, int | None]:
+    ) -> tuple[bool, Totals | None, int | None, Judged]:
         """Of a surface: is the mesh with these points (n, dim) of the piece no worse than the input? And the figures of
-        the better one, and how many of its cells miss the target. All ranks call it."""
+        the better one, how many of its cells miss the target, and by what it was compared. All ranks call it."""
         every, told = brought(self.whole, points, piece, comm), None
         if self.state is not None and every is not None:
-            before, target = self.state.before, options.target
-            after = measure(self.state.mesh.with_points(every), self.state.protection.base)
-            rank = target.rank if target else rank_by(options.best_by)
-            better = rank(after) <= rank(before)
+            before, target, topology = self.state.before, options.target, self.state.protection.base
+            mesh = self.state.mesh.with_points(every)
+            after, places = measure(mesh, topology), (self.state.start, near_points(mesh, topology))
+            first, last = (totals_of(points, topology.scored) for points in places)
+            rank = ranking(options)
+            better = rank(after, last) <= rank(before, first)
             final = after if better else before
-            told = better, final.totals, len(target.missed_in(final)) if target else None
-        found: tuple[bool, Totals | None, int | None] = comm.bcast(told)
+            judged = Judged(first, last if better else first)
+            told = better, final.totals, len(target.missed_in(final)) if target else None, judged
+        found: tuple[bool, Totals | None, int | None, Judged] = comm.bcast(told)
         return found
 
     def note(self, points: Floats, moved: Flags, where: Floats | None, piece: Piece, comm: Any) -> list[str]:

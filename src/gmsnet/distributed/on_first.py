@@ -128,6 +128,7 @@ def _figures(whole: Whole, result: SmoothResult, options: SmoothOptions) -> dict
     return {
         "before": result.before.totals,
         "after": result.after.totals,
+        "judged": result.judged,
         "sweeps": result.sweeps,
         "stop_reason": result.stop_reason,
         "history": result.history,

@@ -125,8 +125,7 @@ class Part:
         free = self.halo.spread(topology.near_free)
         rows, numbers = self._blocks(topology, free)
         scored = self.own_rows
-        if isinstance(topology, Volume) or topology.near_shapes is not None:
-            scored = scored[_of_whole_cells(topology.simplices, _with_a_free_node(topology.simplices, free))[scored]]
+        scored = scored[_of_whole_cells(topology.simplices, _with_a_free_node(topology.simplices, free))[scored]]
         found = replace(topology)
         found.__dict__.update(changeable=topology.simplices.take(rows), scored=topology.simplices.take(scored))
         return found, numbers

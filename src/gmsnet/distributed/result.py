@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.measure.judged import UNKNOWN, Judged
 from gmsnet.measure.totals import Totals
 from gmsnet.mesh.display import amount, miss_it, plain
 from gmsnet.run.result import SmoothResult
@@ -22,8 +23,8 @@ class RankResult:
     cells of the mesh. sweeps, stop_reason, history, notes: as of a SmoothResult. held: reason → how many nodes of the
     mesh. nodes, cells: of the mesh. gathered: why the mesh was smoothed on the first rank, "" where it was shared out.
     seconds: for the whole call. messages, bytes: that this rank sent after colours. interrupted: this is the best mesh
-    so far. missed: how many cells miss the target, None without one. whole: the SmoothResult of the first rank, where
-    that has one.
+    so far. missed: how many cells miss the target, None without one. judged: as of a SmoothResult. whole: the
+    SmoothResult of the first rank, where that has one.
     """
 
     points: NDArray[np.float64]
@@ -43,6 +44,7 @@ class RankResult:
     bytes: int = 0
     interrupted: bool = False
     missed: int | None = None
+    judged: Judged = UNKNOWN
     whole: SmoothResult | None = field(default=None, repr=False)
 
     def summary(self) -> dict[str, Any]:

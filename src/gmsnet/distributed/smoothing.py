@@ -30,6 +30,7 @@ from gmsnet.distributed.stages import Meant, swept
 from gmsnet.distributed.winding import Winding
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology.write_back import put_back
+from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.methods import Smoother
@@ -37,7 +38,7 @@ from gmsnet.methods.banded import Kept
 from gmsnet.methods.base import CELLS
 from gmsnet.preserve.protection import LAYER, WALL
 from gmsnet.run.options import CPU, SmoothOptions
-from gmsnet.run.outcome import factors_of, rank_by
+from gmsnet.run.outcome import factors_of, merit_of
 from gmsnet.run.set_up import check_options, check_target
 from gmsnet.run.state import State
 from gmsnet.topology.ordering import planar_points, space_points, taken
@@ -196,11 +197,12 @@ def _shared(
     state = swept(part, _meant(intent, piece, part), smoother, options, done, ready.inverted)
     if found is not None and isinstance(part.topology, Shell):
         before = found.before
-    points, moved, after, missed = _written(piece, part, state, options, _Judged(ready.inverted, before), found)
+    points, moved, after, missed, judged = _written(piece, part, state, options, ready.inverted, before, found)
     notes = [*intent.notes, *intent.of_walls[state.released :][:1], *([] if done is None else [done.note])]
     if found is not None:
         where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
         notes += found.note(points[at], moved[at], where, piece, part.comm)
+    notes += judged.note(before, after, "η" if part.mesh.has_volumes else "1/q")
     return RankResult(
         points=points[at],
         moved=moved[at],
@@ -219,6 +221,7 @@ def _shared(
         bytes=part.halo.bytes,
         interrupted=state.interruption is not None,
         missed=missed,
+        judged=judged,
     )
 
 
@@ -233,42 +236,52 @@ def _held(part: Part, topology: Topology | Volume) -> dict[str, int]:
     return {reason: number for reason, number in found.items() if number}
 
 
-class _Judged(NamedTuple):
-    """As much of a QualityReport as ``rank_by`` looks at."""
+class _Written(NamedTuple):
+    """The best mesh by global ids, that of the input if it is the better one as it is written. after: its figures;
+    missed: how many cells miss the target, None without one; judged: by what it was compared with the input.
+    """
 
-    inverted: int
-    totals: Totals | None
+    points: Floats
+    moved: NDArray[np.bool_]
+    after: Totals | None
+    missed: int | None
+    judged: Judged
 
 
 def _written(
-    piece: Piece, part: Part, state: State, options: SmoothOptions, before: _Judged, found: Found | None
-) -> tuple[Floats, NDArray[np.bool_], Totals | None, int | None]:
-    """The best mesh by global ids, that of the input if it is the better one as it is written; which nodes moved; its
-    figures; and how many cells miss the target, None without one."""
+    piece: Piece, part: Part, state: State, options: SmoothOptions, inverted_before: int, before: Totals | None,
+    found: Found | None,
+) -> _Written:  # fmt: skip
+    """See _Written. before: the figures of the input, and how many of its cells are inverted."""
     mesh, topology, target = part.mesh, part.topology, options.target
     points, moved = mesh.points.copy(), np.zeros(len(mesh.points), dtype=bool)
     plane = mesh.plane or (0, 1, 2)
     put_back(state.points, part.points, topology.memory, plane, *factors_of(mesh.exponent), points, moved)
     if found is not None and isinstance(topology, Shell):  # whose figures are added up in the order of the cells
         at = np.searchsorted(part.around.nodes.ids, piece.ids)
-        better, after, missing = found.judged(points[at], piece, options, part.comm)
-        return *((points, moved) if better else (mesh.points, np.zeros_like(moved))), after, missing
+        better, after, missing, judged = found.judged(points[at], piece, options, part.comm)
+        if better:
+            return _Written(points, moved, after, missing, judged)
+        return _Written(mesh.points, np.zeros_like(moved), after, missing, judged)
     assert mesh.box is not None
     written = replace(mesh, points=points).as_part(mesh.plane, mesh.kinds_there, mesh.exponent, mesh.box)
     near = taken(planar_points(written) if mesh.plane else space_points(written), topology.memory)
-    after = totals_of(near, part.simplices, Ranks(part))
+    ranks, scored = Ranks(part), state.topology.scored
+    after = totals_of(near, part.simplices, ranks)
+    of_free = Judged(*(totals_of(places, scored, ranks) for places in (part.points, near)))
     inverted, missed, missed_before = 0 if after is None else after.inverted, None, None
     if target:
         first = state.before if isinstance(state.before, QualityReport) else measure(mesh, topology, part.points)
         missed, least = _missing(part, measure(written, topology, near), options)
         missed_before, least_before = _missing(part, first, options)
-        better = (inverted, missed, -least) <= (before.inverted, missed_before, -least_before)
+        better = (inverted, missed, -least) <= (inverted_before, missed_before, -least_before)
     else:
-        rank = rank_by(options.best_by)
-        better = rank(_Judged(inverted, after)) <= rank(before)
+        merits = (merit_of(totals, options.best_by) for totals in (of_free.after, of_free.before))
+        now, then = ((count, *merit) for count, merit in zip((inverted, inverted_before), merits, strict=True))
+        better = now <= then
     if better:
-        return points, moved, after, missed
-    return mesh.points, np.zeros_like(moved), before.totals, missed_before
+        return _Written(points, moved, after, missed, of_free)
+    return _Written(mesh.points, np.zeros_like(moved), before, missed_before, of_free._replace(after=of_free.before))
 
 
 def _missing(part: Part, report: QualityReport, options: SmoothOptions) -> tuple[int, float]:

@@ -105,10 +105,10 @@ class Account:
         return found
 
     def stage_rows(self) -> list[list[str]]:
-        """The same as rows of a table, the first of them its head: least and mean are of the mesh then, or of the
+        """The same as rows of a table, the first of them its head: figures are of the cells with a free node, or of the
         patches that are smoothed for a target. Empty if all was one stage."""
         of = "quality" if self.result.conformity is not None else self.result.after.symbol
-        where = ", in the patches that are smoothed" if self.target else ""
+        where = "in the patches that are smoothed" if self.target else "cells with a free node"
         rows = [
             [
                 name,
@@ -119,7 +119,7 @@ class Account:
             ]
             for name, sweeps, sweep in self.stages()
         ]
-        return [[f"stage{where}", "sweeps", f"{of}, least", f"{of}, mean", "q-hat"], *rows] if rows else []
+        return [[f"stage, {where}", "sweeps", f"{of}, least", f"{of}, mean", "q-hat"], *rows] if rows else []
 
     def nearness(self) -> str:
         """How near the minimum 1/q is to the most that it can be, as far as a bound is known."""
@@ -200,6 +200,7 @@ class Account:
             "after": after.summary(),
             "surface": None if result.surface_change is None else result.surface_change.summary(),
             "conformity": None if change is None else {k: v.summary() for k, v in change._asdict().items()},
+            "judged": result.judged.summary(),
             "improved": bool(result.moved.any()),
             "moved": int(result.moved.sum()),
             "free": self.free,

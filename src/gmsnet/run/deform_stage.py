@@ -87,4 +87,4 @@ def _smoothed(state: State, journey: Journey, options: SmoothOptions, executor: 
     near_walls = protection.near_walls is not None and (region & protection.near_walls).any()
     if near_walls and done.interruption is None:
         done = improve_near_walls(done, options, executor)
-    return replace(done, protection=protection, released=False)
+    return replace(done, protection=protection, released=False, totals=None)  # those were of the region

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from gmsnet.constraints.sliding import Sliding
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.kernels.topology.write_back import put_back
+from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import ASPECT, QualityReport, measure, measured_again
 from gmsnet.measure.surface_change import Compared
-from gmsnet.measure.totals import Totals
+from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.metric.conformity import Conformity, ConformityChange
 from gmsnet.parallel.executor import Executor
@@ -24,27 +25,30 @@ from gmsnet.parallel.threads import serial
 from gmsnet.preserve.protection import WALL, Protection, carried_note, wall_note
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.result import SmoothResult
-from gmsnet.run.state import Final, State
+from gmsnet.run.state import Final, State, with_corners
 from gmsnet.run.stop import NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.run.untangle_stage import still_inverted
 from gmsnet.topology.held import OF_SECOND_ORDER
 from gmsnet.topology.ordering import near_points
+from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
+# Of two meshes that of the lesser rank is the better. It is told from all cells, and from those with a free node.
+Rank = Callable[[QualityReport, Totals | None], Any]
 
 
 def write_back(state: State, options: SmoothOptions, executor: Executor) -> State:
     """The last stage: the best points in the order of the input, and their measures."""
-    rank: Callable[[QualityReport], Any] = options.target.rank if options.target else rank_by(options.best_by)
+    rank = ranking(options)
     if state.second_order is not None and state.second_order.invalid[0]:  # whose mending may cost straight cells shape
         rank = inverted_alone
     if state.motion is not None or state.metric is not None:  # in which meshes were compared
         rank = inverted_alone
     final = outcome(
         state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals,
-        again=state.second_order is not None and state.second_order.solid,
+        with_corners(state), again=state.second_order is not None and state.second_order.solid,
     )  # fmt: skip
     if state.metric is not None:
         plane = list(state.mesh.plane or (0, 1))  # in the units of the input, though its extent may be another now
@@ -61,7 +65,7 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
 def result_of(state: State, options: SmoothOptions, began: float) -> SmoothResult:
     """What the caller gets. began: when the call did, by ``time.perf_counter``."""
     assert state.final is not None
-    points, moved, after = state.final
+    points, moved, after, judged = state.final
     return SmoothResult(
         mesh=state.restore(points),
         points=points.copy(),
@@ -74,12 +78,13 @@ def result_of(state: State, options: SmoothOptions, began: float) -> SmoothResul
         history=list(state.history),
         notes=_notes(state),
         unmended=still_inverted(after, _why_not_mended(state)),
-        topology=_with_corners(state),
+        topology=with_corners(state),
         seconds=time.perf_counter() - began,
         invalid_curved=0 if state.second_order is None else state.second_order.invalid[1],
         conformity=None if state.metric is None else ConformityChange(*state.conformity),
         asked=options.asked,
         compared=_compared(state, points),
+        judged=judged,
     )
 
 
@@ -93,21 +98,6 @@ def _compared(state: State, points: Floats) -> Compared | None:
     if not isinstance(state.sliding, SurfaceSliding) or state.sliding.constraint is None:
         return None
     return Compared(state.sliding.facets.rows, state.mesh.points, points)
-
-
-def _with_corners(state: State) -> Topology | Volume:
-    """The topology; of second-order cells with the corners free that were."""
-    given = state.second_order
-    if given is None:
-        return state.topology
-    free = _near_free_by_id(given.protection.topology) & given.free
-    return given.whole.holding(~(free | _near_free_by_id(state.topology)), OF_SECOND_ORDER)
-
-
-def _near_free_by_id(topology: Topology | Volume) -> NDArray[np.bool_]:
-    free = np.zeros(len(topology.memory), dtype=bool)
-    free[topology.free] = True
-    return free
 
 
 def _held(state: State) -> dict[str, NDArray[np.int64]]:
@@ -135,7 +125,11 @@ def _notes(state: State) -> list[str]:
         of_order.extend(note for note in given.protection.notes if note not in protection.notes)
         if given.protection.walls is not None:
             of_order.append(_wall_note(given.protection, moved=False))
-    return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks, *of_order]
+    held = []
+    if state.final is not None:
+        _, _, after, compared = state.final
+        held = compared.note(state.before.totals, after.totals, after.symbol)
+    return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks, *held, *of_order]
 
 
 def _wall_note(protection: Protection, *, moved: bool) -> str:
@@ -144,14 +138,16 @@ def _wall_note(protection: Protection, *, moved: bool) -> str:
 
 
 def outcome(
-    mesh: Mesh, topology: Topology | Volume, best: Floats, before: QualityReport, rank: Callable[[QualityReport], Any],
-    start: Floats | None = None, executor: Executor = serial, totals: Totals | None = None, *, again: bool = False,
+    mesh: Mesh, topology: Topology | Volume, best: Floats, before: QualityReport, rank: Rank,
+    start: Floats | None = None, executor: Executor = serial, totals: Totals | None = None,
+    compared: Topology | Volume | None = None, *, again: bool = False,
 ) -> Final:  # fmt: skip
     """The best mesh as it is in the input's order; that of the input if the quick sums misjudged it.
 
-    best: (N, 2) in memory order. All nodes that it does not move keep their very bits. rank: of two meshes that of the
-    lesser rank is the better. start: ``near_points`` of the mesh, totals: of ``best``, where they are known.
-    again: the cells of ``before`` are measured, which are more than those of the topology.
+    best: (N, 2) in memory order. All nodes that it does not move keep their very bits. start: ``near_points`` of the
+    mesh. totals: of ``best`` and the cells by which meshes are compared, where they are known. compared: the
+    connectivity whose cells these are, with other nodes held, if not this one. again: the cells of ``before`` are
+    measured, which are more than those of the topology.
     """
     if start is None:
         start = near_points(mesh, topology)
@@ -162,20 +158,25 @@ def outcome(
         points, exact = mesh.rounding.kept(mesh.points, points), False
         moved &= (points != mesh.points).any(axis=1)
         count = int(np.count_nonzero(moved))
-    if count:
-        points.flags.writeable = False  # so that the mesh need not copy them
-        whole = totals  # unless they are of the cells with a free node alone
-        if whole is not None and topology.scored is not topology.simplices:
-            whole = None
-        known = (best, executor, whole) if exact else (None, executor)
-        if again:
-            after = measured_again(before, mesh.with_points(points))
-        else:
-            after = measure(mesh.with_points(points), topology, *known)
-        if rank(after) <= rank(before):
-            return Final(points, moved, after)
-        moved[:] = False
-    return Final(mesh.points, moved, before)
+    compared = compared or topology
+    every = compared.scored is compared.simplices and not again
+    first = before.totals
+    if not every or isinstance(topology, Shell):
+        first = totals_of(start, compared.scored, executor)
+    if not count:
+        return Final(mesh.points, moved, before, Judged(first, first))
+    points.flags.writeable = False  # so that the mesh need not copy them
+    written = mesh.with_points(points)
+    near = best if exact else near_points(written, topology)
+    last = totals if exact and totals is not None else totals_of(near, compared.scored, executor)
+    if again:
+        after = measured_again(before, written)
+    else:
+        after = measure(written, topology, near, executor, last if every else None)
+    if rank(after, last) <= rank(before, first):
+        return Final(points, moved, after, Judged(first, last))
+    moved[:] = False
+    return Final(mesh.points, moved, before, Judged(first, first))
 
 
 def factors_of(exponent: int) -> tuple[float, float]:
@@ -187,34 +188,26 @@ def factors_of(exponent: int) -> tuple[float, float]:
     return 2.0 ** (exponent - most), 2.0**most
 
 
-def inverted_alone(report: QualityReport) -> int:
+def inverted_alone(report: QualityReport, _: Totals | None) -> int:
     """Fewer inverted cells, and nothing else."""
     return report.inverted
 
 
-class Judged(Protocol):
-    """What meshes are compared by: a QualityReport."""
-
-    @property
-    def inverted(self) -> int:
-        """How many cells are not valid."""
-        ...
-
-    @property
-    def totals(self) -> Totals | None:
-        """Means and extremes."""
-        ...
+def ranking(options: SmoothOptions) -> Rank:
+    """Nearer to the target, of all cells, if there is one."""
+    target = options.target
+    return (lambda report, _: target.rank(report)) if target else rank_by(options.best_by)
 
 
-def rank_by(best_by: str) -> Callable[[Judged], Any]:
-    """Fewer inverted cells first, then the larger q̂, or the larger least and then mean 1/q if not all are triangles."""
+def rank_by(best_by: str) -> Rank:
+    """Fewer inverted cells first; then, of the cells with a free node, see ``merit_of``."""
+    return lambda report, totals: (report.inverted, *merit_of(totals, best_by))
 
-    def rank(report: Judged) -> tuple[float, ...]:
-        totals = report.totals
-        if totals is None:
-            return (report.inverted,)
-        if math.isnan(totals.qhat):
-            return report.inverted, -totals.shape_min, -totals.shape_mean
-        return report.inverted, -(totals.qhat_aspect if best_by == ASPECT else totals.qhat)
 
-    return rank
+def merit_of(totals: Totals | None, best_by: str) -> tuple[float, ...]:
+    """Less for a larger q̂, or for a larger least and then mean 1/q if not all are triangles."""
+    if totals is None:
+        return ()
+    if math.isnan(totals.qhat):
+        return -totals.shape_min, -totals.shape_mean
+    return (-(totals.qhat_aspect if best_by == ASPECT else totals.qhat),)

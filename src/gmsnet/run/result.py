@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.measure.bounds.bounds import Limits, limits
+from gmsnet.measure.judged import UNKNOWN, Judged
 from gmsnet.measure.report import QualityReport
 from gmsnet.measure.surface_change import Compared, SurfaceChange, surface_change
 from gmsnet.mesh.adapters import to_mesh
@@ -51,6 +52,7 @@ class SmoothResult:
     and after, to the metric or the sizes that were asked for; None without any. With one, the least and the mean 1/q in
     ``history`` are those in the metric. asked: the options of the call that were not the defaults, as plain values.
     compared: the surface whose nodes may have slid, before and after (``surface_change``); None where none does.
+    judged: means and extremes over the cells with a free node, by which meshes are compared, before and after.
     """
 
     mesh: Any
@@ -70,6 +72,7 @@ class SmoothResult:
     conformity: ConformityChange | None = None
     asked: Mapping[str, Any] = field(default_factory=dict)
     compared: Compared | None = None
+    judged: Judged = UNKNOWN
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "held", HeldNodes(self.held))

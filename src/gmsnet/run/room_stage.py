@@ -13,8 +13,8 @@ from gmsnet.methods.planar_cells import PlanarCells
 from gmsnet.methods.solid_cells import SolidCells
 from gmsnet.parallel.executor import Executor
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.second_order import corners_alone, judged, opened, rank_of
-from gmsnet.run.state import State
+from gmsnet.run.second_order import judged, opened, rank_at
+from gmsnet.run.state import State, with_corners
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS, NOTHING_TO_MOVE
 
 SWEEPS = 10
@@ -34,8 +34,8 @@ def make_room(state: State, options: SmoothOptions, executor: Executor) -> State
         return state
     cells = _with_room(state, options, executor, corners=True)
     if cells is not None and not (options.target or given.invalid[0]):
-        straight = corners_alone(given)
-        now, first = (rank_of(points, straight, options, executor) for points in (cells.points, state.start))
+        straight = with_corners(state)
+        now, first = (rank_at(points, straight, options, executor) for points in (cells.points, state.start))
         if now > first:
             cells = _with_room(state, options, executor, corners=False)
     if state.stop_reason == NOTHING_TO_MOVE:

@@ -28,9 +28,8 @@ from gmsnet.methods.solid_cells import SolidCells
 from gmsnet.parallel.executor import Executor
 from gmsnet.preserve.protection import Protection, protected, protected_volume
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.outcome import rank_by
-from gmsnet.run.score import Score
-from gmsnet.run.state import SecondOrder, State
+from gmsnet.run.outcome import merit_of
+from gmsnet.run.state import SecondOrder, State, with_corners
 from gmsnet.run.stop import CALLBACK, NOTHING_TO_MOVE
 from gmsnet.run.sweep_stage import sweep
 from gmsnet.topology.curved_solids import curved_solids, remembered
@@ -169,17 +168,19 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     level = LEVELS.index(options.guard)
     guard = Field(cells.points, corners.topology, state.precision, level).guard(executor)
     cells.advance(done.points, guard, room, np.asarray(given.sign == 1))
-    after, before = (rank_of(points, corners, options, executor) for points in (cells.points, state.points))
+    topology = with_corners(state)
+    after, before = (rank_at(points, topology, options, executor) for points in (cells.points, state.points))
     if not options.target and after > before:
         return state  # a move of all corners together may cost what the method gained
     return judged(state, cells)
 
 
-def rank_of(points: Floats, straight: Protection, options: SmoothOptions, executor: Executor) -> tuple[float, ...]:
+def rank_at(
+    points: Floats, straight: Topology | Volume, options: SmoothOptions, executor: Executor
+) -> tuple[float, ...]:  # fmt: skip
     """Of two places of the corners those of the lesser rank are the better, by the rule of the last stage."""
-    totals = totals_of(points, straight.topology.simplices, executor)
-    rank: tuple[float, ...] = rank_by(options.best_by)(Score.of(totals, options.best_by))
-    return rank
+    totals = totals_of(points, straight.scored, executor)
+    return (0 if totals is None else totals.inverted, *merit_of(totals, options.best_by))
 
 
 def opened(state: State) -> PlanarCells | SolidCells:

@@ -16,6 +16,7 @@ from gmsnet.kernels.simplex.bernstein import CORNERS, NAMES
 from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.kernels.star.surface import Surface
+from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import QualityReport
 from gmsnet.measure.totals import Totals
 from gmsnet.mesh.mesh import Mesh
@@ -29,6 +30,7 @@ from gmsnet.run.score import Score
 from gmsnet.run.stop import INTERRUPTED
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.curved_solids import CORNERS3, CURVED
+from gmsnet.topology.held import OF_SECOND_ORDER
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -36,11 +38,13 @@ Floats = NDArray[np.float64]
 
 
 class Final(NamedTuple):
-    """What is left of a mesh after the stages. points: (N, dim) by id. moved: (N,) bool. after: the measures."""
+    """What is left of a mesh after the stages. points: (N, dim) by id. moved: (N,) bool. after: the measures. judged:
+    those by which it was compared with the input."""
 
     points: Floats
     moved: NDArray[np.bool_]
     after: QualityReport
+    judged: Judged
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,3 +213,18 @@ class State:
         if self.interruption is not None:
             raise interruption
         return self.ended(INTERRUPTED, interruption)
+
+
+def with_corners(state: State) -> Topology | Volume:
+    """The topology; of second-order cells with the corners free that were."""
+    given = state.second_order
+    if given is None:
+        return state.topology
+    free = _near_free_by_id(given.protection.topology) & given.free
+    return given.whole.holding(~(free | _near_free_by_id(state.topology)), OF_SECOND_ORDER)
+
+
+def _near_free_by_id(topology: Topology | Volume) -> NDArray[np.bool_]:
+    free = np.zeros(len(topology.memory), dtype=bool)
+    free[topology.free] = True
+    return free

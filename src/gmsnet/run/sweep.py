@@ -9,7 +9,8 @@ MOST_SWEEPS = 200  # by default
 
 @dataclass(frozen=True)
 class Sweep:
-    """What one sweep did, and the mesh after it (for a target: its patches). moved, truncated, dropped count nodes.
+    """What one sweep did, and the cells with a free node after it (for a target: those of its patches). moved,
+    truncated, dropped count nodes.
 
     index: sweeps so far; methods that need not know how the mesh is after each sweep leave some out, and the counts are
     of all since the last one told. stage: what of the method they were, "" for methods of one stage.

@@ -270,10 +270,10 @@ class Topology(Connectivity):
 
     @cached_property
     def scored(self) -> Simplices:
-        """Those by which meshes on the way are compared: all triangles, or, if not all cells are triangles, the corner
-        simplices of the cells with a free node; ``simplices`` itself, where these are all."""
+        """Those by which meshes on the way are compared: of the cells with a free node; ``simplices`` itself, where
+        these are all."""
         if self.near_cells is None:
-            return self.simplices
+            return self.changeable
         return self._taken(links.rows_of_cells_with(self.near, self.near_cells, self.near_free))
 
     @cached_property

@@ -1,0 +1,54 @@
+"""The cells with a free node, by which meshes are compared: what they are like before and after."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from gmsnet.measure.totals import Totals
+
+
+class Judged(NamedTuple):
+    """Means and extremes over the cells with a free node; None where there are none."""
+
+    before: Totals | None
+    after: Totals | None
+
+    def note(self, before: Totals | None, after: Totals | None, symbol: str) -> list[str]:
+        """A sentence on them where a cell without a free node is the worst, else none.
+
+        before, after: of all cells. symbol: how their shape is called.
+        """
+        of_free, of_all = (self.before, self.after), (before, after)
+        if None in of_free or None in of_all or not any(map(_behind_others, of_free, of_all)):
+            return []
+        rows = [
+            f"{symbol}, least {_change([each.shape_min for each in of_free if each])}",
+            f"mean {_change([each.shape_mean for each in of_free if each])}",
+        ]
+        qhat = [each.qhat for each in of_free if each]
+        if not math.isnan(qhat[0]):
+            rows.append(f"q-hat {_change(qhat)}")
+        return [f"of the cells with a free node: {', '.join(rows)}; all nodes of a worse cell are held"]
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers, ready for JSON."""
+        return {name: None if totals is None else _plain(totals) for name, totals in self._asdict().items()}
+
+
+UNKNOWN = Judged(None, None)
+
+
+def _behind_others(free: Totals | None, every: Totals | None) -> bool:
+    """Is a cell without a free node worse than all that have one?"""
+    return free is not None and every is not None and free.shape_min > every.shape_min
+
+
+def _change(values: list[float]) -> str:
+    before, after = values
+    return f"{before:.4f} before, {after:.4f} after"
+
+
+def _plain(totals: Totals) -> dict[str, float | None]:
+    known = {"least": totals.shape_min, "mean": totals.shape_mean, "qhat": totals.qhat}
+    return {name: None if math.isnan(value) else value for name, value in known.items()}
