@@ -145,6 +145,16 @@ def test_layers_are_carried_with_their_wall(cells):
     assert np.abs(after / before - 1.0).max() < 0.01
 
 
+def test_cells_outside_of_layers_are_smoothed_where_they_are_worse_than_any_there_were():
+    """Those of the layers, which are worse by far, are meant."""
+    mesh = layered_mesh(10, 200.0, 60, cells="quad")
+    result = gmsnet.deform(mesh, rotate=("airfoil", -30, (0.25, 0.0)))
+    before, after = result.judged
+    assert result.before.shape.min() < 0.1 * before.shape_min
+    assert sum(sweep.moved for sweep in result.history[1:]) > 100
+    assert after.shape_min > 0.9
+
+
 def test_the_same_bits_for_any_number_of_threads(plate):
     one, two = (gmsnet.deform(plate, (0.15, -0.1), "hole", threads=threads).points for threads in (1, 2))
     assert (one == two).all()

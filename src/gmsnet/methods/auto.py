@@ -60,8 +60,8 @@ POOR = 0.5  # a mean of 1/q below this is not left to sweeps alone
 FAIR = 0.8  # nor is one below this where they end
 STILL_POOR = 0.85  # a mean of 1/q where a small mesh ends: its worst cells are among many like them
 AHEAD = 50  # times the last gain are at most expected to come
-# Turns of all nodes for the worst cells, at most; and in the least 1/q, what the last one must have gained for another.
-TURNS, TURN_GAIN = 3, 0.01
+# In the least 1/q, what a turn of all nodes for the worst cells must have gained for another, and for one after TURNS.
+TURNS, TURN_GAIN, LATE_TURN_GAIN = 3, 0.01, 0.05
 COARSER = 10.0  # times what a phase must gain to go on, once these have been moved
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
@@ -122,8 +122,9 @@ class Auto(Smoother):
             phase += 1
         self.at, self.made, self.rounds, self.gained = phase, 0, 0, math.inf
         if phase == len(self.phases):
-            gained = self.turns == 0 or self.least >= self.least_before + TURN_GAIN
-            self.converged = self.turns == TURNS or not gained or not (self.ideal or self._is_even(field, executor))
+            enough = TURN_GAIN if self.turns < TURNS else LATE_TURN_GAIN
+            gained = self.turns == 0 or self.least >= self.least_before + enough
+            self.converged = not gained or not (self.ideal or self._is_even(field, executor))
             self.turns, self.least_before = self.turns + 1, self.least
             return
         self.smoother = self.phases[phase].create()

@@ -55,7 +55,7 @@ class Journey:
 
     held: the topology in which nodes that are moved, and those that slide, stand still; base: that in which the latter
     are free; rails: what they slide on. dimension: of points. wrong: (T,) rows of cells that were not positive when the
-    boundary began to move; shapes: (T,) 1/q then; least: the minimum.
+    boundary began to move; shapes: (T,) 1/q then. movable: (T,) rows with a node that is smoothed. least: theirs.
     """
 
     slides: Flags | None
@@ -68,6 +68,7 @@ class Journey:
     follower: Follower
     wrong: Flags
     shapes: Floats
+    movable: Flags
     least: float
 
     def __init__(self, state: State, prescribed: Prescribed) -> None:
@@ -90,7 +91,8 @@ class Journey:
         self.follower = Follower.of(base, self.start, moving, kept)
         self.wrong = self.inverted(state.points)
         self.shapes = self.shape(state.points)
-        self.least = float(self.shapes.min(initial=1.0))
+        self.movable = np.asarray(state.protection.topology.near_free[self.held.near].any(axis=1))
+        self.least = float(self.shapes[self.movable].min(initial=1.0))
 
     @property
     def rotations(self) -> Rotations:
@@ -220,7 +222,7 @@ class Journey:
         """(N,) by id: nodes of cells whose shapes have suffered, and those around."""
         topology, rows = self.held, self.held.near
         now = self.shape(points)
-        worse = (now < self.least) & (now < SLIGHTLY * self.shapes)
+        worse = self.movable & (now < self.least) & (now < SLIGHTLY * self.shapes)
         bad = whole_cells(topology, worse | (now < SUFFERED * self.shapes))
         chosen = np.zeros(len(points), dtype=bool)
         chosen[rows[bad]] = True
