@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,47 @@ from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 
+if TYPE_CHECKING:
+    from gmsnet.topology.topology import Topology
+
 Floats = NDArray[np.float64]
 
-
 NOWHERE = np.empty(0, dtype=np.float32)
+
+
+class Looked(NamedTuple):
+    """What was seen of some cells, at least one. figures: (F,) sums, extremes and counts, as kernels lay them out.
+
+    number: of cells. grids: on which the sums are (kernels.simplex.measures.grids).
+    """
+
+    figures: Floats
+    number: int
+    grids: tuple[float, float]
+
+    @classmethod
+    def of(
+        cls, summary: Summary, parts: Iterable[Floats], grids: tuple[float, float], number: int | None,
+        executor: Executor,
+    ) -> Looked:  # fmt: skip
+        """From the figures of parts. executor: forms those of the whole mesh. number: None where it is among them."""
+        figures = np.array(list(parts))
+        found = np.array(executor.total(figures.sum(axis=0)))  # exact, but for extremes
+        least, most = list(summary.least), list(summary.most)
+        found[least] = executor.minimum(figures.min(axis=0))[least]
+        if most:
+            found[most] = -executor.minimum(-figures.max(axis=0))[most]
+        return cls(found, int(found[cells.COUNT]) if number is None else number, grids)
+
+    def joined(self, other: Looked) -> Looked | None:
+        """The same of the cells of both; None where the sums are on other grids."""
+        if self.grids != other.grids:
+            return None
+        summary, pair = CELLS if len(self.figures) == CELLS.figures else TRIANGLES, (self.figures, other.figures)
+        found = self.figures + other.figures
+        least, most = list(summary.least), list(summary.most)
+        found[least], found[most] = np.minimum(*pair)[least], np.maximum(*pair)[most]
+        return Looked(found, self.number + other.number, self.grids)
 
 
 @dataclass(frozen=True)
@@ -48,34 +85,28 @@ class Totals:
     aspect_min: float
     inverted: int
     uncertain: int
+    looked: Looked | None = field(default=None, repr=False, compare=False)
 
     @classmethod
-    def of(cls, parts: Iterable[Floats], triangles: int, executor: Executor = serial) -> Totals:
-        """From what kernels.simplex.measures.summarise says of the parts of a mesh; so many triangles, at least one.
-
-        executor: forms the figures of the whole mesh.
-        """
-        figures = np.array(list(parts))
-        sums = executor.total(figures.sum(axis=0))  # of those before EXTREME: exact, see kernels.simplex.measures.grids
-        means = (sums[: kernels.FINE] + sums[kernels.FINE : kernels.EXTREME]) / triangles
+    def of(cls, looked: Looked) -> Totals:
+        """From what was seen of one cell or more."""
+        figures, count = looked.figures, looked.number
+        if len(figures) == CELLS.figures:
+            mean, nan = float((figures[cells.COARSE] + figures[cells.FINE]) / count), math.nan
+            bad, unsure = int(figures[cells.INVERTED]), int(figures[cells.UNCERTAIN])
+            return cls(nan, nan, nan, nan, mean, float(figures[cells.MINIMUM]), nan, nan, bad, unsure, looked)
+        means = (figures[: kernels.FINE] + figures[kernels.FINE : kernels.EXTREME]) / count
         low, high, shape, aspect = means.tolist()
-        least = executor.minimum(figures.min(axis=0)).tolist()
-        most = (-executor.minimum(-figures.max(axis=0))).tolist()
-        inverted, uncertain = (int(sums[count]) for count in (kernels.INVERTED, kernels.UNCERTAIN))
+        low_min, high_max, shape_min, aspect_min = figures[kernels.EXTREME : kernels.INVERTED].tolist()
         return cls(
-            low, least[kernels.EXTREME + kernels.LOW], high, most[kernels.EXTREME + kernels.HIGH],
-            shape, least[kernels.EXTREME + kernels.SHAPE], aspect, least[kernels.EXTREME + kernels.ASPECT],
-            inverted, uncertain,
+            low, low_min, high, high_max, shape, shape_min, aspect, aspect_min, int(figures[kernels.INVERTED]),
+            int(figures[kernels.UNCERTAIN]), looked,
         )  # fmt: skip
 
-    @classmethod
-    def of_cells(cls, parts: Iterable[Floats], executor: Executor = serial) -> Totals:
-        """From what kernels.simplex.cell_measures.summarise_cells says of the parts of a mesh, of one cell or more."""
-        figures = np.array(list(parts))
-        sums = executor.total(figures.sum(axis=0))  # exact: see kernels.simplex.measures.grids
-        least = float(executor.minimum(figures.min(axis=0))[cells.MINIMUM])
-        mean, nan = float((sums[cells.COARSE] + sums[cells.FINE]) / sums[cells.COUNT]), math.nan
-        return cls(nan, nan, nan, nan, mean, least, nan, nan, int(sums[cells.INVERTED]), int(sums[cells.UNCERTAIN]))
+    def joined(self, other: Totals) -> Totals | None:
+        """Those of the cells of both, to the bit; None where their sums are on other grids."""
+        found = None if self.looked is None or other.looked is None else self.looked.joined(other.looked)
+        return None if found is None else Totals.of(found)
 
     @classmethod
     def of_columns(cls, columns: Floats) -> Totals:
@@ -111,16 +142,17 @@ def totals_of(
     simplices: Simplices | Tetrahedra | ShellSimplices,
     executor: Executor = serial,
     shapes: NDArray[np.float32] = NOWHERE,
+    among: int | None = None,
 ) -> Totals | None:
     """Means and extremes over the cells of some corner simplices; None where there are none.
 
     executor: takes blocks of LANES simplices. shapes: (T,), for 1/q of each triangle, if it is wanted and all are
-    triangles.
+    triangles. among: of how many simplices the totals are part (``Totals.joined``).
     """
     blocks, count = -(-len(simplices.rows) // LANES), int(executor.total(np.array(len(simplices.rows))))
     if not count:
         return None
-    grids = kernels.grids(count)
+    grids = kernels.grids(among or count)
     if isinstance(simplices, Tetrahedra):
 
         def part_of_volume(first: int, last: int) -> Floats:
@@ -128,20 +160,36 @@ def totals_of(
             figures: Floats = summarise(points, simplices, first, last, *grids)
             return figures
 
-        return Totals.of_cells(executor.map(part_of_volume, 0, blocks), executor)
+        return Totals.of(Looked.of(CELLS, executor.map(part_of_volume, 0, blocks), grids, None, executor))
     if isinstance(simplices, ShellSimplices):
-        summarised = summarise_shell if simplices.shapes is None else summarise_shell_cells
+        summary, summarised = (
+            (TRIANGLES, summarise_shell) if simplices.shapes is None else (CELLS, summarise_shell_cells)
+        )
 
         def part_of_surface(first: int, last: int) -> Floats:
             figures: Floats = summarised(points, simplices, first, last, *grids)
             return figures
 
         parts = executor.map(part_of_surface, 0, blocks)
-        return Totals.of(parts, count, executor) if simplices.shapes is None else Totals.of_cells(parts, executor)
+        return Totals.of(Looked.of(summary, parts, grids, count if summary is TRIANGLES else None, executor))
     if simplices.shapes is not None:
-        return Totals.of_cells(_parts(CELLS, points, (simplices,), blocks, grids, executor), executor)
+        seen = _parts(CELLS, points, (simplices,), blocks, grids, executor)
+        return Totals.of(Looked.of(CELLS, seen, grids, None, executor))
     triangles = simplices.rows, simplices.orientation
-    return Totals.of(_parts(TRIANGLES, points, triangles, blocks, (*grids, shapes), executor), count, executor)
+    seen = _parts(TRIANGLES, points, triangles, blocks, (*grids, shapes), executor)
+    return Totals.of(Looked.of(TRIANGLES, seen, grids, count, executor))
+
+
+def totals_with_others(
+    points: Floats, topology: Topology, scored: Totals | None, executor: Executor = serial
+) -> Totals | None:
+    """The same over all cells of a mesh in a plane, where those over its scored ones are known."""
+    if topology.scored is topology.simplices:
+        return scored
+    others = totals_of(points, topology.others, executor, among=len(topology.simplices.rows))
+    if scored is None or others is None:
+        return scored or others
+    return scored.joined(others) or totals_of(points, topology.simplices, executor)
 
 
 def _parts(

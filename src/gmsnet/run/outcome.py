@@ -17,7 +17,7 @@ from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import ASPECT, QualityReport, measure, measured_again
 from gmsnet.measure.surface_change import Compared
-from gmsnet.measure.totals import Totals, totals_of
+from gmsnet.measure.totals import Totals, totals_of, totals_with_others
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.metric.conformity import Conformity, ConformityChange
 from gmsnet.parallel.executor import Executor
@@ -48,7 +48,7 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
         rank = inverted_alone
     final = outcome(
         state.mesh, state.topology, state.points, state.before, rank, state.start, executor, state.totals,
-        with_corners(state), again=state.second_order is not None and state.second_order.solid,
+        with_corners(state), state.first, again=state.second_order is not None and state.second_order.solid,
     )  # fmt: skip
     if state.metric is not None:
         plane = list(state.mesh.plane or (0, 1))  # in the units of the input, though its extent may be another now
@@ -140,14 +140,15 @@ def _wall_note(protection: Protection, *, moved: bool) -> str:
 def outcome(
     mesh: Mesh, topology: Topology | Volume, best: Floats, before: QualityReport, rank: Rank,
     start: Floats | None = None, executor: Executor = serial, totals: Totals | None = None,
-    compared: Topology | Volume | None = None, *, again: bool = False,
+    compared: Topology | Volume | None = None, known: tuple[Topology | Volume, Totals] | None = None, *,
+    again: bool = False,
 ) -> Final:  # fmt: skip
     """The best mesh as it is in the input's order; that of the input if the quick sums misjudged it.
 
     best: (N, 2) in memory order. All nodes that it does not move keep their very bits. start: ``near_points`` of the
     mesh. totals: of ``best`` and the cells by which meshes are compared, where they are known. compared: the
-    connectivity whose cells these are, with other nodes held, if not this one. again: the cells of ``before`` are
-    measured, which are more than those of the topology.
+    connectivity whose cells these are, with other nodes held, if not this one. known: those of the input, and of which
+    connectivity. again: the cells of ``before`` are measured, which are more than those of the topology.
     """
     if start is None:
         start = near_points(mesh, topology)
@@ -159,9 +160,11 @@ def outcome(
         moved &= (points != mesh.points).any(axis=1)
         count = int(np.count_nonzero(moved))
     compared = compared or topology
-    every = compared.scored is compared.simplices and not again
-    first = before.totals
-    if not every or isinstance(topology, Shell):
+    whole = compared.scored is compared.simplices and not again
+    first = before.totals if whole else None
+    if known is not None and known[0] is compared:
+        first = known[1]
+    elif not whole or isinstance(topology, Shell):
         first = totals_of(start, compared.scored, executor)
     if not count:
         return Final(mesh.points, moved, before, Judged(first, first))
@@ -172,7 +175,10 @@ def outcome(
     if again:
         after = measured_again(before, written)
     else:
-        after = measure(written, topology, near, executor, last if every else None)
+        every = last if whole else None
+        if compared is topology and isinstance(topology, Topology) and topology.plane is not None:
+            every = totals_with_others(near, topology, last, executor)
+        after = measure(written, topology, near, executor, every)
     if rank(after, last) <= rank(before, first):
         return Final(points, moved, after, Judged(first, last))
     moved[:] = False

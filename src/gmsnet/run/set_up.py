@@ -18,6 +18,7 @@ from gmsnet.errors import InputError
 from gmsnet.kernels.topology.connectivity import CHOSEN
 from gmsnet.measure.report import ASPECT, QualityReport, measure
 from gmsnet.measure.target import Target
+from gmsnet.measure.totals import Totals, totals_of, totals_with_others
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured, unmoved
 from gmsnet.mesh.selection import fixed_mask, images
@@ -87,24 +88,27 @@ def first_state(
     given = given.without_cells()  # whatever was copied of them is given back
     shapes = np.full(len(topology.near) if target else 0, np.nan, dtype=np.float32)  # of triangles alone it is written
 
-    def looked_at(near: Floats) -> tuple[QualityReport, Protection]:
-        before = measure(given, topology, near, executor.for_blocks(0), shapes=shapes)
+    def looked_at(near: Floats) -> tuple[QualityReport, Totals | None, Protection]:
+        looks, first, every = executor.for_blocks(0), None, None
+        if not target:  # else the shapes of all cells are wanted
+            first = totals_of(near, topology.scored, looks)
+            every = totals_with_others(near, topology, first, looks)
+        before = measure(given, topology, near, looks, every, shapes)
         firm = bool(target) or before.inverted > 0
         found = protected(given, topology, options.preserved, options.fix_layers, near, firm=firm)
-        return before, found
+        return before, first, found
 
     if threads == 1 or target or not isinstance(smoother, Auto | StarSmoother):
-        before, protection = looked_at(start)
+        before, first, protection = looked_at(start)
     else:  # most often nothing is protected, and these are the stars that are smoothed
-        (before, protection), _ = side_by_side(threads, partial(looked_at, start), lambda: topology.stars)
+        (before, first, protection), _ = side_by_side(threads, partial(looked_at, start), lambda: topology.stars)
     if values is not None and before.inverted:
         raise InputError(
             f"{'metric' if options.size is None else 'size'} is given at the nodes of a mesh with "
             f"{before.inverted:,} inverted cells, between which it has no meaning: untangle the mesh first, or give a "
             "function of place"
         )
-    compared = protection.topology
-    totals = before.totals if compared.scored is compared.simplices else None  # else a run compares some of the cells
+    same = protection.topology is topology  # else a run compares fewer cells
     return State(
         given,
         restore,
@@ -115,7 +119,8 @@ def first_state(
         start,
         shapes,
         tuple(remarks),
-        totals=totals,
+        totals=first if same else None,
+        first=None if first is None else (topology, first),
         sliding=sliding,
         second_order=second,
         nodal=values,

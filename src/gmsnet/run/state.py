@@ -133,7 +133,8 @@ class State:
     smoother: the method, ready for one run. before: the measures of the input. protection: what of it is protected.
     start: (N, 2) the nodes of the input, points: those of the best mesh so far, both in memory order (``near_points``).
     shapes: (T,) 1/q of the input's triangles in ``topology.near``; none without a target. remarks: what there is to say
-    about the input. totals: of the points, where they are known. untangling: what was done about inverted cells,
+    about the input. totals: of the points and the scored cells of the topology, where they are known; first: of the
+    input and those of a topology. untangling: what was done about inverted cells,
     untangled: the points after that, in which ``protection`` was found, None where nothing was done. reasons: why
     some are left, by the index of each cell. history: one Sweep for each look. stop_reason: one of ``run.stop``,
     "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
@@ -157,6 +158,7 @@ class State:
     shapes: NDArray[np.float32]
     remarks: tuple[str, ...] = ()
     totals: Totals | None = None
+    first: tuple[Topology | Volume, Totals] | None = None
     untangling: tuple[str, ...] = ()
     untangled: Floats | None = None
     reasons: Mapping[int, str] = field(default_factory=dict)

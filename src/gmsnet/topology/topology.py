@@ -277,6 +277,16 @@ class Topology(Connectivity):
         return self._taken(links.rows_of_cells_with(self.near, self.near_cells, self.near_free))
 
     @cached_property
+    def others(self) -> Simplices:
+        """Those of the cells without a free node."""
+        left = np.ones(len(self.near), dtype=bool)
+        if self.near_cells is None:
+            left[self.rows_at(self.near_free)] = False
+        else:
+            left[links.rows_of_cells_with(self.near, self.near_cells, self.near_free)] = False
+        return self._taken(np.flatnonzero(left).astype(np.int32))
+
+    @cached_property
     def changeable(self) -> Simplices:
         """Those that have a free node."""
         return self._taken(self.rows_at(self.near_free))
