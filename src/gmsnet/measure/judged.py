@@ -37,11 +37,12 @@ class Judged(NamedTuple):
 
 
 UNKNOWN = Judged(None, None)
+ROUNDING = 1e-9  # in a 1/q: so far two ways to measure it may be apart
 
 
 def _behind_others(free: Totals | None, every: Totals | None) -> bool:
     """Is a cell without a free node worse than all that have one?"""
-    return free is not None and every is not None and free.shape_min > every.shape_min
+    return free is not None and every is not None and free.shape_min > every.shape_min + ROUNDING
 
 
 def _change(values: list[float]) -> str:

@@ -146,9 +146,9 @@ def outcome(
     """The best mesh as it is in the input's order; that of the input if the quick sums misjudged it.
 
     best: (N, 2) in memory order. All nodes that it does not move keep their very bits. start: ``near_points`` of the
-    mesh. totals: of ``best`` and the cells by which meshes are compared, where they are known. compared: the
-    connectivity whose cells these are, with other nodes held, if not this one. known: those of the input, and of which
-    connectivity. again: the cells of ``before`` are measured, which are more than those of the topology.
+    mesh. totals: of ``best`` and the scored cells, where they are known. compared: the connectivity whose cells meshes
+    are compared by, with other nodes held, if not this one. known: totals of the input, and of which connectivity.
+    again: the cells of ``before`` are measured, which are more than those of the topology.
     """
     if start is None:
         start = near_points(mesh, topology)
@@ -171,7 +171,8 @@ def outcome(
     points.flags.writeable = False  # so that the mesh need not copy them
     written = mesh.with_points(points)
     near = best if exact else near_points(written, topology)
-    last = totals if exact and totals is not None else totals_of(near, compared.scored, executor)
+    last = totals if exact and compared is topology else None
+    last = last or totals_of(near, compared.scored, executor)
     if again:
         after = measured_again(before, written)
     else:
