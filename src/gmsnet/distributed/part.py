@@ -124,8 +124,8 @@ class Part:
         """
         free = self.halo.spread(topology.near_free)
         rows, numbers = self._blocks(topology, free)
-        scored = self.own_rows
-        scored = scored[_of_whole_cells(topology.simplices, _with_a_free_node(topology.simplices, free))[scored]]
+        movable = _of_whole_cells(topology.simplices, _with_a_free_node(topology.simplices, free))
+        scored = self.own_rows[movable[self.own_rows]]
         found = replace(topology)
         found.__dict__.update(changeable=topology.simplices.take(rows), scored=topology.simplices.take(scored))
         return found, numbers

@@ -52,7 +52,7 @@ class RankResult:
         return {
             "nodes": self.nodes, "cells": self.cells, "held": self.held, "sweeps": self.sweeps,
             "stop_reason": self.stop_reason, "target_met": None if self.missed is None else not self.missed,
-            "missed": self.missed, "gathered": self.gathered, "seconds": self.seconds,
+            "missed": self.missed, "judged": self.judged.summary(), "gathered": self.gathered, "seconds": self.seconds,
             **{name: _figures(totals) for name, totals in (("before", self.before), ("after", self.after))},
         }  # fmt: skip
 

@@ -19,16 +19,17 @@ class Judged(NamedTuple):
 
         before, after: of all cells. symbol: how their shape is called.
         """
-        of_free, of_all = (self.before, self.after), (before, after)
-        if None in of_free or None in of_all or not any(map(_behind_others, of_free, of_all)):
+        first, last = self
+        if first is None or last is None or before is None or after is None:
+            return []
+        if not (_held_is_worst(first, before) or _held_is_worst(last, after)):
             return []
         rows = [
-            f"{symbol}, least {_change([each.shape_min for each in of_free if each])}",
-            f"mean {_change([each.shape_mean for each in of_free if each])}",
+            f"{symbol}, least {_change(first.shape_min, last.shape_min)}",
+            f"mean {_change(first.shape_mean, last.shape_mean)}",
         ]
-        qhat = [each.qhat for each in of_free if each]
-        if not math.isnan(qhat[0]):
-            rows.append(f"q-hat {_change(qhat)}")
+        if not math.isnan(first.qhat):
+            rows.append(f"q-hat {_change(first.qhat, last.qhat)}")
         return [f"of the cells with a free node: {', '.join(rows)}; all nodes of a worse cell are held"]
 
     def summary(self) -> dict[str, Any]:
@@ -40,13 +41,12 @@ UNKNOWN = Judged(None, None)
 ROUNDING = 1e-9  # in a 1/q: so far two ways to measure it may be apart
 
 
-def _behind_others(free: Totals | None, every: Totals | None) -> bool:
+def _held_is_worst(free: Totals, every: Totals) -> bool:
     """Is a cell without a free node worse than all that have one?"""
-    return free is not None and every is not None and free.shape_min > every.shape_min + ROUNDING
+    return free.shape_min > every.shape_min + ROUNDING
 
 
-def _change(values: list[float]) -> str:
-    before, after = values
+def _change(before: float, after: float) -> str:
     return f"{before:.4f} before, {after:.4f} after"
 
 

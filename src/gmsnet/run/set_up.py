@@ -108,7 +108,6 @@ def first_state(
             f"{before.inverted:,} inverted cells, between which it has no meaning: untangle the mesh first, or give a "
             "function of place"
         )
-    same = protection.topology is topology  # else a run compares fewer cells
     return State(
         given,
         restore,
@@ -119,7 +118,7 @@ def first_state(
         start,
         shapes,
         tuple(remarks),
-        totals=first if same else None,
+        totals=first if protection.topology is topology else None,  # else a run compares fewer cells
         first=None if first is None else (topology, first),
         sliding=sliding,
         second_order=second,

@@ -8,10 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.star import pattern as kernels
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
 from gmsnet.kernels.star.space_blocks import SpaceBlocks
-from gmsnet.kernels.topology import connectivity
+from gmsnet.kernels.topology import connectivity, layout
 from gmsnet.topology.polygons import Offsets
 
 Ints = NDArray[np.int32]
@@ -29,6 +31,35 @@ class Stars:
 
     blocks: Blocks | SpaceBlocks | ShellStars | ShellBlocks
     first: Ints
+
+    @classmethod
+    def in_plane(cls, free: Ints, links: kernels.Stars, near_colours: Ints, fewest: int) -> Stars:
+        """Those of the free nodes (F,) by places in memory. near_colours: (N,); fewest: as of Colouring."""
+        numbers = links.pattern
+        if links.patterns is None or numbers is None:
+            kind = np.diff(links.start).take(free)
+            most = int(kind.max(initial=0))
+            sizes, pattern = np.arange(most + 1), None
+        else:
+            kind, pattern = numbers.take(free), links.patterns
+            sizes = np.diff(pattern.row)
+            most = int(max(sizes.max(initial=0), np.diff(pattern.first).max(initial=0)))
+        colours, kinds = max(int(near_colours.max(initial=-1)) + 1, fewest), len(sizes)
+        kind = near_colours.take(free) * kinds + kind
+        number = -(-np.bincount(kind, minlength=colours * kinds).reshape(colours, kinds) // LANES)
+        first, to = np.zeros((2, colours + 1), dtype=np.int64)
+        np.cumsum(number.sum(axis=1), out=first[1:])
+        np.cumsum(LANES * (number @ sizes), out=to[1:])
+        blocks = int(first[-1])
+        centre, rings = np.empty(blocks * LANES, dtype=np.int32), np.empty(to[-1], dtype=np.int32)
+        offset, degree = np.empty(blocks, dtype=np.int64), np.empty(blocks, dtype=np.int32)
+        filled = np.zeros(blocks, dtype=np.int32)
+        layout.fill_blocks(
+            free, links.start, links.around, kind, sizes, first[:-1].copy(), to[:-1], centre, rings, offset, degree,
+            filled,
+        )  # fmt: skip
+        of_block = None if pattern is None or numbers is None else numbers[centre[::LANES]]
+        return cls(Blocks(centre, rings, offset, degree, filled, most, of_block, pattern), first.astype(np.int32))
 
     @property
     def colours(self) -> int:

@@ -13,11 +13,9 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.star import pattern as kernels_stars
-from gmsnet.kernels.star.block import Blocks
-from gmsnet.kernels.topology import connectivity, layout, links, patch
+from gmsnet.kernels.topology import connectivity, links, patch
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
@@ -180,32 +178,8 @@ class Topology(Connectivity):
 
     def in_blocks(self) -> Stars:
         """The same, made anew."""
-        free = np.flatnonzero(self.near_free).astype(np.int32)
-        numbers = self.near_pattern
-        if self.patterns is None or numbers is None:
-            kind = np.diff(self.near_start).take(free)
-            most = int(kind.max(initial=0))
-            sizes, pattern = np.arange(most + 1), None
-        else:
-            kind, pattern = numbers.take(free), self.patterns
-            sizes = np.diff(pattern.row)
-            most = int(max(sizes.max(initial=0), np.diff(pattern.first).max(initial=0)))
-        colours, kinds = max(int(self.near_colours.max(initial=-1)) + 1, self.colouring.fewest), len(sizes)
-        kind = self.near_colours.take(free) * kinds + kind
-        number = -(-np.bincount(kind, minlength=colours * kinds).reshape(colours, kinds) // LANES)
-        first, to = np.zeros((2, colours + 1), dtype=np.int64)
-        np.cumsum(number.sum(axis=1), out=first[1:])
-        np.cumsum(LANES * (number @ sizes), out=to[1:])
-        blocks = int(first[-1])
-        centre, rings = np.empty(blocks * LANES, dtype=np.int32), np.empty(to[-1], dtype=np.int32)
-        offset, degree = np.empty(blocks, dtype=np.int64), np.empty(blocks, dtype=np.int32)
-        filled = np.zeros(blocks, dtype=np.int32)
-        layout.fill_blocks(
-            free, self.near_start, self.near_ring, kind, sizes, first[:-1].copy(), to[:-1], centre, rings, offset,
-            degree, filled,
-        )  # fmt: skip
-        of_block = None if pattern is None or numbers is None else numbers[centre[::LANES]]
-        return Stars(Blocks(centre, rings, offset, degree, filled, most, of_block, pattern), first.astype(np.int32))
+        colours, fewest = self.near_colours, self.colouring.fewest
+        return Stars.in_plane(np.flatnonzero(self.near_free).astype(np.int32), self.links, colours, fewest)
 
     @cached_property
     def patches(self) -> tuple[Offsets, Ints]:
@@ -272,19 +246,20 @@ class Topology(Connectivity):
     def scored(self) -> Simplices:
         """Those by which meshes on the way are compared: of the cells with a free node; ``simplices`` itself, where
         these are all."""
-        if self.near_cells is None:
-            return self.changeable
-        return self._taken(links.rows_of_cells_with(self.near, self.near_cells, self.near_free))
+        return self.changeable if self.near_cells is None else self._taken(self._scored_rows())
 
     @cached_property
     def others(self) -> Simplices:
         """Those of the cells without a free node."""
         left = np.ones(len(self.near), dtype=bool)
-        if self.near_cells is None:
-            left[self.rows_at(self.near_free)] = False
-        else:
-            left[links.rows_of_cells_with(self.near, self.near_cells, self.near_free)] = False
+        left[self._scored_rows()] = False
         return self._taken(np.flatnonzero(left).astype(np.int32))
+
+    def _scored_rows(self) -> Ints:
+        if self.near_cells is None:
+            return self.rows_at(self.near_free)
+        found: Ints = links.rows_of_cells_with(self.near, self.near_cells, self.near_free)
+        return found
 
     @cached_property
     def changeable(self) -> Simplices:
