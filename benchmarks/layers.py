@@ -108,7 +108,7 @@ def spacings(points, mesh, corners, layered):
     edges, of_edge = wall_edges(mesh), {}
     for row, (i, j, k, _) in enumerate(corners.tolist()):
         of_edge |= {frozenset((i, j)): row, frozenset((j, k)): row, frozenset((k, i)): row}
-    length = np.linalg.norm(np.diff(mesh.points[edges][:, :, :2], axis=1)[:, 0], axis=1)
+    length = np.linalg.norm(np.diff(points[edges][:, :, :2], axis=1)[:, 0], axis=1)
     return doubles(points, corners[[of_edge[frozenset(edge)] for edge in edges.tolist()]]) / length
 
 

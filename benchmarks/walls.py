@@ -3,7 +3,8 @@
     GMSNET_MESHES=FOLDER python benchmarks/walls.py [--thrown 0 0.05 …] [--ceiling ROUNDS]
 
 On the NACA 0012 and two plates refined towards a hole, as they are and with all nodes thrown by so many edges: q̂ and
-the minimum 1/q after each call, and how much areas of protected cells change, at most and in 95 % of them.
+the minimum 1/q after each call, and how much areas of protected cells change, at most and in 95 % of them, and the
+heights of those on the wall.
 
 ``--ceiling``: how good the worst cell near the airfoil can be if each protected area stays within 10 %, by linear
 programs with a trust region one after the other, from the mesh as it is. A lower bound of what is possible.
@@ -46,16 +47,31 @@ def doubles(points, triangles):
     return (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
 
 
+def on_walls(mesh, topology, cells):
+    """The heights of those of the cells (T,) bool that have an edge of the boundary over it, as a function of points."""
+    edges = np.sort(topology.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, place, count = np.unique(edges, axis=0, return_index=True, return_counts=True)
+    outer = place[count == 1]
+    outer = outer[cells[outer // 3]]
+    rows, ends = topology.triangles[outer // 3], edges[outer]
+
+    def heights(points):
+        return np.abs(doubles(points, rows)) / np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1)
+
+    return heights
+
+
 def compare(name, mesh):
     """Prints a row."""
     topology, text = Topology.of(mesh), ""
     cells = near_walls(mesh, topology).nodes[topology.triangles].all(axis=1)
-    before = doubles(mesh.points[:, :2], topology.triangles)[cells]
+    before, heights = doubles(mesh.points[:, :2], topology.triangles)[cells], on_walls(mesh, topology, cells)
     for choice in CHOICES:
         result = gmsnet.smooth(mesh, threads=1, preserve=choice)
         change = np.abs(doubles(result.points[:, :2], topology.triangles)[cells] / before - 1.0)
         most = (change.max(), np.quantile(change, 0.95)) if cells.any() else (0.0, 0.0)
-        text += f"{result.after.qhat:8.4f}{result.after.shape.min():7.3f}{most[0]:8.1%}{most[1]:8.1%} |"
+        high = np.abs(heights(result.points[:, :2]) / heights(mesh.points[:, :2]) - 1.0).max(initial=0.0)
+        text += f"{result.after.qhat:8.4f}{result.after.shape.min():7.3f}{most[0]:8.1%}{most[1]:8.1%}{high:8.1%} |"
     print(f"{name:20}{cells.sum():6}|{text}", flush=True)
 
 
@@ -155,7 +171,7 @@ def main():
     print(describe())
     naca = gmsnet.read(Path(os.environ["GMSNET_MESHES"]) / "mesh_NACA0012_inv.su2")
     meshes = {"NACA 0012": naca, "plate": plate(0.5, 0.01, 0.25, 4.0), "finer hole": plate(0.15, 0.003, 0.2, 0.5)}
-    heads = "".join(f"{choice + ': q̂':>8}{'least':>7}{'most':>8}{'95 %':>8} |" for choice in CHOICES)
+    heads = "".join(f"{choice + ': q̂':>8}{'least':>7}{'most':>8}{'95 %':>8}{'height':>8} |" for choice in CHOICES)
     print(f"{'':20}{'cells':>6}|{heads}")
     for name, mesh in meshes.items():
         for amount in options.thrown:

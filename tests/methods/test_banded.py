@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.generate import recombine
+from gmsnet.generate import disturb, recombine
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import banded as kernels
+from gmsnet.kernels.methods.bands import AREA, HEIGHT
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.methods import Field
-from gmsnet.methods.banded import BAND, PLAN, Banded, Kept
+from gmsnet.methods.banded import PLAN, Banded, Kept
 from gmsnet.parallel.threads import serial
 from gmsnet.topology.ordering import planar_points
 from gmsnet.topology.topology import Topology
@@ -24,7 +25,7 @@ def doubles(points, triangles):
 
 def everything(count, nodes=None):
     nodes = np.ones(count, dtype=bool) if nodes is None else nodes
-    return Kept(nodes, np.zeros(count), np.ones(count))
+    return Kept.nothing(count)._replace(nodes=nodes)
 
 
 def objective(ring, x, y, low, high, top, power, weight):
@@ -90,7 +91,7 @@ def test_areas_stay_in_their_bands_and_shapes_gain():
     start, end, topology = swept(mesh, kept)
     cells = kept.nodes[topology.memory][topology.near].all(axis=1)
     ratio = doubles(end, topology.near) / doubles(start, topology.near)
-    assert np.abs(ratio[cells] - 1.0).max() <= BAND + 1e-9
+    assert np.abs(ratio[cells] - 1.0).max() <= AREA + 1e-9
     assert np.abs(ratio[cells] - 1.0).max() > 0.09
     assert np.abs(ratio[~cells] - 1.0).max() > 1.0
     points = mesh.points.copy()
@@ -99,6 +100,26 @@ def test_areas_stay_in_their_bands_and_shapes_gain():
     before, after = (gmsnet.quality(m).shape[near] for m in (mesh, mesh.with_points(points)))
     assert after.min() > before.min()
     assert np.quantile(after, 0.05) > np.quantile(before, 0.05)
+
+
+@pytest.mark.parametrize("quads", [False, True])
+def test_heights_over_a_wall_stay_in_theirs(quads):
+    mesh = gmsnet.random_mesh(400, seed=1)
+    good = mesh.with_points(gmsnet.smooth(mesh).points)
+    mesh = disturb(good, Topology.of(good).free, 0.1, seed=0)
+    mesh = recombine(mesh) if quads else mesh
+    wall = (mesh.points == 0.0).any(axis=1) | (mesh.points == 1.0).any(axis=1)
+    heights = []
+    for kept in (everything(len(mesh.points)), everything(len(mesh.points))._replace(heights=wall.astype(float))):
+        start, end, topology = swept(mesh, kept)
+        signs = topology.near_orientation
+        before, after = (signs * doubles(points, topology.near) for points in (start, end))
+        at_wall = (wall[topology.memory][topology.near].sum(axis=1) == 2) & (before > 0.0)
+        assert at_wall.sum() > 70
+        assert np.abs(after / before - 1.0)[before > 0.0].max() <= AREA + 1e-9
+        heights.append(np.abs(after / before - 1.0)[at_wall].max())  # the wall's nodes are held, and so lengths
+    assert heights[0] > 2.0 * HEIGHT
+    assert 0.9 * HEIGHT < heights[1] <= HEIGHT + 1e-9
 
 
 def test_noise_gives_way_to_the_mean_around():
@@ -115,8 +136,8 @@ def test_noise_gives_way_to_the_mean_around():
     own, found = (np.log(doubles(points, topology.near)) for points in (start, end))
     mean = np.log([doubles(start, topology.near[(topology.near == i).any(axis=1)]).mean() for i in range(len(start))])
     goal = mean[topology.near].mean(axis=1)
-    assert (found >= np.minimum(own, goal) + np.log(1.0 - BAND) - 1e-9).all()
-    assert (found <= np.maximum(own, goal) + np.log(1.0 + BAND) + 1e-9).all()
+    assert (found >= np.minimum(own, goal) + np.log(1.0 - AREA) - 1e-9).all()
+    assert (found <= np.maximum(own, goal) + np.log(1.0 + AREA) + 1e-9).all()
 
 
 def test_quads_keep_the_areas_at_their_corners():
@@ -125,7 +146,7 @@ def test_quads_keep_the_areas_at_their_corners():
     signs = topology.near_orientation
     before, after = (signs * doubles(points, topology.near) for points in (start, end))
     good = before > 0.0
-    assert np.abs(after[good] / before[good] - 1.0).max() <= BAND + 1e-9
+    assert np.abs(after[good] / before[good] - 1.0).max() <= AREA + 1e-9
     assert (start != end).any()
 
 

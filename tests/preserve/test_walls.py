@@ -56,7 +56,8 @@ def test_what_becomes_of_the_nodes_near_walls_is_told(ring):
     count = int(kept(ring).sum()) - len(ring.markers["hole"])
     told = f"the mesh is refined towards its walls: the {count:,} nodes next to them"
     moved = gmsnet.smooth(ring)
-    band = "move only as far as the areas of their cells stay within 10% of the input's"
+    band = "move only as far as the areas of their cells stay within 10% of the input's, "
+    band += "and the heights of those on the wall within 2%"
     assert moved.notes == [f"{told} {band} (preserve='shape')"]
     assert WALL not in moved.held
     least = float(moved.before.shape.min())

@@ -1,4 +1,4 @@
-"""Near walls shapes get better, areas stay within a tenth, and nothing moves far from them."""
+"""Near walls shapes get better, areas and heights stay in their bands, and nothing moves far from them."""
 
 from __future__ import annotations
 
@@ -30,6 +30,38 @@ def doubles(points, triangles):
     return (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
 
 
+def heights(points, triangles, wall):
+    """(k,) of the triangles with two corners on a wall, over these. wall: (N,) bool."""
+    rows = triangles[wall[triangles].sum(axis=1) == 2]
+    ends = rows[wall[rows]].reshape(-1, 2)
+    return np.abs(doubles(points, rows)) / np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1)
+
+
+def plate(radius):
+    """Refined towards a hole."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 400)
+    hole = Curve(radius * np.column_stack([np.cos(turn), np.sin(turn)]), "hole")
+    side = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]) * 4.0 * radius
+    return good_mesh(
+        [[Curve(side, "side")], [hole]],
+        lambda x: 0.02 * radius + 0.25 * np.abs(np.linalg.norm(x, axis=1) - radius),
+    )
+
+
+@pytest.mark.parametrize("slide", [False, True])
+def test_cells_on_a_wall_keep_their_heights(slide):
+    mesh = plate(0.3)
+    wall = np.zeros(len(mesh.points), dtype=bool)
+    wall[mesh.markers["hole"]] = True
+    free = [gmsnet.smooth(mesh, slide=slide, preserve=preserve) for preserve in ("shape", "none")]
+    triangles = Topology.of(mesh).triangles
+    before = heights(mesh.points, triangles, wall)
+    assert len(before) > 80
+    change = [np.abs(heights(result.points, triangles, wall) / before - 1.0).max() for result in free]
+    assert 0.01 < change[0] <= 0.02 < 0.05 < change[1]
+    assert free[0].moved[wall].any() == slide
+
+
 def test_the_airfoil_of_the_real_meshes(real_meshes):
     mesh = gmsnet.read(real_meshes / "mesh_NACA0012_inv.su2")
     first = state_of(mesh)
@@ -45,6 +77,10 @@ def test_the_airfoil_of_the_real_meshes(real_meshes):
     cells = inside[topology.near].all(axis=1)
     assert cells.sum() > 1600
     assert np.abs(ratio[cells] - 1.0).max() <= 0.1
+    wall = np.isin(topology.memory, mesh.markers["airfoil"])
+    of_rows = [heights(points, topology.near, wall) for points in (start, best)]
+    assert len(of_rows[0]) > 190
+    assert np.abs(of_rows[1] / of_rows[0] - 1.0).max() <= 0.02
     points = mesh.points.copy()
     points[np.ix_(topology.memory, mesh.plane)] = np.ldexp(best, mesh.exponent)
     near = kept[topology.triangles].all(axis=1)
@@ -75,16 +111,10 @@ def test_the_default_is_better_than_sizes_weighed_and_keeps_them_better(real_mes
 @pytest.mark.parametrize("radius", [0.15, 0.5])
 def test_worse_input_makes_no_better_mesh(radius):
     """Of a plate with a fine hole, thrown about more and more: protection goes by degrees."""
-    turn = np.linspace(0.0, 2.0 * np.pi, 400)
-    hole = Curve(radius * np.column_stack([np.cos(turn), np.sin(turn)]), "hole")
-    side = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]) * 4.0 * radius
-    plate = good_mesh(
-        [[Curve(side, "side")], [hole]],
-        lambda x: 0.02 * radius + 0.25 * np.abs(np.linalg.norm(x, axis=1) - radius),
-    )
-    free, found = Topology.of(plate).free, []
+    made = plate(radius)
+    free, found = Topology.of(made).free, []
     for amount in (0.0, 0.08, 0.16, 0.24, 0.32):
-        mesh = disturb(plate, free, amount, seed=0) if amount else plate
+        mesh = disturb(made, free, amount, seed=0) if amount else made
         found.append(gmsnet.smooth(mesh).after.qhat)
     rises = np.diff(found)
     assert rises.max() < 0.01
@@ -102,7 +132,7 @@ def test_nothing_to_move():
     assert first.protection.walls is None
     assert improve_near_walls(first, OPTIONS, serial) is first
     count = len(first.start)
-    nobody = replace(first.protection, walls=Kept(np.zeros(count, dtype=bool), np.zeros(count), np.ones(count)))
+    nobody = replace(first.protection, walls=Kept.nothing(count))
     last = improve_near_walls(replace(first, protection=nobody), OPTIONS, serial)
     assert last.points.tobytes() == first.start.tobytes()
     assert last.stop_reason == stop.NOTHING_TO_MOVE
@@ -122,3 +152,6 @@ def test_the_airfoil_with_nodes_that_slide(real_meshes):
     assert cells.sum() > 1600
     ratio = doubles(result.points[:, :2], triangles) / doubles(mesh.points[:, :2], triangles)
     assert np.abs(ratio[cells] - 1.0).max() <= 0.1
+    on_wall = np.isin(np.arange(len(mesh.points)), wall)
+    before, after = (heights(points[:, :2], triangles, on_wall) for points in (mesh.points, result.points))
+    assert np.abs(after / before - 1.0).max() <= 0.02

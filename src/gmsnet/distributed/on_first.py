@@ -71,8 +71,7 @@ def intent_of(
     layers = scattered(whole, layers, piece, comm)
     if not of_walls:
         return Intent(layers, notes=notes)
-    nodes, blend, room = scattered(whole, kept, piece, comm).T
-    return Intent(layers, Kept(nodes > 0.0, blend, room), of_walls, notes)
+    return Intent(layers, Kept.of_columns(scattered(whole, kept, piece, comm).T), of_walls, notes)
 
 
 def _of_walls(found: Protection) -> tuple[str, ...]:

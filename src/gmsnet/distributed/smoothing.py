@@ -181,8 +181,7 @@ def _meant(intent: Intent, piece: Piece, part: Part) -> Meant:
         topology = topology.holding(on_part(intent.layers) > 0.0, LAYER)
     if intent.walls is None:
         return Meant(topology, topology)
-    nodes, blend, room = (on_part(values) for values in intent.walls)
-    walls = Kept(nodes > 0.0, blend, room)
+    walls = Kept.of_columns([on_part(values) for values in intent.walls])
     return Meant(topology, topology.holding(walls.nodes, WALL), walls)
 
 

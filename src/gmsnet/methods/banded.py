@@ -7,7 +7,7 @@ times.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +22,6 @@ from gmsnet.methods.base import Field, StarSmoother, Tally
 from gmsnet.methods.sized import places_of
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
-
-BAND = 0.099  # a tenth, and room for the rounding of what is written, and for nodes that slide
 
 
 class Step(NamedTuple):
@@ -43,15 +41,28 @@ class Kept(NamedTuple):
     """Which cells have bands, and how wide; all (N,), in one order.
 
     nodes: bool, the cells all of whose corners are among these have bands. blend, room: see kernels.methods.bands.
+    heights: of the nodes of a wall how firmly the heights over it are kept, above 0 to 1; of others 0.
     """
 
     nodes: NDArray[np.bool_]
     blend: NDArray[np.float64]
     room: NDArray[np.float64]
+    heights: NDArray[np.float64]
+
+    @classmethod
+    def nothing(cls, count: int) -> Kept:
+        """No bands for so many nodes."""
+        return cls(np.zeros(count, dtype=bool), np.zeros(count), np.ones(count), np.zeros(count))
+
+    @classmethod
+    def of_columns(cls, columns: Iterable[NDArray[np.float64]]) -> Kept:
+        """From its arrays, all as float64, in their order."""
+        nodes, *others = columns
+        return cls(nodes > 0.0, *others)
 
     def taken(self, order: NDArray[np.int32]) -> Kept:
         """The same in another order."""
-        return Kept(self.nodes[order], self.blend[order], self.room[order])
+        return Kept(self.nodes[order], self.blend[order], self.room[order], self.heights[order])
 
     @property
     def noisy(self) -> bool:
@@ -78,7 +89,7 @@ class Banded(StarSmoother):
     def __init__(self, start: NDArray[np.float64], kept: Kept) -> None:
         self.start, self.kept = start, kept
         self.topology: Topology | None = None
-        self.bands: bands.Bands = bands.Bands(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0))
+        self.bands = bands.bands_for(np.empty(0, dtype=np.int64), 0)
         self.at, self.inverse = -1, 1.0
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
@@ -97,11 +108,11 @@ class Banded(StarSmoother):
         self.topology, blocks = topology, topology.stars.blocks
         assert isinstance(blocks, Blocks)
         first, count = places_of(blocks)
-        self.bands = bands.Bands(first, np.empty(count), np.empty(count))
-        log_mean, (nodes, blend, room) = np.empty(len(self.start)), self.kept
+        self.bands = bands.bands_for(first, count)
+        log_mean, (nodes, blend, room, firm) = np.empty(len(self.start)), self.kept
         bands.mean_areas(self.start, topology.near, log_mean)
         executor.exchange(log_mean)
-        bands.limit(self.start, nodes, BAND, log_mean, blend, room, blocks, self.bands)
+        bands.limit(self.start, nodes, log_mean, blend, room, firm, blocks, self.bands)
 
     def visit(
         self, points: NDArray[np.float64], blocks: Blocks, first: int, last: int, guard: Guard, tally: Tally

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
+from gmsnet.kernels.methods.bands import AREA, HEIGHT
 from gmsnet.measure.report import SHAPE
 from gmsnet.measure.signs import exact_signs
 from gmsnet.measure.target import Target
 from gmsnet.measure.volumes import exact_signs3
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.methods.banded import BAND, Kept
+from gmsnet.methods.banded import Kept
 from gmsnet.preserve.anchored import split
 from gmsnet.preserve.columns import layers_of_volume
 from gmsnet.preserve.layers import Layers, stretched_layers
@@ -156,9 +157,11 @@ def _certain(layers: Flags, topology: Topology, near: Floats) -> Flags:
 
 def wall_note(walls: Kept, nodes: int, moved: bool) -> str:
     """What to say of so many nodes next to walls that the mesh is refined towards. moved: in a stage of their own."""
-    so = f"move only as far as the areas of their cells stay within {BAND:.0%} of the input's" if moved else ""
+    so = f"move only as far as the areas of their cells stay within {AREA:.0%} of the input's" if moved else ""
     if moved and walls.noisy:
         so += ", or between those and the mean of the areas around where the input is disturbed"
+    if moved and (firm := walls.heights[walls.heights > 0.0]).size:
+        so += f", and the heights of those on the wall within {AREA * (HEIGHT / AREA) ** firm.min():.0%}"
     mend = "" if moved else "; preserve='none' lets them move"
     so = so or "are held in this run"
     return f"the mesh is refined towards its walls: the {nodes:,} nodes next to them {so} (preserve={SHAPE!r}){mend}"

@@ -36,6 +36,7 @@ MOST = 0.5  # at least this share of the cells near a wall is refined, or it is 
 # to the second of these bands reach to the mean around; from there to the third they grow by the factor WIDEST.
 CALM, NOISY, RANDOM = 0.1, 0.2, 0.4
 WIDEST = 4.0
+UNSURE = 0.07, 0.11  # the same for bands of heights: from the second on they are those of areas
 ROUGH, BROKEN = 0.4, 0.5  # the same for single cells, whose band reaches to the mean from the second on
 SOUND, POOR = 0.5, 0.3  # the same by their 1/q
 CANDIDATES = 8  # edges of the wall, by their middles, among which the nearest is looked for
@@ -51,7 +52,7 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
     is known.
     """
     triangles, count = topology.near, len(topology.memory)
-    kept = Kept(np.zeros(count, dtype=bool), np.zeros(count), np.ones(count))
+    kept = Kept.nothing(count)
     if topology.plane is None or not len(triangles):
         return kept
     survey = survey or Survey.of(mesh, topology)
@@ -73,7 +74,7 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
             continue
         rough = _roughness(triangles, _double(points, triangles), len(points)) if rough is None else rough
         if np.median(rough[rows]) < RANDOM:
-            _keep(kept, topology, points, rows, rough[rows])
+            _keep(kept, topology, points, rows, rough[rows], wall)
     if kept.nodes.any():
         _leave_out_inverted(kept, topology, points)
     return kept
@@ -84,8 +85,11 @@ def refined(points: Floats, beside: Ints, double: float) -> bool:
     return bool((_edge(_double(points, beside)) <= REFINED * float(_edge(double))).any())
 
 
-def _keep(kept: Kept, topology: Topology, points: Floats, rows: NDArray[np.int64], rough: Floats) -> None:
-    """Marks the corners of the simplices near one wall. rows: of ``topology.near``; rough: (len(rows),) their noise."""
+def _keep(kept: Kept, topology: Topology, points: Floats, rows: NDArray[np.int64], rough: Floats, wall: Ints) -> None:
+    """Marks the corners of the simplices near one wall. rows: of ``topology.near``; rough: (len(rows),) their noise.
+
+    wall: (k, 2) its edges.
+    """
     corners, columns = topology.near[rows], np.empty((4, len(rows)))
     quality.per_cell(points, corners, topology.near_orientation[rows], columns)
     shape, noise = columns[quality.SHAPE], float(np.median(rough))
@@ -96,6 +100,7 @@ def _keep(kept: Kept, topology: Topology, points: Floats, rows: NDArray[np.int64
     np.maximum.at(kept.blend, nodes, blend[:, None])
     wider = WIDEST ** float(_ramp(np.array(noise), NOISY, RANDOM))
     kept.room[nodes] = np.maximum(kept.room[nodes], wider)
+    kept.heights[topology.memory[wall]] = 1.0 - _ramp(np.array(noise), *UNSURE)
 
 
 def _leave_out_inverted(kept: Kept, topology: Topology, points: Floats) -> None:

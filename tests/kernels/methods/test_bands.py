@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 import gmsnet
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import bands
+from gmsnet.kernels.methods.bands import AREA, HEIGHT
 from gmsnet.kernels.star import stars
 from gmsnet.methods.sized import places_of
 from gmsnet.topology.ordering import planar_points
 from gmsnet.topology.topology import Topology
-
-WIDTH = 0.1
 
 
 def doubles(points, triangles):
@@ -23,14 +22,14 @@ def doubles(points, triangles):
     return (b - a)[..., 0] * (c - a)[..., 1] - (b - a)[..., 1] * (c - a)[..., 0]
 
 
-def limited(points, topology, kept, blend=0.0, room=1.0):
+def limited(points, topology, kept, firm, blend=0.0, room=1.0):
     """The bands of all stars, and the logarithms of the mean areas around nodes."""
     blocks = topology.stars.blocks
     first, count = places_of(blocks)
-    found, log_mean = bands.Bands(first, np.empty(count), np.empty(count)), np.empty(len(points))
+    found, log_mean = bands.bands_for(first, count), np.empty(len(points))
     bands.mean_areas(points, topology.near, log_mean)
     same = np.ones(len(points))
-    bands.limit(points, kept, WIDTH, log_mean, blend * same, room * same, blocks, found)
+    bands.limit(points, kept, log_mean, blend * same, room * same, firm, blocks, found)
     return found, log_mean
 
 
@@ -39,12 +38,14 @@ def test_the_ends_of_bands_follow_from_areas(blend, room):
     mesh = gmsnet.random_mesh(120, seed=3)
     topology = Topology.of(mesh)
     points = planar_points(mesh)[topology.memory]
-    kept = np.random.default_rng(0).random(len(points)) < 0.8
-    found, log_mean = limited(points, topology, kept, blend, room)
+    rng = np.random.default_rng(0)
+    kept, firm = rng.random(len(points)) < 0.8, rng.choice([0.0, 0.0, 0.4, 1.0], len(points))
+    wall = firm > 0.0
+    found, log_mean = limited(points, topology, kept, firm, blend, room)
     for node in range(len(points)):
         around = np.abs(doubles(points, topology.near[(topology.near == node).any(axis=1)]))
         assert log_mean[node] == pytest.approx(np.log(around.mean()))
-    blocks, seen = topology.stars.blocks, 0
+    blocks, seen, over = topology.stars.blocks, 0, 0
     for block, first in enumerate(found.first):
         n = blocks.degree[block]
         for k in range(n):
@@ -54,16 +55,36 @@ def test_the_ends_of_bands_follow_from_areas(blend, room):
                 corners = np.array(
                     [blocks.centre[block * LANES + lane], ring[i * LANES + lane], ring[j * LANES + lane]]
                 )
-                low, high = found.low[first + k * LANES + lane], found.high[first + k * LANES + lane]
+                at = first + k * LANES + lane
+                low, high = found.low[at], found.high[at]
                 if not kept[corners].all():
-                    assert (low, high) == (-np.inf, np.inf)
+                    assert (low, high) == bands.ends_of(found, at, 1.0) == (-np.inf, np.inf)
                     continue
                 own = doubles(points, corners)
                 goal = own * (np.exp(log_mean[corners].mean()) / own) ** blend
-                assert low == pytest.approx((1 - WIDTH) * min(own, goal) / room)
-                assert high == pytest.approx((1 + WIDTH) * max(own, goal) * room)
+                least, most = min(own, goal) / room, max(own, goal) * room
+                assert low == pytest.approx((1 - AREA) * least)
+                assert high == pytest.approx((1 + AREA) * most)
                 seen += 1
+                on_wall = corners[wall[corners]]
+                if len(on_wall) != 2:
+                    assert found.edge[at] == bands.NOWHERE
+                    continue
+                length, calm = np.linalg.norm(np.diff(points[on_wall], axis=0)), firm[on_wall].min() * (1.0 - blend)
+                shallow = (1 - AREA) * ((1 - HEIGHT) / (1 - AREA)) ** calm * least
+                tall = (1 + AREA) * ((1 + HEIGHT) / (1 + AREA)) ** calm * most
+                assert (found.least[at], found.most[at]) == pytest.approx((shallow / length, tall / length))
+                if wall[corners[0]]:
+                    assert wall[corners[found.edge[at] - 1]]
+                    assert bands.ends_of(found, at, length) == (low, high)
+                    continue
+                assert found.edge[at] == bands.OPPOSITE
+                for longer in (0.95, 1.0, 1.05):
+                    ends = max(low, longer * shallow), min(high, longer * tall)
+                    assert bands.ends_of(found, at, longer * length) == pytest.approx(ends)
+                over += 1
     assert seen > 300
+    assert over > 30
 
 
 @given(seed=st.integers(0, 2**32 - 1), reach=st.sampled_from([1e-3, 0.03, 0.3, 10.0]))
@@ -99,7 +120,8 @@ def test_nodes_that_do_not_slide_keep_their_shifts():
     mesh = gmsnet.random_mesh(60, seed=0)
     topology = Topology.of(mesh)
     points = planar_points(mesh)[topology.memory]
-    found, _ = limited(points, topology, np.ones(len(points), dtype=bool))
+    everywhere = np.ones(len(points), dtype=bool)
+    found, _ = limited(points, topology, everywhere, np.zeros(len(points)))
     blocks = topology.stars.blocks
     room, shift = stars.workspace_for(blocks.most), np.full(2 * LANES, 0.3)
     stars.fetch(points, blocks, 0, room, np.empty(2 * blocks.most * LANES))

@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, kernel, part
-from gmsnet.kernels.methods.bands import shorten
+from gmsnet.kernels.methods.bands import ends_of, shorten
 from gmsnet.kernels.methods.worst_first import power
 from gmsnet.kernels.simplex.objectives import aspect
 from gmsnet.kernels.star import stars
@@ -144,10 +144,12 @@ def sweep(points, blocks, bands, inverse, doublings, weight, first, last, guard,
         pattern = pattern_at(blocks.patterns, blocks.pattern, block)
         start, sizes = bands.first[block], workspace.work[SIZE * LANES : (SIZE + 1) * LANES]
         for k in range(count_of(pattern, n)):
+            i, j = pair_of(pattern, n, k)
             for lane in range(LANES):
-                over = 1.0 / (sizes[lane] * sizes[lane])
-                low[k * LANES + lane] = over * bands.low[start + k * LANES + lane]
-                high[k * LANES + lane] = over * bands.high[start + k * LANES + lane]
+                p, q, over = 2 * i * LANES + lane, 2 * j * LANES + lane, 1.0 / (sizes[lane] * sizes[lane])
+                length = sizes[lane] * math.hypot(local[p] - local[q], local[LANES + p] - local[LANES + q])
+                least, most = ends_of(bands, start + k * LANES + lane, length)
+                low[k * LANES + lane], high[k * LANES + lane] = over * least, over * most
         centre = stars.centre_of(blocks, block)
         descend(local, n, pattern, low, high, inverse, doublings, weight, centre, guard.constraint, state, shift)
         shorten(bands, guard.constraint, blocks, block, workspace.star, sizes, shift)

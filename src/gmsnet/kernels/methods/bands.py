@@ -1,15 +1,19 @@
-"""Bands for the areas of simplices: which D they may have, and how far a node may slide so that none leaves its band.
+"""Bands for areas and heights of simplices: which D they may have, and how far a node may slide so that none leaves.
 
 Of a corner simplex (p, r_i, r_j) with what is around it fixed, D is an affine function of the free node's place p. So
 the places where D lies in a band form a strip, and those where all simplices of a star do form a convex polygon. Twice
 the area of a quad is the sum of the D at two opposite corners: it stays in the band with them.
 
-A band reaches from 1 − width to 1 + width times what D is at the start. Where areas are noisy, so that nobody meant
+A band reaches from 1 − AREA to 1 + AREA times what D is at the start. Where areas are noisy, so that nobody meant
 them, it is wider: it reaches to the share ``blend`` of the way (of logarithms) from there to the mean of the areas
 around, and beyond both ends by the factor ``room``.
 
+Simplices at a wall, with two corners on it, have a band for their height over these, too: the same with HEIGHT instead
+of AREA, and the wider the less ``firm`` the wall is. With L the distance of the two, D is L times the height. So this
+is a band for D, as long as they stay; where they slide, it goes with L.
+
 A node that slides goes to places on its curve, beside the straight line of its shift. They, and those of its halves,
-must lie in bands that are wider by ROOM; else the shift is halved.
+must lie in bands of areas that are wider by ROOM, and in those of heights; else the shift is halved.
 """
 
 from __future__ import annotations
@@ -24,6 +28,12 @@ from gmsnet.kernels.jit.compile import LANES, kernel, part
 from gmsnet.kernels.star.constraint import snap
 from gmsnet.kernels.star.pattern import count_of, other_of, pair_of, pattern_at
 
+AREA, HEIGHT = 0.099, 0.0198  # a tenth and a fiftieth, and room for rounding, and for nodes that slide
+LOWER, UPPER = (
+    (1.0 - HEIGHT) / (1.0 - AREA),
+    (1.0 + HEIGHT) / (1.0 + AREA),
+)  # from the ends for areas to those for heights
+NOWHERE, OPPOSITE, FIRST, SECOND = range(4)  # where the wall is: at the pair, or at the centre and one of the pair
 ROOM = 0.0005  # of the ends of a band
 TRIES = 8  # halvings of the shift of a node that slides
 HALVES = 6  # of a shift that are looked at: smaller ones are off the straight line by less than ROOM
@@ -33,12 +43,22 @@ TINY = 1e-300
 class Bands(NamedTuple):
     """The ends of the band of each simplex of the stars in blocks, [simplex][lane], as D; ±∞ where it has none.
 
-    first: (B,) where those of each block begin.
+    first: (B,) where those of each block begin. edge: int8, which two of its corners are on a wall. least, most: the
+    ends for its height over these, where they are.
     """
 
     first: NDArray[np.int64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+    edge: NDArray[np.int8]
+    least: NDArray[np.float64]
+    most: NDArray[np.float64]
+
+
+def bands_for(first: NDArray[np.int64], count: int) -> Bands:
+    """Of so many simplices, to be written by ``limit``."""
+    low, high, least, most = np.empty((4, count))
+    return Bands(first, low, high, np.empty(count, dtype=np.int8), least, most)
 
 
 @kernel
@@ -58,11 +78,11 @@ def mean_areas(points, triangles, log_mean):
 
 
 @kernel
-def limit(start, kept, width, log_mean, blend, room, blocks, bands):
+def limit(start, kept, log_mean, blend, room, firm, blocks, bands):
     """Writes the bands of all stars. Cells have one that have all corners ``kept`` and, at the start, a positive D.
 
     start: (N, 2). kept: (N,) bool. log_mean: as ``mean_areas`` leaves it. blend, room: (N,), of a simplex the means of
-    its corners'.
+    its corners'. firm: (N,), above 0 where a node is on a wall with bands for heights.
     """
     for block in range(len(blocks.degree)):
         n, offset, first = blocks.degree[block], blocks.offset[block], bands.first[block]
@@ -75,13 +95,32 @@ def limit(start, kept, width, log_mean, blend, room, blocks, bands):
                 a, b = blocks.rings[offset + i * LANES + lane], blocks.rings[offset + j * LANES + lane]
                 d = (start[a, 0] - start[c, 0]) * (start[b, 1] - start[c, 1])
                 d -= (start[a, 1] - start[c, 1]) * (start[b, 0] - start[c, 0])
-                bands.low[at], bands.high[at] = -np.inf, np.inf
+                bands.low[at], bands.high[at], bands.edge[at] = -np.inf, np.inf, NOWHERE
                 if d > 0.0 and kept[a] and kept[b] and kept[c] and kept[blocks.rings[offset + other * LANES + lane]]:
-                    way = (blend[a] + blend[b] + blend[c]) / 3.0
-                    way *= (log_mean[a] + log_mean[b] + log_mean[c]) / 3.0 - math.log(max(d, TINY))
+                    noise = (blend[a] + blend[b] + blend[c]) / 3.0
+                    way = noise * ((log_mean[a] + log_mean[b] + log_mean[c]) / 3.0 - math.log(max(d, TINY)))
                     far = (room[a] + room[b] + room[c]) / 3.0
-                    bands.low[at] = (1.0 - width) * d * math.exp(min(way, 0.0)) / far
-                    bands.high[at] = (1.0 + width) * d * math.exp(max(way, 0.0)) * far
+                    bands.low[at] = (1.0 - AREA) * d * math.exp(min(way, 0.0)) / far
+                    bands.high[at] = (1.0 + AREA) * d * math.exp(max(way, 0.0)) * far
+                    if firm[a] > 0.0 and firm[b] > 0.0 and firm[c] == 0.0:
+                        bands.edge[at], p, q = OPPOSITE, a, b
+                    elif firm[c] > 0.0 and (firm[a] > 0.0) != (firm[b] > 0.0):
+                        bands.edge[at], p, q = (FIRST, c, a) if firm[a] > 0.0 else (SECOND, c, b)
+                    else:
+                        continue
+                    calm = min(firm[p], firm[q]) * (1.0 - noise)
+                    length = math.hypot(start[p, 0] - start[q, 0], start[p, 1] - start[q, 1])
+                    bands.least[at] = bands.low[at] * LOWER**calm / length
+                    bands.most[at] = bands.high[at] * UPPER**calm / length
+
+
+@part
+def ends_of(bands, at, length):
+    """The band of a simplex, as D, now that the pair's nodes are so far from each other."""
+    low, high = bands.low[at], bands.high[at]
+    if bands.edge[at] == OPPOSITE:
+        low, high = max(low, length * bands.least[at]), min(high, length * bands.most[at])
+    return low, high
 
 
 @part
@@ -116,6 +155,7 @@ def shortened_on_curve(bands, constraint, blocks, block, lane, star, dx, dy):
             part_of = 0.5**half
             tx, ty, _ = snap(constraint, c, x + part_of * dx, y + part_of * dy)
             inside &= share_in_all(bands, ROOM, blocks, block, lane, star, tx - x, ty - y) == 1.0
+            inside &= heights_kept(bands, blocks, block, lane, star, tx - x, ty - y)
         if inside:
             return dx, dy
         share = 0.5
@@ -138,6 +178,25 @@ def share_in_all(bands, wider, blocks, block, lane, star, dx, dy):
         px, py, qx, qy = star[p] - x, star[p + 1] - y, star[q] - x, star[q + 1] - y
         share = min(share, share_inside((1.0 - wider) * low, (1.0 + wider) * high, px, py, qx, qy, dx, dy))
     return share
+
+
+@part
+def heights_kept(bands, blocks, block, lane, star, dx, dy):
+    """Are the heights over a wall that a lane's node is on in their bands, if it goes by (dx, dy) along it?"""
+    n, first, kept = blocks.degree[block], bands.first[block], True
+    pattern = pattern_at(blocks.patterns, blocks.pattern, block)
+    x, y = star[2 * lane] + dx, star[2 * lane + 1] + dy
+    for k in range(count_of(pattern, n)):
+        at = first + k * LANES + lane
+        edge = bands.edge[at]
+        if edge in (FIRST, SECOND):
+            i, j = pair_of(pattern, n, k)
+            p, q = 2 * ((i + 1) * LANES + lane), 2 * ((j + 1) * LANES + lane)
+            px, py, qx, qy = star[p] - x, star[p + 1] - y, star[q] - x, star[q + 1] - y
+            length = math.hypot(px, py) if edge == FIRST else math.hypot(qx, qy)
+            d = px * qy - py * qx
+            kept &= length * bands.least[at] < d < length * bands.most[at]
+    return kept
 
 
 @part
