@@ -48,7 +48,7 @@ def doubles(points, triangles):
 
 
 def on_walls(mesh, topology, cells):
-    """The heights of those of the cells (T,) bool that have an edge of the boundary over it, as a function of points."""
+    """The heights, over the boundary, of those of the cells (T,) bool that have an edge of it; by points."""
     edges = np.sort(topology.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     _, place, count = np.unique(edges, axis=0, return_index=True, return_counts=True)
     outer = place[count == 1]

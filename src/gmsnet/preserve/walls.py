@@ -3,7 +3,8 @@
 A mesh that is refined towards a body is so on purpose: what happens there, in about a boundary layer's thickness, must
 be resolved as its maker wanted. In isotropic regions the connectivity carries the grading, so they are smoothed freely;
 but converged smoothing changes single areas by a factor of up to two. So cells near such a wall keep their areas
-within a band, and their shapes are improved as far as the bands let them.
+within a band, and those on it their heights within a narrower one. Their shapes are improved as far as the bands let
+them.
 
 Where a mesh has been disturbed, areas are noise, and nobody's intent. There bands reach to the mean of the areas around
 each cell, and where the noise is larger still, further. This goes by degrees, with the median noise near a wall, and
@@ -33,10 +34,10 @@ REFINED = 0.25  # cells there have edges of at most this share of those that cel
 MOST = 0.5  # at least this share of the cells near a wall is refined, or it is not refined towards that wall
 # How far a cell's area lies from the mean of its neighbours', in logarithms, averaged over the stars of its corners:
 # the noise. Meshes as they are made have a median of 0.02 to 0.08 near a wall, random ones 0.4 to 0.5. From the first
-# to the second of these bands reach to the mean around; from there to the third they grow by the factor WIDEST.
-CALM, NOISY, RANDOM = 0.1, 0.2, 0.4
+# to the second of these bands of heights give way to those of areas; from there to the third these reach to the mean
+# around; and from there to the fourth they grow by the factor WIDEST.
+SURE, CALM, NOISY, RANDOM = 0.08, 0.1, 0.2, 0.4
 WIDEST = 4.0
-UNSURE = 0.07, 0.11  # the same for bands of heights: from the second on they are those of areas
 ROUGH, BROKEN = 0.4, 0.5  # the same for single cells, whose band reaches to the mean from the second on
 SOUND, POOR = 0.5, 0.3  # the same by their 1/q
 CANDIDATES = 8  # edges of the wall, by their middles, among which the nearest is looked for
@@ -100,7 +101,7 @@ def _keep(kept: Kept, topology: Topology, points: Floats, rows: NDArray[np.int64
     np.maximum.at(kept.blend, nodes, blend[:, None])
     wider = WIDEST ** float(_ramp(np.array(noise), NOISY, RANDOM))
     kept.room[nodes] = np.maximum(kept.room[nodes], wider)
-    kept.heights[topology.memory[wall]] = 1.0 - _ramp(np.array(noise), *UNSURE)
+    kept.heights[topology.memory[wall]] = 1.0 - _ramp(np.array(noise), SURE, CALM)
 
 
 def _leave_out_inverted(kept: Kept, topology: Topology, points: Floats) -> None:
