@@ -6,8 +6,8 @@
 Airfoils, circles and squares in a square, with 6 to 20 rows, triangles or quads, drawn at random. Each second mesh is
 disturbed: free nodes outside of the layers are thrown by up to half of their shortest edge. Told are the largest change
 of a spacing normal to the wall (of edges of the layers that lead away from it) and of an area in the first two rows.
-They may be 2 and 10 %. Spacings count whose cells are at least twice as long as thick. And the least and mean 1/q of
-the cells with a free node before and after.
+They may be 2 and 10 %. Rows count whose cells are at least twice as long as thick in the median. And the least and mean
+1/q of the cells with a free node before and after.
 """
 
 from __future__ import annotations
@@ -106,8 +106,8 @@ def areas(points, cells):
     return 0.5 * np.abs((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1))
 
 
-def rungs(points, blocks, away):
-    """(k, 2) the edges that lead away from the wall, in cells that are all at least ASPECT times as long as thick."""
+def rungs(points, blocks, away, first, growth):
+    """(k, 2) the edges that lead away from the wall, of rows whose cells are ASPECT times as long as thick or more."""
     edges, flat = [], []
     for cells in blocks:
         ends = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2)
@@ -116,9 +116,10 @@ def rungs(points, blocks, away):
         up = rise >= AWAY * length
         edges.append(np.sort(ends[up], axis=1))
         flat.append((length.max(axis=1)[:, None] >= np.hypot(ASPECT, 1.0) * rise)[up])
-    found, which = np.unique(np.concatenate(edges), axis=0, return_inverse=True)
-    thick = np.bincount(which.ravel(), ~np.concatenate(flat), len(found))
-    return found[thick == 0]
+    edges, flat = np.concatenate(edges), np.concatenate(flat)
+    row = np.rint(np.log1p(away[edges].max(axis=1) * (growth - 1.0) / first) / np.log(growth)).astype(int)
+    counts = 2 * np.bincount(row, flat) > np.bincount(row)
+    return np.unique(edges[counts[row]], axis=0)
 
 
 def measure(mesh, outline, first, growth, thickness, throw, seed):
@@ -126,7 +127,7 @@ def measure(mesh, outline, first, growth, thickness, throw, seed):
     away = distance(mesh.points[:, :2], outline)
     blocks = [block.nodes for block in mesh.cells if block.kind in ("triangle", "quad")]
     layer = away <= OVER * thickness
-    edges = rungs(mesh.points, [b[layer[b].all(axis=1)] for b in blocks], away)
+    edges = rungs(mesh.points, [b[layer[b].all(axis=1)] for b in blocks], away, first, growth)
     rise = np.abs(away[edges[:, 1]] - away[edges[:, 0]])
     free = Topology.of(mesh).free
     given = disturb(mesh, free[~layer[free]], THROW, seed=seed, edge="shortest") if throw else mesh

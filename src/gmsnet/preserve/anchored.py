@@ -83,11 +83,11 @@ def split(mesh: Mesh, topology: Topology, survey: Survey, layers: Layers) -> tup
     nodes = np.zeros(len(layers.nodes), dtype=bool)
     nodes[part[kept]] = True
     gaps = in_gaps(triangles, orientation, equal, points, rim, nodes, points[wall].mean(axis=1)) if len(wall) else False
-    rows = courses.whole(nodes)
+    rows, as_high = courses.whole(nodes)
     if rows.any():
         damaged = np.zeros(len(nodes), dtype=bool)
         damaged[part] = True
-        rows &= layers.nodes | ~damaged
+        rows &= layers.nodes | ~damaged | as_high
         at_walls |= _all_of(np.asarray(rows[triangles].all(axis=1)), first)
         nodes |= rows
     return (

@@ -93,9 +93,12 @@ class Courses(NamedTuple):
         grid = sum(plain.values()) >= MOST * len(self.points)
         return np.isin(self.label, [wall for wall in some if not (grid and wall in plain)])
 
-    def whole(self, inside: Flags) -> Flags:
-        """(N,) the nodes of rows that are layers, or of which most are inside of one; of their walls as well."""
-        label, rows, found = self.label.copy(), self.rows, np.zeros(len(inside), dtype=bool)
+    def whole(self, inside: Flags) -> tuple[Flags, Flags]:
+        """(N,) the nodes of rows that are layers, or of which most are inside of one; of their walls as well.
+
+        And which of the nodes of rows are as high over the row before as others.
+        """
+        label, rows, (found, as_high) = self.label.copy(), self.rows, np.zeros((2, len(inside)), dtype=bool)
         made = {wall for wall, own in rows.items() if _are_layers(own)}
         nothing = ~np.isin(label, [*made]) & ~inside
         if (label[nothing] >= 0).any():  # what is no layer takes no rows from those that are
@@ -106,8 +109,9 @@ class Courses(NamedTuple):
             for k, row in enumerate(own):
                 if k < last or inside[row.nodes].mean() >= SHARE:
                     found[row.nodes] = True
+                as_high[row.nodes] = abs(row.height - np.median(row.height)) <= STEADY
             found[label == wall] |= last > 0
-        return found
+        return found, as_high
 
 
 def _graph(edges: Edges, count: int) -> Graph:

@@ -43,6 +43,7 @@ EVEN = 0.2  # of the mean area of a star: the minimum of its areas where a layer
 NEXT = 3.0  # how many times the area of a cell's neighbour in a layer its own may be, or the other way round
 BYTES_PER_NODE = 600  # that the layers of a mesh that has some take to be told, measured where all cells are in one
 BROKEN = 0.05  # of the mean area around: a cell of less is damaged, and its nodes are not held
+THICK = math.log(4.0)
 CALM = (
     1.35  # times the mean area around, or the other way round: where half of the cells are so, the node is not at fault
 )
@@ -176,7 +177,7 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:
     if not chosen.any():
         return None
     area, around = cells[:, stretch.AREA], _area_around(triangles, cells, number)
-    damaged = chosen & (area <= BROKEN * around)
+    damaged = chosen & (area <= BROKEN * around) & ((area <= 0.0) | (cells[:, stretch.LENGTH] >= THICK))
     nodes = np.zeros(len(layer), dtype=bool)
     nodes[triangles[chosen]] = True
     if damaged.any():
