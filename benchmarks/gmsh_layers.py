@@ -29,6 +29,7 @@ from gmsnet.topology.topology import Topology
 THROW = 0.5
 AWAY = 0.95  # of its length an edge must lead away from the wall
 ASPECT = 2.0
+OFF = 0.05  # of a row: so far from its place a node may be
 OVER = 1.01  # of a thickness: rounding of places, and bends of the wall
 
 
@@ -117,9 +118,11 @@ def rungs(points, blocks, away, first, growth):
         edges.append(np.sort(ends[up], axis=1))
         flat.append((length.max(axis=1)[:, None] >= np.hypot(ASPECT, 1.0) * rise)[up])
     edges, flat = np.concatenate(edges), np.concatenate(flat)
-    row = np.rint(np.log1p(away[edges].max(axis=1) * (growth - 1.0) / first) / np.log(growth)).astype(int)
+    place = np.log1p(away[edges] * (growth - 1.0) / first) / np.log(growth)  # 1 on the first row, and so on
+    row = np.rint(place.max(axis=1)).astype(int)
+    made = (abs(place - np.rint(place)) <= OFF).all(axis=1)  # rows end before a thickness that is too large for them
     counts = 2 * np.bincount(row, flat) > np.bincount(row)
-    return np.unique(edges[counts[row]], axis=0)
+    return np.unique(edges[counts[row] & made], axis=0)
 
 
 def measure(mesh, outline, first, growth, thickness, throw, seed):

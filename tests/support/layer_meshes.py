@@ -79,3 +79,40 @@ def shaken(mesh, x, y, amount, seed=0):
     free = np.zeros(len(local), dtype=bool)
     free[Topology.of(mesh).free] = True
     return mesh.with_points(np.where(free[:, None], mesh.points + thrown, mesh.points))
+
+
+def with_fans(cells, rows=14, side=12, fan=5, first=2e-3, growth=1.3):
+    """Rows around a square, with fans of cells around its corners, and its nodes row by row; then rows that grow on.
+
+    On the wall the nodes of a fan are one: its first cells are triangles.
+    """
+    along = np.linspace(-1.0, 1.0, side + 1)[1:-1]
+    turns = np.linspace(-0.25, 0.25, fan + 1) * np.pi
+    foot, way = [], []
+    for k in range(4):
+        quarter = np.array([[np.cos(0.5 * np.pi * k), -np.sin(0.5 * np.pi * k)],
+                            [np.sin(0.5 * np.pi * k), np.cos(0.5 * np.pi * k)]])  # fmt: skip
+        own_foot = np.concatenate([np.column_stack([np.ones_like(along), along]), np.ones((fan + 1, 2))])
+        corner = np.column_stack([np.cos(0.25 * np.pi + turns), np.sin(0.25 * np.pi + turns)])
+        foot.append(own_foot @ quarter.T)
+        way.append(np.concatenate([np.tile([1.0, 0.0], (len(along), 1)), corner]) @ quarter.T)
+    foot, way = np.concatenate(foot), np.concatenate(way)
+    height = np.append(0.0, np.cumsum(first * growth ** np.arange(rows + 8)))
+    node = np.arange(len(height) * len(foot)).reshape(len(height), -1)
+    points = (foot + height[:, None, None] * way).reshape(-1, 2)
+    same = np.append(False, (np.diff(foot, axis=0) == 0.0).all(axis=1))  # a node of a fan after the first
+    node[0] = node[0][np.maximum.accumulate(np.where(same, 0, np.arange(len(foot))))]
+    used, number = np.unique(node, return_inverse=True)
+    node = number.reshape(node.shape)
+    quads = _cells_between(node)
+    fans = quads[:, 3] == quads[:, 0]
+    triangles, quads = quads[fans][:, :3], quads[~fans]
+    if cells == "quad":
+        blocks = (
+            CellBlock("triangle", triangles, np.zeros(len(triangles), dtype=int)),
+            made(points, quads, "quad").cells[0],
+        )
+    else:
+        halves = np.concatenate([triangles, made(points, quads, "triangle").cells[0].nodes])
+        blocks = (CellBlock("triangle", halves, np.zeros(len(halves), dtype=int)),)
+    return Mesh(points[used], blocks), node[: rows + 1]

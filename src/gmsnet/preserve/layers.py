@@ -42,8 +42,8 @@ RINGS = 4  # how far a layer extends beyond those, in edges
 EVEN = 0.2  # of the mean area of a star: the minimum of its areas where a layer goes around a corner
 NEXT = 3.0  # how many times the area of a cell's neighbour in a layer its own may be, or the other way round
 BYTES_PER_NODE = 600  # that the layers of a mesh that has some take to be told, measured where all cells are in one
-BROKEN = 0.05  # of the mean area around: a cell of less is damaged, and its nodes are not held
-THICK = math.log(4.0)
+BROKEN = 0.05  # of the mean area around: a cell of less is damaged, and its nodes are not held,
+THIN = math.log(4.0)  # if it is so stretched
 CALM = (
     1.35  # times the mean area around, or the other way round: where half of the cells are so, the node is not at fault
 )
@@ -56,9 +56,9 @@ class Layers:
     nodes: (N,) bool by node id, the corners of those cells, but for damaged places; of layers of walls those in gaps,
     too. cells: (T,) bool, which triangles and quads. median, largest: stretch of those cells, the ratio of the longer
     to the shorter axis of their Steiner ellipse (1 where there are none). damaged: how many of those cells are
-    inverted, or have less than a twentieth of the area of those around; their nodes are left out of ``nodes``, so that
-    they can be untangled, but for those of which half the cells are as large as those around: they are not what damaged
-    them.
+    inverted, or thin and of less than a twentieth of the area of those around (in fans around corners cells are small,
+    and as thick as long); their nodes are left out of ``nodes``, so that they can be untangled, but for those of which
+    half the cells are as large as those around: they are not what damaged them.
     """
 
     nodes: Flags
@@ -177,7 +177,7 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:
     if not chosen.any():
         return None
     area, around = cells[:, stretch.AREA], _area_around(triangles, cells, number)
-    damaged = chosen & (area <= BROKEN * around) & ((area <= 0.0) | (cells[:, stretch.LENGTH] >= THICK))
+    damaged = chosen & (area <= BROKEN * around) & ((area <= 0.0) | (cells[:, stretch.LENGTH] >= THIN))
     nodes = np.zeros(len(layer), dtype=bool)
     nodes[triangles[chosen]] = True
     if damaged.any():
