@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.topology import columns as kernels
 from gmsnet.kernels.topology import connectivity
+from gmsnet.preserve.column_gaps import with_gaps
 from gmsnet.preserve.layers import Layers
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.volume import Volume
@@ -55,9 +56,7 @@ def layers_of_volume(topology: Volume, points: Floats) -> Layers:
     chosen = long & _accepted(rows, columns, heights, flatness, last, long, wall, len(topology.free))
     if not chosen.any():
         return none
-    inside = np.zeros(nodes, dtype=bool)
-    members = columns[chosen]
-    inside[members[members >= 0]] = True
+    inside = with_gaps(topology, points, columns[chosen], heights[chosen], wall)
     solids = topology.simplices.solids
     cells: Flags = np.asarray(inside[rows if solids is None else solids.nodes].all(axis=1))
     held = np.zeros(nodes, dtype=bool)

@@ -1,0 +1,71 @@
+"""Gaps between columns of layers of volumes: around edges and corners of a wall, where cells are not flat.
+
+Over an edge of a body no cell lies along the wall, and no column starts. The rows go on there all the same, and their
+heights are meant. A node belongs to a row if it shares cells with nodes of that row, and of the one below, and is about
+as high over the latter as these are. So rows are followed around edges, from the first one on, and end where cells are
+as those of no row.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.kernels.topology import connectivity
+from gmsnet.kernels.topology.columns import EDGES
+from gmsnet.topology.polygons import Ints
+from gmsnet.topology.volume import Volume
+
+Flags = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+
+AS_HIGH = math.log(1.8)  # from rows beside a node; along the mean normal of a cube's corner a row is 1.73 times as far
+
+
+def with_gaps(topology: Volume, points: Floats, columns: Ints, heights: Floats, wall: Flags) -> Flags:
+    """(N,) by places: the nodes of columns (C, R), and those of the same rows between and beside them.
+
+    heights: (C, R − 1) of the rows. wall: (N,) the nodes of walls.
+    """
+    row, high = np.full(len(points), -1, dtype=np.int32), np.zeros(len(points))
+    row[columns[:, 0]] = 0
+    for k in range(1, columns.shape[1]):
+        going = columns[:, k] >= 0
+        row[columns[going, k]], high[columns[going, k]] = k, np.log(heights[going, k - 1])
+    for k in range(1, columns.shape[1]):
+        new: Flags = row == k
+        below = wall if k == 1 else row == k - 1
+        while new.any():
+            new = _beside(topology, points, row == k, new, below, row, high)
+            row[new] = k
+    return row >= 0
+
+
+def _beside(
+    topology: Volume, points: Floats, own: Flags, new: Flags, below: Flags, row: NDArray[np.int32], high: Floats
+) -> Flags:
+    """(N,) the nodes that belong to a row, its own nodes, and share cells with the new ones of these.
+
+    below: the nodes of the row below. high: logarithms of heights, to which theirs are added.
+    """
+    near, found = topology.near, np.zeros(len(row), dtype=bool)
+    outside = topology.near_free & (row < 0)
+    corners = near[connectivity.touching(near, new)]
+    found[corners[outside[corners]]] = True
+    if not found.any():
+        return found
+    corners = near[connectivity.touching(near, found)]
+    one, two = (corners[:, EDGES[:, k]].ravel() for k in range(2))
+    one, two = np.concatenate([one, two]), np.concatenate([two, one])
+    over, with_row = found[one] & below[two], found[one] & own[two]
+    height = np.full(len(row), np.inf)
+    np.minimum.at(height, one[over], np.linalg.norm(points[one[over]] - points[two[over]], axis=1))
+    number = np.bincount(one[with_row], minlength=len(row))
+    usual = np.bincount(one[with_row], high[two[with_row]], minlength=len(row)) / np.maximum(number, 1)
+    found &= np.isfinite(height) & (height > 0.0)
+    own_height = np.log(height, where=found, out=np.zeros(len(row)))
+    found &= abs(own_height - usual) <= AS_HIGH
+    high[found] = own_height[found]
+    return found
