@@ -32,6 +32,7 @@ BROAD, BROAD_THIRDS = 1.5, 1.2
 ALONG_WALL = 0.1  # of the squared length of the edges on a wall: what may lie across it
 TURN = math.cos(math.radians(30.0))  # of a column from row to row
 HIGHER = 2.5  # times as high as the row before it: no row of the same layer
+LAST = 1.6  # the same for the last row
 ROWS = 2  # nodes of a column above its wall
 FEWEST = 12  # columns
 GROWN = 1.25  # times as flat at the wall as at the end of the column, in the median
@@ -49,16 +50,21 @@ def layers_of_volume(topology: Volume, points: Floats) -> Layers:
     foot, normal, flatness = _feet(points, rows, wall, broad)
     if len(foot) < FEWEST:
         return none
-    columns, heights, last = _grown(topology, points, foot, normal, broad)
+    columns, heights, last, top, above = _grown(topology, points, foot, normal, flatness, broad)
     long: Flags = np.asarray((columns[:, ROWS : ROWS + 1] >= 0).any(axis=1))
     if long.sum() < FEWEST:
         return none
     chosen = long & _accepted(rows, columns, heights, flatness, last, long, wall, len(topology.free))
-    if not chosen.any():
-        return none
-    inside = with_gaps(topology, points, columns[chosen], heights[chosen], wall)
     solids = topology.simplices.solids
-    cells: Flags = np.asarray(inside[rows if solids is None else solids.nodes].all(axis=1))
+    nodes_of = rows if solids is None else solids.nodes
+    inside = np.zeros(nodes, dtype=bool)
+    members = columns[chosen]
+    inside[members[members >= 0]] = True
+    if not inside[nodes_of].all(axis=1).any():  # columns without a cell between them are none
+        return none
+    columns, heights = _ended(columns[chosen], heights[chosen], top[chosen], above[chosen])
+    inside = with_gaps(topology, points, columns, heights, wall)
+    cells: Flags = np.asarray(inside[nodes_of].all(axis=1))
     held = np.zeros(nodes, dtype=bool)
     held[topology.memory] = inside & topology.near_free
     found = flatness[chosen]
@@ -95,10 +101,17 @@ def _feet(points: Floats, rows: Ints, wall: Flags, broad: float) -> tuple[Ints, 
     return some[good], normal[good], flatness[good]
 
 
-def _grown(topology: Volume, points: Floats, foot: Ints, normal: Floats, broad: float) -> tuple[Ints, Floats, Floats]:
-    """The columns: (C, R) places from the foot on, −1 behind their ends; heights (C, R − 1); flatness of the last."""
+def _grown(
+    topology: Volume, points: Floats, foot: Ints, normal: Floats, usual: Floats, broad: float
+) -> tuple[Ints, Floats, Floats, Ints, Floats]:
+    """The columns: (C, R) places from the foot on, −1 behind their ends; heights (C, R − 1); flatness of the last.
+
+    And (C,) the node at the top of the last row, −1 where there is none, with the height of that row: cells above are
+    not flat any more, and so not all of those around that node. usual: flatness at the feet.
+    """
     nodes, inner = len(points), topology.near_free & (np.diff(topology.start) > 0)
-    at, normal, last = foot.copy(), normal.copy(), np.full(len(foot), np.nan)
+    at, normal, usual, last = foot.copy(), normal.copy(), usual.copy(), np.full(len(foot), np.nan)
+    top, above = np.full(len(foot), -1, dtype=np.int32), np.zeros(len(foot))
     taken = np.zeros(nodes, dtype=bool)
     taken[foot] = True
     columns, heights = [foot], list[Floats]()
@@ -119,15 +132,28 @@ def _grown(topology: Volume, points: Floats, foot: Ints, normal: Floats, broad: 
         kernels.of_stars(points, to[ahead], topology.start, topology.local, topology.ring_start, topology.ring, mean)
         flatness, direction = _flat(mean, broad)
         alike = (flatness >= STILL_FLAT) & (abs((direction * normal[ahead]).sum(axis=1)) >= TURN)
-        to[ahead[~alike]] = -1
-        going = ahead[alike]
+        going, ending = ahead[alike], ahead[~alike]
+        low = (height <= LAST * before) & (height * STILL_FLAT <= usual * before)
+        top[ending] = np.where(low[ending], to[ending], -1)
+        above = np.where(to >= 0, height, above)
+        to[ending], usual[going] = -1, flatness[alike]
         last[going], normal[going] = flatness[alike], direction[alike]
         before = np.where(to >= 0, height, before)
         taken[to[going]] = True
         columns.append(to)
         heights.append(np.where(to >= 0, height, np.nan))
         at = to
-    return np.stack(columns, axis=1), np.stack(heights, axis=1), last
+    return np.stack(columns, axis=1), np.stack(heights, axis=1), last, top, above
+
+
+def _ended(columns: Ints, heights: Floats, top: Ints, above: Floats) -> tuple[Ints, Floats]:
+    """Columns and heights with the tops of their last rows, which no column goes through."""
+    free = (top >= 0) & ~np.isin(top, columns)
+    columns = np.column_stack([columns, np.full(len(columns), -1, dtype=np.int32)])
+    heights = np.column_stack([heights, np.full(len(columns), np.nan)])
+    end = (columns >= 0).sum(axis=1)
+    columns[free, end[free]], heights[free, end[free] - 1] = top[free], above[free]
+    return columns, heights
 
 
 def _accepted(
