@@ -4,7 +4,8 @@ The halves and thirds of prisms that were grown from a wall have their nodes in 
 wall around which all cells are flat, as one, and along the wall. It goes on, from row to row, to the next node along
 its own direction, as long as the cells there are flat alike. Slivers are flat in directions of their own, which cancel
 out around a node, and a mesh that was squeezed has no rows. So columns count that have ROWS rows or more, FEWEST or
-more beside one another, whose cells are thinner at the wall than at their ends, or whose first rows have one height.
+more beside one another, whose cells are thinner at the wall than at their ends, or whose first rows have one height,
+and higher ones follow. What lies around edges of the wall, between columns, belongs to them (see column_gaps.py).
 """
 
 from __future__ import annotations
@@ -35,9 +36,9 @@ HIGHER = 2.5  # times as high as the row before it: no row of the same layer
 LAST = 1.6  # the same for the last row
 ROWS = 2  # nodes of a column above its wall
 FEWEST = 12  # columns
-GROWN = 1.25  # times as flat at the wall as at the end of the column, in the median
+GROWN = 1.25  # times as flat at the wall as at the end of the column, or as high there, in the median
 EVEN = 0.03  # of its height: by how much that of a row differs from column to column, in the median
-MOST = 0.35  # of the free nodes, in columns of rows of one height: more are a grid
+MOST = 0.35  # of the free nodes, in columns of rows of one height that do not grow: more are a grid
 DETERMINANT = 1.0 / 45.0  # of a moment of trace 1: less is flat by 2 or more
 
 
@@ -168,14 +169,18 @@ def _accepted(
 
     number = np.full(len(wall), -1, dtype=np.int64)
     number[columns[long, 0]] = np.flatnonzero(long)
-    beside = number[rows[connectivity.touching(rows, number >= 0)]]
+    others = np.flatnonzero(wall & (number < 0))  # they link columns as well, those of a face with those around an edge
+    number[others] = len(columns) + np.arange(len(others))
+    beside = number[rows[connectivity.touching(rows, (number >= 0) & (number < len(columns)))]]
     pairs = np.concatenate([beside[:, [a, b]] for a, b in kernels.EDGES])
-    pairs = pairs[(pairs >= 0).all(axis=1)]
-    shape = (len(columns), len(columns))
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=shape)
-    piece = connected_components(graph, directed=False)[1]
+    pairs = pairs[(pairs >= 0).all(axis=1) & (pairs < len(columns)).any(axis=1)]
+    count = len(columns) + len(others)
+    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    piece = connected_components(graph, directed=False)[1][: len(columns)]
+    pairs = pairs[(pairs < len(columns)).all(axis=1)]
     accepted = np.zeros(len(columns), dtype=bool)
     first = heights[:, 0]
+    higher = np.nan_to_num(heights).max(axis=1) / np.where(first > 0.0, first, np.inf)
     differ = abs(first[pairs[:, 0]] - first[pairs[:, 1]]) / np.maximum(first[pairs[:, 0]], first[pairs[:, 1]])
     part = np.count_nonzero(columns[long, 1:] >= 0) < MOST * free
     for name in np.unique(piece[long]).tolist():
@@ -184,7 +189,7 @@ def _accepted(
             continue
         grown = np.median(flatness[own]) >= GROWN * np.median(last[own])
         even = np.median(differ[piece[pairs[:, 0]] == name], axis=None) <= EVEN
-        accepted[own] = grown or (even and part)
+        accepted[own] = grown or (even and (part or np.median(higher[own]) >= GROWN))
     return accepted
 
 
