@@ -3,7 +3,7 @@
 Over an edge of a body no cell lies along the wall, and no column starts. The rows go on there all the same, and their
 heights are meant. A node belongs to a row if it shares cells with nodes of that row, and of the one below, and is about
 as high over the latter as these are. So rows are followed around edges, from the first one on, and end where cells are
-as those of no row.
+as those of no row. Where most nodes of rows are in no column, there are no rows.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from gmsnet.topology.volume import Volume
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 
+MOST = 3.0  # times as many nodes as are in columns: else the columns are what is between others
 AS_HIGH = math.log(1.8)  # from rows beside a node; along the mean normal of a cube's corner a row is 1.73 times as far
 
 
@@ -34,13 +35,15 @@ def with_gaps(topology: Volume, points: Floats, columns: Ints, heights: Floats, 
     for k in range(1, columns.shape[1]):
         going = columns[:, k] >= 0
         row[columns[going, k]], high[columns[going, k]] = k, np.log(heights[going, k - 1])
+    alone: Flags = row >= 0
     for k in range(1, columns.shape[1]):
         new: Flags = row == k
         below = wall if k == 1 else row == k - 1
         while new.any():
             new = _beside(topology, points, row == k, new, below, row, high)
             row[new] = k
-    return row >= 0
+    whole: Flags = row >= 0
+    return whole if np.count_nonzero(whole) <= MOST * np.count_nonzero(alone) else alone
 
 
 def _beside(

@@ -35,10 +35,12 @@ TURN = math.cos(math.radians(30.0))  # of a column from row to row
 HIGHER = 2.5  # times as high as the row before it: no row of the same layer
 LAST = 1.6  # the same for the last row
 ROWS = 2  # nodes of a column above its wall
-FEWEST = 12  # columns
+FEWEST, SHARE = 12, 0.66  # columns beside one another; of the feet there
 GROWN = 1.25  # times as flat at the wall as at the end of the column, or as high there, in the median
 EVEN = 0.03  # of its height: by how much that of a row differs from column to column, in the median
-MOST = 0.35  # of the free nodes, in columns of rows of one height that do not grow: more are a grid
+# In columns of rows of one height: up to these shares of the free nodes, the last row must be so many times as high as
+# the first. Rows that do not grow and are most of a mesh are a grid.
+SHARES, GROWN_BY = (0.35, 0.75), (0.0, 1.1, GROWN)
 DETERMINANT = 1.0 / 45.0  # of a moment of trace 1: less is flat by 2 or more
 
 
@@ -176,20 +178,22 @@ def _accepted(
     pairs = pairs[(pairs >= 0).all(axis=1) & (pairs < len(columns)).any(axis=1)]
     count = len(columns) + len(others)
     graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    piece = connected_components(graph, directed=False)[1][: len(columns)]
+    piece = connected_components(graph, directed=False)[1]
+    feet = np.bincount(piece[number[columns[:, 0]]], minlength=count)  # of each piece
+    piece = piece[: len(columns)]
     pairs = pairs[(pairs < len(columns)).all(axis=1)]
     accepted = np.zeros(len(columns), dtype=bool)
     first = heights[:, 0]
     higher = np.nan_to_num(heights).max(axis=1) / np.where(first > 0.0, first, np.inf)
     differ = abs(first[pairs[:, 0]] - first[pairs[:, 1]]) / np.maximum(first[pairs[:, 0]], first[pairs[:, 1]])
-    part = np.count_nonzero(columns[long, 1:] >= 0) < MOST * free
+    least = GROWN_BY[int(np.searchsorted(SHARES, np.count_nonzero(columns[long, 1:] >= 0) / max(free, 1)))]
     for name in np.unique(piece[long]).tolist():
         own = long & (piece == name)
-        if own.sum() < FEWEST:
+        if own.sum() < max(FEWEST, SHARE * feet[name]):
             continue
         grown = np.median(flatness[own]) >= GROWN * np.median(last[own])
         even = np.median(differ[piece[pairs[:, 0]] == name], axis=None) <= EVEN
-        accepted[own] = grown or (even and (part or np.median(higher[own]) >= GROWN))
+        accepted[own] = grown or (even and np.median(higher[own]) >= least)
     return accepted
 
 
