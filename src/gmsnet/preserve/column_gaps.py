@@ -2,8 +2,8 @@
 
 Over an edge of a body no cell lies along the wall, and no column starts. The rows go on there all the same, and their
 heights are meant. A node belongs to a row if it shares cells with nodes of that row, and of the one below, and is about
-as high over the latter as these are. So rows are followed around edges, from the first one on, and end where cells are
-as those of no row. Where most nodes of rows are in no column, there are no rows.
+as high over the latter as these are. So rows are followed around edges, from the first one on, as far as half of the
+columns go, and end where cells are as those of no row. Where most nodes of rows are in no column, there are no rows.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from gmsnet.topology.volume import Volume
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 
+SHARE = 0.5  # of the columns: rows that fewer of them reach are not followed
 MOST = 3.0  # times as many nodes as are in columns: else the columns are what is between others
 AS_HIGH = math.log(1.8)  # from rows beside a node; along the mean normal of a cube's corner a row is 1.73 times as far
 
@@ -36,7 +37,8 @@ def with_gaps(topology: Volume, points: Floats, columns: Ints, heights: Floats, 
         going = columns[:, k] >= 0
         row[columns[going, k]], high[columns[going, k]] = k, np.log(heights[going, k - 1])
     alone: Flags = row >= 0
-    for k in range(1, columns.shape[1]):
+    number = (columns >= 0).sum(axis=0)
+    for k in range(1, int(np.argmin(np.append(number >= SHARE * number[0], False)))):
         new: Flags = row == k
         below = wall if k == 1 else row == k - 1
         while new.any():
