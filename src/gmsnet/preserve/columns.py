@@ -53,10 +53,12 @@ def layers_of_volume(topology: Volume, points: Floats) -> Layers:
     foot, normal, flatness = _feet(points, rows, wall, broad)
     if len(foot) < FEWEST:
         return none
-    columns, heights, last, top, above = _grown(topology, points, foot, normal, flatness, broad)
+    width = _widths(points, rows, wall, foot)
+    columns, heights, last, top, above = _grown(topology, points, foot, normal, width, broad)
     long: Flags = np.asarray((columns[:, ROWS : ROWS + 1] >= 0).any(axis=1))
     if long.sum() < FEWEST:
         return none
+    whole, heights = _ended(columns, heights, top, above)
     chosen = long & _accepted(rows, columns, heights, flatness, last, long, wall, len(topology.free))
     solids = topology.simplices.solids
     nodes_of = rows if solids is None else solids.nodes
@@ -65,8 +67,7 @@ def layers_of_volume(topology: Volume, points: Floats) -> Layers:
     inside[members[members >= 0]] = True
     if not inside[nodes_of].all(axis=1).any():  # columns without a cell between them are none
         return none
-    columns, heights = _ended(columns[chosen], heights[chosen], top[chosen], above[chosen])
-    inside = with_gaps(topology, points, columns, heights, wall)
+    inside = with_gaps(topology, points, whole[chosen], heights[chosen], wall)
     cells: Flags = np.asarray(inside[nodes_of].all(axis=1))
     held = np.zeros(nodes, dtype=bool)
     held[topology.memory] = inside & topology.near_free
@@ -104,16 +105,30 @@ def _feet(points: Floats, rows: Ints, wall: Flags, broad: float) -> tuple[Ints, 
     return some[good], normal[good], flatness[good]
 
 
+def _widths(points: Floats, rows: Ints, wall: Flags, foot: Ints) -> Floats:
+    """(C,) the mean lengths of the edges of these nodes that lie on their wall."""
+    chosen = np.zeros(len(wall), dtype=bool)
+    chosen[foot] = True
+    corners = rows[connectivity.touching(rows, chosen)]
+    one, two = (corners[:, kernels.EDGES[:, k]].ravel() for k in range(2))
+    one, two = np.concatenate([one, two]), np.concatenate([two, one])
+    on_wall = chosen[one] & wall[two]
+    one, length = one[on_wall], np.linalg.norm(points[one[on_wall]] - points[two[on_wall]], axis=1)
+    total, number = (np.bincount(one, weight, len(wall)) for weight in (length, None))
+    found: Floats = total[foot] / np.maximum(number[foot], 1)
+    return found
+
+
 def _grown(
-    topology: Volume, points: Floats, foot: Ints, normal: Floats, usual: Floats, broad: float
+    topology: Volume, points: Floats, foot: Ints, normal: Floats, width: Floats, broad: float
 ) -> tuple[Ints, Floats, Floats, Ints, Floats]:
     """The columns: (C, R) places from the foot on, −1 behind their ends; heights (C, R − 1); flatness of the last.
 
     And (C,) the node at the top of the last row, −1 where there is none, with the height of that row: cells above are
-    not flat any more, and so not all of those around that node. usual: flatness at the feet.
+    not flat any more, and so not all of those around that node. width: (C,) of cells at the feet.
     """
     nodes, inner = len(points), topology.near_free & (np.diff(topology.start) > 0)
-    at, normal, usual, last = foot.copy(), normal.copy(), usual.copy(), np.full(len(foot), np.nan)
+    at, normal, last = foot.copy(), normal.copy(), np.full(len(foot), np.nan)
     top, above = np.full(len(foot), -1, dtype=np.int32), np.zeros(len(foot))
     taken = np.zeros(nodes, dtype=bool)
     taken[foot] = True
@@ -136,10 +151,10 @@ def _grown(
         flatness, direction = _flat(mean, broad)
         alike = (flatness >= STILL_FLAT) & (abs((direction * normal[ahead]).sum(axis=1)) >= TURN)
         going, ending = ahead[alike], ahead[~alike]
-        low = (height <= LAST * before) & (height * STILL_FLAT <= usual * before)
+        low = (height <= LAST * before) & (height * STILL_FLAT <= width)
         top[ending] = np.where(low[ending], to[ending], -1)
         above = np.where(to >= 0, height, above)
-        to[ending], usual[going] = -1, flatness[alike]
+        to[ending] = -1
         last[going], normal[going] = flatness[alike], direction[alike]
         before = np.where(to >= 0, height, before)
         taken[to[going]] = True
