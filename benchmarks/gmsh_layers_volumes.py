@@ -4,8 +4,8 @@
     python benchmarks/gmsh_layers_volumes.py [--meshes 30] [--seed 0]
 
 Balls, boxes, cylinders, cones and rings in a large box, with 3 to 10 rows of prisms, or of their thirds, drawn at
-random. Each second mesh is disturbed: free nodes outside of the layers are thrown about by a tenth of their shortest
-edge. Told are how many nodes of the rows have moved, and by how much their distance from the wall changes at most, and
+random. Half of the meshes are disturbed: free nodes outside of the layers are thrown about by a tenth of their shortest
+edge, or by all of it, so that cells are inverted. Told are how many nodes of the rows have moved, and by how much their distance from the wall changes at most, and
 the least and mean η of the cells with a free node before and after.
 """
 
@@ -24,7 +24,8 @@ from gmsnet.generate import disturb
 from gmsnet.topology.mixed_volume import volume_of, wound_of
 
 HALF, FAR = 3.0, 0.9  # of the box around: half its edge, and how large cells are there
-THROW = 0.1
+THROWN = {"as made": 0.0, "thrown": 0.1, "tangled": 1.0}
+WHAT = ("as made", "thrown", "as made", "tangled")
 MOST = 0.02  # of a distance from the wall
 
 
@@ -106,10 +107,10 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for number in range(options.meshes):
             draw = np.random.default_rng([options.seed, number])
-            body, prisms, throw = list(BODIES)[number % 5], bool(number // 5 % 2), bool(number // 10 % 2)
+            body, prisms, what = list(BODIES)[number % 5], bool(number // 5 % 2), WHAT[number // 10 % 4]
             size, rows = draw.uniform(0.1, 0.35), int(draw.integers(3, 11))
             growth, aspect = draw.uniform(1.05, 1.4), 10.0 ** draw.uniform(0.6, 2.0)
-            last = size / draw.uniform(2.0, 4.0)  # the height of the last row, at most
+            last = size / draw.uniform(2.5, 4.0)  # the height of the last row, at most
             heights = min(size / aspect, last / growth ** (rows - 1)) * growth ** np.arange(rows)
             path = Path(folder) / f"{number}.msh"
             made(body, size, heights, prisms, path)
@@ -117,21 +118,22 @@ def main():
             away = BODIES[body][1](mesh.points)
             wall = np.isin(np.arange(len(mesh.points)), mesh.markers["wall"])
             layer = (away <= 1.001 * heights.sum()) & ~wall
-            free = volume_of(wound_of(mesh)).free
-            given = disturb(mesh, free[~layer[free]], THROW, seed=number, edge="shortest") if throw else mesh
+            free, amount = volume_of(wound_of(mesh)).free, THROWN[what]
+            outside, valid = free[~layer[free]], what != "tangled"
+            given = disturb(mesh, outside, amount, seed=number, keep_valid=valid, edge="shortest") if amount else mesh
             result = gmsnet.smooth(given)
             change = np.abs(BODIES[body][1](result.points) / np.where(wall, 1.0, away) - 1.0)[layer]
-            passed = change.max() <= MOST
+            passed = change.max() <= MOST and not result.after.inverted
             good += passed
             before, after = result.judged
             print(
-                f"{number:3} {body:9}{'prisms' if prisms else 'thirds':7}{'thrown' if throw else 'as made':8}"
+                f"{number:3} {body:9}{'prisms' if prisms else 'thirds':7}{what:8}"
                 f"{rows:2} rows, growth {growth:.2f}, aspects {size / heights[0]:3.0f} to {size / heights[-1]:3.1f}: "
                 f"{len(mesh.points):6,} nodes, {layer.sum():6,} of rows, {result.moved[layer].sum():5,} moved, "
-                f"by {change.max():.1%}; η {before.shape_min:.3f} {before.shape_mean:.3f} → {after.shape_min:.3f} "
+                f"by {change.max():.1%}; {result.before.inverted:,} inverted → {result.after.inverted}, η {before.shape_min:.3f} {before.shape_mean:.3f} → {after.shape_min:.3f} "
                 f"{after.shape_mean:.3f}; {'pass' if passed else 'FAIL'}", flush=True,
             )  # fmt: skip
-    print(f"{good} of {options.meshes} keep distances from the wall within {MOST:.0%}")
+    print(f"{good} of {options.meshes} keep distances from the wall within {MOST:.0%}, without an inverted cell")
 
 
 if __name__ == "__main__":

@@ -92,7 +92,7 @@ def protected(
         found, elsewhere = split(mesh, topology, survey, found)
     layers = found.nodes if found and (fix_layers or preserve not in (METRIC, NONE)) else None
     if firm and layers is not None:
-        layers = _certain(layers, topology, near)
+        layers = _certain(layers, topology, exact_signs(near, topology.near, topology.near_orientation) > 0)
     protection = _with_layers(topology, found, layers, preserve, fix_layers)
     notes = protection.notes
     if elsewhere and preserve != METRIC:
@@ -108,13 +108,11 @@ def protected(
 
 
 def protected_volume(topology: Volume, preserve: str, fix_layers: bool, near: Floats, *, firm: bool) -> Protection:
-    """The same of a mesh of tetrahedra: its stretched layers. near: (N, 4). firm: not nodes of inverted cells."""
+    """The same of a mesh of volumes: its stretched layers. near: (N, 4)."""
     found = layers_of_volume(topology, near)
     layers = found.nodes if found and (fix_layers or preserve not in (METRIC, NONE)) else None
     if firm and layers is not None:
-        layers = layers.copy()
-        inverted = exact_signs3(near, topology.near, topology.near_orientation) <= 0
-        layers[topology.memory[topology.near[inverted]]] = False
+        layers = _certain(layers, topology, exact_signs3(near, topology.near, topology.near_orientation) > 0)
     return _with_layers(topology, found, layers, preserve, fix_layers)
 
 
@@ -136,13 +134,13 @@ def _with_layers(
     return protection
 
 
-def _certain(layers: Flags, topology: Topology, near: Floats) -> Flags:
+def _certain(layers: Flags, topology: Topology | Volume, positive: Flags) -> Flags:
     """Of the nodes of layers (N,) by id, those without an inverted cell, and those that share a layer's cell with one.
 
-    Beside inverted cells others may look like a layer by chance, or have been thrown out of one.
+    positive: which of the simplices are. Beside inverted cells others may look like a layer by chance, or have been
+    thrown out of one.
     """
     inside, bad = layers[topology.memory], np.zeros(len(layers), dtype=bool)
-    positive = exact_signs(near, topology.near, topology.near_orientation) > 0
     bad[topology.near[~positive]] = True
     if not bad.any():
         return layers
