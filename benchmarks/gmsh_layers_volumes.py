@@ -5,8 +5,8 @@
 
 Balls, boxes, cylinders, cones and rings in a large box, with 3 to 10 rows of prisms, or of their thirds, drawn at
 random. Half of the meshes are disturbed: free nodes outside of the layers are thrown about by a tenth of their shortest
-edge, or by all of it, so that cells are inverted. Told are how many nodes of the rows have moved, and by how much their distance from the wall changes at most, and
-the least and mean η of the cells with a free node before and after.
+edge, or by all of it, so that cells are inverted. Told are how many nodes of the rows have moved, and by how much their
+distance from the wall changes at most, inverted cells, and the least and mean η of the cells with a free node.
 """
 
 from __future__ import annotations
@@ -130,8 +130,8 @@ def main():
                 f"{number:3} {body:9}{'prisms' if prisms else 'thirds':7}{what:8}"
                 f"{rows:2} rows, growth {growth:.2f}, aspects {size / heights[0]:3.0f} to {size / heights[-1]:3.1f}: "
                 f"{len(mesh.points):6,} nodes, {layer.sum():6,} of rows, {result.moved[layer].sum():5,} moved, "
-                f"by {change.max():.1%}; {result.before.inverted:,} inverted → {result.after.inverted}, η {before.shape_min:.3f} {before.shape_mean:.3f} → {after.shape_min:.3f} "
-                f"{after.shape_mean:.3f}; {'pass' if passed else 'FAIL'}", flush=True,
+                f"by {change.max():.1%}; {result.before.inverted:,} inverted → {result.after.inverted}; "
+                f"η {before.shape_min:.3f} {before.shape_mean:.3f} → {after.shape_min:.3f} {after.shape_mean:.3f}; {'pass' if passed else 'FAIL'}", flush=True,
             )  # fmt: skip
     print(f"{good} of {options.meshes} keep distances from the wall within {MOST:.0%}, without an inverted cell")
 
