@@ -131,7 +131,8 @@ def main():
                 f"{rows:2} rows, growth {growth:.2f}, aspects {size / heights[0]:3.0f} to {size / heights[-1]:3.1f}: "
                 f"{len(mesh.points):6,} nodes, {layer.sum():6,} of rows, {result.moved[layer].sum():5,} moved, "
                 f"by {change.max():.1%}; {result.before.inverted:,} inverted → {result.after.inverted}; "
-                f"η {before.shape_min:.3f} {before.shape_mean:.3f} → {after.shape_min:.3f} {after.shape_mean:.3f}; {'pass' if passed else 'FAIL'}", flush=True,
+                f"η {before.shape_min:.3f} {before.shape_mean:.3f} → {after.shape_min:.3f} {after.shape_mean:.3f}; "
+                f"{'pass' if passed else 'FAIL'}", flush=True,
             )  # fmt: skip
     print(f"{good} of {options.meshes} keep distances from the wall within {MOST:.0%}, without an inverted cell")
 
