@@ -77,14 +77,15 @@ def drawn(number, seed):
 
 
 def judged(mesh, metric):
-    """By the metric that the mesh was made for: share of edges, least quality, least 1/q of shape alone, mean."""
+    """By the metric that the mesh was made for: share of edges within 20 % of 1, least quality, least 1/q of shape alone,
+    mean quality, and share of quasi-unit edges."""
     found = gmsnet.smooth(mesh, metric=metric, max_sweeps=0).conformity.before
     corners = mesh.points[mesh.cells[0].nodes]
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     m11, m12, m22 = metric(corners.mean(axis=1)).T
     total = sum(m11 * e[:, 0] ** 2 + 2.0 * m12 * e[:, 0] * e[:, 1] + m22 * e[:, 1] ** 2 for e in (a, b, b - a))
     shape = 2.0 * math.sqrt(3.0) * np.sqrt(m11 * m22 - m12**2) * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / total
-    return found.near_one, found.least, float(shape.min()), found.mean
+    return found.near_one, found.least, float(shape.min()), found.mean, found.quasi_unit
 
 
 def adapted(options):
@@ -105,24 +106,26 @@ def adapted(options):
             result = gmsnet.smooth(thrown, **way(metric, thrown.points), threads=1)
             seconds = time.process_time() - began
             figures = judged(result.mesh, metric)
-            passes = not result.after.inverted and all(
-                a >= b for a, b in zip(figures[:2], row["input"][:2], strict=True)
-            )
-            row[name] = [*figures, passes, seconds, int(result.after.inverted)]
+            better = [a >= b for a, b in zip(figures, row["input"], strict=True)]
+            passes = [not result.after.inverted and better[1] and better[k] for k in (0, 4)]
+            row[name] = [*figures, *passes, seconds, int(result.after.inverted)]
         rows.append(row)
         shown = "   ".join(f"{name} {row[name][0]:.3f} {row[name][1]:.3f}" for name in ("made", "input", *ways))
         print(f"{number:4} {what}: {shown}", flush=True)
     for kind, chosen in (("as made", 0), ("thrown", 1)):
         some = [row for k, row in enumerate(rows) if (k % 6 != 0) == bool(chosen)]
-        print(f"\n{len(some)} meshes {kind}, means (least): edges near 1, least quality, least 1/q in it, mean quality")
+        print(
+            f"\n{len(some)} meshes {kind}, means (least): edges near 1, least quality, least 1/q in it, mean quality, "
+            "quasi-unit edges; how many are no worse, with these edges, with those"
+        )
         for name in ("made", "input", *ways):
-            figures = np.array([row[name][:4] for row in some])
-            text = "   ".join(f"{figures[:, k].mean():.3f} ({figures[:, k].min():.3f})" for k in range(4))
+            figures = np.array([row[name][:5] for row in some])
+            text = "   ".join(f"{figures[:, k].mean():.3f} ({figures[:, k].min():.3f})" for k in range(5))
             if name in ways:
-                seconds = sum(row[name][5] for row in some)
-                inverted = sum(row[name][6] for row in some)
-                passed = sum(row[name][4] for row in some)
-                text += f"   {passed:3} of {len(some)} pass, {inverted} inverted, {seconds / len(some):.2f} s each"
+                near, unit, seconds, inverted = (sum(row[name][k] for row in some) for k in range(5, 9))
+                text += (
+                    f"   {near:2} and {unit:2} of {len(some)}, {inverted} inverted, {seconds / len(some):.2f} s each"
+                )
             print(f"  {name:20} {text}")
     return rows
 

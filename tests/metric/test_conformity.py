@@ -50,10 +50,21 @@ def test_a_mesh_of_squares_conforms_to_their_side(scale):
     found = Conformity.of(near, topology, metric)
     assert metric.reachable == pytest.approx(1.0)
     assert (found.least, found.length, found.near_one, found.near_mean) == pytest.approx((1.0, 1.0, 1.0, 1.0))
+    assert found.quasi_unit == 1.0
     coarse = Metric.of_place(topology, near, sizes(lambda p: np.full(len(p), scale / 4)), mesh.exponent)
     found = Conformity.of(near, topology, coarse)
     assert coarse.reachable == pytest.approx(0.5)
     assert (found.least, found.length, found.near_one, found.near_mean) == pytest.approx((1.0, 0.5, 0.0, 1.0))
+    assert found.quasi_unit == 0.0
+    for side, share in ((1.4, 1.0), (1.43, 0.0), (0.72, 1.0), (0.7, 0.0)):
+        found = Conformity.of(
+            near,
+            topology,
+            Metric.of_place(
+                topology, near, sizes(lambda p, side=side: np.full(len(p), side * scale / 8)), mesh.exponent
+            ),
+        )
+        assert found.quasi_unit == share
 
 
 def test_cells_are_judged_by_their_worst_corner_as_matrices_judge_it():

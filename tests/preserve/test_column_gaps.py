@@ -95,3 +95,15 @@ def test_rows_end_where_cells_are_higher_and_gaps_are_the_lesser_part():
     above = volume.places[node[1]]
     points[above[~inner]] *= 1.2  # ten times as high
     assert found(inner) == set(node[:4][:, inner].ravel().tolist())
+
+
+@pytest.mark.parametrize("kind", ["tetra", "wedge", "hexahedron"])
+def test_rows_beside_inverted_cells_are_held(kind):
+    mesh, node = around_a_cube(kind)
+    flat = 8
+    outside = np.setdiff1d(volume_of(wound_of(mesh)).free, node[:flat])
+    given = disturb(mesh, outside, 1.0, seed=3, edge="shortest", keep_valid=False)
+    assert gmsnet.quality(given).inverted
+    result = gmsnet.smooth(given)
+    assert not result.after.inverted
+    assert (result.points[node[:flat]] == mesh.points[node[:flat]]).all()

@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 NEAR = 0.2  # of a length: so far from it an edge may be
+TINY = 1e-300
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,11 @@ class Conformity:
 
     least, mean: of the quality of cells in it, in (0, 1], of shape and size (kernels/metric/quality.py); sizes are
     compared with those that the number of cells allows. edges: how many there are. length: the mean of their lengths in
-    the metric; near_one, near_mean: the shares of those within ±20 % of 1 and of that mean.
+    the metric; near_one, near_mean: the shares of those within ±20 % of 1 and of that mean. quasi_unit: the share of
+    those from 1/√2 to √2.
+
+    Source of the last: A. Loseille, F. Alauzet, "Continuous mesh framework", SIAM Journal on Numerical Analysis 49,
+    2011.
     """
 
     least: float
@@ -35,6 +40,7 @@ class Conformity:
     length: float
     near_one: float
     near_mean: float
+    quasi_unit: float
 
     @classmethod
     def of(cls, points: Floats, topology: Topology, metric: Metric) -> Conformity:
@@ -44,9 +50,9 @@ class Conformity:
         lengths = metric.reachable * edge_lengths(points, logs, edges_of(topology))
         mean = float(lengths.mean()) if len(lengths) else float("nan")
         near = [float((np.abs(lengths - goal) <= NEAR * goal).mean()) if len(lengths) else mean for goal in (1.0, mean)]
-        return cls(
-            float(values.min(initial=1.0)), float(values.mean()) if len(values) else mean, len(lengths), mean, *near
-        )
+        unit = float((np.abs(np.log2(np.maximum(lengths, TINY))) <= 0.5).mean()) if len(lengths) else mean
+        of_cells = float(values.min(initial=1.0)), float(values.mean()) if len(values) else mean
+        return cls(*of_cells, len(lengths), mean, *near, unit)
 
     def figures(self) -> list[tuple[str, str]]:
         """(name, value) for tables."""
@@ -56,6 +62,7 @@ class Conformity:
             ("edges: mean length in it", f"{self.length:.4f}"),
             ("edges within 20 % of 1", f"{self.near_one:.2%}"),
             ("edges within 20 % of mean", f"{self.near_mean:.2%}"),
+            ("edges from 1/√2 to √2", f"{self.quasi_unit:.2%}"),
         ]
 
     def summary(self) -> dict[str, Any]:
