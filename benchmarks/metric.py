@@ -77,8 +77,8 @@ def drawn(number, seed):
 
 
 def judged(mesh, metric):
-    """By the metric that the mesh was made for: share of edges within 20 % of 1, least quality, least 1/q of shape alone,
-    mean quality, and share of quasi-unit edges."""
+    """By the metric that the mesh was made for: share of edges within 20 % of 1, least quality, least 1/q of shape
+    alone, mean quality, and share of quasi-unit edges."""
     found = gmsnet.smooth(mesh, metric=metric, max_sweeps=0).conformity.before
     corners = mesh.points[mesh.cells[0].nodes]
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
