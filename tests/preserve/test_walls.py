@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 
 import numpy as np
@@ -14,7 +15,7 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.paper.cases import CASES
 from gmsnet.preserve.layers import stretched_layers
-from gmsnet.preserve.protection import WALL
+from gmsnet.preserve.protection import WALL, wall_note
 from gmsnet.preserve.survey import Survey
 from gmsnet.preserve.walls import NEAR, WIDEST, _walls, near_walls
 from gmsnet.topology.topology import Topology
@@ -85,6 +86,20 @@ def test_the_more_a_mesh_is_disturbed_the_wider_are_its_bands(ring):
     assert means[0] < 0.02 < 0.1 < means[1] < 0.5 < means[2] < means[3] == 1.0
     assert found[2].room.max() == 1.0 < found[3].room.max() < WIDEST
     assert not near_walls(disturb(ring, free, 1.0, seed=0), Topology.of(ring)).nodes.any()
+
+
+def test_heights_give_way_to_areas_where_a_mesh_is_disturbed(ring):
+    free, hole = Topology.of(ring).free, ring.markers["hole"]
+    found = [near_walls(disturb(ring, free, amount, seed=0), Topology.of(ring)) for amount in (0.0, 0.1, 0.2)]
+    for walls in found:
+        assert not np.delete(walls.heights, hole).any()
+        assert len(set(walls.heights[hole].tolist())) == 1
+    as_made, little, much = (walls.heights[hole[0]] for walls in found)
+    assert as_made == 1.0 > little > 0.0 == much
+    told = [wall_note(walls, 3, moved=True) for walls in found]
+    assert "the heights of those on the wall within 2%" in told[0]
+    assert re.search(r"the heights of those on the wall within [3-9]%", told[1])
+    assert "heights" not in told[2]
 
 
 def test_the_bands_of_damaged_cells_are_wide(ring):

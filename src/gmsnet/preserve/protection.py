@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
-from gmsnet.kernels.methods.bands import AREA, HEIGHT
+from gmsnet.kernels.methods.bands import AREA, UPPER
 from gmsnet.measure.report import SHAPE
 from gmsnet.measure.signs import exact_signs
 from gmsnet.measure.target import Target
@@ -159,7 +159,7 @@ def wall_note(walls: Kept, nodes: int, moved: bool) -> str:
     if moved and walls.noisy:
         so += ", or between those and the mean of the areas around where the input is disturbed"
     if moved and (firm := walls.heights[walls.heights > 0.0]).size:
-        so += f", and the heights of those on the wall within {AREA * (HEIGHT / AREA) ** firm.min():.0%}"
+        so += f", and the heights of those on the wall within {(1.0 + AREA) * UPPER ** firm.min() - 1.0:.0%}"
     mend = "" if moved else "; preserve='none' lets them move"
     so = so or "are held in this run"
     return f"the mesh is refined towards its walls: the {nodes:,} nodes next to them {so} (preserve={SHAPE!r}){mend}"

@@ -29,10 +29,8 @@ from gmsnet.kernels.star.constraint import snap
 from gmsnet.kernels.star.pattern import count_of, other_of, pair_of, pattern_at
 
 AREA, HEIGHT = 0.099, 0.0198  # a tenth and a fiftieth, and room for rounding, and for nodes that slide
-LOWER, UPPER = (
-    (1.0 - HEIGHT) / (1.0 - AREA),
-    (1.0 + HEIGHT) / (1.0 + AREA),
-)  # from the ends for areas to those for heights
+# Times the ends for areas those for heights are.
+LOWER, UPPER = (1.0 - HEIGHT) / (1.0 - AREA), (1.0 + HEIGHT) / (1.0 + AREA)
 NOWHERE, OPPOSITE, FIRST, SECOND = range(4)  # where the wall is: at the pair, or at the centre and one of the pair
 ROOM = 0.0005  # of the ends of a band
 TRIES = 8  # halvings of the shift of a node that slides
