@@ -51,8 +51,8 @@ class Conformity:
         mean = float(lengths.mean()) if len(lengths) else float("nan")
         near = [float((np.abs(lengths - goal) <= NEAR * goal).mean()) if len(lengths) else mean for goal in (1.0, mean)]
         unit = float((np.abs(np.log2(np.maximum(lengths, TINY))) <= 0.5).mean()) if len(lengths) else mean
-        of_cells = float(values.min(initial=1.0)), float(values.mean()) if len(values) else mean
-        return cls(*of_cells, len(lengths), mean, *near, unit)
+        least, quality = float(values.min(initial=1.0)), float(values.mean()) if len(values) else mean
+        return cls(least, quality, len(lengths), mean, near[0], near[1], unit)
 
     def figures(self) -> list[tuple[str, str]]:
         """(name, value) for tables."""
