@@ -37,31 +37,33 @@ def with_gaps(topology: Volume, points: Floats, columns: Ints, heights: Floats, 
         going = columns[:, k] >= 0
         row[columns[going, k]], high[columns[going, k]] = k, np.log(heights[going, k - 1])
     alone: Flags = row >= 0
+    shell = topology.near[connectivity.touching(topology.near, alone)]
+    shell = shell[(topology.near_free & ~alone)[shell].any(axis=1)]
     number = (columns >= 0).sum(axis=0)
     for k in range(1, int(np.argmin(np.append(number >= SHARE * number[0], False)))):
-        new: Flags = row == k
+        new, around = row == k, shell
         below = wall if k == 1 else row == k - 1
         while new.any():
-            new = _beside(topology, points, row == k, new, below, row, high)
+            new = _beside(topology, points, around[new[around].any(axis=1)], row == k, below, row, high)
             row[new] = k
+            around = topology.near[connectivity.touching(topology.near, new)]
+            shell = np.concatenate([shell, around])
     whole: Flags = row >= 0
     return whole if np.count_nonzero(whole) <= MOST * np.count_nonzero(alone) else alone
 
 
 def _beside(
-    topology: Volume, points: Floats, own: Flags, new: Flags, below: Flags, row: NDArray[np.int32], high: Floats
+    topology: Volume, points: Floats, around: Ints, own: Flags, below: Flags, row: NDArray[np.int32], high: Floats
 ) -> Flags:
-    """(N,) the nodes that belong to a row, its own nodes, and share cells with the new ones of these.
+    """(N,) which nodes of some cells belong to a row. around: (S, 4) these cells, each with a node of the row.
 
-    below: the nodes of the row below. high: logarithms of heights, to which theirs are added.
+    own, below: the nodes of the row, and of the one below. high: logarithms of heights, to which theirs are added.
     """
-    near, found = topology.near, np.zeros(len(row), dtype=bool)
-    outside = topology.near_free & (row < 0)
-    corners = near[connectivity.touching(near, new)]
-    found[corners[outside[corners]]] = True
+    found = np.zeros(len(row), dtype=bool)
+    found[around[topology.near_free[around] & (row[around] < 0)]] = True
     if not found.any():
         return found
-    corners = near[connectivity.touching(near, found)]
+    corners = topology.near[connectivity.touching(topology.near, found)]
     one, two = (corners[:, EDGES[:, k]].ravel() for k in range(2))
     one, two = np.concatenate([one, two]), np.concatenate([two, one])
     over, with_row = found[one] & below[two], found[one] & own[two]
