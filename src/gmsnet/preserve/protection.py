@@ -148,8 +148,30 @@ def _certain(layers: Flags, topology: Topology | Volume, positive: Flags) -> Fla
     cells = topology.near[positive & inside[topology.near].all(axis=1)]
     certain = core.copy()
     certain[cells[core[cells].any(axis=1)]] = True
+    certain = _in_place(certain, topology, positive)
     found = np.zeros_like(layers)
     found[topology.memory[certain]] = True
+    return found
+
+
+def _in_place(certain: Flags, topology: Topology | Volume, positive: Flags) -> Flags:
+    """Of certain nodes (N,) by places, those that make no inverted cell with one another and with held ones.
+
+    Of each such cell those nodes are left out, round by round, of whose cells the largest share is inverted.
+    """
+    found = certain.copy()
+    fixed = certain | ~topology.near_free
+    rows = np.flatnonzero(fixed[topology.near].all(axis=1) & certain[topology.near].any(axis=1))
+    corners, inverted = topology.near[rows], ~positive[rows]
+    while inverted.any():
+        every, bad = (np.bincount(some.ravel(), minlength=len(found)) for some in (corners, corners[inverted]))
+        share = np.where(found, bad / np.maximum(every, 1), 0.0)[corners[inverted]]
+        out = (share == share.max(axis=1, keepdims=True)) & (share > 0.0)
+        if not out.any():
+            break
+        found[corners[inverted][out]] = False
+        left = (found | ~topology.near_free)[corners].all(axis=1)
+        corners, inverted = corners[left], inverted[left]
     return found
 
 
