@@ -3,11 +3,12 @@
     pip install gmsh
     python benchmarks/gmsh_layers.py [--meshes 40] [--seed 0]
 
-Airfoils, circles and squares in a square, with 6 to 20 rows, triangles or quads, drawn at random. Each second mesh is
-disturbed: free nodes outside of the layers are thrown by up to half of their shortest edge. Told are the largest change
-of a spacing normal to the wall (of edges of the layers that lead away from it) and of an area in the first two rows.
-They may be 2 and 10 %. Rows count whose cells are at least twice as long as thick in the median. And the least and mean
-1/q of the cells with a free node before and after.
+Airfoils, circles and squares in a square, with 6 to 20 rows, triangles or quads, drawn at random. Half of the meshes
+are disturbed: free nodes outside of the layers are thrown by up to half of their shortest edge, or by up to two of
+their mean edges, so that cells are inverted. Told are the largest change of a spacing normal to the wall (of edges of
+the layers that lead away from it) and of an area in the first two rows. They may be 2 and 10 %. Rows count whose cells
+are at least twice as long as thick in the median. And the least and mean 1/q of the cells with a free node before and
+after.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ import gmsnet
 from gmsnet.generate import disturb
 from gmsnet.topology.topology import Topology
 
-THROW = 0.5
+THROWN = {"as made": 0.0, "thrown": 0.5, "tangled": 2.0}  # of the shortest edge; of the mean one, if tangled
+WHAT = ("as made", "thrown", "as made", "tangled")
 AWAY = 0.95  # of its length an edge must lead away from the wall
 ASPECT = 2.0
 OFF = 0.05  # of a row: so far from its place a node may be
@@ -125,22 +127,26 @@ def rungs(points, blocks, away, first, growth):
     return np.unique(edges[counts[row] & made], axis=0)
 
 
-def measure(mesh, outline, first, growth, thickness, throw, seed):
-    """How much spacings and areas change, and the measures of the cells with a free node before and after."""
+def measure(mesh, outline, first, growth, thickness, what, seed):
+    """How many cells are inverted in the end, how much spacings and areas change, and the least and mean 1/q of the
+    cells with a free node before and after."""
     away = distance(mesh.points[:, :2], outline)
     blocks = [block.nodes for block in mesh.cells if block.kind in ("triangle", "quad")]
     layer = away <= OVER * thickness
     edges = rungs(mesh.points, [b[layer[b].all(axis=1)] for b in blocks], away, first, growth)
     rise = np.abs(away[edges[:, 1]] - away[edges[:, 0]])
     free = Topology.of(mesh).free
-    given = disturb(mesh, free[~layer[free]], THROW, seed=seed, edge="shortest") if throw else mesh
+    valid, outside = what != "tangled", free[~layer[free]]
+    edge = "shortest" if valid else "mean"
+    given = disturb(mesh, outside, THROWN[what], seed=seed, keep_valid=valid, edge=edge) if THROWN[what] else mesh
     result = gmsnet.smooth(given)
     now = distance(result.points[:, :2], outline)
     changes = np.abs(np.abs(now[edges[:, 1]] - now[edges[:, 0]]) / rise - 1.0)
     two = [b[(away[b] <= OVER * first * (1.0 + growth)).all(axis=1)] for b in blocks]
     pairs = [(areas(mesh.points, cells), areas(result.points, cells)) for cells in two]
     of_areas = np.concatenate([np.abs(after / before - 1.0) for before, after in pairs])
-    return changes, of_areas, [(totals.shape_min, totals.shape_mean) for totals in result.judged]
+    left = result.after.inverted
+    return left, changes, of_areas, [(totals.shape_min, totals.shape_mean) for totals in result.judged]
 
 
 def main():
@@ -153,17 +159,17 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for number in range(options.meshes):
             draw = np.random.default_rng([options.seed, number])
-            body, quads, throw = list(BODIES)[number % 3], bool(number // 3 % 2), bool(number // 6 % 2)
+            body, quads, what = list(BODIES)[number % 3], bool(number // 3 % 2), WHAT[number // 6 % 4]
             around, rows = 4 * int(draw.integers(15, 41)), int(draw.integers(6, 21))
             first, growth = 10 ** draw.uniform(-4.0, -2.3), draw.uniform(1.1, 1.35)
             path = Path(folder) / f"{number}.msh"
             outline, thickness = made(body, around, first, growth, rows, quads, path)
             mesh = gmsnet.read(path)
-            changes, of_areas, shapes = measure(mesh, outline, first, growth, thickness, throw, number)
-            passed = changes.max() <= MOST_SPACING and of_areas.max() <= MOST_AREA
+            left, changes, of_areas, shapes = measure(mesh, outline, first, growth, thickness, what, number)
+            passed = not left and changes.max() <= MOST_SPACING and of_areas.max() <= MOST_AREA
             good += passed
             print(
-                f"{number:3} {body:8}{'quads' if quads else 'triangles':10}{'thrown' if throw else 'as made':8}"
+                f"{number:3} {body:8}{'quads' if quads else 'triangles':10}{what:8}"
                 f"{around:4} around, {rows:2} rows, first {first:.1e}, growth {growth:.2f}: "
                 f"{len(mesh.points):5,} nodes, {len(changes):5,} spacings by {changes.max():.1%}, "
                 f"{len(of_areas):5,} areas by {of_areas.max():.1%}; "

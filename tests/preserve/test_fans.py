@@ -49,3 +49,19 @@ def test_a_node_thrown_out_of_a_fan_is_not_held():
     assert result.moved[thrown]
     others = np.setdiff1d(node[1:12], thrown)
     assert not result.moved[others].any()
+
+
+@pytest.mark.parametrize("cells", ["triangle", "quad"])
+@pytest.mark.parametrize("seed", range(3))
+def test_rows_beside_thrown_nodes_are_held_and_these_are_not(cells, seed):
+    """Nodes thrown into layers look like their next row, and would cross their edges for ever."""
+    mesh, node = with_fans(cells, fan=5, first=1e-4, rows=26)
+    rows = node[:18]
+    outside = np.setdiff1d(Topology.of(mesh).free, rows)
+    given = disturb(mesh, outside, 2.0, seed=seed, keep_valid=False)
+    assert gmsnet.quality(given).inverted > 50
+    result = gmsnet.smooth(given)
+    assert result.after.inverted == 0
+    moved = (result.points[rows] != mesh.points[rows]).any(axis=2)
+    assert not moved[:16].any()
+    assert moved.sum() <= 3  # of 1,224: beside what could not be mended before
