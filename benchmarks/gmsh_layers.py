@@ -149,9 +149,27 @@ def measure(mesh, outline, first, growth, thickness, what, seed):
     return left, changes, of_areas, [(totals.shape_min, totals.shape_mean) for totals in result.judged]
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--meshes", type=int, default=40)
+def drawn(number, draw, path):
+    """Makes and measures a mesh. Whether it passes, and what to say."""
+    body, quads, what = list(BODIES)[number % 3], bool(number // 3 % 2), WHAT[number // 6 % 4]
+    around, rows = 4 * int(draw.integers(15, 41)), int(draw.integers(6, 21))
+    first, growth = 10 ** draw.uniform(-4.0, -2.3), draw.uniform(1.1, 1.35)
+    outline, thickness = made(body, around, first, growth, rows, quads, path)
+    mesh = gmsnet.read(path)
+    left, changes, of_areas, shapes = measure(mesh, outline, first, growth, thickness, what, number)
+    return not left and changes.max() <= MOST_SPACING and of_areas.max() <= MOST_AREA, (
+        f"{body:8}{'quads' if quads else 'triangles':10}{what:8}"
+        f"{around:4} around, {rows:2} rows, first {first:.1e}, growth {growth:.2f}: "
+        f"{len(mesh.points):5,} nodes, {len(changes):5,} spacings by {changes.max():.1%}, "
+        f"{len(of_areas):5,} areas by {of_areas.max():.1%}; "
+        f"1/q {shapes[0][0]:.3f} {shapes[0][1]:.3f} → {shapes[1][0]:.3f} {shapes[1][1]:.3f}"
+    )
+
+
+def run(title, meshes, of_each, goal):
+    """Reads the options, prints a line for each mesh, and how many pass. meshes: how many by default."""
+    parser = argparse.ArgumentParser(description=title)
+    parser.add_argument("--meshes", type=int, default=meshes)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     print(describe(), f"gmsh {gmsh.__version__}")
@@ -159,25 +177,12 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for number in range(options.meshes):
             draw = np.random.default_rng([options.seed, number])
-            body, quads, what = list(BODIES)[number % 3], bool(number // 3 % 2), WHAT[number // 6 % 4]
-            around, rows = 4 * int(draw.integers(15, 41)), int(draw.integers(6, 21))
-            first, growth = 10 ** draw.uniform(-4.0, -2.3), draw.uniform(1.1, 1.35)
-            path = Path(folder) / f"{number}.msh"
-            outline, thickness = made(body, around, first, growth, rows, quads, path)
-            mesh = gmsnet.read(path)
-            left, changes, of_areas, shapes = measure(mesh, outline, first, growth, thickness, what, number)
-            passed = not left and changes.max() <= MOST_SPACING and of_areas.max() <= MOST_AREA
+            passed, text = of_each(number, draw, Path(folder) / f"{number}.msh")
             good += passed
-            print(
-                f"{number:3} {body:8}{'quads' if quads else 'triangles':10}{what:8}"
-                f"{around:4} around, {rows:2} rows, first {first:.1e}, growth {growth:.2f}: "
-                f"{len(mesh.points):5,} nodes, {len(changes):5,} spacings by {changes.max():.1%}, "
-                f"{len(of_areas):5,} areas by {of_areas.max():.1%}; "
-                f"1/q {shapes[0][0]:.3f} {shapes[0][1]:.3f} → {shapes[1][0]:.3f} {shapes[1][1]:.3f}; "
-                f"{'pass' if passed else 'FAIL'}", flush=True,
-            )  # fmt: skip
-    print(f"{good} of {options.meshes} keep spacings within {MOST_SPACING:.0%} and areas within {MOST_AREA:.0%}")
+            print(f"{number:3} {text}; {'pass' if passed else 'FAIL'}", flush=True)
+    print(f"{good} of {options.meshes} {goal}")
 
 
 if __name__ == "__main__":
-    main()
+    goal = f"keep spacings within {MOST_SPACING:.0%} and areas within {MOST_AREA:.0%}, without an inverted cell"
+    run(__doc__.splitlines()[0], 40, drawn, goal)

@@ -11,13 +11,9 @@ distance from the wall changes at most, inverted cells, and the least and mean �
 
 from __future__ import annotations
 
-import argparse
-import tempfile
-from pathlib import Path
-
 import gmsh
 import numpy as np
-from machine import describe
+from gmsh_layers import WHAT, run
 
 import gmsnet
 from gmsnet.generate import disturb
@@ -25,7 +21,6 @@ from gmsnet.topology.mixed_volume import volume_of, wound_of
 
 HALF, FAR = 3.0, 0.9  # of the box around: half its edge, and how large cells are there
 THROWN = {"as made": 0.0, "thrown": 0.1, "tangled": 1.0}
-WHAT = ("as made", "thrown", "as made", "tangled")
 MOST = 0.02  # of a distance from the wall
 
 
@@ -97,45 +92,33 @@ def made(body, size, heights, prisms, path):
     gmsh.finalize()
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--meshes", type=int, default=30)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    print(describe(), f"gmsh {gmsh.__version__}")
-    good = 0
-    with tempfile.TemporaryDirectory() as folder:
-        for number in range(options.meshes):
-            draw = np.random.default_rng([options.seed, number])
-            body, prisms, what = list(BODIES)[number % 5], bool(number // 5 % 2), WHAT[number // 10 % 4]
-            size, rows = draw.uniform(0.1, 0.35), int(draw.integers(3, 11))
-            growth, aspect = draw.uniform(1.05, 1.4), 10.0 ** draw.uniform(0.6, 2.0)
-            last = size / draw.uniform(2.5, 4.0)  # the height of the last row, at most
-            heights = min(size / aspect, last / growth ** (rows - 1)) * growth ** np.arange(rows)
-            path = Path(folder) / f"{number}.msh"
-            made(body, size, heights, prisms, path)
-            mesh = gmsnet.read(path)
-            away = BODIES[body][1](mesh.points)
-            wall = np.isin(np.arange(len(mesh.points)), mesh.markers["wall"])
-            layer = (away <= 1.001 * heights.sum()) & ~wall
-            free, amount = volume_of(wound_of(mesh)).free, THROWN[what]
-            outside, valid = free[~layer[free]], what != "tangled"
-            given = disturb(mesh, outside, amount, seed=number, keep_valid=valid, edge="shortest") if amount else mesh
-            result = gmsnet.smooth(given)
-            change = np.abs(BODIES[body][1](result.points) / np.where(wall, 1.0, away) - 1.0)[layer]
-            passed = change.max() <= MOST and not result.after.inverted
-            good += passed
-            before, after = result.judged
-            print(
-                f"{number:3} {body:9}{'prisms' if prisms else 'thirds':7}{what:8}"
-                f"{rows:2} rows, growth {growth:.2f}, aspects {size / heights[0]:3.0f} to {size / heights[-1]:3.1f}: "
-                f"{len(mesh.points):6,} nodes, {layer.sum():6,} of rows, {result.moved[layer].sum():5,} moved, "
-                f"by {change.max():.1%}; {result.before.inverted:,} inverted → {result.after.inverted}; "
-                f"η {before.shape_min:.3f} {before.shape_mean:.3f} → {after.shape_min:.3f} {after.shape_mean:.3f}; "
-                f"{'pass' if passed else 'FAIL'}", flush=True,
-            )  # fmt: skip
-    print(f"{good} of {options.meshes} keep distances from the wall within {MOST:.0%}, without an inverted cell")
+def drawn(number, draw, path):
+    """Makes and measures a mesh. Whether it passes, and what to say."""
+    body, prisms, what = list(BODIES)[number % 5], bool(number // 5 % 2), WHAT[number // 10 % 4]
+    size, rows = draw.uniform(0.1, 0.35), int(draw.integers(3, 11))
+    growth, aspect = draw.uniform(1.05, 1.4), 10.0 ** draw.uniform(0.6, 2.0)
+    last = size / draw.uniform(2.5, 4.0)  # the height of the last row, at most
+    heights = min(size / aspect, last / growth ** (rows - 1)) * growth ** np.arange(rows)
+    made(body, size, heights, prisms, path)
+    mesh = gmsnet.read(path)
+    away = BODIES[body][1](mesh.points)
+    wall = np.isin(np.arange(len(mesh.points)), mesh.markers["wall"])
+    layer = (away <= 1.001 * heights.sum()) & ~wall
+    free, amount = volume_of(wound_of(mesh)).free, THROWN[what]
+    outside, valid = free[~layer[free]], what != "tangled"
+    given = disturb(mesh, outside, amount, seed=number, keep_valid=valid, edge="shortest") if amount else mesh
+    result = gmsnet.smooth(given)
+    change = np.abs(BODIES[body][1](result.points) / np.where(wall, 1.0, away) - 1.0)[layer]
+    before, after = result.judged
+    return change.max() <= MOST and not result.after.inverted, (
+        f"{body:9}{'prisms' if prisms else 'thirds':7}{what:8}"
+        f"{rows:2} rows, growth {growth:.2f}, aspects {size / heights[0]:3.0f} to {size / heights[-1]:3.1f}: "
+        f"{len(mesh.points):6,} nodes, {layer.sum():6,} of rows, {result.moved[layer].sum():5,} moved, "
+        f"by {change.max():.1%}; {result.before.inverted:,} inverted → {result.after.inverted}; "
+        f"η {before.shape_min:.3f} {before.shape_mean:.3f} → {after.shape_min:.3f} {after.shape_mean:.3f}"
+    )
 
 
 if __name__ == "__main__":
-    main()
+    goal = f"keep distances from the wall within {MOST:.0%}, without an inverted cell"
+    run(__doc__.splitlines()[0], 30, drawn, goal)

@@ -26,6 +26,13 @@ MOST = 3.0  # times as many nodes as are in columns: else the columns are what i
 AS_HIGH = math.log(1.8)  # from rows beside a node; along the mean normal of a cube's corner a row is 1.73 times as far
 
 
+def neighbours(rows: Ints, chosen: Flags) -> tuple[Ints, Ints]:
+    """The ends of the edges of the simplices (S, 4) with a chosen node (N,), both ways, once for each simplex."""
+    corners = rows[connectivity.touching(rows, chosen)]
+    one, two = (corners[:, EDGES[:, k]].ravel() for k in range(2))
+    return np.concatenate([one, two]), np.concatenate([two, one])
+
+
 def with_gaps(topology: Volume, points: Floats, columns: Ints, heights: Floats, wall: Flags) -> Flags:
     """(N,) by places: the nodes of columns (C, R), and those of the same rows between and beside them.
 
@@ -63,9 +70,7 @@ def _beside(
     found[around[topology.near_free[around] & (row[around] < 0)]] = True
     if not found.any():
         return found
-    corners = topology.near[connectivity.touching(topology.near, found)]
-    one, two = (corners[:, EDGES[:, k]].ravel() for k in range(2))
-    one, two = np.concatenate([one, two]), np.concatenate([two, one])
+    one, two = neighbours(topology.near, found)
     over, with_row = found[one] & below[two], found[one] & own[two]
     height = np.full(len(row), np.inf)
     np.minimum.at(height, one[over], np.linalg.norm(points[one[over]] - points[two[over]], axis=1))

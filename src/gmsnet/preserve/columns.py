@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.topology import columns as kernels
 from gmsnet.kernels.topology import connectivity
-from gmsnet.preserve.column_gaps import with_gaps
+from gmsnet.preserve.column_gaps import neighbours, with_gaps
 from gmsnet.preserve.layers import Layers
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.volume import Volume
@@ -60,6 +60,8 @@ def layers_of_volume(topology: Volume, points: Floats) -> Layers:
         return none
     whole, heights = _ended(columns, heights, top, above)
     chosen = long & _accepted(rows, columns, heights, flatness, last, long, wall, len(topology.free))
+    if not chosen.any():
+        return none
     solids = topology.simplices.solids
     nodes_of = rows if solids is None else solids.nodes
     inside = np.zeros(nodes, dtype=bool)
@@ -109,9 +111,7 @@ def _widths(points: Floats, rows: Ints, wall: Flags, foot: Ints) -> Floats:
     """(C,) the mean lengths of the edges of these nodes that lie on their wall."""
     chosen = np.zeros(len(wall), dtype=bool)
     chosen[foot] = True
-    corners = rows[connectivity.touching(rows, chosen)]
-    one, two = (corners[:, kernels.EDGES[:, k]].ravel() for k in range(2))
-    one, two = np.concatenate([one, two]), np.concatenate([two, one])
+    one, two = neighbours(rows, chosen)
     on_wall = chosen[one] & wall[two]
     one, length = one[on_wall], np.linalg.norm(points[one[on_wall]] - points[two[on_wall]], axis=1)
     total, number = (np.bincount(one, weight, len(wall)) for weight in (length, None))

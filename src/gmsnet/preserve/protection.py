@@ -159,20 +159,17 @@ def _in_place(certain: Flags, topology: Topology | Volume, positive: Flags) -> F
 
     Of each such cell those nodes are left out, round by round, of whose cells the largest share is inverted.
     """
-    found = certain.copy()
-    fixed = certain | ~topology.near_free
-    rows = np.flatnonzero(fixed[topology.near].all(axis=1) & certain[topology.near].any(axis=1))
+    found = certain & topology.near_free  # the others stay anyhow
+    fixed = found | ~topology.near_free
+    rows = np.flatnonzero(fixed[topology.near].all(axis=1) & found[topology.near].any(axis=1))
     corners, inverted = topology.near[rows], ~positive[rows]
     while inverted.any():
         every, bad = (np.bincount(some.ravel(), minlength=len(found)) for some in (corners, corners[inverted]))
         share = np.where(found, bad / np.maximum(every, 1), 0.0)[corners[inverted]]
-        out = (share == share.max(axis=1, keepdims=True)) & (share > 0.0)
-        if not out.any():
-            break
-        found[corners[inverted][out]] = False
+        found[corners[inverted][share == share.max(axis=1, keepdims=True)]] = False
         left = (found | ~topology.near_free)[corners].all(axis=1)
         corners, inverted = corners[left], inverted[left]
-    return found
+    return found | (certain & ~topology.near_free)
 
 
 def wall_note(walls: Kept, nodes: int, moved: bool) -> str:
