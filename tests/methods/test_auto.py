@@ -136,3 +136,9 @@ def test_what_is_to_come_is_a_geometric_series():
     assert to_come(math.inf, 0.01) == 0.01
     assert to_come(0.01, 0.01) == math.inf
     assert to_come(0.01, -0.01) == 0.0
+
+
+def test_a_turn_that_doubles_a_tiny_least_has_another(real_meshes):
+    """The far field of a C-grid without its layers kept: one turn ends at 0.0007, and the next ones at far more."""
+    mesh = gmsnet.read(real_meshes / "n0012_113-33.su2")
+    assert gmsnet.smooth(mesh, preserve="none").judged.after.shape_min >= 0.02

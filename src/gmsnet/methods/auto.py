@@ -62,6 +62,7 @@ STILL_POOR = 0.85  # a mean of 1/q where a small mesh ends: its worst cells are 
 AHEAD = 50  # times the last gain are at most expected to come
 # In the least 1/q, what a turn of all nodes for the worst cells must have gained for another, and for one after TURNS.
 TURNS, TURN_GAIN, LATE_TURN_GAIN = 3, 0.01, 0.05
+VERY_POOR, HOPELESS = 0.1, 1e-5  # between these a turn that doubled the least 1/q has another
 COARSER = 10.0  # times what a phase must gain to go on, once these have been moved
 PASSES = 8  # over the worst cells and what follows them, at most
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
@@ -86,6 +87,7 @@ class Auto(Smoother):
     turns: int
     ideal: bool
     early: bool
+    doubled: bool
     pass_gain: float
     passes: int
     least: float
@@ -109,7 +111,7 @@ class Auto(Smoother):
         self.at = -1
         self.creep: Creep | None = None
         self.whole = 0  # how often all nodes have moved at once
-        self.slow = self.ideal = self.early = False
+        self.slow = self.ideal = self.early = self.doubled = False
         self.turns, self.least_before = 0, -math.inf  # how often all nodes had their turn for the worst cells
         self.pass_gain = PASS_GAIN
         self.passes, self.least = 0, -math.inf  # passes over the worst cells, and the least 1/q after the last one
@@ -123,7 +125,8 @@ class Auto(Smoother):
         self.at, self.made, self.rounds, self.gained = phase, 0, 0, math.inf
         if phase == len(self.phases):
             enough = TURN_GAIN if self.turns < TURNS else LATE_TURN_GAIN
-            gained = self.turns == 0 or self.least >= self.least_before + enough
+            self.doubled = self.least < VERY_POOR and self.least > max(2.0 * self.least_before, HOPELESS)
+            gained = self.turns == 0 or self.doubled or self.least >= self.least_before + enough
             self.converged = not gained or not (self.ideal or self._is_even(field, executor))
             self.turns, self.least_before = self.turns + 1, self.least
             return
@@ -192,7 +195,7 @@ class Auto(Smoother):
         """All nodes at once, for the worst cells; then all phases have another turn for the mean."""
         self.looks, self.phase = True, WHOLE_WORST
         tally = WholeMesh(POWERS).sweep(field, executor, test)
-        if tally[MOVED]:
+        if tally[MOVED] or self.doubled:
             self._enter(0, field, executor)
         else:
             self.converged = True
