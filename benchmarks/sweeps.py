@@ -58,7 +58,7 @@ def measure(nodes, threads, repeats, methods, guards):
     jobs = {
         "L": lambda: matrix @ points,
         "set-up": lambda: Topology.of(mesh).stars,
-        "measures": lambda: totals_of(points, topology.near, topology.near_orientation),
+        "measures": lambda: totals_of(points, topology.scored),
     }
     stack = ExitStack()
     for name, method in METHODS.items():
