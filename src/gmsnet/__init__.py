@@ -25,13 +25,14 @@ if TYPE_CHECKING:
     from gmsnet.mesh.mesh import Mesh
     from gmsnet.methods import METHODS
     from gmsnet.run.api import quality, smooth
-    from gmsnet.run.deform import DeformResult, deform
-    from gmsnet.run.result import SmoothResult
+    from gmsnet.run.deform import deform
+    from gmsnet.run.deform_result import DeformResult
+    from gmsnet.run.smooth_result import SmoothResult
     from gmsnet.run.sweep import Sweep
 
 _HOME = {
-    "DeformResult": "run.deform",
-    "SmoothResult": "run.result",
+    "DeformResult": "run.deform_result",
+    "SmoothResult": "run.smooth_result",
     "Sweep": "run.sweep",
     "deform": "run.deform",
     "quality": "run.api",

@@ -13,7 +13,7 @@ from gmsnet.run.sweep import MOST_SWEEPS
 
 if TYPE_CHECKING:
     from gmsnet.mesh.mesh import Mesh
-    from gmsnet.run.deform import DeformResult
+    from gmsnet.run.deform_result import DeformResult
 
 
 def deform(

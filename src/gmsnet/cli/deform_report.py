@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gmsnet.cli.smooth_report import Outcome
-from gmsnet.run.moved_account import MovedAccount
+from gmsnet.run.deform_result import MovedAccount
 
 
 class MovedOutcome(MovedAccount, Outcome):

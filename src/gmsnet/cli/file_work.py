@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gmsnet.cli.smooth_report import Outcome
     from gmsnet.mesh.mesh import Mesh
     from gmsnet.run.progress import Progress
-    from gmsnet.run.result import SmoothResult
+    from gmsnet.run.smooth_result import SmoothResult
     from gmsnet.run.sweep import Sweep
 
 

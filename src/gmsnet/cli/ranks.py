@@ -12,7 +12,7 @@ from gmsnet.cli.failure import BAD_INPUT, BUG, DONE, print_failure
 from gmsnet.errors import GmsnetError
 
 if TYPE_CHECKING:
-    from gmsnet.run.result import SmoothResult
+    from gmsnet.run.smooth_result import SmoothResult
 
 # How launchers tell a process which of how many it is: Open MPI, MPICH and Intel MPI.
 TOLD = (("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("PMI_RANK", "PMI_SIZE"))

@@ -14,7 +14,7 @@ from gmsnet.run.sweep import MOST_SWEEPS
 if TYPE_CHECKING:
     from gmsnet.cli.destination import Destination
     from gmsnet.mesh.mesh import Mesh
-    from gmsnet.run.result import SmoothResult
+    from gmsnet.run.smooth_result import SmoothResult
 
 
 def _method_names() -> list[str]:

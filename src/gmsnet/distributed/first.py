@@ -26,8 +26,8 @@ from gmsnet.parallel.threads import serial
 from gmsnet.run.call import ended
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import result_of, write_back
-from gmsnet.run.result import SmoothResult
 from gmsnet.run.set_up import first_state
+from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.state import State
 from gmsnet.topology.ordering import near_points
 

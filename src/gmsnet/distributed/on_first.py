@@ -23,7 +23,7 @@ from gmsnet.methods.banded import Kept
 from gmsnet.preserve.protection import WALL, Protection, protected, protected_volume, wall_note
 from gmsnet.run.api import smooth_with
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.result import SmoothResult
+from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.stop import INTERRUPTED
 from gmsnet.topology.ordering import near_points
 from gmsnet.topology.volume import Volume

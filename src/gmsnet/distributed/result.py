@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gmsnet.measure.judged import UNKNOWN, Judged
 from gmsnet.measure.totals import Totals
 from gmsnet.mesh.display import amount, miss_it, plain
-from gmsnet.run.result import SmoothResult
+from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.sweep import Sweep
 
 

@@ -17,7 +17,7 @@ from gmsnet.measure.target import Target
 from gmsnet.mesh.selection import chosen_nodes
 from gmsnet.run.api import smooth as smooth_mesh
 from gmsnet.run.progress import Progress
-from gmsnet.run.result import SmoothResult
+from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.sweep import MOST_SWEEPS
 
 HOLD, SLIDE = "hold", "slide"

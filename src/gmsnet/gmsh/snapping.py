@@ -13,7 +13,7 @@ from gmsnet.gmsh.curve import CadCurve
 from gmsnet.gmsh.live import Live, Part
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.measure.target import Target
-from gmsnet.run.result import SmoothResult
+from gmsnet.run.smooth_result import SmoothResult
 
 Floats = NDArray[np.float64]
 KEPT = "slide: the nodes stay close to Gmsh's geometry, as cells would become worse on it"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -203,7 +203,7 @@ class QualityReport:
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers, ready for JSON: min, mean, max, 1st percentile (p1) and counts beyond thresholds."""
-        return summary_of(self)
+        return summary_of(self.cells, self.totals, self.inverted, partial(getattr, self))
 
 
 def _of_volumes(report: QualityReport) -> list[tuple[str, str]]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,8 @@ from numpy.typing import NDArray
 from gmsnet.measure.cells import MeasuredCells
 from gmsnet.measure.defects import defects_of
 from gmsnet.measure.solids import MeasuredSolids
-
-if TYPE_CHECKING:
-    from gmsnet.measure.report import QualityReport
+from gmsnet.measure.totals import Totals
+from gmsnet.measure.volumes import MeasuredTetrahedra
 
 Floats = NDArray[np.float64]
 
@@ -25,20 +25,23 @@ BEST_IS_LOW = ("max_angle", "max_dihedral")
 NAMED = 10  # cells with a defect are named
 
 
-def summary_of(report: QualityReport) -> dict[str, Any]:
-    """See ``QualityReport.summary``."""
-    document: dict[str, Any] = {**report.cells.counts, "inverted": report.inverted}
-    if report.totals is None:
+def summary_of(
+    cells: MeasuredCells | MeasuredTetrahedra | MeasuredSolids, totals: Totals | None, inverted: int,
+    column: Callable[[str], Floats],
+) -> dict[str, Any]:  # fmt: skip
+    """See ``QualityReport.summary``. column: the (T,) values of a measure, by its name."""
+    document: dict[str, Any] = {**cells.counts, "inverted": inverted}
+    if totals is None:
         return document
-    planar = isinstance(report.cells, MeasuredCells) and report.cells.order is None
-    known = {"shape": report.totals.shape_mean}
+    planar = isinstance(cells, MeasuredCells) and cells.order is None
+    known = {"shape": totals.shape_mean}
     if planar:
-        known |= {"min_angle": report.totals.low_mean, "max_angle": report.totals.high_mean}
-        known["aspect"] = report.totals.aspect_mean
-    names = [name for name in report.cells.names if planar or name != "aspect"]
+        known |= {"min_angle": totals.low_mean, "max_angle": totals.high_mean}
+        known["aspect"] = totals.aspect_mean
+    names = [name for name in cells.names if planar or name != "aspect"]
     names += [] if planar or "scaled_jacobian" in names else ["scaled_jacobian"]
     for name in names:
-        values, mean = getattr(report, name), known.get(name, math.nan)
+        values, mean = column(name), known.get(name, math.nan)
         best_is_low = name in BEST_IS_LOW
         document[name] = {
             "min": float(values.min()),
@@ -49,9 +52,9 @@ def summary_of(report: QualityReport) -> dict[str, Any]:
         for limit in THRESHOLDS.get(name, ()):
             beyond = values > limit if best_is_low else values < limit
             document[name][f"{'above' if best_is_low else 'below'}_{limit:g}"] = int(np.count_nonzero(beyond))
-    if isinstance(report.cells, MeasuredSolids):
-        document |= _of_solids(report.cells)
-    return {**document, "qhat": report.qhat, "qhat_aspect": report.qhat_aspect} if planar else document
+    if isinstance(cells, MeasuredSolids):
+        document |= _of_solids(cells)
+    return {**document, "qhat": totals.qhat, "qhat_aspect": totals.qhat_aspect} if planar else document
 
 
 def _of_solids(cells: MeasuredSolids) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from gmsnet.measure.report import ASPECT
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import METHODS, Smoother, smoother
 from gmsnet.run.api import smooth
-from gmsnet.run.result import SmoothResult
+from gmsnet.run.smooth_result import SmoothResult
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from gmsnet.measure.report import QualityReport, measure
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.run.api import smooth
 from gmsnet.run.progress import Progress
-from gmsnet.run.result import SmoothResult
+from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.sweep import MOST_SWEEPS
 
 PREFIX = "gmsnet_"  # of cell arrays: PyVista's own measures have some of these names

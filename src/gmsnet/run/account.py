@@ -17,7 +17,7 @@ from gmsnet.mesh.display import amount, miss_it, plain
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.protection import LAYER
 from gmsnet.run import stop
-from gmsnet.run.result import SmoothResult, free_nodes
+from gmsnet.run.result import Result, free_nodes
 from gmsnet.run.sweep import Sweep
 
 UNKNOWN = "not untangled, or untangling was off"
@@ -28,7 +28,7 @@ class Account:
     """A finished run. mesh: that was smoothed. compiled: the seconds of the result's that went into compilation."""
 
     mesh: Mesh
-    result: SmoothResult
+    result: Result
     compiled: float = 0.0
 
     @property

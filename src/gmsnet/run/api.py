@@ -18,8 +18,8 @@ from gmsnet.parallel.threads import workers
 from gmsnet.run.call import ended
 from gmsnet.run.options import CUDA, SmoothOptions
 from gmsnet.run.outcome import result_of
-from gmsnet.run.result import SmoothResult
 from gmsnet.run.set_up import first_state
+from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.stages import carry_out
 from gmsnet.run.state import State
 from gmsnet.run.sweep import MOST_SWEEPS, Sweep

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gmsnet.errors import InputError
 from gmsnet.kernels.simplex.bernstein import NAMES
@@ -18,51 +18,15 @@ from gmsnet.motion.prescribed import Prescribed
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import workers
 from gmsnet.run.call import ended
+from gmsnet.run.deform_result import DeformResult
 from gmsnet.run.deform_stage import move_boundary
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import result_of
-from gmsnet.run.result import SmoothResult
 from gmsnet.run.set_up import check_mesh, first_state
 from gmsnet.run.stages import carry_out
 from gmsnet.run.state import Motion, State
 from gmsnet.run.sweep import MOST_SWEEPS, Sweep
 from gmsnet.run.untangle_stage import untangle_all
-
-if TYPE_CHECKING:
-    from gmsnet.run.account import Account
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class DeformResult(SmoothResult):
-    """What ``deform`` returns: a SmoothResult, and how far the boundary has come.
-
-    fraction: of its way, 1.0 where all nodes are at the places asked for. steps: in so many. reason: why it has not
-    come further, "" where it has.
-    """
-
-    fraction: float = 0.0
-    steps: int = 0
-    reason: str = ""
-
-    _function = "deform"
-
-    def _account(self, mesh: Mesh) -> Account:
-        from gmsnet.run.moved_account import MovedAccount
-
-        return MovedAccount(mesh, self)
-
-    @property
-    def _remarks(self) -> list[str]:
-        return [self.verdict, *super()._remarks]
-
-    @property
-    def verdict(self) -> str:
-        """How far the boundary has come, in a sentence."""
-        steps = f"in {self.steps} step{'s' if self.steps != 1 else ''}"
-        if self.fraction == 1.0:
-            return f"the boundary is in place ({steps})"
-        far = f"{100.0 * self.fraction:.4g} % of its way" if self.fraction else "no part of its way"
-        return f"the boundary has come {far} ({steps}): {self.reason}"
 
 
 def deform(
@@ -152,6 +116,6 @@ def _check_fixed(mesh: Mesh, fixed: Any, prescribed: Prescribed) -> None:
 
 def _result(state: State, options: SmoothOptions, began: float) -> DeformResult:
     done, motion = result_of(state, options, began), state.motion or Motion(reason=state.stop_reason)
-    known = {each.name: getattr(done, each.name) for each in fields(SmoothResult)}
+    known = {each.name: getattr(done, each.name) for each in fields(done)}
     known["compared"] = None  # the surface is elsewhere on purpose
     return DeformResult(**known, fraction=motion.fraction, steps=motion.steps, reason=motion.reason)

@@ -106,7 +106,11 @@ class SmoothOptions:
         if self.device == CUDA:
             gpu_library()  # whether there is one is told before a file is read
         self._method()
-        check_adapting(self)
+        given = [name for name in ("metric", "size") if getattr(self, name) is not None]
+        check_adapting(
+            given, preserve=self.preserve, method=self.method, target=self.target, guard=self.guard,
+            best_by=self.best_by,
+        )  # fmt: skip
 
     @property
     def target(self) -> Target:

@@ -24,7 +24,7 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 from gmsnet.preserve.protection import WALL, Protection, carried_note, wall_note
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.result import SmoothResult
+from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.state import Final, State, with_corners
 from gmsnet.run.stop import NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.run.untangle_stage import still_inverted

@@ -1,12 +1,11 @@
-"""What ``smooth`` returns."""
+"""A finished run: the mesh, its figures before and after, and what there is to know."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +22,6 @@ from gmsnet.run.untangle_stage import StillInvertedCell
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
-if TYPE_CHECKING:
-    from gmsnet.mesh.mesh import Mesh
-    from gmsnet.run.account import Account
-
 Floats = NDArray[np.float64]
 
 
@@ -40,20 +35,8 @@ class HeldNodes(dict[str, NDArray[np.int64]]):
 
 
 @dataclass(frozen=True, eq=False)
-class SmoothResult:
-    """What ``smooth`` returns.
-
-    mesh: of the type that came in. points: (N, dim) float64. before, after: QualityReports. sweeps: how many were
-    made. stop_reason: one of the texts above. moved: (N,) bool, which nodes are elsewhere than in the input.
-    held: reason → ids of the nodes that were not free. history: one Sweep for each look. notes: what else there is to
-    know, a sentence each. unmended: the cells that untangling could not mend and that are inverted still, and why.
-    topology: what follows from the connectivity, with the nodes that were held.
-    seconds: for the whole call. invalid_curved: how many second-order cells are not certified valid. conformity: before
-    and after, to the metric or the sizes that were asked for; None without any. With one, the least and the mean 1/q in
-    ``history`` are those in the metric. asked: the options of the call that were not the defaults, as plain values.
-    compared: the surface whose nodes may have slid, before and after (``surface_change``); None where none does.
-    judged: means and extremes over the cells with a free node, by which meshes are compared, before and after.
-    """
+class Result:
+    """A finished run. The fields are those of ``SmoothResult``, which tells what they are."""
 
     mesh: Any
     points: Floats
@@ -108,33 +91,13 @@ class SmoothResult:
         """How far the surface has come from the input's facets; None where there is no surface that changes."""
         return None if self.compared is None else surface_change(self.compared)
 
-    def report(self, path: str | os.PathLike[str]) -> None:
-        """Write one HTML file that shows what was done: figures, a picture before and after, what is held and why.
-
-        It needs nothing but a browser, and loads nothing. path: ``.html``. Raises InputError for another suffix, and
-        where the file cannot be written.
-        """
-        from gmsnet.page import write_page
-        from gmsnet.run.reporting import contents_of
-
-        given = "".join(f", {name}={value!r}" for name, value in self.asked.items())
-        mesh = to_mesh(self.mesh)[0]
-        write_page(path, contents_of(self._account(mesh), "mesh", f"gmsnet.{self._function}(mesh{given})"))
-
-    _function = "smooth"  # that returned it
-
-    def _account(self, mesh: Mesh) -> Account:
-        from gmsnet.run.account import Account
-
-        return Account(mesh, self)
-
     @cached_property
     def limits(self) -> Limits:
         """Upper bounds of the worst cells with this connectivity and these held nodes; made when first asked for."""
         return limits(to_mesh(self.mesh)[0], self.topology, report=self.after)
 
 
-def free_nodes(result: SmoothResult) -> int:
+def free_nodes(result: Result) -> int:
     """How many nodes could move, those among them that were held once they were untangled."""
     still = np.zeros(len(result.points), dtype=bool)
     for ids in result.held.values():

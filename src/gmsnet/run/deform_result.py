@@ -1,12 +1,45 @@
-"""What there is to say about a finished run of ``deform``."""
+"""What ``deform`` returns, and what there is to say about it."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from gmsnet.mesh.display import amount, plain
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.run.account import Account
-from gmsnet.run.deform import DeformResult
+from gmsnet.run.smooth_result import SmoothResult
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DeformResult(SmoothResult):
+    """What ``deform`` returns: a SmoothResult, and how far the boundary has come.
+
+    fraction: of its way, 1.0 where all nodes are at the places asked for. steps: in so many. reason: why it has not
+    come further, "" where it has.
+    """
+
+    fraction: float = 0.0
+    steps: int = 0
+    reason: str = ""
+
+    _function = "deform"
+
+    def _account(self, mesh: Mesh) -> Account:
+        return MovedAccount(mesh, self)
+
+    @property
+    def _remarks(self) -> list[str]:
+        return [self.verdict, *super()._remarks]
+
+    @property
+    def verdict(self) -> str:
+        """How far the boundary has come, in a sentence."""
+        steps = f"in {self.steps} step{'s' if self.steps != 1 else ''}"
+        if self.fraction == 1.0:
+            return f"the boundary is in place ({steps})"
+        far = f"{100.0 * self.fraction:.4g} % of its way" if self.fraction else "no part of its way"
+        return f"the boundary has come {far} ({steps}): {self.reason}"
 
 
 class MovedAccount(Account):
