@@ -147,7 +147,9 @@ def med(packed: bool = False) -> bytes:
             family.attrs["NUM"] = number
             names = np.zeros((1, 80), np.int8)
             names[0, : len(text)] = np.frombuffer(text.encode(), np.int8)
-            family.create_dataset("GRO/NOM", data=names)
+            one = number < -1  # values that are 80 letters each, as MED's own library writes them, or rows of letters
+            kind = np.dtype((np.int8, 80)) if one else np.int8
+            family.create_dataset("GRO/NOM", (1,) if one else (1, 80), kind)[...] = names
             family["GRO"].attrs["NBR"] = 1
 
     return _file(fill)

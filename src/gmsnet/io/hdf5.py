@@ -185,7 +185,7 @@ class Node:
         """
         shape = self.shape()
         with said_of(self.path):
-            kind = self.thing.dtype
+            kind = self.thing.dtype.base  # a value may be an array, as names of groups in MED are
             if kind.kind not in kinds or (kind.kind == "f" and kind.itemsize not in (4, 8)):
                 raise FormatError(f"{shown(self.path)}: values of type {kind} are not understood here")
             if self.thing.external or self.thing.is_virtual:
