@@ -29,7 +29,7 @@ from gmsnet.io.stamps import Stamps
 from gmsnet.io.vtk_ghosts import GHOST_CELLS
 
 # Formats whose files can tell how their numbers lie.
-PLANNED = ("cgns", "exodus", "gmsh", "ugrid", "vtk", "vtkhdf", "vtu")
+PLANNED = ("cgns", "exodus", "gmsh", "med", "ply", "stl", "ugrid", "vtk", "vtkhdf", "vtu")
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
 Value = TypeVar("Value")

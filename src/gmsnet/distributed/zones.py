@@ -100,11 +100,14 @@ class Zones:
 def in_zones(comm: Any, first: Sequence[int], points: Shared, named: Ids) -> tuple[Zones, Shared, Ids]:
     """All ranks call it: the nodes that points of zones are, and those of them at the place of others of their zone.
 
-    See ``gmsnet.io.merge.merged``. first: of all zones the first point. named: points of cells that this rank has read.
+    See ``gmsnet.io.merge.merged``. first: of all zones the first point; a range where each point is one.
+    named: points of cells that this rank has read.
     """
     used = points.marked(comm, named)
     start = int(points.rows[comm.rank])
-    zone = np.searchsorted(np.asarray(first), start + np.arange(len(used)), side="right") - 1
+    zone = start + np.arange(len(used))
+    if not isinstance(first, range):  # else each point is a zone
+        zone = np.searchsorted(np.asarray(first), zone, side="right") - 1
     found = joined_points(comm, points.points, zone, used)
     ids, at = np.unique(found.node, return_index=True)
     own = at[(ids >= found.starts[comm.rank]) & (ids < found.starts[comm.rank + 1])]

@@ -17,6 +17,9 @@ from gmsnet.io.cell_table import check_range
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node, shown
+from gmsnet.io.med_ranges import planned
+from gmsnet.io.ranges import Plan
+from gmsnet.io.rows import Ranges
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -38,20 +41,12 @@ def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
     data = files[".med"]
     file = File(data)
-    meshes = list(file.root.need("ENS_MAA").members())
-    if len(meshes) != 1:
-        raise FormatError(f"the file has {len(meshes)} meshes: only files of one are smoothed")
-    dimension = meshes[0].attribute("ESP")
-    steps = [step for step in meshes[0].members() if step.get("NOE/COO") is not None]
-    if len(steps) != 1:
-        raise FormatError(f"{shown(meshes[0].path)}: {len(steps)} sets of coordinates: only meshes of one are smoothed")
-    place = steps[0].need("NOE/COO")
-    if not isinstance(dimension, (int, np.integer)) or dimension not in (2, 3):
-        raise FormatError(f"{shown(meshes[0].path)}: the dimension of its space (ESP) is not 2 or 3")
-    points, slots, single = coordinates([Part(place, tuple(range(int(dimension))), by_axis=True)], data)
-    groups = _groups(file.root.get(f"FAS/{meshes[0].name}"))
+    mesh, step, dimension = _only(file.root)
+    place = step.need("NOE/COO")
+    points, slots, single = coordinates([Part(place, tuple(range(dimension)), by_axis=True)], data)
+    groups = _groups(file.root.get(f"FAS/{mesh.name}"))
     cells, names, unread = list[CellBlock](), dict[tuple[int, int], str](), list[str]()
-    listed = steps[0].get("MAI")
+    listed = step.get("MAI")
     for node in listed.members() if listed is not None else ():
         if node.name not in KINDS:
             raise FormatError(f"{shown(node.path)}: cells of the type {node.name[:8]!r} are not known")
@@ -60,9 +55,30 @@ def read(files: Mapping[str, Data]) -> Parsed:
         dim = CELLS[block.kind].dimension
         names |= {(dim, number): text for number, text in groups.items() if text and (block.regions == number).any()}
         unread += ["the numbers of cells"] * (node.get("NUM") is not None)
-    sets = _node_sets(steps[0].get("NOE/FAM"), groups, len(points))
+    sets = _node_sets(step.get("NOE/FAM"), groups, len(points))
     unread += ["fields"] * (file.root.get("CHA") is not None)
     return Parsed(points, cells, slots, names, single=single, unread=list(dict.fromkeys(unread)), node_sets=sets)
+
+
+def plan(file: Ranges) -> Plan | None:
+    """See ``med_ranges.planned``."""
+    with File.opened(file.path) as opened:
+        mesh, step, dimension = _only(opened.root)
+        return planned(file, step, dimension, KINDS, _groups(opened.root.get(f"FAS/{mesh.name}")))
+
+
+def _only(root: Node) -> tuple[Node, Node, int]:
+    """The mesh of a file, its step with coordinates, and how many axes it has."""
+    meshes = list(root.need("ENS_MAA").members())
+    if len(meshes) != 1:
+        raise FormatError(f"the file has {len(meshes)} meshes: only files of one are smoothed")
+    dimension = meshes[0].attribute("ESP")
+    steps = [step for step in meshes[0].members() if step.get("NOE/COO") is not None]
+    if len(steps) != 1:
+        raise FormatError(f"{shown(meshes[0].path)}: {len(steps)} sets of coordinates: only meshes of one are smoothed")
+    if not isinstance(dimension, (int, np.integer)) or dimension not in (2, 3):
+        raise FormatError(f"{shown(meshes[0].path)}: the dimension of its space (ESP) is not 2 or 3")
+    return meshes[0], steps[0], int(dimension)
 
 
 def _block(node: Node, kind: str, count: int) -> CellBlock:

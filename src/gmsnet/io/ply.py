@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io import convert, ply_header
+from gmsnet.io import convert, ply_header, ply_ranges
 from gmsnet.io.cell_table import Kind, check_range, table_blocks
 from gmsnet.io.cells import joined
 from gmsnet.io.contents import Data
@@ -21,6 +21,8 @@ from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import side_by_side
 from gmsnet.io.ply_rows import Column, Table, tables
+from gmsnet.io.ranges import Plan
+from gmsnet.io.rows import Ranges
 from gmsnet.io.text import fail
 from gmsnet.io.words import Words, typed
 from gmsnet.mesh.mesh import Mesh
@@ -68,6 +70,11 @@ def read(files: Mapping[str, Data]) -> Parsed:
         key: _values(words, column) for key, column in vertex.items() if key not in "xyz" and column.sizes is None
     }
     return Parsed(points, cells, slots, {}, point_data, cell_data, kind == "f4", _unread(header))
+
+
+def plan(file: Ranges) -> Plan | None:
+    """See ``ply_ranges.plan``."""
+    return ply_ranges.plan(file, LISTS)
 
 
 def _unread(header: ply_header.Header) -> list[str]:

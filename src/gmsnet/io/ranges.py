@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io.cells import MOST_BLOCKS
+from gmsnet.io.cells import MOST_BLOCKS, distinct
 from gmsnet.io.pieces import Piece
-from gmsnet.io.rows import AnyRows, Listed, Ranges, Rows
+from gmsnet.io.rows import AT_ONCE, AnyRows, Listed, Ranges, Rows
 from gmsnet.io.vtk_ghosts import marked
 
 
@@ -200,6 +200,12 @@ def put(values: NDArray[Any], moves: Moves, first: int, axis: int) -> bool:
         changed |= bool((new != old).any())
         values[here] = np.where(new != old, new, old)
     return changed
+
+
+def distinct_of(file: Ranges, rows: AnyRows) -> set[int]:
+    """The whole numbers that occur, some looked at at a time."""
+    parts = (rows.of(file, at, min(at + AT_ONCE, rows.rows)) for at in range(0, rows.rows, AT_ONCE))
+    return {number for part in parts for number in distinct(part[:, 0])}
 
 
 def blocks_of(tables: Sequence[Table]) -> list[list[Table]]:

@@ -14,13 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
-from gmsnet.io import convert
+from gmsnet.io import convert, stl_ranges
 from gmsnet.io.cells import distinct, joined, sealed
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Lattice, Places
+from gmsnet.io.ranges import Plan
+from gmsnet.io.rows import Ranges
 from gmsnet.io.splice import BinarySlots, TextSlots
+from gmsnet.io.stl_ranges import HEAD, RECORD
 from gmsnet.io.text import Starts, Text
 from gmsnet.io.words import ByteWords
 from gmsnet.kernels.topology import weld as kernels
@@ -30,7 +33,6 @@ from gmsnet.mesh.mesh import Mesh
 name = "STL"
 suffixes: tuple[str, ...] = (".stl",)
 
-HEAD, RECORD = 84, 50  # bytes in front of the triangles of a binary file, and of each of them
 _VERTEX = [b"vertex", b"", b"", b""]
 _FACET = [b"facet", b"normal", b"", b"", b"", b"outer", b"loop", *_VERTEX * 3, b"endloop", b"endfacet"]
 _CORNERS = [8, 9, 10, 12, 13, 14, 16, 17, 18]  # where the coordinates are among the words of a facet
@@ -64,6 +66,11 @@ def _binary(data: Data, count: int) -> Parsed:
     marks = np.ndarray((count, 2), np.uint8, data, HEAD + RECORD - 2, (RECORD, 1))
     unread = ["attributes of triangles"] * bool(marks.any())
     return Parsed(weld.points, cells, BinarySlots(places, "<f4", weld.node), single=True, unread=unread)
+
+
+def plan(file: Ranges) -> Plan | None:
+    """See ``stl_ranges.plan``."""
+    return stl_ranges.plan(file)
 
 
 def _text(data: Data) -> Parsed:

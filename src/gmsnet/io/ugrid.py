@@ -23,8 +23,8 @@ from gmsnet.io.cells import distinct, sealed
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.pieces import Piece, Pieces
-from gmsnet.io.ranges import Column, Plan, Table
-from gmsnet.io.rows import AT_ONCE, Ranges, Rows
+from gmsnet.io.ranges import Column, Plan, Table, distinct_of
+from gmsnet.io.rows import Ranges, Rows
 from gmsnet.io.text import Text
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 from gmsnet.mesh.cell_block import CellBlock
@@ -130,14 +130,8 @@ def plan(file: Ranges) -> Plan | None:
         tables[k] = tables[k]._replace(regions=Rows(surfaces, counts[1 + k], 4, whole))
         surfaces += 4 * counts[1 + k]
     faces = Rows(surfaces - 4 * (counts[1] + counts[2]), counts[1] + counts[2], 4, whole)
-    names = _names(_distinct(file, faces)) if any(counts[1 + FACES :]) else {}
+    names = _names(distinct_of(file, faces)) if any(counts[1 + FACES :]) else {}
     return Plan([Column(points)], [[table] for table in tables if table.nodes.rows], form.real == 4, names=names)
-
-
-def _distinct(file: Ranges, rows: Rows) -> set[int]:
-    """The whole numbers that occur, some looked at at a time."""
-    parts = (rows.of(file, at, min(at + AT_ONCE, rows.rows)) for at in range(0, rows.rows, AT_ONCE))
-    return {number for part in parts for number in distinct(part[:, 0])}
 
 
 def form_of(data: Data, size: int | None = None) -> str:
