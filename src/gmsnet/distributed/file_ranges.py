@@ -21,15 +21,17 @@ from gmsnet.distributed.tags import nodes_of
 from gmsnet.distributed.zones import Shared, Zones, asked, homes, in_zones, named_here, with_vertices
 from gmsnet.errors import FormatError, GmsnetError, InputError
 from gmsnet.io.atomic import replace_files
-from gmsnet.io.formats import FORMATS
+from gmsnet.io.formats import FORMATS, Entry
+from gmsnet.io.linked import links_of, placed
 from gmsnet.io.pieces import Piece as Bytes
+from gmsnet.io.pieces import Pieces
 from gmsnet.io.ranges import Column, Plan, put
 from gmsnet.io.rows import AT_ONCE, Ranges, Rows
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.vtk_ghosts import GHOST_CELLS
 
 # Formats whose files can tell how their numbers lie.
-PLANNED = ("cgns", "exodus", "gmsh", "med", "ply", "stl", "ugrid", "vtk", "vtkhdf", "vtu")
+PLANNED = ("cgns", "exodus", "gmsh", "med", "ply", "stl", "ugrid", "vtk", "vtkhdf", "vtu", "xdmf")
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
 Value = TypeVar("Value")
@@ -45,13 +47,15 @@ def plan_of(file: Ranges, format: str) -> Plan | None:
 @dataclass(frozen=True, eq=False)
 class FileRanges:
     """What one rank has of a file. piece: its share of the cells, and their nodes. rows: (ranks + 1,) where the rows of
-    coordinates begin that each rank keeps. zones: where the nodes are not the points of the file."""
+    coordinates begin that each rank keeps. zones: where the nodes are not the points of the file. index: the file that
+    names it, with its format, where it is not the one that was asked for."""
 
     file: Ranges
     plan: Plan
     piece: Piece
     rows: Ids
     zones: Zones | None = None
+    index: tuple[Ranges, Entry] | None = None
 
     def write(self, target: str, points: Floats, comm: Any) -> None:
         """All ranks call it: a file of the same bytes but for the points (n, dim) of the piece that are elsewhere.
@@ -65,8 +69,7 @@ class FileRanges:
         wrong = ""
         if comm.rank == 0:
             try:
-                stamps = Stamps.of([(self.file.path, None, self.file.stamp)])
-                replace_files({target: self._contents(moved, target)}, stamps)
+                self._replace(target, self._contents(moved, target))
             except GmsnetError as error:
                 wrong = str(error)
             finally:
@@ -74,6 +77,19 @@ class FileRanges:
         else:
             moved.serve()
         raise_everywhere(comm, wrong)
+
+    def _replace(self, target: str, contents: Iterator[Bytes]) -> None:
+        """On the first rank. target: of the file that names the one with these contents, where there are two."""
+        if self.index is None:
+            replace_files({target: contents}, Stamps.of([(self.file.path, None, self.file.stamp)]))
+            return
+        index, entry = self.index
+        stamps = Stamps.of([(each.path, None, each.stamp) for each in (index, self.file)])
+        text = bytes(index.read(0, index.size))
+        (key,) = links_of(entry, text)
+        given = {entry.suffixes[0]: Pieces(lambda: [text]), key: Pieces(lambda: contents)}
+        files, targets = placed(entry, given, target, stamps)
+        replace_files({path: files[each] for each, path in targets.items()}, stamps)
 
     def _brought(self, points: Floats, comm: Any) -> tuple[Ids, Floats]:
         """Of the rows that this rank keeps: the nodes that have moved on any rank, ascending, and where they are."""
@@ -156,9 +172,11 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
 
     The mesh is that of ``gmsnet.read``. Raises InputError, on all ranks, with what it says.
     """
-    file = everywhere(comm, lambda: Ranges(name))
-    agreed(comm, (file.stamp.size, file.stamp.modified), f"{name}: the file")
+    file, index = _opened(comm, name), None
     plan = comm.bcast(everywhere(comm, lambda: _planned(file, format) if comm.rank == 0 else None))
+    if plan.beside:
+        index = file, FORMATS[format]
+        file = _opened(comm, os.path.join(os.path.dirname(name), plan.beside))
     rows = np.array([plan.nodes * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
     first, last = rows[comm.rank : comm.rank + 2].tolist()
     read = everywhere(comm, lambda: _said(file, lambda: _blocks(file, plan, comm)))
@@ -183,9 +201,17 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     lonely = np.flatnonzero(~nodes.marked(comm, ids)) + nodes.rows[comm.rank]  # of no cell
     ids = np.sort(np.concatenate([ids, lonely]))
     points, fixed = (asked(comm, nodes.rows, mine, ids) for mine in (nodes.points, nodes.held))
-    everywhere(comm, file.check)
+    for each in [file] if index is None else [file, index[0]]:
+        everywhere(comm, each.check)
     piece = everywhere(comm, lambda: Piece(ids, points, fixed, tuple(blocks), plan.single, names))
-    return FileRanges(file, plan, piece, nodes.rows, zones)
+    return FileRanges(file, plan, piece, nodes.rows, zones, index)
+
+
+def _opened(comm: Any, name: str) -> Ranges:
+    """All ranks call it: a file that is the same for all."""
+    file = everywhere(comm, lambda: Ranges(name))
+    agreed(comm, (file.stamp.size, file.stamp.modified), f"{name}: the file")
+    return file
 
 
 def _nodes(file: Ranges, plan: Plan, rows: Ids, rank: int) -> Shared:

@@ -69,7 +69,8 @@ class Plan:
     nodes; those that are not 0 are to be held. encoded: where the rows of some points are not bytes of the file.
     images: (n, 2) tags of nodes and of those that they are images of; these are to be held, too. zones: (k + 1,) first
     nodes of zones; those of different zones that are at one place are one node. None where there is but one. names: of
-    regions and markers, see Mesh; None where only a reader of the whole can tell."""
+    regions and markers, see Mesh; None where only a reader of the whole can tell. beside: the name of the file in the
+    same folder that holds all numbers, where this one only tells of them."""
 
     points: Sequence[Column]
     blocks: Sequence[Sequence[Table]]
@@ -80,6 +81,7 @@ class Plan:
     images: NDArray[np.int64] = field(default_factory=lambda: NO_IMAGES)
     zones: Sequence[int] = ()
     names: Mapping[tuple[int, int], str] | None = field(default_factory=dict)
+    beside: str = ""
 
     @property
     def nodes(self) -> int:

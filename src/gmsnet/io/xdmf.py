@@ -16,16 +16,19 @@ from numpy.typing import NDArray
 
 from gmsnet.cells.table import nodes_of
 from gmsnet.errors import FormatError
+from gmsnet.io import xdmf_ranges
 from gmsnet.io.cell_table import check_range, table_blocks
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.hdf5 import File, Node
 from gmsnet.io.places import ranges
+from gmsnet.io.ranges import Plan
+from gmsnet.io.rows import Ranges
 from gmsnet.io.splice import Points, Slots, TextSlots
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.io.text import Text
 from gmsnet.io.xdmf_links import H5
-from gmsnet.io.xdmf_tags import MIXED, SHORT, TABLE, TYPES, Mark, Tags
+from gmsnet.io.xdmf_tags import MIXED, TABLE, TYPES, Mark, Tags, cell_word
 from gmsnet.io.xml_tree import Element, blame, check_plain, parse
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import combined, regions_of
@@ -126,6 +129,11 @@ def read(files: Mapping[str, Data]) -> Parsed:
     return Parsed(points, cells, slots, {}, fields[0], cell_data, single, unread, main="" if inside else H5)
 
 
+def plan(file: Ranges) -> Plan | None:
+    """See ``xdmf_ranges.plan``."""
+    return xdmf_ranges.plan(file)
+
+
 def _mark(items: Items, grid: Element, count: int) -> Mark | None:
     """The cells of a grid that includes the points of another one, and the number that each has; None for others."""
     if grid.of("Geometry") or not grid.of("include") or len(grid.of("Topology")) != 1:
@@ -171,9 +179,7 @@ def _geometry(items: Items, geometry: Element) -> tuple[Points, Slots, bool, boo
 
 def _topology(items: Items, topology: Element) -> tuple[Ints, Ints, Ints]:
     """The type and the number of nodes of each cell, and the nodes of all cells one after another."""
-    word = topology.get("TopologyType", "Type").lower().replace("_", "")
-    beginning = word.rstrip("0123456789")
-    word = SHORT.get(beginning, beginning) + word[len(beginning) :]
+    word = cell_word(topology)
     found = topology.of("DataItem")
     if len(found) != 1 or topology.get("BaseOffset", default="0").strip() != "0":
         blame(items.data, topology, f"{len(found)} items, or nodes that are not counted from 0, are not read")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS
 from gmsnet.io.cell_table import Kind, table_blocks
+from gmsnet.io.xml_tree import Element
 from gmsnet.mesh.cell_block import CellBlock
 
 Ints = NDArray[np.int64]
@@ -24,6 +25,13 @@ TYPES = {  # lower case, without underscores → its number in a list of mixed t
 SHORT = {"tri": "triangle", "quad": "quadrilateral", "tet": "tetrahedron", "hex": "hexahedron", "pyr": "pyramid"}
 MIXED = dict(TYPES.values())
 TABLE = {code: Kind(kind) for code, kind in MIXED.items()}
+
+
+def cell_word(topology: Element) -> str:
+    """The type of the cells of a topology, as in TYPES."""
+    word = topology.get("TopologyType", "Type").lower().replace("_", "")
+    beginning = word.rstrip("0123456789")
+    return SHORT.get(beginning, beginning) + word[len(beginning) :]
 
 
 class Mark(NamedTuple):

@@ -1,0 +1,151 @@
+"""XDMF whose numbers are in an HDF5 file beside it, of which a process reads and writes some only."""
+
+from __future__ import annotations
+
+import os
+
+from gmsnet.cells.table import CELLS, nodes_of
+from gmsnet.io.contents import Data
+from gmsnet.io.hdf5 import File, Node
+from gmsnet.io.hdf5_rows import numbers_of, rows_of, stored_points
+from gmsnet.io.ranges import Column, Plan, Table
+from gmsnet.io.rows import Listed, Ranges
+from gmsnet.io.vtk_runs import Field, told_by
+from gmsnet.io.xdmf_links import H5, links
+from gmsnet.io.xdmf_tags import TYPES, cell_word
+from gmsnet.io.xml_tree import Element, check_plain, parse
+
+_MOST = 1 << 22  # bytes of a text that only names numbers
+_AXES = {"XYZ": 3, "XY": 2, "X_Y_Z": 1, "X_Y": 1}  # type of a geometry → numbers in a row of each of its items
+_OF_ANY_SIZE = ("vertex", "line", "polygon")  # unless the text says of how many nodes
+
+
+class Numbers:
+    """The items of a text, as rows of the file beside it."""
+
+    def __init__(self, data: Data, file: Ranges, root: Node) -> None:
+        self.data, self.file, self._root = data, file, root
+
+    def node(self, item: Element) -> Node | None:
+        """The data set of an item; None where its numbers are elsewhere."""
+        if item.get("Format", default="XML") != "HDF" or item.get("Reference"):
+            return None
+        if item.get("ItemType", default="Uniform") != "Uniform":
+            return None
+        first, stop = check_plain(self.data, item)
+        path = bytes(self.data[first:stop]).decode("utf-8", "replace").strip().partition(":")[2]
+        node = self._root.get(path) if path else None
+        return node if node is not None and node.is_data and node.numeric() and _size(node) == _told(item) else None
+
+    def rows(self, item: Element, width: int) -> Listed | None:
+        """Its numbers, so many in a row; None where they do not fill rows."""
+        node = self.node(item)
+        found = None if node is None else numbers_of(node)
+        return None if found is None or found.rows % width else found.cut(0, found.rows // width, width, width)
+
+
+def _size(node: Node) -> int:
+    size = 1
+    for length in node.shape():
+        size *= length
+    return size
+
+
+def _told(item: Element) -> int:
+    words, size = item.get("Dimensions").split(), 1
+    for word in words:
+        size *= int(word) if word.isdigit() and len(word) < 16 else 0
+    return size if words else 0
+
+
+def plan(file: Ranges) -> Plan | None:
+    """How the numbers lie; None where some stand in the text, or where only a reader of the whole can tell."""
+    if file.size > _MOST:
+        return None
+    data = bytes(file.read(0, file.size))
+    name = links(data).get(H5)
+    if name is None:
+        return None
+    grids = list(parse(data, "Xdmf").all("Grid"))
+    with_points = [grid for grid in grids if grid.of("Geometry")]
+    if len(with_points) != 1 or len(with_points[0].of("Geometry")) != 1:
+        return None
+    (own,) = with_points
+    numbers = Ranges(os.path.join(os.path.dirname(file.path), name))
+    with File.opened(numbers.path) as opened:
+        others = [each for each in grids if each is not own]
+        return _planned(Numbers(data, numbers, opened.root), name, own, others)
+
+
+def _planned(numbers: Numbers, name: str, grid: Element, others: list[Element]) -> Plan | None:
+    """name: of the file with the numbers. grid: with points of its own."""
+    columns, main = _points(numbers, grid.of("Geometry")[0]), _cells(numbers, grid)
+    if not columns or main is None:
+        return None
+    kind, nodes = main
+    counts = (next(iter(columns.values())).rows.rows, nodes.rows)
+    told = told_by(numbers.file, _fields(numbers, grid, "Node"), _fields(numbers, grid, "Cell"), counts)
+    if told is None:
+        return None
+    blocks = [[Table(kind, nodes, 0, regions=told.regions)]]
+    for other in others:
+        if not other.of("include") or len(other.of("Topology")) != 1 or not other.of("Topology")[0].of("DataItem"):
+            continue  # no marks
+        table = _mark(numbers, other, CELLS[kind].dimension)
+        if table is None:
+            return None
+        blocks.append([table])
+    points = list(columns.values())
+    single = all(column.rows.dtype[1:] == "f4" for column in points)
+    return Plan(points, blocks, single, fixed=told.fixed, encoded=stored_points([columns]), beside=name)
+
+
+def _points(numbers: Numbers, geometry: Element) -> dict[str, Column]:
+    """Path of a data set → the coordinates in it; none where these cannot be told."""
+    how, items = geometry.get("GeometryType", "Type", default="XYZ").upper(), geometry.of("DataItem")
+    width, axes = _AXES.get(how, 0), len(how.replace("_", ""))
+    nodes = [numbers.node(item) for item in items]
+    found = [None if node is None else rows_of(node) for node in nodes]
+    columns = {
+        node.path: Column(rows, axis=axis) for axis, (node, rows) in enumerate(zip(nodes, found, strict=True))
+        if node is not None and rows is not None and rows.width == width and rows.dtype[1:] in ("f4", "f8")
+    }  # fmt: skip
+    counts = {column.rows.rows for column in columns.values()}
+    return columns if width and len(columns) == len(items) == axes // width and len(counts) == 1 else {}
+
+
+def _cells(numbers: Numbers, grid: Element) -> tuple[str, Listed] | None:
+    """The kind and the nodes of cells of one type."""
+    topologies = grid.of("Topology")
+    if len(topologies) != 1 or len(topologies[0].of("DataItem")) != 1:
+        return None
+    topology = topologies[0]
+    kind, given = TYPES.get(cell_word(topology), (0, ""))[1], topology.get("NodesPerElement", default="0").strip()
+    width = nodes_of(kind) if kind and kind not in _OF_ANY_SIZE else {"vertex": 1, "line": 2}.get(kind, 0)
+    if not width or (kind in _OF_ANY_SIZE and given not in ("0", str(width))):
+        return None
+    nodes = numbers.rows(topology.of("DataItem")[0], width)
+    plain = topology.get("BaseOffset", default="0").strip() == "0"
+    return (kind, nodes) if plain and nodes is not None and nodes.rows and nodes.dtype[1] in "iu" else None
+
+
+def _fields(numbers: Numbers, grid: Element, center: str) -> list[Field]:
+    """The data of nodes or cells. The last of one name counts, as in a reader of the whole."""
+    found = dict[str, Listed | None]()
+    for attribute in grid.of("Attribute"):
+        items = attribute.of("DataItem")
+        if attribute.get("Center", default="Node") == center and len(items) == 1:
+            node = numbers.node(items[0])
+            name = "".join(c for c in attribute.get("Name") if c.isprintable())
+            found[name] = None if node is None else rows_of(node)
+    return [Field(name, rows) for name, rows in found.items()]
+
+
+def _mark(numbers: Numbers, grid: Element, dimension: int) -> Table | None:
+    """Cells of fewer dimensions that another grid lists, each with its number; None for others."""
+    main = _cells(numbers, grid)
+    if main is None or CELLS[main[0]].dimension >= dimension:
+        return None
+    values = [field.rows for field in _fields(numbers, grid, "Cell")]
+    told = told_by(numbers.file, [], [Field("region", rows) for rows in values], (0, main[1].rows))
+    return None if told is None else Table(main[0], main[1], 0, regions=told.regions)
