@@ -230,6 +230,12 @@ def test_bad_files_are_refused_in_words(data: bytes, match: str) -> None:
     refused(vtk_format, data, match)
 
 
+@pytest.mark.parametrize("word", [f"vtktype{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)])
+def test_types_of_numbers_as_meshio_calls_them(word: str) -> None:
+    field = f"CELL_DATA 2\nFIELD FieldData 1\nmaterial 1 2 {word}\n1 2\n"
+    assert regions_of(read(vtk_format, mesh_with(CELLS, field)), "triangle") == [1, 2]
+
+
 def test_triangle_strips_of_polydata_are_refused() -> None:
     text = mesh_with("TRIANGLE_STRIPS 1 5\n4 0 1 2 3\n").replace(b"UNSTRUCTURED_GRID", b"POLYDATA")
     refused(vtk_format, text, "line 7: TRIANGLE_STRIPS are not supported")

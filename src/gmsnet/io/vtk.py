@@ -24,7 +24,7 @@ from gmsnet.io.places import Addresses, Lattice, Places, lists, pick
 from gmsnet.io.ranges import Plan
 from gmsnet.io.rows import Ranges
 from gmsnet.io.vtk_fields import attribute, field_arrays, keyword
-from gmsnet.io.vtk_stream import TYPES, Array, Line, Stream, opened, word_of
+from gmsnet.io.vtk_stream import OWN_TYPES, Array, Line, Stream, opened, word_of
 from gmsnet.kernels.text import text as kernels
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX
@@ -33,10 +33,7 @@ name = "VTK"
 suffixes: tuple[str, ...] = (".vtk",)
 
 LISTS = {"VERTICES": POLYVERTEX, "LINES": POLYLINE, "POLYGONS": POLYGON}
-TYPE_NAMES = {kind: called for called, kind in TYPES.items() if called not in ("vtkidtype", "signed_char")} | {
-    "i8": "long",
-    "u8": "unsigned_long",
-}
+TYPE_NAMES = {kind: called for called, kind in OWN_TYPES.items() if called not in ("vtkidtype", "signed_char")}
 
 
 @dataclass(frozen=True)

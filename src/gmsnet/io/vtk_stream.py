@@ -19,8 +19,10 @@ from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 TYPES = {
     "unsigned_char": "u1", "char": "i1", "signed_char": "i1", "unsigned_short": "u2", "short": "i2",
     "unsigned_int": "u4", "int": "i4", "unsigned_long": "u8", "long": "i8", "float": "f4", "double": "f8",
-    "vtkidtype": "i4", "vtktypeint64": "i8", "vtktypeuint64": "u8",
+    "vtkidtype": "i4",
 }  # fmt: skip
+OWN_TYPES = dict(TYPES)  # that VTK itself writes; meshio others, too
+TYPES |= {f"vtktype{kind}{8 * size}": f"{kind[0]}{size}" for kind in ("int", "uint") for size in (1, 2, 4, 8)}
 
 _HEAD = re.compile(
     rb"#\s*vtk\s+DataFile\s+Version\s+(\d+)\.\d+[^\r\n]*(?:\r\n?|\n)"
