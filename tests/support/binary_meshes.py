@@ -238,7 +238,7 @@ XDMF = """<?xml version="1.0"?>
 {cells}</DataItem></Topology>
 <Attribute Name="material" Center="Cell"><DataItem Dimensions="7" NumberType="Int" Format="XML">1 1 1 1 2 2 2</DataItem>
 </Attribute></Grid></Domain></Xdmf>
-""".replace(" []", "")
+"""
 
 
 def xdmf_topology() -> np.ndarray:
