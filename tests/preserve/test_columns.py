@@ -11,6 +11,7 @@ from gmsnet.generate import (
     layered_volume,
     o_grid_section,
     part_volume,
+    random_mesh,
     random_volume,
     swept_volume,
 )
@@ -147,3 +148,17 @@ def test_layers_are_told_on_the_untangled_mesh():
 def test_fix_layers_without_layers_says_so():
     result = gmsnet.smooth(lattice_volume(4), fix_layers=True)
     assert any("no stretched layers were found" in note for note in result.notes)
+
+
+@pytest.mark.parametrize(("rows", "growth"), [(4, 1.2), (5, 1.2), (8, 1.2)])
+def test_rows_from_wall_to_wall_grow_from_where_they_are_thin(rows, growth):
+    """Cells at the wall opposite are flat as well, but no columns that start there take nodes from the others."""
+    bottom = random_mesh(300, seed=1)
+    triangles, nodes = bottom.cells[0].nodes, len(bottom.points)
+    heights = 0.008 * np.concatenate([[0.0], np.cumsum(growth ** np.arange(rows))])
+    points = np.concatenate([np.column_stack([bottom.points, np.full(nodes, height)]) for height in heights])
+    wedges = np.concatenate([np.hstack([triangles + nodes * k, triangles + nodes * (k + 1)]) for k in range(rows)])
+    mesh = Mesh(points, (CellBlock("wedge", wedges, np.zeros(len(wedges), dtype=np.int64)),))
+    layers, free = found(mesh)
+    assert free.sum() > 200 * (rows - 1)
+    assert layers.nodes[free].mean() > 0.97

@@ -34,6 +34,7 @@ ALONG_WALL = 0.1  # of the squared length of the edges on a wall: what may lie a
 TURN = math.cos(math.radians(30.0))  # of a column from row to row
 HIGHER = 2.5  # times as high as the row before it: no row of the same layer
 LAST = 1.6  # the same for the last row
+AT_ONCE = 1.1  # times as high as the lowest next row are rows that grow together
 ROWS = 2  # nodes of a column above its wall
 FEWEST, SHARE = 12, 0.66  # columns beside one another; of the feet there
 GROWN = 1.25  # times as flat at the wall as at the end of the column, or as high there, in the median
@@ -125,27 +126,31 @@ def _grown(
     """The columns: (C, R) places from the foot on, −1 behind their ends; heights (C, R − 1); flatness of the last.
 
     And (C,) the node at the top of the last row, −1 where there is none, with the height of that row: cells above are
-    not flat any more, and so not all of those around that node. width: (C,) of cells at the feet.
+    not flat any more, and so not all of those around that node. width: (C,) of cells at the feet. The lowest rows come
+    first: so a layer that reaches from a wall to another one grows from where it is thin.
     """
     nodes, inner = len(points), topology.near_free & (np.diff(topology.start) > 0)
     at, normal, last = foot.copy(), normal.copy(), np.full(len(foot), np.nan)
     top, above = np.full(len(foot), -1, dtype=np.int32), np.zeros(len(foot))
     taken = np.zeros(nodes, dtype=bool)
     taken[foot] = True
-    columns, heights = [foot], list[Floats]()
-    before = np.full(len(foot), np.inf)
-    while (at >= 0).any():
-        front = np.full(nodes, -1, dtype=np.int32)
-        front[at[at >= 0]] = np.flatnonzero(at >= 0)
-        near = topology.near[connectivity.touching(topology.near, front >= 0)]
-        to, height = np.full(len(foot), -1, dtype=np.int32), np.full(len(foot), TURN)
-        kernels.next_in_columns(points, near, front, normal, inner, taken, to, height)
-        to[height > HIGHER * before] = -1
-        _, first = np.unique(to, return_index=True)  # two columns may not go on to one node
-        alone = np.zeros(len(to), dtype=bool)
-        alone[first] = True
-        to[~alone] = -1
-        ahead = np.flatnonzero(to >= 0)
+    rows, row = list[tuple[Ints, Ints, Ints, Floats]](), np.zeros(len(foot), dtype=np.int64)
+    before, stale = np.full(len(foot), np.inf), np.ones(len(foot), dtype=bool)
+    to, height = np.full(len(foot), -1, dtype=np.int32), np.zeros(len(foot))
+    while stale.any() or (to >= 0).any():
+        if stale.any():
+            front = np.full(nodes, -1, dtype=np.int32)
+            front[at[stale]] = np.flatnonzero(stale)
+            near = topology.near[connectivity.touching(topology.near, front >= 0)]
+            found, length = np.full(len(foot), -1, dtype=np.int32), np.full(len(foot), TURN)
+            kernels.next_in_columns(points, near, front, normal, inner, taken, found, length)
+            found[length > HIGHER * before] = -1
+            to[stale], height[stale] = found[stale], length[stale]
+        lowest = np.min(height, where=to >= 0, initial=np.inf)
+        step = np.flatnonzero((to >= 0) & (height <= AT_ONCE * lowest))
+        step = step[np.argsort(height[step], kind="stable")]
+        _, first = np.unique(to[step], return_index=True)  # two columns may not go on to one node
+        ahead, there = np.sort(step[first]), to.copy()
         mean = np.empty((len(ahead), kernels.MOMENTS))
         kernels.of_stars(points, to[ahead], topology.start, topology.local, topology.ring_start, topology.ring, mean)
         flatness, direction = _flat(mean, broad)
@@ -153,15 +158,20 @@ def _grown(
         going, ending = ahead[alike], ahead[~alike]
         low = (height <= LAST * before) & (height * STILL_FLAT <= width)
         top[ending] = np.where(low[ending], to[ending], -1)
-        above = np.where(to >= 0, height, above)
-        to[ending] = -1
+        above[ahead] = before[ahead] = height[ahead]
+        to[step] = -1
         last[going], normal[going] = flatness[alike], direction[alike]
-        before = np.where(to >= 0, height, before)
-        taken[to[going]] = True
-        columns.append(to)
-        heights.append(np.where(to >= 0, height, np.nan))
-        at = to
-    return np.stack(columns, axis=1), np.stack(heights, axis=1), last, top, above
+        at[going], taken[there[going]] = there[going], True
+        row[going] += 1
+        rows.append((going, row[going], there[going], height[going]))
+        stale = (to >= 0) & taken[to]
+        stale[going] = True
+    columns = np.full((len(foot), 1 + int(row.max(initial=0))), -1, dtype=np.int32)
+    heights = np.full((len(foot), columns.shape[1] - 1), np.nan)
+    columns[:, 0] = foot
+    for of, number, node, high in rows:
+        columns[of, number], heights[of, number - 1] = node, high
+    return columns, heights, last, top, above
 
 
 def _ended(columns: Ints, heights: Floats, top: Ints, above: Floats) -> tuple[Ints, Floats]:
