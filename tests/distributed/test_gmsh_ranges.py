@@ -22,7 +22,7 @@ from gmsnet.mesh.selection import images
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 from distributed.test_file_pieces import saved
 from distributed.test_file_ranges import assert_bytes_of_one_process, assert_read_alike, heard, mixed
-from support import gmsh_partitioned
+from support import gmsh_partitioned, gmsh_variants
 from support.comm import together
 from support.gmsh_binary import save, wild
 from support.gmsh_variants import VARIANTS
@@ -221,3 +221,11 @@ def test_no_rank_has_all_nodes(form, tmp_path: Path) -> None:
     pieces = together(4, lambda comm: read_ranges(str(path), "gmsh", comm).piece)
     assert max(len(piece.ids) for piece in pieces) < 0.5 * len(mesh.points)
     assert gmsnet.read(path).points.tobytes() == mesh.points.tobytes()
+
+
+def test_cells_that_may_be_listed_once_for_each_group_are_for_the_reader_of_the_whole(tmp_path: Path) -> None:
+    path = tmp_path / "a.msh"
+    path.write_bytes(gmsh_variants.old("<"))
+    assert planned_format(str(path), "gmsh") == "gmsh"
+    path.write_bytes(gmsh_variants.old("<", again=[(2, 4, *gmsh_variants.TRIANGLES[0][2:])]))
+    assert planned_format(str(path), "gmsh") == ""

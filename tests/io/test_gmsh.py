@@ -87,6 +87,17 @@ def test_files_of_meshio(file_format: str, binary: bool, tmp_path: Path) -> None
     check_all_cuts_refused(gmsh, data, most=80)
 
 
+@pytest.mark.parametrize(("order", "follow"), [("", False), ("<", False), (">", True)])
+def test_a_cell_that_is_listed_once_for_each_of_its_groups_is_one(order: str, follow: bool) -> None:
+    """As Gmsh writes version 2.2. A cell that is twice in one group, or with its nodes in another order, stays."""
+    again = [(2, 4, *cell[2:]) for cell in gmsh_variants.TRIANGLES[:2]]
+    again += [gmsh_variants.TRIANGLES[4], (2, 9, 22, (3, 4, 2))]
+    parsed = read(gmsh, data := gmsh_variants.old(order, follow=follow, again=again))
+    assert regions_of(parsed, "triangle") == [10, 10, 4, 4, 0, 0, 9]
+    assert parsed.region_names[2, 10] == "steel + air"
+    check_splice(gmsh, data)
+
+
 def test_several_physical_groups_make_a_region_of_their_own() -> None:
     for order in ("", "<"):
         parsed = read(gmsh, gmsh_variants.new(order, groups={22: [3, 4], 23: [4, 3]}))

@@ -41,8 +41,11 @@ def _head(out: Out, version: str) -> None:
     out.close("MeshFormat")
 
 
-def old(order: str = "", tags: Sequence[int] = TAGS, follow: bool = False) -> bytes:
-    """Version 2.2. order: '<' or '>' for binary; follow: whether elements of one kind share a head (binary)."""
+def old(
+    order: str = "", tags: Sequence[int] = TAGS, follow: bool = False, again: Sequence[tuple[object, ...]] = ()
+) -> bytes:
+    """Version 2.2. order: '<' or '>' for binary; follow: whether elements of one kind share a head (binary). again:
+    triangles that follow the others."""
     out = Out(order)
     _head(out, "2.2")
     out.parts.append(NAMES)
@@ -51,7 +54,7 @@ def old(order: str = "", tags: Sequence[int] = TAGS, follow: bool = False) -> by
         out.put("i", tag, end=" ")
         out.put("d", *point)
     out.close("Nodes")
-    groups = [POINT, LINES, TRIANGLES]
+    groups = [POINT, LINES, [*TRIANGLES, *again]]
     out.text(f"$Elements\n{sum(map(len, groups))}\n")
     number = 0
     for group in groups:

@@ -13,7 +13,7 @@ from gmsnet.cells.table import CELLS
 from gmsnet.distributed.agreement import everywhere
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.piece import Piece
-from gmsnet.mesh.mesh import marker_name
+from gmsnet.mesh.mesh import marker_names
 
 # What is named in a mesh of so many nodes with such markers: markers and ids. Raises InputError.
 Chosen = Callable[[int, Collection[str]], Sequence[str | NDArray[np.int64]]]
@@ -44,7 +44,6 @@ def _markers(piece: Piece, comm: Any) -> dict[str, list[tuple[int, int]]]:
     for number, (block, regions) in enumerate(zip(piece.blocks, zip(*every, strict=True), strict=True)):
         dimension = CELLS[block.kind].dimension if block.kind in CELLS else None
         for region in sorted({each for some in regions for each in some}):
-            name = marker_name(piece.names, dimension, region)
-            if name is not None:
+            for name in marker_names(piece.names, dimension, region):
                 found.setdefault(name, []).append((number, region))
     return found

@@ -24,6 +24,7 @@ from gmsnet.io.gmsh_cursor import Cursor, opened, show
 from gmsnet.io.gmsh_entities import (
     ghost_marks,
     group_numbers,
+    listed_once,
     merge_groups,
     read_entities,
     read_names,
@@ -120,14 +121,17 @@ def _assemble(found: Contents, nodes: Nodes, elements: Elements) -> Parsed:
         where, named = int(elements.at[unknown]), elements.nodes[unknown]
         elements.words.fail(where, f"an element names the node {named}, which is not in $Nodes")
     names = merge_groups(found, elements)
-    regions = elements.physical
-    if regions is None:
+    once = np.ones(len(elements.codes), dtype=bool)
+    if elements.physical is None:
         regions = group_numbers(found, elements, names)
+    else:
+        once, regions = listed_once(elements, names)
     unread = _unread(found, nodes, elements, regions)
     kept, between = without_interfaces(found, elements)
+    kept &= once
     codes, sizes = elements.codes, elements.sizes
     marks = ghost_marks(found, elements)
-    if between:
+    if not kept.all():
         codes, regions, place, sizes = codes[kept], regions[kept], place[np.repeat(kept, sizes)], sizes[kept]
         marks = {key: values[kept] for key, values in marks.items()}
     cells, cell_data = table_blocks(KINDS, codes, sizes, place, regions, marks)

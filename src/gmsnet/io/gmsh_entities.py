@@ -8,6 +8,8 @@ adds the cells of other partitions that touch those of a file (Mesh.PartitionCre
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,10 @@ from gmsnet.io.gmsh_cursor import Cursor
 from gmsnet.io.gmsh_sections import KINDS, SIZES, Contents, Elements
 from gmsnet.io.vtk_ghosts import DUPLICATE, TYPES
 from gmsnet.io.words import Words
+from gmsnet.mesh.mesh import SEVERAL as BETWEEN
+
+Ints = NDArray[np.int64]
+SEVERAL = BETWEEN[0]  # between the names of groups
 
 # What Gmsh calls the part of a physical group in a partition, or between several.
 PART = re.compile(r"_part\{(\d+(?:,\d+)*)\}_physical\{(\d{1,18})\}_dim\{[0-3]\}")
@@ -118,15 +124,72 @@ def group_numbers(found: Contents, elements: Elements, names: dict[tuple[int, in
     assert elements.number is not None
     entities, which = np.unique(elements.entity, axis=0, return_inverse=True)
     groups = [found.physical.get((dim, tag), ()) for dim, tag in entities.tolist()]
-    tags = [abs(tag) for group in found.physical.values() for tag in group] + [abs(tag) for _, tag in names]
-    combined = sorted({group for group in groups if len(group) > 1})
-    last = max(tags, default=0)
-    if combined and last >= MOST_TAG:
-        raise FormatError(f"the physical tag {last} is larger than those that Gmsh has, of 32 bits")
-    number = {group: 1 + last + k for k, group in enumerate(combined)}
-    for (dim, _), group in zip(entities.tolist(), groups, strict=True):
-        if group in number:
-            parts = [names.get((dim, abs(tag)), str(tag)) for tag in group]
-            names[dim, number[group]] = " + ".join(parts)
+    tags = [abs(tag) for group in found.physical.values() for tag in group]
+    number = _combined(zip(entities[:, 0].tolist(), groups, strict=True), tags, names)
     numbers = [number.get(group, group[0] if group else 0) for group in groups]
     return np.repeat(np.array(numbers, dtype=np.int64)[which.reshape(-1)], elements.number)
+
+
+def _combined(
+    groups: Iterable[tuple[int, tuple[int, ...]]], tags: Iterable[int], names: dict[tuple[int, int], str]
+) -> dict[tuple[int, ...], int]:
+    """A number for each combination of several groups, of a dimension each, and its name. tags: in use."""
+    several = {(dim, group) for dim, group in groups if len(group) > 1}
+    last = max([*map(abs, tags), *(abs(tag) for _, tag in names)], default=0)
+    if several and last >= MOST_TAG:
+        raise FormatError(f"the physical tag {last} is larger than those that Gmsh has, of 32 bits")
+    number = {group: 1 + last + k for k, group in enumerate(sorted({group for _, group in several}))}
+    for dim, group in several:
+        names[dim, number[group]] = SEVERAL.join(names.get((dim, abs(tag)), str(tag)) for tag in group)
+    return number
+
+
+def entities_in_several(codes: NDArray[np.int8], geometrical: Ints, physical: Ints) -> set[tuple[int, int]]:
+    """The entities of version 2.2, dimension and tag each, that are in several physical groups. (n,) of elements."""
+    keys = np.column_stack([_DIMENSIONS[codes], geometrical, physical])
+    new = np.ones(len(keys), dtype=bool)
+    new[1:] = (keys[1:] != keys[:-1]).any(axis=1)  # elements of an entity follow each other
+    counts = Counter((dim, tag) for dim, tag, _ in {tuple(row) for row in keys[new].tolist()})
+    return {key for key, count in counts.items() if count > 1}
+
+
+def _repeated(nodes: Ints) -> NDArray[np.bool_]:
+    """(n,) which of the rows (n, k) may be there more than once: all that are, and few others."""
+    factors = np.array([pow(0x9E3779B97F4A7C15, 1 + k, 2**64) for k in range(nodes.shape[1])], dtype=np.uint64)
+    mixed = (nodes.astype(np.uint64) * factors).sum(axis=1)
+    _, which, counts = np.unique(mixed, return_inverse=True, return_counts=True)
+    return np.asarray(counts[which.reshape(-1)] > 1)
+
+
+def listed_once(elements: Elements, names: dict[tuple[int, int], str]) -> tuple[NDArray[np.bool_], Ints]:
+    """Of elements of version 2.2 (n,): which are the first of the same cell, and the number of their groups.
+
+    Gmsh writes a cell of several physical groups once for each of them. Cells that are twice in one group stay.
+    """
+    physical, geometrical, codes = elements.physical, elements.geometrical, elements.codes
+    assert physical is not None
+    assert geometrical is not None
+    kept, tags = np.ones(len(codes), dtype=bool), physical.copy()
+    several = entities_in_several(codes, geometrical, physical)
+    if not several:
+        return kept, tags
+    dims = _DIMENSIONS[codes]
+    some = np.zeros(len(codes), dtype=bool)
+    for dim, tag in several:
+        some |= (dims == dim) & (geometrical == tag)
+    starts, groups = np.cumsum(elements.sizes) - elements.sizes, dict[int, tuple[int, ...]]()
+    for code in np.unique(codes[some]).tolist():
+        own = np.flatnonzero(some & (codes == code))
+        nodes = elements.nodes[starts[own][:, None] + np.arange(SIZES[code])]
+        twice = _repeated(nodes)
+        own, nodes = own[twice], nodes[twice]
+        _, first, cell = np.unique(nodes, axis=0, return_index=True, return_inverse=True)
+        for row, one in zip(own.tolist(), own[first[cell.reshape(-1)]].tolist(), strict=True):
+            known = groups.setdefault(one, (int(physical[one]),))
+            if physical[row] not in known:
+                groups[one] = (*known, int(physical[row]))
+                kept[row] = False
+    number = _combined(((int(dims[one]), group) for one, group in groups.items()), physical.tolist(), names)
+    for one, group in groups.items():
+        tags[one] = number.get(group, tags[one])
+    return kept, tags

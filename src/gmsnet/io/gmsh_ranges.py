@@ -13,6 +13,7 @@ from gmsnet.io import gmsh_sections as sections
 from gmsnet.io.gmsh_cursor import BEGIN, Cursor, opened
 from gmsnet.io.gmsh_entities import (
     PART,
+    entities_in_several,
     ghost_marks,
     group_numbers,
     merge_groups,
@@ -111,7 +112,7 @@ def plan(file: Ranges) -> Plan | None:
             runs = list(itertools.islice(sections.element_runs(words, count), MOST))
             if sum(rows.rows for _, _, rows in runs) < count:
                 return None
-            tables = partial(_old_tables, found, runs, order)
+            tables = partial(_old_tables, found, runs, order, file)
         else:
             tables = partial(_new_tables, found, words, *sections.element_blocks(words))
         cursor.close(name, words)
@@ -130,9 +131,14 @@ def _old_nodes(words: RangeWords, count: int) -> tuple[list[Lattice], list[Latti
     return [tags], [points]
 
 
-def _old_tables(found: Contents, runs: Sequence[tuple[int, int, Lattice]], order: str) -> list[Table] | None:
-    """Cells of version 2.2; None where partitioning may have changed the groups, or added elements."""
+def _old_tables(
+    found: Contents, runs: Sequence[tuple[int, int, Lattice]], order: str, file: Ranges
+) -> list[Table] | None:
+    """Cells of version 2.2; None where partitioning may have changed the groups, or added elements, or where cells may
+    be listed once for each of several groups."""
     if any(map(PART.fullmatch, found.names.values())) or any(tags >= PARTITIONED for _, tags, _ in runs):
+        return None
+    if _has_several_groups(runs, order, file):
         return None
     tables, whole = list[Table](), f"{order}i4"
     for code, tags, rows in runs:
@@ -140,6 +146,19 @@ def _old_tables(found: Contents, runs: Sequence[tuple[int, int, Lattice]], order
         groups = Rows(rows.start + 4, rows.rows, rows.stride, whole) if tags else None
         tables.append(Table(KINDS[code].name, nodes, 0, KINDS[code].order, 0, groups))
     return tables
+
+
+def _has_several_groups(runs: Sequence[tuple[int, int, Lattice]], order: str, file: Ranges) -> bool:
+    """Whether elements of an entity are in several groups; some are looked at at a time."""
+    known: list[NDArray[np.int64]] = [np.empty((0, 3), dtype=np.int64)]
+    for code, tags, rows in runs:
+        both = Rows(rows.start + 4, rows.rows, rows.stride, f"{order}i4", 2)
+        step = max(1, AT_ONCE // rows.stride)
+        for begin in range(0, rows.rows if tags > 1 else 0, step):
+            found = np.unique(both.of(file, begin, min(begin + step, rows.rows)).astype(np.int64), axis=0)
+            known.append(np.column_stack([np.full(len(found), code), found]))
+    code, physical, geometrical = np.unique(np.concatenate(known), axis=0).T
+    return bool(entities_in_several(code.astype(np.int8), geometrical, physical))
 
 
 def _new_tables(

@@ -45,7 +45,8 @@ class Elements:
     """Elements one after another. nodes: tags, those of an element behind those of the one before; at: their addresses.
 
     entity: (blocks, 2) dimension and tag of the entity of each block, and number: (blocks,) of its elements (of version
-    4.1). physical: (n,) the physical tag of each, and partitioned: (n,) whether it names a partition (of version 2.2).
+    4.1). physical: (n,) the physical tag of each, geometrical: (n,) that of its entity, partitioned: (n,) whether it
+    names a partition (of version 2.2). Tags that are not there are 0.
     """
 
     codes: NDArray[np.int8]
@@ -55,6 +56,7 @@ class Elements:
     entity: NDArray[np.int64] | None = None
     number: NDArray[np.int64] | None = None
     physical: NDArray[np.int64] | None = None
+    geometrical: NDArray[np.int64] | None = None
     partitioned: NDArray[np.bool_] | None = None
 
     @property
@@ -199,7 +201,8 @@ def elements_old(words: Words, total: int) -> Elements:
     """Elements of version 2.2: in a text rows of tag, type, number of tags, tags, nodes; in a binary file blocks."""
     if isinstance(words, ByteWords):
         return _elements_of_bytes(words, total)
-    codes, physical, parted, nodes, places, found, most = [], [], [], [], list[Addresses](), 0, _TOGETHER
+    codes, parted, nodes, places, found, most = [], [], [], list[Addresses](), 0, _TOGETHER
+    physical, geometrical = list[NDArray[np.int64]](), list[NDArray[np.int64]]()
     while found < total:
         start = words.at
         values = words.values(Places(Lattice(start, min(most, words.end - start), 1)), "i4")
@@ -215,14 +218,15 @@ def elements_old(words: Words, total: int) -> Elements:
         tags, sizes = values[first + 2], SIZES[code].astype(np.int64)
         at = lists(first, 3 + tags + sizes, 3 + tags, sizes)
         codes.append(code)
-        physical.append(np.where(tags > 0, values[np.minimum(first + 3, len(values) - 1)], 0))
+        for tag, given in enumerate((physical, geometrical)):
+            given.append(np.where(tags > tag, values[np.minimum(first + 3 + tag, len(values) - 1)], 0))
         parted.append(tags >= PARTITIONED)
         nodes.append(pick(values, at))
         places.append(shifted(at, start))
         words.at, found = start + end, found + count
     return Elements(
         joined(codes, np.int8), joined(nodes), chained(places), words,
-        physical=joined(physical), partitioned=joined(parted, np.bool_),
+        physical=joined(physical), geometrical=joined(geometrical), partitioned=joined(parted, np.bool_),
     )  # fmt: skip
 
 
@@ -237,19 +241,22 @@ def _blame(words: Words, values: NDArray[np.int64], found: int, total: int) -> N
 
 def _elements_of_bytes(words: ByteWords, total: int) -> Elements:
     """Elements of version 2.2 in a binary file."""
-    codes, physical, parted, places = [], [], [], []
+    codes, parted, places = [], [], []
+    physical, geometrical = list[NDArray[np.int64]](), list[NDArray[np.int64]]()
     for code, tags, rows in element_runs(words, total):
         number, size = rows.rows, node_count(words, rows.start, code)
         codes.append(np.full(number, code, dtype=np.int8))
-        physical.append(words.values(Places(Lattice(rows.start + 4, number if tags else 0, rows.stride)), "i4"))
-        physical.append(np.zeros(0 if tags else number, dtype=np.int64))
+        for tag, given in enumerate((physical, geometrical)):
+            there = number if tags > tag else 0
+            given.append(words.values(Places(Lattice(rows.start + 4 * (1 + tag), there, rows.stride)), "i4"))
+            given.append(np.zeros(number - there, dtype=np.int64))
         parted.append(np.full(number, tags >= PARTITIONED))
         columns = tuple(4 * (1 + tags + k) for k in range(size))
         places.append(Lattice(rows.start, number, rows.stride, columns))
     at_nodes = Places(*places)
     return Elements(
         joined(codes, np.int8), words.values(at_nodes, "i4"), at_nodes, words,
-        physical=joined(physical), partitioned=joined(parted, np.bool_),
+        physical=joined(physical), geometrical=joined(geometrical), partitioned=joined(parted, np.bool_),
     )  # fmt: skip
 
 

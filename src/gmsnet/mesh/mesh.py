@@ -235,23 +235,31 @@ class Mesh:
     def markers(self) -> dict[str, NDArray[np.int64]]:
         """Name of each marker, region and node set → its node ids.
 
-        A marker of lines or vertices without a name goes by its number; regions of faces and volumes need a name.
+        A marker of lines or vertices without a name goes by its number; regions of faces and volumes need a name. Cells
+        in several groups, a region "a + b", are in "a" and in "b" as well.
         """
         nodes: dict[str, list[NDArray[np.int64]]] = {name: [ids] for name, ids in self.node_sets.items()}
         for block in self.cells:
             for region in np.unique(block.regions).tolist():
-                name = marker_name(self.region_names, block.dimension, region)
-                if name is not None:
+                for name in marker_names(self.region_names, block.dimension, region):
                     nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
         return {name: np.unique(np.concatenate(ids)) for name, ids in nodes.items()}
 
 
-def marker_name(names: Mapping[tuple[int, int], str], dimension: int | None, region: int) -> str | None:
-    """By which a region of cells goes as a marker. names: see Mesh. None where it has none: most often 0, the region of
-    all cells, to hold which would be to hold the whole mesh."""
+SEVERAL = (" + ", ", ")  # between the names of a region whose cells are in several groups: of Gmsh, and of MED
+
+
+def marker_names(names: Mapping[tuple[int, int], str], dimension: int | None, region: int) -> list[str]:
+    """By which a region of cells goes as a marker, and as a part of one. names: see Mesh.
+
+    None where it has none: most often 0, the region of all cells, to hold which would be to hold the whole mesh.
+    """
     if dimension is None:
-        return None
-    return names.get((dimension, region), str(region) if dimension in (0, 1) else None)
+        return []
+    if (whole := names.get((dimension, region))) is None:
+        return [str(region)] if dimension in (0, 1) else []
+    parts = next((whole.split(between) for between in SEVERAL if between in whole), [])
+    return list(dict.fromkeys([whole, *parts]))
 
 
 def counts(mesh: Mesh) -> str:
