@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from support.tangles import grid, mesh_of, moved, untangled
 
+import gmsnet
+from gmsnet.generate import block_volume
 from gmsnet.topology.topology import Topology
 from gmsnet.untangle.reasons import CROSSING, EMPTY, HELD, kernel_depth
+from gmsnet.untangle.result import CORNER_HELD
 
 
 def test_a_cell_whose_nodes_are_all_held():
@@ -57,3 +60,14 @@ def test_all_held():
     result, _, _, _ = untangled(mesh, Topology.of(mesh, np.ones(25, dtype=bool)))
     assert result.after == result.before == len(result.unmended) > 0
     assert {row.reason for row in result.unmended} == {HELD}
+
+
+def test_a_corner_that_is_held_is_told_from_a_cell_that_is():
+    """Of a hexahedron with free nodes, where those of an inverted corner may not move."""
+    mesh = block_volume(3)
+    points = mesh.points.copy()
+    corner = np.flatnonzero((points == points.min(axis=0)).all(axis=1))[0]
+    points[corner] += 0.45  # beyond the first node inside
+    result = gmsnet.smooth(mesh.with_points(points))
+    assert CORNER_HELD in {cell.reason for cell in result.unmended}
+    assert HELD not in {cell.reason for cell in result.unmended}

@@ -21,6 +21,7 @@ from gmsnet.run.result import Result, free_nodes
 from gmsnet.run.sweep import Sweep
 
 UNKNOWN = "not untangled, or untangling was off"
+NO_AREA = "it has no area, and facets in space are not untangled: two of its corners are at one place, or all in a line"
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +134,9 @@ class Account:
         after = self.result.after
         rows = np.flatnonzero(~after.valid)
         why = {cell.cell: cell.reason for cell in self.result.unmended}
+        other = NO_AREA if self.mesh.plane is None and not self.mesh.has_volumes else UNKNOWN
         first = [
-            f"cell {cell} at {' '.join(f'{value:.6g}' for value in centre)}: {why.get(cell, UNKNOWN)}"
+            f"cell {cell} at {' '.join(f'{value:.6g}' for value in centre)}: {why.get(cell, other)}"
             for cell, centre in zip(after.cell[rows].tolist(), after.centre[rows].tolist(), strict=True)
         ][:NAMED]
         more = f"; and {len(rows) - len(first):,} more" if len(rows) > len(first) else ""

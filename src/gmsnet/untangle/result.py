@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 ALL, PART, NOTHING = "all", "part", "nothing"
 HELD = "all its nodes are held"
+CORNER_HELD = "a corner of it is held with the nodes beside it"
 
 
 class UntanglingStep(NamedTuple):

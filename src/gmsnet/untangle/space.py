@@ -20,7 +20,7 @@ from gmsnet.measure.volumes import exact_signs3
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume
 from gmsnet.untangle.reach import Reach
-from gmsnet.untangle.result import ALL, HELD, NOTHING, PART, StillInverted, Untangled, UntanglingStep
+from gmsnet.untangle.result import ALL, CORNER_HELD, HELD, NOTHING, PART, StillInverted, Untangled, UntanglingStep
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -252,13 +252,16 @@ def untangle_volume(
         why = "no cell was untangled"
     taken = NOTHING if not moved else PART if attempt.left else ALL
     left = np.flatnonzero(attempt.bad)
-    held: list[bool] = np.all(~topology.near_free[topology.near[left]], axis=1).tolist()
-    sweeps = sum(step.sweeps for step in steps)
+    simplices, sweeps = topology.simplices, sum(step.sweeps for step in steps)
+    corners = whole = topology.near[left]
+    if simplices.solids is not None and simplices.cells is not None:
+        whole = simplices.solids.nodes[simplices.cells[left]]
+    fixed, corner = (np.all(~topology.near_free[nodes], axis=1) for nodes in (whole, corners))
+    reasons = np.where(fixed, HELD, np.where(corner, CORNER_HELD, f"not untangled within {sweeps} sweeps"))
     unmended = tuple(
-        StillInverted(int(row), HELD if alone else f"not untangled within {sweeps} sweeps", (float(x), float(y)))
-        for row, alone, (x, y) in zip(
-            left, held,
-            attempt.points[topology.near[left]].mean(axis=1)[:, :2], strict=True,
+        StillInverted(int(row), reason, (float(x), float(y))) for row, reason, (x, y) in zip(
+            left, reasons.tolist(),
+            attempt.points[corners].mean(axis=1)[:, :2], strict=True,
         )
     )  # fmt: skip
     made = tuple(step for step in steps if step.nodes)
