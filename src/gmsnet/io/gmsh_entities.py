@@ -21,10 +21,9 @@ from gmsnet.io.gmsh_cursor import Cursor
 from gmsnet.io.gmsh_sections import KINDS, SIZES, Contents, Elements
 from gmsnet.io.vtk_ghosts import DUPLICATE, TYPES
 from gmsnet.io.words import Words
-from gmsnet.mesh.mesh import SEVERAL as BETWEEN
+from gmsnet.mesh.mesh import SEVERAL
 
 Ints = NDArray[np.int64]
-SEVERAL = BETWEEN[0]  # between the names of groups
 
 # What Gmsh calls the part of a physical group in a partition, or between several.
 PART = re.compile(r"_part\{(\d+(?:,\d+)*)\}_physical\{(\d{1,18})\}_dim\{[0-3]\}")
@@ -140,7 +139,7 @@ def _combined(
         raise FormatError(f"the physical tag {last} is larger than those that Gmsh has, of 32 bits")
     number = {group: 1 + last + k for k, group in enumerate(sorted({group for _, group in several}))}
     for dim, group in several:
-        names[dim, number[group]] = SEVERAL.join(names.get((dim, abs(tag)), str(tag)) for tag in group)
+        names[dim, number[group]] = SEVERAL[0].join(names.get((dim, abs(tag)), str(tag)) for tag in group)
     return number
 
 

@@ -22,7 +22,7 @@ from gmsnet.io.ranges import Plan
 from gmsnet.io.rows import Ranges
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.mesh.cell_block import CellBlock
-from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.mesh import SEVERAL, Mesh
 
 name = "MED"
 suffixes: tuple[str, ...] = (".med",)
@@ -108,7 +108,7 @@ def _groups(families: Node | None) -> dict[int, str]:
             if isinstance(number, (int, np.integer)) and names is not None:
                 rows = names.array("iuS")
                 texts = [row.tobytes().split(b"\0")[0].decode("utf-8", "replace").strip() for row in rows]
-                found[int(number)] = ", ".join("".join(c for c in text if c.isprintable()) for text in texts)
+                found[int(number)] = SEVERAL[1].join("".join(c for c in text if c.isprintable()) for text in texts)
     return found
 
 
