@@ -252,7 +252,7 @@ SEVERAL = (" + ", ", ")  # between the names of a region whose cells are in seve
 def marker_names(names: Mapping[tuple[int, int], str], dimension: int | None, region: int) -> list[str]:
     """By which a region of cells goes as a marker, and as a part of one. names: see Mesh.
 
-    None where it has none: most often 0, the region of all cells, to hold which would be to hold the whole mesh.
+    Empty where it has no name: most often 0, the region of all cells, to hold which would be to hold the whole mesh.
     """
     if dimension is None:
         return []
