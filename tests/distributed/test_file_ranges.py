@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.distributed import file_ranges
+from gmsnet.distributed import file_ranges, moved
 from gmsnet.distributed.file_ranges import planned_format, read_ranges
 from gmsnet.distributed.file_run import FileTask, smooth_file
 from gmsnet.distributed.gathered import gathered
@@ -342,7 +342,7 @@ def test_the_first_rank_asks_for_few_nodes_at_a_time(window: int, tmp_path: Path
     path, shared = save_vtkhdf(mixed(), tmp_path / "a.vtkhdf"), tmp_path / "shared.vtkhdf"
     gmsnet.write(gmsnet.smooth(gmsnet.read(path), "barrier", max_sweeps=4).mesh, tmp_path / "serial.vtkhdf")
     monkeypatch.setattr(file_ranges, "AT_ONCE", 240)
-    monkeypatch.setattr(file_ranges, "WINDOW", window)
+    monkeypatch.setattr(moved, "WINDOW", window)
     options = SmoothOptions(method="barrier", max_sweeps=4, threads=1)
     together(3, lambda comm: smooth_file(FileTask(str(path), str(shared), "vtkhdf", options), comm))
     assert shared.read_bytes() == (tmp_path / "serial.vtkhdf").read_bytes() != path.read_bytes()

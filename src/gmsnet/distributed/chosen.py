@@ -13,7 +13,7 @@ from gmsnet.cells.table import CELLS
 from gmsnet.distributed.agreement import everywhere
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.piece import Piece
-from gmsnet.mesh.mesh import marker_names
+from gmsnet.mesh.markers import marker_names
 
 # What is named in a mesh of so many nodes with such markers: markers and ids. Raises InputError.
 Chosen = Callable[[int, Collection[str]], Sequence[str | NDArray[np.int64]]]

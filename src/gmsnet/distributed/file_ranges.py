@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gmsnet.distributed.agreement import agreed, everywhere, raise_everywhere
 from gmsnet.distributed.by_rank import by_rank
+from gmsnet.distributed.moved import Moved
 from gmsnet.distributed.partition import along_curve
 from gmsnet.distributed.piece import Cells, Piece
 from gmsnet.distributed.tags import nodes_of
@@ -35,7 +36,6 @@ PLANNED = ("cgns", "exodus", "gmsh", "med", "ply", "stl", "ugrid", "vtk", "vtkhd
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
 Value = TypeVar("Value")
-WINDOW = 1 << 17  # nodes that the first rank asks for at a time
 
 
 def plan_of(file: Ranges, format: str) -> Plan | None:
@@ -127,44 +127,6 @@ class FileRanges:
         values = rows.in_bytes(data, end - begin)
         put(values, moved.between, column.first + begin, column.axis)
         return bytes(data)
-
-
-class Moved:
-    """The nodes that have moved, ascending, and where they are: each rank has those of the rows that it keeps."""
-
-    def __init__(self, comm: Any, rows: Ids, ids: Ids, points: Floats) -> None:
-        self._comm, self._rows, self._own = comm, rows, (ids, points)
-        self._known: tuple[int, int, Ids, Floats] = (0, 0, ids[:0], points[:0])  # nodes from, to, which were asked for
-
-    def between(self, begin: int, end: int) -> Iterator[tuple[Ids, Floats]]:
-        """On the first rank, while the others serve: those of a range of nodes, in parts."""
-        while begin < end:
-            if not self._known[0] <= begin < self._known[1]:
-                home = int(np.searchsorted(self._rows, begin, side="right")) - 1
-                stop = min(begin + WINDOW, int(self._rows[home + 1]))
-                self._known = (begin, stop, *self._of(home, begin, stop))
-            _, stop, ids, points = self._known
-            first, last = np.searchsorted(ids, [begin, end])
-            yield ids[first:last], points[first:last]
-            begin = stop
-
-    def _of(self, rank: int, begin: int, end: int) -> tuple[Ids, Floats]:
-        if rank == self._comm.rank:
-            first, last = np.searchsorted(self._own[0], [begin, end])
-            return self._own[0][first:last], self._own[1][first:last]
-        self._comm.send((begin, end), rank)
-        found: tuple[Ids, Floats] = self._comm.recv(source=rank)
-        return found
-
-    def serve(self) -> None:
-        """Answers the first rank until it ends."""
-        while (asked := self._comm.recv(source=0)) is not None:
-            self._comm.send(self._of(self._comm.rank, *asked), 0)
-
-    def end(self) -> None:
-        """Lets the other ranks go on."""
-        for rank in range(1, self._comm.size):
-            self._comm.send(None, rank)
 
 
 def read_ranges(name: str, format: str, comm: Any) -> FileRanges:

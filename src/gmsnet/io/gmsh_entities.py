@@ -21,7 +21,7 @@ from gmsnet.io.gmsh_cursor import Cursor
 from gmsnet.io.gmsh_sections import KINDS, SIZES, Contents, Elements
 from gmsnet.io.vtk_ghosts import DUPLICATE, TYPES
 from gmsnet.io.words import Words
-from gmsnet.mesh.mesh import SEVERAL
+from gmsnet.mesh.markers import SEVERAL
 
 Ints = NDArray[np.int64]
 
@@ -143,12 +143,17 @@ def _combined(
     return number
 
 
+def changes(rows: Ints) -> Ints:
+    """Those of the rows (n, k) that differ from the one before: elements of an entity follow each other."""
+    new = np.ones(len(rows), dtype=bool)
+    new[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+    return rows[new]
+
+
 def entities_in_several(codes: NDArray[np.int8], geometrical: Ints, physical: Ints) -> set[tuple[int, int]]:
     """The entities of version 2.2, dimension and tag each, that are in several physical groups. (n,) of elements."""
-    keys = np.column_stack([_DIMENSIONS[codes], geometrical, physical])
-    new = np.ones(len(keys), dtype=bool)
-    new[1:] = (keys[1:] != keys[:-1]).any(axis=1)  # elements of an entity follow each other
-    counts = Counter((dim, tag) for dim, tag, _ in {tuple(row) for row in keys[new].tolist()})
+    keys = changes(np.column_stack([_DIMENSIONS[codes], geometrical, physical]))
+    counts = Counter((dim, tag) for dim, tag, _ in {tuple(row) for row in keys.tolist()})
     return {key for key, count in counts.items() if count > 1}
 
 
@@ -188,7 +193,7 @@ def listed_once(elements: Elements, names: dict[tuple[int, int], str]) -> tuple[
             if physical[row] not in known:
                 groups[one] = (*known, int(physical[row]))
                 kept[row] = False
-    number = _combined(((int(dims[one]), group) for one, group in groups.items()), physical.tolist(), names)
+    number = _combined(((int(dims[one]), group) for one, group in groups.items()), np.unique(physical).tolist(), names)
     for one, group in groups.items():
         tags[one] = number.get(group, tags[one])
     return kept, tags

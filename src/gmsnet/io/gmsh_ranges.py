@@ -13,6 +13,7 @@ from gmsnet.io import gmsh_sections as sections
 from gmsnet.io.gmsh_cursor import BEGIN, Cursor, opened
 from gmsnet.io.gmsh_entities import (
     PART,
+    changes,
     entities_in_several,
     ghost_marks,
     group_numbers,
@@ -155,9 +156,9 @@ def _has_several_groups(runs: Sequence[tuple[int, int, Lattice]], order: str, fi
         both = Rows(rows.start + 4, rows.rows, rows.stride, f"{order}i4", 2)
         step = max(1, AT_ONCE // rows.stride)
         for begin in range(0, rows.rows if tags > 1 else 0, step):
-            found = np.unique(both.of(file, begin, min(begin + step, rows.rows)).astype(np.int64), axis=0)
+            found = changes(both.of(file, begin, min(begin + step, rows.rows)).astype(np.int64))
             known.append(np.column_stack([np.full(len(found), code), found]))
-    code, physical, geometrical = np.unique(np.concatenate(known), axis=0).T
+    code, physical, geometrical = np.concatenate(known).T
     return bool(entities_in_several(code.astype(np.int8), geometrical, physical))
 
 

@@ -22,7 +22,8 @@ from gmsnet.io.ranges import Plan
 from gmsnet.io.rows import Ranges
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.mesh.cell_block import CellBlock
-from gmsnet.mesh.mesh import SEVERAL, Mesh
+from gmsnet.mesh.markers import SEVERAL
+from gmsnet.mesh.mesh import Mesh
 
 name = "MED"
 suffixes: tuple[str, ...] = (".med",)

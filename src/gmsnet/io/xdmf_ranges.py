@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 
 from gmsnet.cells.table import CELLS, nodes_of
@@ -28,14 +29,15 @@ class Numbers:
 
     def node(self, item: Element) -> Node | None:
         """The data set of an item; None where its numbers are elsewhere."""
-        if item.get("Format", default="XML") != "HDF" or item.get("Reference"):
-            return None
-        if item.get("ItemType", default="Uniform") != "Uniform":
+        kind, how = item.get("ItemType", default="Uniform"), item.get("Format", default="XML")
+        if (kind, how) != ("Uniform", "HDF") or item.get("Reference"):
             return None
         first, stop = check_plain(self.data, item)
         path = bytes(self.data[first:stop]).decode("utf-8", "replace").strip().partition(":")[2]
         node = self._root.get(path) if path else None
-        return node if node is not None and node.is_data and node.numeric() and _size(node) == _told(item) else None
+        if node is None or not node.is_data or not node.numeric() or math.prod(node.shape()) != _told(item):
+            return None
+        return node
 
     def rows(self, item: Element, width: int) -> Listed | None:
         """Its numbers, so many in a row; None where they do not fill rows."""
@@ -44,18 +46,10 @@ class Numbers:
         return None if found is None or found.rows % width else found.cut(0, found.rows // width, width, width)
 
 
-def _size(node: Node) -> int:
-    size = 1
-    for length in node.shape():
-        size *= length
-    return size
-
-
 def _told(item: Element) -> int:
-    words, size = item.get("Dimensions").split(), 1
-    for word in words:
-        size *= int(word) if word.isdigit() and len(word) < 16 else 0
-    return size if words else 0
+    """How many numbers an item has by its dimensions, 0 where these cannot be understood."""
+    words = item.get("Dimensions").split()
+    return math.prod(int(word) if word.isdigit() and len(word) < 16 else 0 for word in words) if words else 0
 
 
 def plan(file: Ranges) -> Plan | None:

@@ -26,6 +26,7 @@ from gmsnet.mesh.checks import (
     rows_of,
 )
 from gmsnet.mesh.display import amount, html_table, listed
+from gmsnet.mesh.markers import marker_names
 from gmsnet.mesh.plane import exponent_of, flat_axes
 from gmsnet.mesh.rounding import Rounding
 
@@ -244,22 +245,6 @@ class Mesh:
                 for name in marker_names(self.region_names, block.dimension, region):
                     nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
         return {name: np.unique(np.concatenate(ids)) for name, ids in nodes.items()}
-
-
-SEVERAL = (" + ", ", ")  # between the names of a region whose cells are in several groups: of Gmsh, and of MED
-
-
-def marker_names(names: Mapping[tuple[int, int], str], dimension: int | None, region: int) -> list[str]:
-    """By which a region of cells goes as a marker, and as a part of one. names: see Mesh.
-
-    Empty where it has no name: most often 0, the region of all cells, to hold which would be to hold the whole mesh.
-    """
-    if dimension is None:
-        return []
-    if (whole := names.get((dimension, region))) is None:
-        return [str(region)] if dimension in (0, 1) else []
-    parts = next((whole.split(between) for between in SEVERAL if between in whole), [])
-    return list(dict.fromkeys([whole, *parts]))
 
 
 def counts(mesh: Mesh) -> str:
