@@ -179,6 +179,8 @@ What else these formats have:
 - Abaqus: C3D27 takes all of its 27 nodes; cells that leave some of the last six out are held.
 - Medit: `HexahedraQ2Ordering` and its like are read. Without them, Q2 hexahedra have the middles of their faces at the
   bottom, at the top, then around; P2 prisms and pyramids have the order of VTK.
+- Gmsh and MED: cells in several groups are a region "a + b", or "a, b". Each of the names means all cells of its
+  group, for `--fix` and `--slide` too. Gmsh 2.2 lists such a cell once for each group; it is one cell here.
 - Medit: Gmsh writes second-order quadrilaterals and hexahedra under `Quadrilaterals` and `Hexahedra`, in its own order.
   They are told by the keyword that follows.
 - Nastran: nodes in another coordinate system (CP), INCLUDE and superelements are refused. Nodes of loads, supports,
