@@ -15,8 +15,9 @@ from gmsnet.measure.report import QualityReport, measure
 from gmsnet.methods import Smoother
 from gmsnet.methods.banded import Kept
 from gmsnet.preserve.protection import Protection
+from gmsnet.run.carry_out import carry_out_all
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.stages import carry_out_all
+from gmsnet.run.stages import SWEEPS
 from gmsnet.run.state import State
 from gmsnet.run.wall_stage import improve_near_walls
 from gmsnet.topology.topology import Topology
@@ -57,7 +58,7 @@ def swept(
     )  # fmt: skip
     if mended is not None:
         state = replace(state, points=mended.points, untangled=mended.points)
-    state = carry_out_all(state, options, executor)
+    state = carry_out_all(state, options, executor, SWEEPS)
     if meant.walls is None or state.interruption is not None:
         return state
     executor, topology = _ready(part, meant.outer)

@@ -145,7 +145,10 @@ def untangle_second_order(state: State, options: SmoothOptions, executor: Execut
 
 
 def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """The sweeps of the method over the corners of second-order cells, which take their middles along."""
+    """The sweeps of the method over the corners of second-order cells, which take their middles along.
+
+    Those of solids may be stopped where they do not all arrive, those of a plane where cells are thin.
+    """
     given = state.second_order
     if given is None or given.unable or state.stop_reason == CALLBACK or not given.free.any():
         return state
@@ -164,15 +167,26 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
         return state
     state = replace(state, history=done.history, interruption=done.interruption, stop_reason=done.stop_reason)
     if isinstance(cells, PlanarCells):
-        return judged(state, cells._replace(points=done.points))
+        assert given.quality is not None
+        state = judged(state, cells._replace(points=done.points))
+        assert state.second_order is not None
+        assert state.second_order.quality is not None
+        return stopped(state, np.minimum(given.quality, state.second_order.quality) < cells.low)
     level = LEVELS.index(options.guard)
     guard = Field(cells.points, corners.topology, state.precision, level).guard(executor)
     cells.advance(done.points, guard, room, np.asarray(given.sign == 1))
+    state = stopped(state, (cells.points != done.points).any(axis=1)[cells.corner])
     topology = with_corners(state)
     after, before = (rank_at(points, topology, options, executor) for points in (cells.points, state.points))
     if not options.target and after > before:
         return state  # a move of all corners together may cost what the method gained
     return judged(state, cells)
+
+
+def stopped(state: State, flags: Flags) -> State:
+    """The state, and whether any of the flags is set: that corners may have been stopped."""
+    assert state.second_order is not None
+    return replace(state, second_order=replace(state.second_order, stopped=bool(flags.any())))
 
 
 def rank_at(

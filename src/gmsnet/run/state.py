@@ -59,7 +59,7 @@ class SecondOrder:
     over its least determinant at a corner, both at first and now. quality: (C,) these bounds now, sharp where they are
     low. linked: volumes and what follows their corners, by places in memory. None is known before the first stage.
     unable: why the method does not move corners. numbers: (C,) of each cell among all of the mesh. reasons: why cells,
-    by these, could not be made valid.
+    by these, could not be made valid. stopped: some corners may not have gone where the method put them.
     """
 
     cells: NDArray[np.int32]
@@ -75,6 +75,7 @@ class SecondOrder:
     least: tuple[float, float] = (0.0, 0.0)
     unable: str = ""
     reasons: Mapping[int, str] = field(default_factory=dict)
+    stopped: bool = False
 
     @property
     def solid(self) -> bool:

@@ -59,7 +59,7 @@ def _closer_one(state: State, other: State, options: SmoothOptions, executor: Ex
 
 def _closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
     """Is a state closer to the target than another one?"""
-    return _rank(state, options, executor) < _rank(other, options, executor)
+    return rank_to_target(state, options, executor) < rank_to_target(other, options, executor)
 
 
 def _miss_it(state: State, options: SmoothOptions, executor: Executor, share: float, few: int) -> bool:
@@ -101,7 +101,7 @@ def _going_on(state: State) -> State:
     return replace(state, stop_reason="") if state.stop_reason == NO_PROGRESS else state
 
 
-def _rank(state: State, options: SmoothOptions, executor: Executor) -> tuple[int, int, float]:
+def rank_to_target(state: State, options: SmoothOptions, executor: Executor) -> tuple[int, int, float]:
     """Of two states that of the lesser rank is closer to the target."""
     totals, missing = totals_of(state.points, state.topology.scored, executor), _missing(state, options, executor)
     return (0, missing, -math.inf) if totals is None else (totals.inverted, missing, -totals.shape_min)
