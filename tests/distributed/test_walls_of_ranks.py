@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.generate import Curve, disturb, good_mesh
+from gmsnet.generate import Curve, disturb, good_mesh, recombine
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
 from support.layer_meshes import blunt
 from support.ranks import parts_at_random, same
 
+from gmsnet.methods.banded import PLAN
 from gmsnet.preserve.protection import LAYER
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.wall_stage import PHASE
@@ -25,11 +26,11 @@ WALL = "refined near a wall"
 
 
 @cache
-def plate(amount):
-    """With a hole that it is refined towards, its free nodes thrown."""
-    turn = np.linspace(0.0, 2.0 * np.pi, 150)
+def plate(amount, corners=150, half=1.2):
+    """With a hole that it is refined towards, its free nodes thrown. half: of the side of the square."""
+    turn = np.linspace(0.0, 2.0 * np.pi, corners)
     hole = Curve(0.3 * np.column_stack([np.cos(turn), np.sin(turn)]), "hole")
-    side = 1.2 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
+    side = half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
     found = good_mesh([[Curve(side, "side")], [hole]], lambda x: 0.01 + 0.25 * np.abs(np.linalg.norm(x, axis=1) - 0.3))
     return disturb(found, Topology.of(found).free, amount, seed=0) if amount else found
 
@@ -41,6 +42,16 @@ def test_the_stage_near_walls_is_shared_out(amount, how):
     told = same(mesh, SmoothOptions(threads=1), parts_at_random(mesh, 3, np.random.default_rng(1), how), 3)
     assert told.gathered == ""
     assert PHASE in [sweep.stage for sweep in told.history]
+    assert WALL not in told.held
+
+
+@pytest.mark.parametrize("how", ["interleaved", "strips"])
+def test_turns_are_shared_out(how):
+    """Quads, of which the worst one is not near the wall."""
+    mesh = recombine(plate(0.0, 200, 0.9))
+    told = same(mesh, SmoothOptions(threads=1), parts_at_random(mesh, 3, np.random.default_rng(5), how), 3)
+    assert told.gathered == ""
+    assert [sweep.stage for sweep in told.history].count(PHASE) == 2 * len(PLAN)
     assert WALL not in told.held
 
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.generate import Curve, disturb, good_mesh
+from gmsnet.generate import Curve, disturb, good_mesh, recombine
 from gmsnet.methods.banded import PLAN, Kept
 from gmsnet.parallel.threads import serial
-from gmsnet.run import stop
+from gmsnet.run import stop, wall_stage
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.set_up import first_state
-from gmsnet.run.wall_stage import improve_near_walls, with_rings
+from gmsnet.run.wall_stage import PHASE, improve_near_walls, with_rings
 from gmsnet.topology.topology import Topology
 
 OPTIONS = SmoothOptions()
@@ -106,6 +106,34 @@ def test_the_default_is_better_than_sizes_weighed_and_keeps_them_better(real_mes
         change[preserve] = np.abs(doubles(result.points, topology.triangles)[cells] / before - 1.0).max()
     assert qhat["shape"] > qhat["size"] > 0.39
     assert change["shape"] <= 0.1 < change["size"]
+
+
+def test_sweeps_go_on_elsewhere_where_the_worst_cell_is(monkeypatch):
+    """Of quads: while nodes near the wall stood still, one of their cells was the worst."""
+    mesh = recombine(plate(0.3))
+    several = gmsnet.smooth(mesh)
+    stages = [sweep.stage for sweep in several.history]
+    assert stages.count(PHASE) == 2 * len(PLAN)
+    assert stages[-1] == PHASE
+    assert stages[-1 - len(PLAN)] != PHASE
+    assert several.after.inverted == 0
+    monkeypatch.setattr(wall_stage, "TURNS", 0)
+    one = gmsnet.smooth(mesh)
+    assert one.judged.after.shape_min + 0.01 < several.judged.after.shape_min
+    wall = np.zeros(len(mesh.points), dtype=bool)
+    wall[mesh.markers["hole"]] = True
+    near = one.moved & (np.linalg.norm(mesh.points, axis=1) < 0.34) & ~wall
+    assert near.any()
+
+
+@pytest.mark.parametrize("most", [34, 40, 50, 57])
+def test_sweeps_that_end_early_elsewhere_keep_what_is_near_walls(most):
+    mesh = recombine(plate(0.3))
+    first, last = gmsnet.smooth(mesh, max_sweeps=33), gmsnet.smooth(mesh, max_sweeps=most)
+    assert [sweep.stage for sweep in first.history].count(PHASE) == len(PLAN)
+    assert last.sweeps <= most
+    assert last.judged.after.shape_min >= first.judged.after.shape_min
+    assert not any("refined near" in reason for reason in last.topology.held)
 
 
 @pytest.mark.parametrize("radius", [0.15, 0.5])

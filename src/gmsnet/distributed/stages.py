@@ -19,7 +19,8 @@ from gmsnet.run.carry_out import carry_out_all
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.stages import SWEEPS
 from gmsnet.run.state import State
-from gmsnet.run.wall_stage import improve_near_walls
+from gmsnet.run.sweep_stage import sweep
+from gmsnet.run.wall_stage import improve_near_walls, in_turns
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -58,12 +59,19 @@ def swept(
     )  # fmt: skip
     if mended is not None:
         state = replace(state, points=mended.points, untangled=mended.points)
-    state = carry_out_all(state, options, executor, SWEEPS)
+    state, held = carry_out_all(state, options, executor, SWEEPS), state.protection
     if meant.walls is None or state.interruption is not None:
         return state
-    executor, topology = _ready(part, meant.outer)
-    walled = replace(state, protection=Protection(topology, [], walls=meant.walls))
-    last = carry_out_all(walled, options, executor, [improve_near_walls])
+    released, topology = _ready(part, meant.outer)
+    outer = Protection(topology, [], walls=meant.walls)
+
+    def near(given: State) -> State:
+        return carry_out_all(replace(given, protection=outer), options, released, [improve_near_walls])
+
+    def elsewhere(given: State) -> State:
+        return carry_out_all(replace(given, protection=held), options, executor, [sweep])
+
+    last = in_turns(replace(state, protection=outer), near, elsewhere, options, released)
     return last if last.released else state
 
 

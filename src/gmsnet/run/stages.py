@@ -18,11 +18,11 @@ from gmsnet.run.second_order_turns import take_turns
 from gmsnet.run.state import State
 from gmsnet.run.sweep_stage import sweep
 from gmsnet.run.untangle_stage import protect_untangled, untangle_all, untangle_protected
-from gmsnet.run.wall_stage import improve_near_walls
+from gmsnet.run.wall_stage import improve_in_turns
 
 STAGES: tuple[Stage, ...] = (
     untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_rest, improve_dihedrals,
-    improve_mean, improve_near_walls, untangle_second_order, take_turns,
+    improve_mean, improve_in_turns, untangle_second_order, take_turns,
 )  # fmt: skip
 
 

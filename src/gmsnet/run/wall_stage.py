@@ -1,23 +1,68 @@
-"""The last stage: near walls that a mesh is refined towards, shapes get better within bands of the areas."""
+"""The last stage: near walls that a mesh is refined towards, shapes get better within bands of the areas.
+
+Before it, nodes near walls stand still, and the worst cell may be one of theirs: then sweeps elsewhere end early. Where
+the worst cell is elsewhere afterwards, sweeps go on there, and the stage follows once more.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.measure.totals import totals_of
 from gmsnet.methods.banded import PLAN, Banded
 from gmsnet.parallel.executor import Executor
+from gmsnet.run.carry_out import carry_out_all
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run
 from gmsnet.run.state import State
 from gmsnet.run.stop import NO_PROGRESS, NOTHING_TO_MOVE
+from gmsnet.run.sweep_stage import sweep
 from gmsnet.topology.topology import Topology
 
 RINGS = 3  # around the nodes that were held near walls, which move with them
 PHASE = "near walls, areas kept"
 ELSEWHERE = "not near a wall"
+TURNS = 2  # at most, after the first
+GAIN = 0.005  # in the least 1/q: the turn that gains less is the last one
+Step = Callable[[State], State]
+
+
+def improve_in_turns(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """Cells near walls become better, then those elsewhere, as long as these are the worst and it is worth it."""
+
+    def near(given: State) -> State:
+        return carry_out_all(given, options, executor, [improve_near_walls])
+
+    def elsewhere(given: State) -> State:
+        return carry_out_all(given, options, executor, [sweep])
+
+    return in_turns(state, near, elsewhere, options, executor)
+
+
+def in_turns(state: State, near: Step, elsewhere: Step, options: SmoothOptions, executor: Executor) -> State:
+    """See improve_in_turns. near: releases the nodes near walls; elsewhere: is for a state that holds them.
+
+    executor: for the connectivity with these nodes free.
+    """
+    last, least = near(state), -math.inf
+    for _ in range(TURNS):
+        if not last.released or last.interruption is not None:
+            break
+        totals = totals_of(last.points, last.planar.scored, executor)
+        if totals is None or not least + GAIN < totals.shape_min < last.least_near_walls:
+            break
+        least = totals.shape_min
+        again = replace(last, released=False, totals=None, stop_reason="", smoother=options.smoother())
+        swept = elsewhere(again)
+        last = near(swept)
+        if not last.released:  # sweeps have not ended of themselves
+            last = replace(last, released=True, totals=None, protection=state.protection)
+    return last
 
 
 def improve_near_walls(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -34,7 +79,9 @@ def improve_near_walls(state: State, options: SmoothOptions, executor: Executor)
     smoother.phase = PHASE
     run = Run(state.run_start(options.best_by)._replace(topology=zone), smoother, options, executor.of(zone))
     stop_reason = run.to_the_end(min(run.sweeps + len(PLAN), options.max_sweeps))
-    return replace(state, points=run.best, history=tuple(run.history)).ended(stop_reason, run.interruption)
+    least = run.best_score.min_shape
+    done = replace(state, points=run.best, history=tuple(run.history), least_near_walls=least)
+    return done.ended(stop_reason, run.interruption)
 
 
 def with_rings(nodes: NDArray[np.bool_], topology: Topology, executor: Executor) -> NDArray[np.bool_]:
