@@ -245,6 +245,15 @@ def test_conversion_keeps_cells_and_regions() -> None:
     check_fields(contents(written)[".bdf"])
 
 
+def test_blank_properties_are_no_regions_where_the_file_has_no_properties() -> None:
+    """Else each cell would be a region of its own, and all nodes would be held between them."""
+    blank = PLAIN.replace(b"PSHELL         7       1      .1\n", b"").replace(b"CTRIA3,2,7,2,3,5", b"CTRIA3,2,,2,3,5")
+    parsed = read(nastran, blank)
+    assert sorted(regions_of(parsed, "triangle")) == [0, 0, 7, 7]
+    other = blank.replace(b"BEGIN BULK\n", b"BEGIN BULK\nPSOLID         8       1\n")
+    assert sorted(regions_of(read(nastran, other), "triangle")) == [2, 4, 7, 7]
+
+
 def test_regions_that_are_no_numbers_of_properties_get_others() -> None:
     blocks = (
         CellBlock("triangle", [[0, 1, 2]], [-3]),

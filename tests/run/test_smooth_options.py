@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 import gmsnet
+from gmsnet import random_mesh
 from gmsnet.cli import smooth as command_line
 from gmsnet.errors import InputError
+from gmsnet.generate import lattice_volume, second_order
 from gmsnet.run.options import SmoothOptions
 
 NO_WHOLE_NUMBERS = [-1, 1.0, 2.5, "3", True, np.True_, np.array([1, 2]), np.array(3), 1j, float("nan")]
@@ -117,3 +119,28 @@ def test_the_options_are_those_of_smooth_and_of_the_command_line():
     command = inspect.signature(command_line.smooth).parameters
     for name in set(options) - {"callback", "geometry"}:  # those two are objects of Python
         assert command[name].default == options[name]
+
+
+@pytest.mark.parametrize("mesh", [lambda: random_mesh(60, seed=1), lambda: lattice_volume(3)])
+def test_a_feature_angle_without_sliding_is_told_to_have_no_effect(mesh):
+    told = [note for note in gmsnet.smooth(mesh(), feature_angle=20.0).notes if note.startswith("feature angle")]
+    assert told == ["feature angle: it has no effect, as no node is to slide: ask for that by slide"]
+    for asked in ({}, {"feature_angle": 20.0, "slide": True}):
+        assert not any(note.startswith("feature angle") for note in gmsnet.smooth(mesh(), **asked).notes)
+
+
+def test_why_nodes_of_second_order_cells_do_not_slide():
+    mesh = second_order(random_mesh(60, seed=1))
+    assert "slide: boundary nodes of second-order cells stay where they are" in gmsnet.smooth(mesh, slide=True).notes
+    assert not any(note.startswith("slide") for note in gmsnet.smooth(mesh).notes)
+
+
+def test_a_target_of_angles_that_is_met_says_that_a_quad_has_a_large_one():
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.51, 0.5], [0.0, 1.0]])
+    for moved, told in ((points, True), (points + 0.4 * (np.arange(4) == 2)[:, None], False)):
+        result = gmsnet.smooth((moved, {"quad": [[0, 1, 2, 3]]}), target_angle=40.0)
+        said = [note for note in result.notes if note.startswith("target")]
+        assert bool(said) == told
+        assert not told or said == [
+            "target: it is of small angles alone, and the greatest one is 178.85°: a target of 1/q is of both"
+        ]

@@ -43,8 +43,9 @@ def read(files: Mapping[str, Data]) -> Parsed:
     for cards in (*grids, *elements):
         bulk.check(cards)
     ids, points, slots = _nodes(bulk, grids)
-    blocks = [block for cards in elements for block in blocks_of(bulk, cells_of(bulk, cards), ids)]
     properties = _properties(bulk, groups)
+    found = [cells_of(bulk, cards, with_properties=bool(properties)) for cards in elements]
+    blocks = [block for cells in found for block in blocks_of(bulk, cells, ids)]
     names = {(block.dimension, region): properties[region] for block in blocks for region in
              np.unique(block.regions).tolist() if block.dimension is not None and region in properties}  # fmt: skip
     taken = {int(region) for block in blocks for region in np.unique(block.regions).tolist()}

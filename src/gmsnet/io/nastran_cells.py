@@ -56,8 +56,12 @@ class Found:
     lines: Ints
 
 
-def cells_of(bulk: Bulk, cards: Cards) -> Found:
-    """The cells of cards whose name is in ``CELLS``."""
+def cells_of(bulk: Bulk, cards: Cards, *, with_properties: bool) -> Found:
+    """The cells of cards whose name is in ``CELLS``.
+
+    with_properties: the file has cards of properties. Then a blank field stands for the number of the element, as
+    Nastran has it; else it would make a region of each cell, and stands for none.
+    """
     first, kinds = CELLS[cards.name]
     columns = []
     for k in range(max(kinds)):
@@ -67,7 +71,8 @@ def cells_of(bulk: Bulk, cards: Cards) -> Found:
     number = whole(bulk, *bulk.field(cards, 1), "the number of an element")
     if cards.name not in WITHOUT_PROPERTY:
         properties = whole(bulk, *bulk.field(cards, 2), "the number of a property", blank=0)
-        properties = np.where(properties == 0, number, properties)  # as Nastran has it
+        if with_properties:
+            properties = np.where(properties == 0, number, properties)
     return Found(cards.name, np.stack(columns, axis=1), properties, cards.line)
 
 

@@ -76,7 +76,7 @@ def result_of(state: State, options: SmoothOptions, began: float) -> SmoothResul
         moved=moved,
         held=_held(state),
         history=list(state.history),
-        notes=_notes(state),
+        notes=[*_notes(state), *_large_angles(after, options)],
         unmended=still_inverted(after, _why_not_mended(state)),
         topology=with_corners(state),
         seconds=time.perf_counter() - began,
@@ -130,6 +130,19 @@ def _notes(state: State) -> list[str]:
         _, _, after, compared = state.final
         held = compared.note(state.before.totals, after.totals, after.symbol)
     return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks, *held, *of_order]
+
+
+def _large_angles(after: QualityReport, options: SmoothOptions) -> list[str]:
+    """Says so where the target of angles is met, and a quad has a large one: it asks for the smallest alone."""
+    least = options.target_angle
+    if least is None or len(options.target.missed_in(after)):
+        return []
+    greatest = float(after.column(after.angles[1]).max(initial=0.0))
+    if greatest <= 180.0 - least:
+        return []
+    return [
+        f"target: it is of small angles alone, and the greatest angle is {greatest:.5g}°: a target of 1/q is of both"
+    ]
 
 
 def _wall_note(protection: Protection, *, moved: bool) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.cells.jacobian import has_form
-from gmsnet.constraints.options import check_slide
+from gmsnet.constraints.options import FEATURE_ANGLE, check_slide
 from gmsnet.constraints.sliding import Sliding, curves_to_slide_on
 from gmsnet.constraints.sliding_in_space import SurfaceSliding, patches_to_slide_on
 from gmsnet.errors import InputError
@@ -34,7 +34,7 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.second_order import second_order_of
 from gmsnet.run.second_order_volumes import second_order_solids_of
 from gmsnet.run.set_up_surface import first_of_surface
-from gmsnet.run.state import State
+from gmsnet.run.state import SecondOrder, State
 from gmsnet.topology.held import REASONS
 from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
 from gmsnet.topology.ordering import space_points, taken
@@ -76,8 +76,9 @@ def first_state(
     sliding = None
     if curves is not None:
         sliding = Sliding.of(given, curves, topology.memory, topology.free, options.geometry)
-    remarks += held_anyway(given, asked, topology, fixed, options.slides)
     second = second_order_of(given, topology, options)
+    remarks += held_anyway(given, asked, topology, fixed, options.slides)
+    remarks += not_slid(options, second)
     if options.adapts and second is not None:
         raise InputError("a metric for second-order cells cannot be had so far: leave out metric, size and preserve")
     values = check_given(options, len(given.points))
@@ -124,6 +125,15 @@ def first_state(
         second_order=second,
         nodal=values,
     )
+
+
+def not_slid(options: SmoothOptions, second: SecondOrder | None) -> list[str]:
+    """What of the options of sliding has no effect on a mesh in a plane, or of volumes."""
+    if options.slides:
+        return [] if second is None else ["slide: boundary nodes of second-order cells stay where they are"]
+    if options.feature_angle == FEATURE_ANGLE:
+        return []
+    return ["feature angle: it has no effect, as no node is to slide: ask for that by slide"]
 
 
 def held_anyway(
@@ -173,6 +183,7 @@ def _first_of_volume(
         remarks.append(f"read with their corners in the other order, for they are inside out: {turned}")
     start = taken(space_points(given), topology.memory)
     second = second_order_solids_of(given, topology, options)
+    remarks += not_slid(options, second)
     if second is None:
         before = measure(given.without_cells(), topology, start, executor.for_blocks(0))
     else:
