@@ -140,9 +140,8 @@ def _large_angles(after: QualityReport, options: SmoothOptions) -> list[str]:
     greatest = float(after.column(after.angles[1]).max(initial=0.0))
     if greatest <= 180.0 - least:
         return []
-    return [
-        f"target: it is of small angles alone, and the greatest angle is {greatest:.5g}°: a target of 1/q is of both"
-    ]
+    told = f"the greatest one is {greatest:.5g}°"
+    return [f"target: it is of small angles alone, and {told}: a target of 1/q is of both"]
 
 
 def _wall_note(protection: Protection, *, moved: bool) -> str:
