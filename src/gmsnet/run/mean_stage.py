@@ -30,8 +30,8 @@ LOSS = 0.001
 def improve_mean(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Makes the mean η larger where ``auto`` has ended of itself on a volume of other cells than tetrahedra alone.
 
-    Where a valid mesh has lost more than LOSS of its mean, some of what the least has gained is given for it. A mesh
-    with inverted cells stays.
+    Where a valid mesh has lost more than LOSS of its mean, some of what the least has gained is given for it, if that
+    brings it back. A mesh with inverted cells stays.
     """
     totals = totals_at_end(state, options, executor, mixed=True)
     topology = state.rest or state.topology
@@ -42,11 +42,15 @@ def improve_mean(state: State, options: SmoothOptions, executor: Executor) -> St
     first = totals_of(state.start, topology.scored, executor)
     assert first is not None
     wanted = first.shape_mean - LOSS if not state.before.inverted else -math.inf
+    raised = list[tuple[float, tuple[NDArray[np.float64], Totals, Tally]]]()
     for share in SHARES:
         shape = max(share * totals.shape_min, min(first.shape_min, totals.shape_min))
-        points, after, tally = _raised(state, topology, totals, shape, options, executor)
-        if after.shape_mean >= wanted:
+        raised = [*raised[:1], (shape, _raised(state, topology, totals, shape, options, executor))]
+        if raised[-1][1][1].shape_mean >= wanted:
             break
+    else:
+        raised = raised[:1]
+    shape, (points, after, tally) = raised[-1]
     if after.shape_mean < totals.shape_mean + GAIN or after.shape_min < shape - 1e-12 or after.uncertain:
         return state
     return with_sweep(state, options, points, after, MeanInSpace.phase, tally, executor=outer)
