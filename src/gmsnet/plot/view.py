@@ -150,7 +150,7 @@ def draw(axes: Axes, view: View, box: NDArray[np.float64] | None = None) -> Scal
 
 def add_colour_bar(figure: Figure, mappable: ScalarMappable, maps: Sequence[Axes], shrink: float = 1.0) -> None:
     """The legend of the cells' colours, beside the pictures that it belongs to. shrink: its share of their height."""
-    label = "1/q (1 equilateral or square, 0 flat; red: inverted)"
+    label = "1/q (1 equilateral or square,\n0 flat; red: inverted)"  # in two lines, or it is longer than a low bar
     figure.colorbar(mappable, ax=list(maps), label=label, aspect=40 * shrink, pad=0.01, shrink=shrink)
 
 
