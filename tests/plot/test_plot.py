@@ -11,6 +11,7 @@ import pytest
 
 from gmsnet.errors import InputError, MissingExtraError
 from gmsnet.generate import random_mesh, random_quad_mesh, structured_mesh
+from gmsnet.generate.curved import disc_of_quads, on_circle, second_order
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -20,7 +21,7 @@ from matplotlib.colors import to_rgb
 
 from gmsnet import plot
 from gmsnet.plot import smoothing
-from gmsnet.plot.view import BAD_TO_GOOD, INVERTED, View
+from gmsnet.plot.view import BAD_TO_GOOD, INVERTED, PARTS, View
 
 SMALL = random_mesh(60, seed=2)
 LARGE = random_mesh(4000, seed=2)
@@ -208,3 +209,32 @@ def test_no_global_state_and_no_display(tmp_path):
     env = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "MPLBACKEND")}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_edges_with_a_middle_node_are_drawn_through_it():
+    mesh = second_order(disc_of_quads(2), quads="quad8", project=on_circle(1.0), bend=0.1)
+    shown = View.of(mesh)
+    rows = np.arange(len(shown.corners))
+    drawn = shown.outlines(rows).reshape(len(rows), 4, PARTS, 2)
+    quads = next(block.nodes for block in mesh.cells if block.kind == "quad8")
+    assert (drawn[:, :, 0] == mesh.points[quads[:, :4]]).all()
+    assert np.abs(drawn[:, :, PARTS // 2] - mesh.points[quads[:, 4:]]).max() < 1e-15
+    between = 0.375 * mesh.points[quads[:, :4]] - 0.125 * mesh.points[np.roll(quads[:, :4], -1, axis=1)]
+    assert np.abs(drawn[:, :, PARTS // 4] - between - 0.75 * mesh.points[quads[:, 4:]]).max() < 1e-15
+    lines = next(block.nodes for block in mesh.cells if block.kind == "line3")
+    curves = np.array(shown.curves(np.ones(len(lines), dtype=bool)))
+    assert np.abs(curves[:, [0, PARTS // 2, PARTS]] - mesh.points[lines[:, [0, 2, 1]]]).max() < 1e-15
+
+
+def test_straight_cells_and_edges_beside_bent_ones_stay_straight():
+    bent = second_order(random_mesh(40, seed=1), bend=0.2)
+    count = len(bent.points)
+    straight = CellBlock("triangle", np.array([[count, count + 1, count + 2]]), np.zeros(1))
+    points = np.concatenate([bent.points, [[2.0, 0.0], [3.0, 0.0], [2.0, 1.0]]])
+    mesh = Mesh(points, (*bent.cells, straight))
+    shown = View.of(mesh)
+    (last,) = shown.outlines(np.arange(len(shown.corners)))[(shown.corners >= count).all(axis=1)]
+    assert (last[[0, PARTS, 2 * PARTS]] == points[-3:]).all()
+    assert (last[:PARTS, 1] == 0.0).all()
+    alone = View.of(Mesh(mesh.points, mesh.cells[-1:]))
+    assert alone.outlines(np.array([0])).shape == (1, 3, 2)

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
+from gmsnet.kernels.simplex.bernstein import NAMES
 from gmsnet.measure.palette import AFTER, BAD_TO_GOOD, INVERTED, OTHER_CELLS
 from gmsnet.measure.report import QualityReport, measure
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh, measured
 from gmsnet.topology.topology import Topology
 
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
 EDGE = "#ffffff"
 MANY = 20_000  # more cells than this are an image in SVG and PDF, so that the file stays small, and share one style
+PARTS = 4  # of an edge with a middle node, each drawn straight
 POINTS = 345.6  # across a picture, in printer's points: 4.8 inches
 
 
@@ -39,7 +42,8 @@ class View:
 
     title, colour: of its histogram. points: (N × 2). corners: (T × 3 or 4) of the cells of ``report``, in its
     order, the last one of a triangle twice where there are quads. others: the corners of other faces. lines: (L × 2)
-    the ends of line cells.
+    the ends of line cells. middles: (T × 3 or 4) of the edges from one corner to the next, −1 where they are straight;
+    bends: (L,) of the lines.
     """
 
     title: str
@@ -49,6 +53,8 @@ class View:
     report: QualityReport
     others: Sequence[NDArray[np.int64]]
     lines: NDArray[np.int64]
+    middles: NDArray[np.int64]
+    bends: NDArray[np.int64]
 
     @classmethod
     def of(cls, mesh: Mesh, title: str = "", colour: str = AFTER, topology: Topology | None = None) -> View:
@@ -59,7 +65,7 @@ class View:
         corners = [block.nodes[:, np.minimum(np.arange(width), block.corners - 1)] for block in own]
         faces = [b for b in mesh.cells if b.dimension == 2 and len(b.nodes) and not measured(mesh, b)]
         others = [block.nodes[:, : block.corners] for block in faces]
-        lines = [block.nodes[:, :2] for block in mesh.cells if block.dimension == 1]
+        lines = [block for block in mesh.cells if block.dimension == 1]
         return cls(
             title,
             colour,
@@ -67,7 +73,9 @@ class View:
             np.concatenate(corners),
             measure(mesh, topology),
             others,
-            np.concatenate([np.zeros((0, 2), dtype=np.int64), *lines]),
+            np.concatenate([np.zeros((0, 2), dtype=np.int64), *(block.nodes[:, :2] for block in lines)]),
+            np.concatenate([_middles(block, width) for block in own]),
+            np.concatenate([np.zeros(0, dtype=np.int64), *(_middles(block, 1)[:, 0] for block in lines)]),
         )
 
     @property
@@ -75,10 +83,27 @@ class View:
         """See ``Shown``."""
         return bool(self.corners.shape[1] == 4)
 
+    def outlines(self, rows: NDArray[np.intp]) -> NDArray[np.float64]:
+        """(K × P × 2) the polygons of some cells: edges with a middle node bent through it."""
+        corners, middles = self.corners[rows], self.middles[rows]
+        if (middles < 0).all():
+            return self.points[corners]
+        bent = _bent(self.points, corners, np.roll(corners, -1, axis=1), middles)
+        return bent.reshape(len(rows), -1, 2)
+
+    def curves(self, rows: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
+        """The line cells of some, each (P × 2)."""
+        ends, middles = self.lines[rows], self.bends[rows]
+        if (middles < 0).all():
+            return list(self.points[ends])
+        bent = _bent(self.points, ends[:, 0], ends[:, 1], middles)
+        return list(np.concatenate([bent, self.points[ends[:, 1]][:, None]], axis=1))
+
     @property
     def box(self) -> NDArray[np.float64]:
         """(2 × 2) least and greatest coordinates of the nodes that are drawn."""
-        used = self.points[np.unique(np.concatenate([self.corners.ravel(), *(o.ravel() for o in self.others)]))]
+        nodes = [self.corners.ravel(), self.middles[self.middles >= 0], *(each.ravel() for each in self.others)]
+        used = self.points[np.unique(np.concatenate(nodes))]
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
     @property
@@ -125,6 +150,7 @@ def draw(axes: Axes, view: View, box: NDArray[np.float64] | None = None) -> Scal
     rows = np.flatnonzero(seen(view.corners))
     rows = rows[np.argsort(-view.report.shape[rows], kind="stable")]
     polygons = view.points[view.corners[rows]]
+    drawn = view.outlines(rows)
     colours = mappable.to_rgba(view.report.shape[rows])
     colours[~view.report.valid[rows]] = to_rgba(INVERTED)
     # White edges fade out where cells are specks; slivers are outlined in their own colour, or they would drown in it.
@@ -137,13 +163,9 @@ def draw(axes: Axes, view: View, box: NDArray[np.float64] | None = None) -> Scal
         faces = view.points[nodes[seen(nodes)]]
         other = PolyCollection(list(faces), facecolors=OTHER_CELLS, edgecolors=EDGE, linewidths=0.3, rasterized=many)
         axes.add_collection(other, autolim=False)
-    cells = PolyCollection(
-        cast(Any, polygons), facecolors=colours, edgecolors=edges, linewidths=widths, rasterized=many
-    )
+    cells = PolyCollection(cast(Any, drawn), facecolors=colours, edgecolors=edges, linewidths=widths, rasterized=many)
     axes.add_collection(cells, autolim=False)
-    lines = LineCollection(
-        list(view.points[view.lines[seen(view.lines)]]), colors="black", linewidths=0.9, rasterized=many
-    )
+    lines = LineCollection(view.curves(seen(view.lines)), colors="black", linewidths=0.9, rasterized=many)
     axes.add_collection(lines, autolim=False)
     return mappable
 
@@ -152,6 +174,28 @@ def add_colour_bar(figure: Figure, mappable: ScalarMappable, maps: Sequence[Axes
     """The legend of the cells' colours, beside the pictures that it belongs to. shrink: its share of their height."""
     label = "1/q (1 equilateral or square,\n0 flat; red: inverted)"  # in two lines, or it is longer than a low bar
     figure.colorbar(mappable, ax=list(maps), label=label, aspect=40 * shrink, pad=0.01, shrink=shrink)
+
+
+def _middles(block: CellBlock, width: int) -> NDArray[np.int64]:
+    """(C × width) the middle nodes of the edges of cells, −1 where there are none."""
+    found = np.full((len(block.nodes), width), -1, dtype=np.int64)
+    if block.kind in (*NAMES, "line3"):
+        count = block.corners if block.kind in NAMES else 1
+        found[:, :count] = block.nodes[:, block.corners : block.corners + count]
+    return found
+
+
+def _bent(
+    points: NDArray[np.float64], first: NDArray[np.int64], last: NDArray[np.int64], middle: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """(… × PARTS × 2) points of edges from their first nodes, which are among them, towards their last."""
+    ends = points[first], points[last]
+    through = np.where(middle[..., None] < 0, 0.5 * (ends[0] + ends[1]), points[middle])
+    start, end, bend = (each[..., None, :] for each in (*ends, through))
+    share = np.arange(PARTS)[:, None] / PARTS
+    rest = 1.0 - share
+    bent: NDArray[np.float64] = (rest - share) * (rest * start - share * end) + 4.0 * share * rest * bend
+    return bent
 
 
 def _thickness(polygons: NDArray[np.float64]) -> NDArray[np.float64]:
