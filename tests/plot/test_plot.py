@@ -238,3 +238,14 @@ def test_straight_cells_and_edges_beside_bent_ones_stay_straight():
     assert (last[:PARTS, 1] == 0.0).all()
     alone = View.of(Mesh(mesh.points, mesh.cells[-1:]))
     assert alone.outlines(np.array([0])).shape == (1, 3, 2)
+
+
+def test_triangles_of_second_order_beside_quads():
+    mesh = second_order(random_quad_mesh(60, cells="mixed", seed=1), quads="quad8", bend=0.2)
+    shown = View.of(mesh)
+    triangles = next(block.nodes for block in mesh.cells if block.kind == "triangle6")
+    drawn = shown.outlines(np.arange(len(shown.corners)))[shown.corners[:, 2] == shown.corners[:, 3]]
+    drawn = drawn.reshape(len(triangles), 4, PARTS, 2)
+    assert len(triangles) > 5
+    assert np.abs(drawn[:, [0, 1, 3], PARTS // 2] - mesh.points[triangles[:, 3:]]).max() < 1e-15
+    assert np.abs(drawn[:, 2] - mesh.points[triangles[:, 2]][:, None]).max() == 0.0

@@ -179,9 +179,12 @@ def add_colour_bar(figure: Figure, mappable: ScalarMappable, maps: Sequence[Axes
 def _middles(block: CellBlock, width: int) -> NDArray[np.int64]:
     """(C × width) the middle nodes of the edges of cells, −1 where there are none."""
     found = np.full((len(block.nodes), width), -1, dtype=np.int64)
-    if block.kind in (*NAMES, "line3"):
-        count = block.corners if block.kind in NAMES else 1
-        found[:, :count] = block.nodes[:, block.corners : block.corners + count]
+    if block.kind == "line3":
+        found[:, 0] = block.nodes[:, 2]
+    elif block.kind in NAMES:
+        edges = np.arange(block.corners)
+        edges[-1] = width - 1  # of triangles beside quads the last corner is there twice
+        found[:, edges] = block.nodes[:, block.corners : 2 * block.corners]
     return found
 
 
