@@ -16,7 +16,7 @@ from support.optional import library
 
 import gmsnet
 from gmsnet.cli import main
-from gmsnet.generate import random_mesh, random_volume
+from gmsnet.generate import lattice_volume, random_mesh, random_volume, second_order_volume
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -35,7 +35,8 @@ def test_the_public_names_are_those_of_the_page(monkeypatch):
 
 @pytest.fixture
 def files(tmp_path):
-    for name, mesh in {"a.su2": random_mesh(60, seed=1), "b.vtk": random_volume(40, seed=3)}.items():
+    for name, mesh in {"a.su2": random_mesh(60, seed=1), "b.vtk": random_volume(40, seed=3),
+                       "c.vtk": second_order_volume(lattice_volume(2), bend=0.05)}.items():  # fmt: skip
         gmsnet.write(mesh, tmp_path / name)
     (tmp_path / "broken.su2").write_text("NDIME= 2\nNPOIN= 1\n0 x\n")
     return tmp_path
@@ -47,6 +48,7 @@ def files(tmp_path):
         ("smooth {dir}/a.su2 {dir}/o.su2 --json", "run"),
         ("smooth {dir}/a.su2 {dir}/o.vtu --json --target-quality 0.9 --preserve none", "run"),
         ("smooth {dir}/b.vtk {dir}/o.vtk --json --max-sweeps 3", "run"),
+        ("smooth {dir}/c.vtk {dir}/o.vtk --json --max-sweeps 3", "run"),
         ("smooth {dir}/a.su2 --dry-run --json --method laplacian", "run"),
         ("smooth {dir}/a.su2 {dir}/broken.su2 --out-dir {dir}/out --json", "run failed"),
         ("deform {dir}/a.su2 {dir}/o.su2 --json --move top 0.1 0.1", "run"),

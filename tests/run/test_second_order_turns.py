@@ -9,7 +9,7 @@ from support import curved_meshes
 import gmsnet
 from gmsnet.generate import block_volume, disturb, lattice_volume
 from gmsnet.generate.curved_volumes import second_order_volume
-from gmsnet.run import second_order_turns
+from gmsnet.run import second_order_turns, stop
 
 
 def thrown(volume, amount, seed):
@@ -48,6 +48,21 @@ def test_turns_are_what_makes_it_so(name, monkeypatch):
     one, second = least_of_two_calls(MESHES[name]())
     assert second > one + 0.05
     assert several >= second
+
+
+@pytest.mark.parametrize("look", [2, 4, 8])
+def test_a_callback_that_stops_is_obeyed_in_every_turn(look):
+    mesh, looks = MESHES["plane 16"](), []
+    result = gmsnet.smooth(mesh, callback=lambda sweep: bool(looks.append(sweep)) or len(looks) == look)
+    assert len(looks) == look
+    assert result.stop_reason == stop.CALLBACK
+    assert result.invalid_curved == 0
+
+
+def test_the_last_look_is_at_the_cells_as_they_are():
+    mesh = MESHES["tetra10 1"]()
+    result = gmsnet.smooth(mesh, max_sweeps=6)
+    assert result.history[-1].min_shape == result.judged.after.shape_min
 
 
 def test_a_turn_that_makes_the_mesh_worse_is_taken_back(monkeypatch):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gmsnet
-from gmsnet.generate import disturb, random_quad_mesh
+from gmsnet.generate import disturb, random_mesh, random_quad_mesh
 from gmsnet.kernels.topology.patch import around
 from gmsnet.measure.report import measure
 from gmsnet.measure.target import Target
@@ -280,3 +280,14 @@ def test_no_triangle_with_a_smaller_angle_has_a_larger_shape_than_a_target_allow
     report = gmsnet.quality(([[0, 0], [1, 0], [ratio * math.cos(alpha), ratio * math.sin(alpha)]], [[0, 1, 2]]))
     assert report.min_angle[0] <= angle * (1 + 1e-9)
     assert report.shape[0] <= Target(angle=angle).max_shape * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("look", [2, 5, 8])
+def test_a_callback_that_stops_all_cells_stops_the_patches_after_them(look):
+    """Many cells miss the target, so that after the first patches all cells are smoothed, then patches again."""
+    mesh, looks = random_mesh(800, seed=1), []
+    result = gmsnet.smooth(
+        mesh, target_quality=0.97, callback=lambda sweep: bool(looks.append(sweep)) or len(looks) == look
+    )
+    assert len(looks) == look
+    assert result.stop_reason == stop.CALLBACK

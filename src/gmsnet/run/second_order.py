@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.curved.stars import counter_clockwise, curved_mesh
 from gmsnet.kernels.simplex.bernstein import CORNERS, KINDS, NAMES, WIDEST
 from gmsnet.kernels.star.guard import LEVELS, VALID
-from gmsnet.measure.totals import totals_of
+from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, method_named
@@ -177,10 +177,19 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     cells.advance(done.points, guard, room, np.asarray(given.sign == 1))
     state = stopped(state, (cells.points != done.points).any(axis=1)[cells.corner])
     topology = with_corners(state)
-    after, before = (rank_at(points, topology, options, executor) for points in (cells.points, state.points))
-    if not options.target and after > before:
-        return state  # a move of all corners together may cost what the method gained
-    return judged(state, cells)
+    after, before = (totals_of(points, topology.scored, executor) for points in (cells.points, state.points))
+    if not options.target and rank_of(after, options) > rank_of(before, options):
+        return _as_they_are(state, before)  # a move of all corners together may cost what the method gained
+    return _as_they_are(judged(state, cells), after)
+
+
+def _as_they_are(state: State, totals: Totals | None) -> State:
+    """The state with its last look at the cells as they are: the method saw straight ones where corners did not go."""
+    if totals is None or not state.history:
+        return state
+    *looks, last = state.history
+    seen = replace(last, inverted=totals.inverted, min_shape=totals.shape_min, mean_shape=totals.shape_mean)
+    return replace(state, history=(*looks, seen))
 
 
 def stopped(state: State, flags: Flags) -> State:
@@ -193,7 +202,11 @@ def rank_at(
     points: Floats, straight: Topology | Volume, options: SmoothOptions, executor: Executor
 ) -> tuple[float, ...]:  # fmt: skip
     """Of two places of the corners those of the lesser rank are the better, by the rule of the last stage."""
-    totals = totals_of(points, straight.scored, executor)
+    return rank_of(totals_of(points, straight.scored, executor), options)
+
+
+def rank_of(totals: Totals | None, options: SmoothOptions) -> tuple[float, ...]:
+    """The same of totals over the cells that are compared."""
     return (0 if totals is None else totals.inverted, *merit_of(totals, options.best_by))
 
 

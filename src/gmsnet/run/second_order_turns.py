@@ -14,38 +14,40 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.room_stage import make_room, raise_bounds
 from gmsnet.run.second_order import corners_alone, rank_at, smooth_corners
 from gmsnet.run.state import State, with_corners
-from gmsnet.run.stop import TARGET_REACHED
+from gmsnet.run.stop import CALLBACK, TARGET_REACHED
 from gmsnet.run.sweep_stage import rank_to_target
 
 TURN = (smooth_corners, make_room, raise_bounds)
 TURNS = 5  # at most
-GAIN = 0.01  # in that by which meshes are compared: the turn that gains less is the last one
+GAIN, PATIENCE = 0.01, 2  # after so many turns that gain less in that by which meshes are compared, they end
 
 
 def take_turns(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """The mesh after one turn, and after more as long as corners may have been stopped and turns are worth it.
+    """The best mesh of several turns: as many as corners may have been stopped, and are worth it.
 
-    A turn after the first is taken back if the mesh is not better for it by the rule of the last stage.
+    Room that one turn makes is what the next one gains by. What comes after the best mesh by the rule of the last stage
+    is taken back.
     """
     if state.second_order is None or not state.second_order.free.any():
         return state
-    worth = _worth(state, options, executor)
+    best, most, idle = state, _worth(state, options, executor), 0
     for turn in range(TURNS):
-        after = carry_out_all(state, options, executor, TURN)
-        now = _worth(after, options, executor)
-        if turn and now <= worth:
-            return state if after.interruption is None else state.interrupted(after.interruption)
-        gained = [new - old for new, old in zip(now, worth, strict=True)]
-        state, worth = after, now
-        if not _goes_on(state) or max(gained) < GAIN:
+        state = carry_out_all(state, options, executor, TURN)
+        worth = _worth(state, options, executor)
+        gained = max(new - old for new, old in zip(worth, most, strict=True))
+        idle = 0 if gained >= GAIN else idle + 1
+        if not turn or worth > most:
+            best, most = state, worth
+        if not _goes_on(state) or idle == PATIENCE:
             break
-    return state
+    asked_to_end = state.interruption is not None or state.stop_reason == CALLBACK
+    return best.ended(state.stop_reason, state.interruption) if asked_to_end else best
 
 
 def _goes_on(state: State) -> bool:
     given = state.second_order
     assert given is not None
-    return given.stopped and state.interruption is None and state.stop_reason != TARGET_REACHED
+    return given.stopped and state.interruption is None and state.stop_reason not in (TARGET_REACHED, CALLBACK)
 
 
 def _worth(state: State, options: SmoothOptions, executor: Executor) -> tuple[float, ...]:

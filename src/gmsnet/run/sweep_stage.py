@@ -18,7 +18,7 @@ from gmsnet.run.mean_stage import improve_mean
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run
 from gmsnet.run.state import State
-from gmsnet.run.stop import NO_PROGRESS
+from gmsnet.run.stop import CALLBACK, NO_PROGRESS
 from gmsnet.run.target_run import reach_target
 from gmsnet.topology.volume import Volume
 
@@ -49,11 +49,13 @@ def _to_target(state: State, options: SmoothOptions, executor: Executor) -> Stat
 
 
 def _closer_one(state: State, other: State, options: SmoothOptions, executor: Executor) -> State:
-    """The one that is closer to the target, the other one if neither is; interrupted if the first one is."""
+    """The one that is closer to the target, the other one if neither is; ended from outside if the first one is."""
     if _closer(state, other, options, executor):
         return state
     if other.constraint is not None:  # it has followed the nodes of the state that is given up
         (locate3 if isinstance(other.constraint, Surface) else locate)(other.constraint, other.points)
+    if state.stop_reason == CALLBACK:
+        return other.ended(CALLBACK)
     return other if state.interruption is None else other.interrupted(state.interruption)
 
 
@@ -86,7 +88,10 @@ def _at_large(state: State, options: SmoothOptions, executor: Executor) -> State
     """Sweeps over all free nodes, without a target, then patches; with the stage of the mean between, where that is
     closer to the target."""
     plain = replace(options, target_quality=None, target_angle=None, target_dihedral=None)
-    all_of_it = improve_dihedrals(_sweep_all(state, plain, executor), plain, executor)
+    swept = _sweep_all(state, plain, executor)
+    if swept.stop_reason == CALLBACK or swept.interruption is not None:
+        return swept
+    all_of_it = improve_dihedrals(swept, plain, executor)
     found = reach_target(_going_on(all_of_it), options, executor)
     if found.stop_reason != NO_PROGRESS or not isinstance(state.topology, Volume):
         return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -86,6 +88,11 @@ def _orientations(faces: Faces, points: Floats | None, marks: Marks) -> Orientat
     del by_low, ends
     part, orientation = np.full(len(faces), -1, dtype=np.int32), np.ones(len(faces), dtype=np.int8)
     consistent = winding.wind(first, corner, face, twin, part, orientation)
+    if points is not None and first is not None and not consistent.all():  # a wrong order of corners may be why
+        crossed = _crossed(faces, points)
+        linked = _without_links(twin, np.repeat(crossed, np.diff(first)))
+        part[:], orientation[:] = -1, 1
+        consistent = winding.wind(first, corner, face, linked, part, orientation)
     bad = [(~consistent, connectivity.NON_ORIENTABLE)]
     if points is not None:
         area, extent = winding.part_areas(points, first, corner, part, orientation, len(consistent))
@@ -96,3 +103,24 @@ def _orientations(faces: Faces, points: Floats | None, marks: Marks) -> Orientat
             of_corner = np.repeat(parts[part], 3 if first is None else np.diff(first))
             marks[corner[of_corner]] |= np.uint16(mark)
     return orientation
+
+
+def _crossed(faces: Faces, points: Floats) -> NDArray[np.bool_]:
+    """(F,) which faces of a plane are quads whose boundary crosses itself: two corners turn one way, two the other."""
+    assert faces.first is not None
+    quads = np.flatnonzero(np.diff(faces.first) == 4)
+    corners = points[faces.corner[faces.first[quads][:, None] + np.arange(4)], :2]
+    forth, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    turn = forth[..., 0] * back[..., 1] - forth[..., 1] * back[..., 0]
+    found = np.zeros(len(faces), dtype=bool)
+    found[quads] = ((turn > 0.0).sum(axis=1) == 2) & ((turn < 0.0).sum(axis=1) == 2)
+    return found
+
+
+def _without_links(twin: NDArray[Any], cut: NDArray[np.bool_]) -> NDArray[Any]:
+    """The partners of half-edges where some are cut off from theirs."""
+    found = twin.copy()
+    found[cut] = winding.ALONE
+    other = twin[cut & (twin >= 0)]
+    found[other] = winding.ALONE
+    return found
