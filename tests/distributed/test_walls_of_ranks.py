@@ -51,7 +51,7 @@ def test_turns_are_shared_out(how):
     mesh = recombine(plate(0.0, 200, 0.9))
     told = same(mesh, SmoothOptions(threads=1), parts_at_random(mesh, 3, np.random.default_rng(5), how), 3)
     assert told.gathered == ""
-    assert [sweep.stage for sweep in told.history].count(PHASE) == 2 * len(PLAN)
+    assert [sweep.stage for sweep in told.history].count(PHASE) == 3 * len(PLAN)
     assert WALL not in told.held
 
 

@@ -177,8 +177,10 @@ def wall_note(walls: Kept, nodes: int, moved: bool) -> str:
     so = f"move only as far as the areas of their cells stay within {AREA:.0%} of the input's" if moved else ""
     if moved and walls.noisy:
         so += ", or between those and the mean of the areas around where the input is disturbed"
-    if moved and (firm := walls.heights[walls.heights > 0.0]).size:
-        so += f", and the heights of those on the wall within {(1.0 + AREA) * UPPER ** firm.min() - 1.0:.0%}"
+    calm = (walls.heights > 0.0) & (walls.blend == 0.0)
+    if moved and calm.any():
+        most = (1.0 + AREA) * UPPER ** walls.heights[calm].min() - 1.0
+        so += f", and the heights of those on the wall within {most:.0%}{' where it is not' if walls.noisy else ''}"
     mend = "" if moved else "; preserve='none' lets them move"
     so = so or "are held in this run"
     return f"the mesh is refined towards its walls: the {nodes:,} nodes next to them {so} (preserve={SHAPE!r}){mend}"

@@ -140,7 +140,7 @@ class State:
     untangled: the points after that, in which ``protection`` was found, None where nothing was done. reasons: why
     some are left, by the index of each cell. history: one Sweep for each look. stop_reason: one of ``run.stop``,
     "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
-    least_near_walls: the least 1/q of the cells there and around, once they are not.
+    least_at_walls: the least 1/q of the cells there and around, once they are not, and of those elsewhere.
     sliding: the nodes that move along curves or a boundary, if any. curved: while the corners of second-order cells
     move, those cells (``second_order``, which is all that is known of them). nodal: (N, 3) by id, the logarithms of a
     metric that is given at nodes. metric: what cells are to become, once it is known; conformity: of the input to it,
@@ -168,7 +168,7 @@ class State:
     history: tuple[Sweep, ...] = ()
     stop_reason: str = ""
     released: bool = False
-    least_near_walls: float = math.nan
+    least_at_walls: tuple[float, float] = (math.inf, math.inf)
     interruption: KeyboardInterrupt | None = None
     final: Final | None = None
     sliding: Sliding | SurfaceSliding | Rails | None = None

@@ -1,7 +1,7 @@
 """The last stage: near walls that a mesh is refined towards, shapes get better within bands of the areas.
 
 Before it, nodes near walls stand still, and the worst cell may be one of theirs: then sweeps elsewhere end early. Where
-the worst cell is elsewhere afterwards, sweeps go on there, and the stage follows once more.
+a cell elsewhere is as bad as the worst one there afterwards, sweeps go on, and the stage follows once more.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ from gmsnet.topology.topology import Topology
 
 RINGS = 3  # around the nodes that were held near walls, which move with them
 PHASE = "near walls, areas kept"
-ELSEWHERE = "not near a wall"
+ELSEWHERE, NEAR = "not near a wall", "near a wall"
 TURNS = 2  # at most, after the first
-GAIN = 0.005  # in the least 1/q: the turn that gains less is the last one
+GAIN = 0.005  # in the least 1/q elsewhere: the turn that gains less is the last one
+AHEAD = 0.02  # in 1/q: the worst cell near a wall may be worse by so much, and sweeps elsewhere go on
 Step = Callable[[State], State]
 
 
 def improve_in_turns(state: State, options: SmoothOptions, executor: Executor) -> State:
-    """Cells near walls become better, then those elsewhere, as long as these are the worst and it is worth it."""
+    """Cells near walls become better, then those elsewhere, as long as these are as bad and it is worth it."""
 
     def near(given: State) -> State:
         return carry_out_all(given, options, executor, [improve_near_walls])
@@ -41,22 +42,19 @@ def improve_in_turns(state: State, options: SmoothOptions, executor: Executor) -
     def elsewhere(given: State) -> State:
         return carry_out_all(given, options, executor, [sweep])
 
-    return in_turns(state, near, elsewhere, options, executor)
+    return in_turns(state, near, elsewhere, options)
 
 
-def in_turns(state: State, near: Step, elsewhere: Step, options: SmoothOptions, executor: Executor) -> State:
-    """See improve_in_turns. near: releases the nodes near walls; elsewhere: is for a state that holds them.
-
-    executor: for the connectivity with these nodes free.
-    """
+def in_turns(state: State, near: Step, elsewhere: Step, options: SmoothOptions) -> State:
+    """See improve_in_turns. near: releases the nodes near walls; elsewhere: is for a state that holds them."""
     last, least = near(state), -math.inf
     for _ in range(TURNS):
         if not last.released or last.interruption is not None:
             break
-        totals = totals_of(last.points, last.planar.scored, executor)
-        if totals is None or not least + GAIN < totals.shape_min < last.least_near_walls:
+        near_walls, elsewhere_now = last.least_at_walls
+        if not least + GAIN < elsewhere_now < near_walls + AHEAD:
             break
-        least = totals.shape_min
+        least = elsewhere_now
         again = replace(last, released=False, totals=None, stop_reason="", smoother=options.smoother())
         swept = elsewhere(again)
         last = near(swept)
@@ -74,13 +72,16 @@ def improve_near_walls(state: State, options: SmoothOptions, executor: Executor)
     if walls is None or options.target or state.stop_reason not in (NO_PROGRESS, NOTHING_TO_MOVE):
         return state
     state = replace(state, released=True, totals=None)
-    zone = executor.holding(state.planar, ~with_rings(walls.nodes, state.planar, executor), ELSEWHERE)
+    inside = with_rings(walls.nodes, state.planar, executor)
+    zone = executor.holding(state.planar, ~inside, ELSEWHERE)
     smoother = Banded(state.start if state.untangled is None else state.untangled, walls.taken(zone.memory))
     smoother.phase = PHASE
     run = Run(state.run_start(options.best_by)._replace(topology=zone), smoother, options, executor.of(zone))
     stop_reason = run.to_the_end(min(run.sweeps + len(PLAN), options.max_sweeps))
-    least = run.best_score.min_shape
-    done = replace(state, points=run.best, history=tuple(run.history), least_near_walls=least)
+    outside = executor.holding(state.planar, inside, NEAR)
+    rest = totals_of(run.best, outside.scored, executor.of(outside))
+    least = run.best_score.min_shape, math.inf if rest is None else rest.shape_min
+    done = replace(state, points=run.best, history=tuple(run.history), least_at_walls=least)
     return done.ended(stop_reason, run.interruption)
 
 
