@@ -143,6 +143,7 @@ def test_a_section_of_several_kinds_that_is_cut_is_for_the_reader_of_the_whole(t
     ("data", "shared"),
     [
         (made.cgns(), "cgns"), (made.cgns(kind=np.float32), "cgns"), (made.cgns(mixed=True), "cgns"),
+        (made.cgns(joined="CellCenter"), "cgns"),
         (made.cgns(packed=True), "cgns"), (made.cgns_zones(), "cgns"), (made.cgns_zones(packed=True), "cgns"),
         (made.cgns_zones(packed=True, mixed=True), "cgns"), (made.cgns_structured(), "cgns"), (b"no HDF5", ""),
     ],

@@ -57,6 +57,24 @@ def test_zones_are_one_mesh(key: str) -> None:
     assert isinstance(parsed.slots, ColumnSlots if key == "zones" else SharedSlots)
 
 
+def test_sections_of_several_types_in_one_boundary_condition_are_one_region(tmp_path: Path) -> None:
+    apart = {(2, 1): "tri", (2, 2): "quad", (1, 3): "walls"}
+    joined = read(cgns, made.cgns(joined="CellCenter"))
+    assert dict(joined.region_names) == {(2, 1): "body", (1, 2): "walls"}
+    assert {int(region) for block in joined.cells if block.dimension == 2 for region in block.regions} == {1}
+    assert dict(read(cgns, made.cgns()).region_names) == apart
+    assert dict(read(cgns, made.cgns(joined="Vertex")).region_names) == apart
+    assert list(dict(read(cgns, made.cgns(joined="CellCenter", split=2)).region_names).values()) == [
+        "first", "tri", "quad", "walls",
+    ]  # fmt: skip
+    held = []
+    for name, data in {"apart": made.cgns(), "joined": made.cgns(joined="CellCenter")}.items():
+        (tmp_path / f"{name}.cgns").write_bytes(data)
+        held.append(gmsnet.smooth(gmsnet.read(tmp_path / f"{name}.cgns")).held)
+    assert "interface between regions" in held[0]
+    assert "interface between regions" not in held[1]
+
+
 @pytest.mark.parametrize("key", FILES)
 def test_both_zones_get_the_same_coordinates(key: str) -> None:
     data = FILES[key]

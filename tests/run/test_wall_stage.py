@@ -136,6 +136,18 @@ def test_sweeps_that_end_early_elsewhere_keep_what_is_near_walls(most):
     assert not any("refined near" in reason for reason in last.topology.held)
 
 
+def test_where_no_sweep_is_left_for_them_nodes_near_walls_are_held():
+    mesh = recombine(plate(0.3))
+    whole = gmsnet.smooth(mesh)
+    sweeps = next(k for k, sweep in enumerate(whole.history) if sweep.stage == PHASE)
+    most = whole.history[sweeps - 1].index
+    for allowed, held in ((most, True), (most + 1, False)):
+        result = gmsnet.smooth(mesh, max_sweeps=allowed)
+        assert ("refined near a wall" in result.held) == held
+        assert result.sweeps == allowed
+        assert result.history[-1].min_shape == pytest.approx(result.judged.after.shape_min) or not held
+
+
 @pytest.mark.parametrize("radius", [0.15, 0.5])
 def test_worse_input_makes_no_better_mesh(radius):
     """Of a plate with a fine hole, thrown about more and more: protection goes by degrees."""

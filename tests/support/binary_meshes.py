@@ -61,8 +61,13 @@ def _elements(zone: h5py.Group, sections: Any) -> None:
         at += count
 
 
-def cgns(packed: bool = False, kind: type = np.float64, mixed: bool = False) -> bytes:
-    """One zone with a section of each type, or with one of them all."""
+def cgns(
+    packed: bool = False, kind: type = np.float64, mixed: bool = False, split: int = 0, joined: str = ""
+) -> bytes:  # fmt: skip
+    """One zone with a section of each type, or with one of them all.
+
+    split: so many triangles are a section by themselves. joined: where a boundary condition has all faces as a range.
+    """
 
     def fill(file: h5py.File) -> None:
         base = _node(file, "Base", "CGNSBase_t", np.array([2, 2], np.int32))
@@ -72,9 +77,17 @@ def cgns(packed: bool = False, kind: type = np.float64, mixed: bool = False) -> 
         if mixed:
             rows = [np.array([code - 1, *row]) for _, code, cells, _ in sections[:2] for row in cells.tolist()]
             sections = [("all", 20, np.concatenate(rows), 7), sections[2]]
+        if split:
+            parts = ("first", 5, TRIANGLES[:split], split), ("tri", 5, TRIANGLES[split:], 6 - split)
+            sections[:1] = parts
         _elements(zone, sections)
-        held = _node(_node(zone, "ZoneBC", "ZoneBC_t"), "held", "BC_t", _letters("BCWall"))
+        conditions = _node(zone, "ZoneBC", "ZoneBC_t")
+        held = _node(conditions, "held", "BC_t", _letters("BCWall"))
         _node(held, "PointList", "IndexArray_t", np.array([[7]], np.int32))
+        if joined:
+            body = _node(conditions, "body", "BC_t", _letters("FamilySpecified"))
+            _node(body, "PointRange", "IndexRange_t", np.array([[1], [7]], np.int32))
+            _node(body, "GridLocation", "GridLocation_t", _letters(joined))
         _node(zone, "FlowSolution", "FlowSolution_t")
 
     return _file(fill)

@@ -1,7 +1,8 @@
 """CGNS meshes in HDF5 (needs h5py). Only the coordinates are written again.
 
-Sections of elements are regions and markers by name, as are structured zones; boundary conditions that list nodes are
-node sets. Of several zones, points at one place are one node.
+Sections of elements are regions and markers by name, as are structured zones; those of several types that one boundary
+condition joins are one. Boundary conditions that list nodes are node sets. Of several zones, points at one place are
+one node.
 Source: CGNS Standard Interface Data Structures, and its SIDS-to-HDF5 mapping.
 """
 
@@ -80,10 +81,12 @@ def _zone(zone: Node, data: Data, number: int, prefix: str) -> Parsed:
     else:
         sections = [section(node, len(points)) for node in _labelled(zone, "Elements_t")]
     cells, names = list[CellBlock](), dict[tuple[int, int], str]()
-    for region, each in enumerate(sorted(sections, key=lambda each: each.first), number):
+    sections.sort(key=lambda each: each.first)
+    told = _regions(zone, [(each.first, each.name, [of for of, _ in each.blocks]) for each in sections], number)
+    for each, (region, called) in zip(sections, told, strict=True):
         for of, nodes in each.blocks:
             cells.append(CellBlock(of, nodes, np.full(len(nodes), region)))
-            names[CELLS[of].dimension, region] = prefix + each.name
+            names[CELLS[of].dimension, region] = prefix + called
     sets = {prefix + name: nodes for name, nodes in _conditions(zone, len(points))}
     unread = [what for label, what in (("FlowSolution_t", "solutions"), ("ZoneGridConnectivity_t", "interfaces"),
               ("ZoneBC_t", "boundary conditions")) if _labelled(zone, label)]  # fmt: skip
@@ -98,6 +101,37 @@ def _labelled(node: Node, label: str) -> list[Node]:
 def _is_grid(zone: Node) -> bool:
     kind = zone.get("ZoneType/" + DATA)
     return kind is not None and kind.text() == "Structured"
+
+
+def _regions(zone: Node, sections: Sequence[tuple[int, str, list[str]]], number: int) -> list[tuple[int, str]]:
+    """The region of each section, from ``number`` on, and its name.
+
+    sections: the first element, the name and the types of cells of each, ascending. Those of different types that one
+    boundary condition has as a range are one region, by its name: a writer can give a section one type alone.
+    """
+    ranges, kinds = list(_ranges(zone)), dict[str, list[str]]()
+    group = [next((name for low, high, name in ranges if low <= first <= high), "") for first, _, _ in sections]
+    for of, (_, _, types) in zip(group, sections, strict=True):
+        kinds.setdefault(of, []).extend({*types})
+    found, known = list[tuple[int, str]](), dict[str, int]()
+    for (_, name, _), of in zip(sections, group, strict=True):
+        together = bool(of) and group.count(of) > 1 and len({*kinds[of]}) == len(kinds[of])
+        region = known.setdefault(of, number) if together else number
+        number += region == number
+        found.append((region, of if together else name))
+    return found
+
+
+def _ranges(zone: Node) -> Iterator[tuple[int, int, str]]:
+    """The first and the last element and the name of boundary conditions that have a range of elements."""
+    for group in _labelled(zone, "ZoneBC_t"):
+        for condition in _labelled(group, "BC_t"):
+            place, span = condition.get(f"GridLocation/{DATA}"), condition.get(f"PointRange/{DATA}")
+            if span is None or place is None or place.text() == "Vertex":
+                continue
+            ends = span.integers().reshape(-1)
+            if len(ends) == 2:
+                yield int(ends[0]), int(ends[1]), title(condition)
 
 
 def _conditions(zone: Node, count: int) -> Iterator[tuple[str, Ints]]:
@@ -178,11 +212,13 @@ def _planned(zone: Node, file: Ranges, first: int, region: int, prefix: str) -> 
         if len(sections) < len(found):
             return None
     tables, names = list[Table](), dict[tuple[int, int], str]()
-    for number, (name, (_, some)) in enumerate(sorted(sections, key=lambda each: each[1][0]), region):
+    sections.sort(key=lambda each: each[1][0])
+    told = _regions(zone, [(begin, name, [each.kind for each in some]) for name, (begin, some) in sections], region)
+    for (_, (_, some)), (number, called) in zip(sections, told, strict=True):
         for table in some:
             if table.nodes.rows:
                 tables.append(table._replace(region=number, zone=(first, counts[0])))
-                names[CELLS[table.kind].dimension, number] = prefix + name
+                names[CELLS[table.kind].dimension, number] = prefix + called
     return _Zone(columns, tables, names)
 
 

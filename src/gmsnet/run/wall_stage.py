@@ -71,6 +71,8 @@ def improve_near_walls(state: State, options: SmoothOptions, executor: Executor)
     walls = state.protection.walls
     if walls is None or options.target or state.stop_reason not in (NO_PROGRESS, NOTHING_TO_MOVE):
         return state
+    if state.history and state.history[-1].index >= options.max_sweeps:  # else nodes would be free that none has seen
+        return state
     state = replace(state, released=True, totals=None)
     inside = with_rings(walls.nodes, state.planar, executor)
     zone = executor.holding(state.planar, ~inside, ELSEWHERE)
