@@ -71,7 +71,7 @@ def swept(
     def elsewhere(given: State) -> State:
         return carry_out_all(replace(given, protection=held), options, executor, [sweep])
 
-    last = in_turns(replace(state, protection=outer), near, elsewhere, options)
+    last = in_turns(replace(state, protection=outer), near, elsewhere, options, released)
     return last if last.released else state
 
 

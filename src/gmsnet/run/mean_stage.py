@@ -42,15 +42,15 @@ def improve_mean(state: State, options: SmoothOptions, executor: Executor) -> St
     first = totals_of(state.start, topology.scored, executor)
     assert first is not None
     wanted = first.shape_mean - LOSS if not state.before.inverted else -math.inf
-    raised = list[tuple[float, tuple[NDArray[np.float64], Totals, Tally]]]()
+    tried = list[tuple[float, NDArray[np.float64], Totals, Tally]]()
     for share in SHARES:
         shape = max(share * totals.shape_min, min(first.shape_min, totals.shape_min))
-        raised = [*raised[:1], (shape, _raised(state, topology, totals, shape, options, executor))]
-        if raised[-1][1][1].shape_mean >= wanted:
+        points, after, tally = _raised(state, topology, totals, shape, options, executor)
+        tried = [*tried[:1], (shape, points, after, tally)]
+        if after.shape_mean >= wanted:
             break
-    else:
-        raised = raised[:1]
-    shape, (points, after, tally) = raised[-1]
+    else:  # nothing brings it back
+        shape, points, after, tally = tried[0]
     if after.shape_mean < totals.shape_mean + GAIN or after.shape_min < shape - 1e-12 or after.uncertain:
         return state
     return with_sweep(state, options, points, after, MeanInSpace.phase, tally, executor=outer)

@@ -14,7 +14,7 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.room_stage import make_room, raise_bounds
 from gmsnet.run.second_order import corners_alone, rank_at, smooth_corners
 from gmsnet.run.state import State, with_corners
-from gmsnet.run.stop import CALLBACK, TARGET_REACHED
+from gmsnet.run.stop import TARGET_REACHED
 from gmsnet.run.sweep_stage import rank_to_target
 
 TURN = (smooth_corners, make_room, raise_bounds)
@@ -40,14 +40,13 @@ def take_turns(state: State, options: SmoothOptions, executor: Executor) -> Stat
             best, most = state, worth
         if not _goes_on(state) or idle == PATIENCE:
             break
-    asked_to_end = state.interruption is not None or state.stop_reason == CALLBACK
-    return best.ended(state.stop_reason, state.interruption) if asked_to_end else best
+    return best.ended_as(state)
 
 
 def _goes_on(state: State) -> bool:
     given = state.second_order
     assert given is not None
-    return given.stopped and state.interruption is None and state.stop_reason not in (TARGET_REACHED, CALLBACK)
+    return given.stopped and not state.cut_short and state.stop_reason != TARGET_REACHED
 
 
 def _worth(state: State, options: SmoothOptions, executor: Executor) -> tuple[float, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -28,7 +27,7 @@ from gmsnet.metric.field import Metric
 from gmsnet.preserve.protection import Protection
 from gmsnet.run.run import Start, precision_of
 from gmsnet.run.score import Score
-from gmsnet.run.stop import INTERRUPTED
+from gmsnet.run.stop import CALLBACK, INTERRUPTED
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.curved_solids import CORNERS3, CURVED
 from gmsnet.topology.held import OF_SECOND_ORDER
@@ -140,7 +139,6 @@ class State:
     untangled: the points after that, in which ``protection`` was found, None where nothing was done. reasons: why
     some are left, by the index of each cell. history: one Sweep for each look. stop_reason: one of ``run.stop``,
     "" before the first sweep. released: the nodes near walls are no longer held (``wall_stage``).
-    least_at_walls: the least 1/q of the cells there and around, once they are not, and of those elsewhere.
     sliding: the nodes that move along curves or a boundary, if any. curved: while the corners of second-order cells
     move, those cells (``second_order``, which is all that is known of them). nodal: (N, 3) by id, the logarithms of a
     metric that is given at nodes. metric: what cells are to become, once it is known; conformity: of the input to it,
@@ -168,7 +166,6 @@ class State:
     history: tuple[Sweep, ...] = ()
     stop_reason: str = ""
     released: bool = False
-    least_at_walls: tuple[float, float] = (math.inf, math.inf)
     interruption: KeyboardInterrupt | None = None
     final: Final | None = None
     sliding: Sliding | SurfaceSliding | Rails | None = None
@@ -213,6 +210,15 @@ class State:
     def ended(self, stop_reason: str, interruption: KeyboardInterrupt | None = None) -> State:
         """The same, and why the sweeps ended."""
         return replace(self, stop_reason=stop_reason, interruption=interruption)
+
+    @property
+    def cut_short(self) -> bool:
+        """Was it ended from outside, by the callback or an interruption?"""
+        return self.stop_reason == CALLBACK or self.interruption is not None
+
+    def ended_as(self, other: State) -> State:
+        """The same; ended from outside if the other one was."""
+        return self.ended(other.stop_reason, other.interruption) if other.cut_short else self
 
     def interrupted(self, interruption: KeyboardInterrupt) -> State:
         """The same, interrupted. Raises the second interruption: who asks twice does not want to wait."""

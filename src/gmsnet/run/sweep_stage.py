@@ -18,7 +18,7 @@ from gmsnet.run.mean_stage import improve_mean
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run
 from gmsnet.run.state import State
-from gmsnet.run.stop import CALLBACK, NO_PROGRESS
+from gmsnet.run.stop import NO_PROGRESS
 from gmsnet.run.target_run import reach_target
 from gmsnet.topology.volume import Volume
 
@@ -54,9 +54,7 @@ def _closer_one(state: State, other: State, options: SmoothOptions, executor: Ex
         return state
     if other.constraint is not None:  # it has followed the nodes of the state that is given up
         (locate3 if isinstance(other.constraint, Surface) else locate)(other.constraint, other.points)
-    if state.stop_reason == CALLBACK:
-        return other.ended(CALLBACK)
-    return other if state.interruption is None else other.interrupted(state.interruption)
+    return other.ended_as(state)
 
 
 def _closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
@@ -89,7 +87,7 @@ def _at_large(state: State, options: SmoothOptions, executor: Executor) -> State
     closer to the target."""
     plain = replace(options, target_quality=None, target_angle=None, target_dihedral=None)
     swept = _sweep_all(state, plain, executor)
-    if swept.stop_reason == CALLBACK or swept.interruption is not None:
+    if swept.cut_short:
         return swept
     all_of_it = improve_dihedrals(swept, plain, executor)
     found = reach_target(_going_on(all_of_it), options, executor)

@@ -42,25 +42,38 @@ def improve_in_turns(state: State, options: SmoothOptions, executor: Executor) -
     def elsewhere(given: State) -> State:
         return carry_out_all(given, options, executor, [sweep])
 
-    return in_turns(state, near, elsewhere, options)
+    return in_turns(state, near, elsewhere, options, executor)
 
 
-def in_turns(state: State, near: Step, elsewhere: Step, options: SmoothOptions) -> State:
-    """See improve_in_turns. near: releases the nodes near walls; elsewhere: is for a state that holds them."""
+def in_turns(state: State, near: Step, elsewhere: Step, options: SmoothOptions, executor: Executor) -> State:
+    """See improve_in_turns. near: releases the nodes near walls; elsewhere: is for a state that holds them.
+
+    executor: for the connectivity with these nodes free.
+    """
     last, least = near(state), -math.inf
     for _ in range(TURNS):
         if not last.released or last.interruption is not None:
             break
-        near_walls, elsewhere_now = last.least_at_walls
-        if not least + GAIN < elsewhere_now < near_walls + AHEAD:
+        of_all, now = _leasts(last, executor)
+        if not least + GAIN < now < of_all + AHEAD:
             break
-        least = elsewhere_now
+        least = now
         again = replace(last, released=False, totals=None, stop_reason="", smoother=options.smoother())
         swept = elsewhere(again)
         last = near(swept)
         if not last.released:  # sweeps have not ended of themselves
             last = replace(last, released=True, totals=None, protection=state.protection)
     return last
+
+
+def _leasts(state: State, executor: Executor) -> tuple[float, float]:
+    """The least 1/q of all cells with a free node, and of those with one that is not near a wall; infinite if none."""
+    walls = state.protection.walls
+    assert walls is not None
+    outside = executor.holding(state.planar, with_rings(walls.nodes, state.planar, executor), NEAR)
+    found = (totals_of(state.points, each.scored, executor.of(each)) for each in (state.planar, outside))
+    of_all, elsewhere = (math.inf if totals is None else totals.shape_min for totals in found)
+    return of_all, elsewhere
 
 
 def improve_near_walls(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -74,17 +87,12 @@ def improve_near_walls(state: State, options: SmoothOptions, executor: Executor)
     if state.history and state.history[-1].index >= options.max_sweeps:  # else nodes would be free that none has seen
         return state
     state = replace(state, released=True, totals=None)
-    inside = with_rings(walls.nodes, state.planar, executor)
-    zone = executor.holding(state.planar, ~inside, ELSEWHERE)
+    zone = executor.holding(state.planar, ~with_rings(walls.nodes, state.planar, executor), ELSEWHERE)
     smoother = Banded(state.start if state.untangled is None else state.untangled, walls.taken(zone.memory))
     smoother.phase = PHASE
     run = Run(state.run_start(options.best_by)._replace(topology=zone), smoother, options, executor.of(zone))
     stop_reason = run.to_the_end(min(run.sweeps + len(PLAN), options.max_sweeps))
-    outside = executor.holding(state.planar, inside, NEAR)
-    rest = totals_of(run.best, outside.scored, executor.of(outside))
-    least = run.best_score.min_shape, math.inf if rest is None else rest.shape_min
-    done = replace(state, points=run.best, history=tuple(run.history), least_at_walls=least)
-    return done.ended(stop_reason, run.interruption)
+    return replace(state, points=run.best, history=tuple(run.history)).ended(stop_reason, run.interruption)
 
 
 def with_rings(nodes: NDArray[np.bool_], topology: Topology, executor: Executor) -> NDArray[np.bool_]:
