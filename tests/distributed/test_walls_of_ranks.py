@@ -89,3 +89,9 @@ def test_gaps_in_the_rows_of_layers_are_held():
     held = gmsnet.smooth(given).held[LAYER]
     assert np.isin(node[12:20, :5], held).all()
     assert told.held[LAYER] == len(held)
+
+
+def test_ranks_say_that_a_feature_angle_without_sliding_has_no_effect():
+    mesh, options = plate(0.0), SmoothOptions(threads=1, feature_angle=20.0, max_sweeps=1)
+    told = same(mesh, options, parts_at_random(mesh, 2, np.random.default_rng(6), "strips"), 2)
+    assert any(note.startswith("feature angle: it has no effect") for note in told.notes)

@@ -39,7 +39,7 @@ from gmsnet.methods.base import CELLS
 from gmsnet.preserve.protection import LAYER, WALL
 from gmsnet.run.options import CPU, SmoothOptions
 from gmsnet.run.outcome import factors_of, merit_of
-from gmsnet.run.set_up import check_options, check_target
+from gmsnet.run.set_up import check_options, check_target, not_slid
 from gmsnet.run.state import State
 from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.shell import Shell
@@ -201,6 +201,8 @@ def _shared(
     if found is not None:
         where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
         notes += found.note(points[at], moved[at], where, piece, part.comm)
+    else:
+        notes += not_slid(options)
     notes += judged.note(before, after, "η" if part.mesh.has_volumes else "1/q")
     return RankResult(
         points=points[at],

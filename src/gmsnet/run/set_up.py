@@ -127,7 +127,7 @@ def first_state(
     )
 
 
-def not_slid(options: SmoothOptions, second: SecondOrder | None) -> list[str]:
+def not_slid(options: SmoothOptions, second: SecondOrder | None = None) -> list[str]:
     """What of the options of sliding has no effect on a mesh in a plane, or of volumes."""
     if options.slides:
         return [] if second is None else ["slide: boundary nodes of second-order cells stay where they are"]
