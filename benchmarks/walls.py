@@ -2,9 +2,9 @@
 
     GMSNET_MESHES=FOLDER python benchmarks/walls.py [--thrown 0 0.05 …] [--ceiling ROUNDS]
 
-On the NACA 0012 and two plates refined towards a hole, as they are and with all nodes thrown by so many edges: q̂ and
-the minimum 1/q after each call, and how much areas of protected cells change, at most and in 95 % of them, and the
-heights of those on the wall.
+On the NACA 0012 and two plates refined towards a hole, of triangles and recombined to quads, as they are and with all
+nodes thrown by so many edges: q̂ (of quads the mean 1/q) and the minimum 1/q after each call, and how much areas of
+protected cells change, at most and in 95 % of them, and the heights of those on the wall.
 
 ``--ceiling``: how good the worst cell near the airfoil can be if each protected area stays within 10 %, by linear
 programs with a trust region one after the other, from the mesh as it is. A lower bound of what is possible.
@@ -22,7 +22,7 @@ from machine import describe
 from scipy.optimize import linprog
 
 import gmsnet
-from gmsnet.generate import Curve, disturb, good_mesh
+from gmsnet.generate import Curve, disturb, good_mesh, recombine
 from gmsnet.preserve.walls import near_walls
 from gmsnet.topology.topology import Topology
 
@@ -47,32 +47,68 @@ def doubles(points, triangles):
     return (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
 
 
-def on_walls(mesh, topology, cells):
-    """The heights, over the boundary, of those of the cells (T,) bool that have an edge of it; by points."""
-    edges = np.sort(topology.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    _, place, count = np.unique(edges, axis=0, return_index=True, return_counts=True)
-    outer = place[count == 1]
-    outer = outer[cells[outer // 3]]
-    rows, ends = topology.triangles[outer // 3], edges[outer]
+def cells_of(topology):
+    """The corners of the cells of each kind."""
+    return [cells for cells in (topology.triangles, topology.quads) if len(cells)]
+
+
+def areas(points, cells):
+    """Of cells of one kind (C, 3 or 4)."""
+    x, y = points[cells].transpose(2, 0, 1)
+    return 0.5 * np.abs((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1))
+
+
+def on_walls(mesh, topology, kept):
+    """The heights over the boundary, by points: of the other nodes of kept cells that have an edge of it.
+
+    Of a quad, of the two that are next to the edge.
+    """
+    ends, above = [], []
+    for cells in cells_of(topology):
+        count = cells.shape[1]
+        for k in range(count):
+            edge = cells[:, [k, (k + 1) % count]]
+            for other in {(k + 2) % count, (k - 1) % count}:
+                ends.append(np.where(kept[cells].all(axis=1)[:, None], edge, -1))
+                above.append(cells[:, other])
+    ends, above = np.sort(np.concatenate(ends), axis=1), np.concatenate(above)
+    wall = np.zeros(len(kept), dtype=bool)
+    wall[topology.held["boundary"]] = True
+    pairs = [np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2) for cells in cells_of(topology)]
+    found, count = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0, return_counts=True)
+    outer = {tuple(edge) for edge in found[count == 1].tolist()}
+    chosen = np.array([tuple(edge) in outer for edge in ends.tolist()]) & ~wall[above]
+    ends, above = ends[chosen], above[chosen]
 
     def heights(points):
-        return np.abs(doubles(points, rows)) / np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1)
+        along, away = points[ends[:, 1]] - points[ends[:, 0]], points[above] - points[ends[:, 0]]
+        return np.abs(along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0]) / np.linalg.norm(along, axis=1)
 
     return heights
+
+
+def all_areas(points, kinds):
+    return np.concatenate([areas(points, cells) for cells in kinds])
+
+
+def upper(values):
+    return np.quantile(values, 0.95)
 
 
 def compare(name, mesh):
     """Prints a row."""
     topology, text = Topology.of(mesh), ""
-    cells = near_walls(mesh, topology).nodes[topology.triangles].all(axis=1)
-    before, heights = doubles(mesh.points[:, :2], topology.triangles)[cells], on_walls(mesh, topology, cells)
+    kept = near_walls(mesh, topology).kept.nodes
+    banded = [cells[kept[cells].all(axis=1)] for cells in cells_of(topology)]
+    before, heights = all_areas(mesh.points[:, :2], banded), on_walls(mesh, topology, kept)
     for choice in CHOICES:
         result = gmsnet.smooth(mesh, threads=1, preserve=choice)
-        change = np.abs(doubles(result.points[:, :2], topology.triangles)[cells] / before - 1.0)
-        most = (change.max(), np.quantile(change, 0.95)) if cells.any() else (0.0, 0.0)
-        high = np.abs(heights(result.points[:, :2]) / heights(mesh.points[:, :2]) - 1.0).max(initial=0.0)
-        text += f"{result.after.qhat:8.4f}{result.after.shape.min():7.3f}{most[0]:8.1%}{most[1]:8.1%}{high:8.1%} |"
-    print(f"{name:20}{cells.sum():6}|{text}", flush=True)
+        change = np.abs(all_areas(result.points[:, :2], banded) / before - 1.0)
+        high = np.abs(heights(result.points[:, :2]) / heights(mesh.points[:, :2]) - 1.0)
+        figures = [f"{part(values):8.1%}" for values in (change, high) if len(values) for part in (np.max, upper)]
+        best = result.after.qhat if len(topology.quads) == 0 else result.after.shape.mean()
+        text += f"{best:8.4f}{result.after.shape.min():7.3f}{''.join(figures):32} |"
+    print(f"{name:24}{len(before):6}|{text}", flush=True)
 
 
 class Program:
@@ -83,7 +119,7 @@ class Program:
         self.points, triangles = mesh.points[:, :2].copy(), topology.triangles.copy()
         turned = topology.orientation < 0
         triangles[turned] = triangles[turned][:, [0, 2, 1]]
-        kept = near_walls(mesh, topology).nodes
+        kept = near_walls(mesh, topology).kept.nodes
         zone = kept.copy()
         for _ in range(RINGS):
             zone[triangles[zone[triangles].any(axis=1)]] = True
@@ -171,8 +207,9 @@ def main():
     print(describe())
     naca = gmsnet.read(Path(os.environ["GMSNET_MESHES"]) / "mesh_NACA0012_inv.su2")
     meshes = {"NACA 0012": naca, "plate": plate(0.5, 0.01, 0.25, 4.0), "finer hole": plate(0.15, 0.003, 0.2, 0.5)}
-    heads = "".join(f"{choice + ': q̂':>8}{'least':>7}{'most':>8}{'95 %':>8}{'height':>8} |" for choice in CHOICES)
-    print(f"{'':20}{'cells':>6}|{heads}")
+    meshes |= {f"{name}, quads": recombine(mesh) for name, mesh in meshes.items()}
+    columns = f"{'least':>7}{'areas':>8}{'95 %':>8}{'heights':>8}{'95 %':>8} |"
+    print(f"{'':24}{'cells':>6}|{''.join(f'{choice:>8}{columns}' for choice in CHOICES)}")
     for name, mesh in meshes.items():
         for amount in options.thrown:
             thrown = disturb(mesh, Topology.of(mesh).free, amount, seed=0) if amount else mesh

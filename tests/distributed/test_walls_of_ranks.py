@@ -48,7 +48,7 @@ def test_the_stage_near_walls_is_shared_out(amount, how):
 @pytest.mark.parametrize("how", ["interleaved", "strips"])
 def test_turns_are_shared_out(how):
     """Quads, of which the worst one is not near the wall."""
-    mesh = recombine(plate(0.0, 200, 0.9))
+    mesh = recombine(plate(0.0, 200, 1.6))
     told = same(mesh, SmoothOptions(threads=1), parts_at_random(mesh, 3, np.random.default_rng(5), how), 3)
     assert told.gathered == ""
     assert [sweep.stage for sweep in told.history].count(PHASE) == 3 * len(PLAN)

@@ -10,7 +10,7 @@ import pytest
 from support.layer_meshes import grid
 
 import gmsnet
-from gmsnet.generate import Curve, disturb, good_mesh, layered_mesh, random_quad_mesh
+from gmsnet.generate import Curve, disturb, good_mesh, layered_mesh, random_quad_mesh, recombine
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.paper.cases import CASES
@@ -22,7 +22,7 @@ from gmsnet.topology.topology import Topology
 
 
 def kept(mesh, held=None):
-    return near_walls(mesh, Topology.of(mesh, held)).nodes
+    return near_walls(mesh, Topology.of(mesh, held)).kept.nodes
 
 
 def distances(points, wall):
@@ -80,17 +80,47 @@ def test_it_moves_turns_and_scales_with_the_mesh(ring):
 
 def test_the_more_a_mesh_is_disturbed_the_wider_are_its_bands(ring):
     free = Topology.of(ring).free
-    found = [near_walls(disturb(ring, free, amount, seed=0), Topology.of(ring)) for amount in (0.05, 0.2, 0.3, 0.5)]
-    assert near_walls(ring, Topology.of(ring)).blend.max() < 0.1
+    found = [
+        near_walls(disturb(ring, free, amount, seed=0), Topology.of(ring)).kept for amount in (0.05, 0.2, 0.3, 0.5)
+    ]
+    assert near_walls(ring, Topology.of(ring)).kept.blend.max() < 0.1
     means = [walls.blend[walls.nodes].mean() for walls in found]
     assert means[0] < 0.02 < 0.1 < means[1] < 0.5 < means[2] < means[3] == 1.0
     assert found[2].room.max() == 1.0 < found[3].room.max() < WIDEST
-    assert not near_walls(disturb(ring, free, 1.0, seed=0), Topology.of(ring)).nodes.any()
+    assert not near_walls(disturb(ring, free, 1.0, seed=0), Topology.of(ring)).kept.nodes.any()
+
+
+def test_the_noise_of_quads_is_that_of_their_areas(ring):
+    """What a mesh generator recombines to quads is undisturbed as it is; thrown about, it is not."""
+    quads = recombine(ring)
+    free, hole = Topology.of(quads).free, ring.markers["hole"]
+    found = [near_walls(disturb(quads, free, t, seed=0), Topology.of(quads)).kept for t in (0.0, 0.1, 0.2, 0.3)]
+    assert [walls.heights[hole].max() for walls in found][::3] == [1.0, 0.0]
+    assert found[0].blend[found[0].nodes].mean() < 0.2
+    assert found[1].blend[found[1].nodes].mean() < found[2].blend[found[2].nodes].mean() < 1.0
+    assert found[2].room.max() == 1.0 < found[3].room.max() < WIDEST
+    assert not near_walls(disturb(quads, free, 0.6, seed=0), Topology.of(quads)).kept.nodes.any()
+
+
+@pytest.mark.parametrize("cells", ["triangle", "quad"])
+def test_walls_with_cells_too_large_to_be_kept_are_told(cells):
+    """60 edges around a hole: each is longer than 2 % of its diameter."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 61)
+    hole = Curve(0.5 * np.column_stack([np.cos(turn), np.sin(turn)]), "hole")
+    square = Curve(np.array([[-6.0, -6.0], [6.0, -6.0], [6.0, 6.0], [-6.0, 6.0], [-6.0, -6.0]]), "square")
+    mesh = good_mesh([[square], [hole]], lambda x: 0.05 + 0.3 * np.abs(np.linalg.norm(x, axis=1) - 0.5))
+    mesh = recombine(mesh) if cells == "quad" else mesh
+    found = near_walls(mesh, Topology.of(mesh))
+    assert found.coarse == 1
+    assert not found.kept.nodes.any()
+    told = "the mesh is refined towards a wall, but cells on it are larger than 2% of its diameter"
+    assert any(note.startswith(told) for note in gmsnet.smooth(mesh).notes)
+    assert not any(note.startswith(told) for note in gmsnet.smooth(mesh, preserve="none").notes)
 
 
 def test_heights_give_way_to_areas_where_a_mesh_is_disturbed(ring):
     free, hole = Topology.of(ring).free, ring.markers["hole"]
-    found = [near_walls(disturb(ring, free, amount, seed=0), Topology.of(ring)) for amount in (0.0, 0.1, 0.2)]
+    found = [near_walls(disturb(ring, free, amount, seed=0), Topology.of(ring)).kept for amount in (0.0, 0.1, 0.2)]
     for walls in found:
         assert not np.delete(walls.heights, hole).any()
         assert len(set(walls.heights[hole].tolist())) == 1
@@ -103,11 +133,11 @@ def test_heights_give_way_to_areas_where_a_mesh_is_disturbed(ring):
 
 
 def test_the_bands_of_damaged_cells_are_wide(ring):
-    walls, topology = near_walls(ring, Topology.of(ring)), Topology.of(ring)
+    walls, topology = near_walls(ring, Topology.of(ring)).kept, Topology.of(ring)
     inner = np.flatnonzero(walls.nodes & np.isin(np.arange(len(walls.nodes)), topology.free))
     chosen = inner[np.random.default_rng(0).permutation(len(inner))[:6]]
     broken = disturb(ring, chosen, 3.0, seed=0, keep_valid=True)
-    found = near_walls(broken, topology)
+    found = near_walls(broken, topology).kept
     shape = gmsnet.quality(broken).shape
     near = walls.nodes[topology.triangles].all(axis=1)
     bad = (shape < 0.3) & near & found.nodes[topology.triangles].all(axis=1)

@@ -62,6 +62,42 @@ def test_cells_on_a_wall_keep_their_heights(slide):
     assert free[0].moved[wall].any() == slide
 
 
+def quad_areas(points, quads):
+    one, other = points[quads[:, 2]] - points[quads[:, 0]], points[quads[:, 3]] - points[quads[:, 1]]
+    return 0.5 * np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
+
+
+@pytest.mark.parametrize("slide", [False, True])
+@pytest.mark.parametrize("radius", [0.15, 0.5])
+def test_quads_keep_their_areas_and_their_heights_on_the_wall(radius, slide):
+    """The area of a whole quad, and not of each of its corners, is what is kept: so its shape can get better."""
+    mesh = recombine(plate(radius))
+    topology, wall = Topology.of(mesh), np.zeros(len(mesh.points), dtype=bool)
+    wall[mesh.markers["hole"]] = True
+    walls = state_of(mesh).protection.walls
+    calm = walls.nodes & (walls.blend == 0.0)
+    calm[wall] &= walls.heights[wall] == 1.0
+    quads, triangles = topology.quads, topology.triangles
+    inside = quads[calm[quads].all(axis=1)]
+    assert len(inside) > 200
+    result = gmsnet.smooth(mesh, slide=slide)
+    change = np.abs(quad_areas(result.points, inside) / quad_areas(mesh.points, inside) - 1.0)
+    assert 0.05 < change.max() <= 0.1
+    corners = [doubles(points, inside[:, [0, 1, 3]]) for points in (mesh.points, result.points)]
+    assert np.abs(corners[1] / corners[0] - 1.0).max() > 0.2
+    on_wall = np.concatenate([np.roll(inside, -k, axis=1)[:, :3] for k in range(4)])  # with the edge 01 or 12
+    on_wall = on_wall[wall[on_wall].sum(axis=1) == 2]
+    on_wall = on_wall[wall[on_wall[:, 1]]]
+    assert len(on_wall) > 60
+    before, after = (heights(points, on_wall, wall) for points in (mesh.points, result.points))
+    assert 0.01 < np.abs(after / before - 1.0).max() <= 0.02
+    near = quads[walls.nodes[quads].all(axis=1)]
+    first, last = (gmsnet.quality(m).shape[len(triangles) :] for m in (mesh, result.mesh))
+    chosen = walls.nodes[quads].all(axis=1)
+    assert len(near) == chosen.sum()
+    assert last[chosen].min() > first[chosen].min() + 0.1
+
+
 def test_the_airfoil_of_the_real_meshes(real_meshes):
     mesh = gmsnet.read(real_meshes / "mesh_NACA0012_inv.su2")
     first = state_of(mesh)

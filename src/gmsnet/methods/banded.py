@@ -37,6 +37,9 @@ PLAN = (
 )  # fmt: skip
 
 
+POOREST = 0.3  # 1/q of a worst cell that others are measured by: by a worse one, the barrier would be all they see
+
+
 class Kept(NamedTuple):
     """Which cells have bands, and how wide; all (N,), in one order.
 
@@ -97,7 +100,7 @@ class Banded(StarSmoother):
         if field.planar is not self.topology:
             self._begin(field.planar, executor)
         self.at += 1
-        self.inverse = max(least_shape(field, executor), 0.0)
+        self.inverse = max(least_shape(field, executor), POOREST)
         tally = np.zeros(3, dtype=np.int64)
         for _ in range(PLAN[self.at].passes):
             tally += super().sweep(field, executor, test)

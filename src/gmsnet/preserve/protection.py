@@ -20,7 +20,7 @@ from gmsnet.preserve.anchored import split
 from gmsnet.preserve.columns import layers_of_volume
 from gmsnet.preserve.layers import Layers, stretched_layers
 from gmsnet.preserve.survey import Survey
-from gmsnet.preserve.walls import near_walls
+from gmsnet.preserve.walls import NEAR, near_walls
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -101,8 +101,9 @@ def protected(
         return protection
     outer = protection.outer
     assert isinstance(outer, Topology)
-    walls = near_walls(mesh, outer, survey)
+    walls, coarse = near_walls(mesh, outer, survey)
     walls = walls.firm if firm else walls
+    notes.extend(_coarse(coarse))
     walled = Protection(topology, notes, layers, walls)
     return walled if walls.nodes.any() and WALL in walled.topology.held else protection
 
@@ -184,6 +185,16 @@ def wall_note(walls: Kept, nodes: int, moved: bool) -> str:
     mend = "" if moved else "; preserve='none' lets them move"
     so = so or "are held in this run"
     return f"the mesh is refined towards its walls: the {nodes:,} nodes next to them {so} (preserve={SHAPE!r}){mend}"
+
+
+def _coarse(walls: int) -> list[str]:
+    """What to say of so many walls that the mesh is refined towards, but so coarsely that no cell is kept."""
+    if not walls:
+        return []
+    which = "a wall" if walls == 1 else f"{walls} walls"
+    so = f"cells on it are larger than {NEAR:.0%} of its diameter, and smoothed like others"
+    mend = f"their heights may change by a third; preserve={SIZE!r} changes them less"
+    return [f"the mesh is refined towards {which}, but {so}: {mend}"]
 
 
 def carried_note(nodes: int) -> str:

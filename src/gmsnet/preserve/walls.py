@@ -13,6 +13,8 @@ with that around single cells that are damaged. So a mesh that is a little worse
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,20 +33,34 @@ Floats = NDArray[np.float64]
 
 NEAR = 0.02  # of a wall's diameter: how far from it a cell's middle may lie
 REFINED = 0.25  # cells there have edges of at most this share of those that cells of the mesh's mean area would have
+COARSE = 0.1  # of a wall's diameter: the edges on a body that is resolved at all are shorter
 MOST = 0.5  # at least this share of the cells near a wall is refined, or it is not refined towards that wall
 # How far a cell's area lies from the mean of its neighbours', in logarithms, averaged over the stars of its corners:
-# the noise. Meshes as they are made have a median of 0.02 to 0.08 near a wall, random ones 0.4 to 0.5. From the first
-# to the second of these bands of heights give way to those of areas; from there to the third these reach to the mean
-# around; and from there to the fourth they grow by the factor WIDEST.
-SURE, CALM, NOISY, RANDOM = 0.08, 0.1, 0.2, 0.4
+# the noise. Meshes of triangles as they are made have a median of 0.02 to 0.08 near a wall, random ones 0.4 to 0.5; of
+# quads, recombined of triangles, 0.03 to 0.12 and 0.3 to 0.35. From the first to the second of these bands of heights
+# give way to those of areas; from there to the third these reach to the mean around; and from there to the fourth they
+# grow by the factor WIDEST.
+SURE, CALM, NOISY, RANDOM = range(4)
+NOISE = np.array([[0.08, 0.1, 0.2, 0.4], [0.12, 0.145, 0.17, 0.25]])  # of triangles, of quads
 WIDEST = 4.0
 ROUGH, BROKEN = 0.4, 0.5  # the same for single cells, whose band reaches to the mean from the second on
 SOUND, POOR = 0.5, 0.3  # the same by their 1/q
 CANDIDATES = 8  # edges of the wall, by their middles, among which the nearest is looked for
 
 
-def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> Kept:
-    """The corners, by node id, of cells of a planar mesh that keep their areas, and how exactly.
+class NearWalls(NamedTuple):
+    """Which cells keep their areas.
+
+    kept: their corners, by node id, and how exactly. coarse: how many walls there are that the mesh is refined towards,
+    but of which no cell is kept, for those on them are larger than NEAR.
+    """
+
+    kept: Kept
+    coarse: int
+
+
+def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> NearWalls:
+    """The cells of a planar mesh that keep their areas.
 
     topology: of this mesh, with what is stretched on purpose held. The cells are those whose middle lies within NEAR of
     a wall's diameter from it (a wall is a piece of the boundary that hangs together), provided that the mesh is refined
@@ -53,32 +69,34 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
     is known.
     """
     triangles, count = topology.near, len(topology.memory)
-    kept = Kept.nothing(count)
+    kept, coarse = Kept.nothing(count), 0
     if topology.plane is None or not len(triangles):
-        return kept
+        return NearWalls(kept, 0)
     survey = survey or Survey.of(mesh, topology)
     points = survey.points
     largest = REFINED * float(_edge(survey.double))
     if not refined(points, triangles.take(survey.beside, axis=0), survey.double):
-        return kept  # so it is with most meshes
+        return NearWalls(kept, 0)  # so it is with most meshes
     rough: Floats | None = None
     for wall, cells in _walls(topology.simplices, survey):
         size = _edge(_double(points, triangles[cells]))
         if (size <= largest).mean() < MOST:
             continue
-        close = NEAR * _diameter(points[np.unique(wall)])
+        diameter = _diameter(points[np.unique(wall)])
+        close = NEAR * diameter
         most = min(largest, close)
-        if not most > 0.0 or (size <= most).mean() < MOST:
-            continue
         rows = _rows_near(points, triangles, points[wall], close)
-        if not rows.size or (_edge(_double(points, triangles[rows])) <= most).mean() < MOST:
+        inside = _edge(_double(points, triangles[rows]))
+        if not (most > 0.0 and all(len(some) and (some <= most).mean() >= MOST for some in (size, inside))):
+            coarse += bool(0.0 < np.median(size) <= COARSE * diameter)
             continue
-        rough = _roughness(triangles, _double(points, triangles), len(points)) if rough is None else rough
-        if np.median(rough[rows]) < RANDOM:
-            _keep(kept, topology, points, rows, rough[rows], wall)
+        rough = _roughness(topology, points) if rough is None else rough
+        levels = _levels(topology, rows)
+        if np.median(rough[rows]) < levels[RANDOM]:
+            _keep(kept, topology, points, rows, rough[rows], levels, wall)
     if kept.nodes.any():
         _leave_out_inverted(kept, topology, points)
-    return kept
+    return NearWalls(kept, coarse)
 
 
 def refined(points: Floats, beside: Ints, double: float) -> bool:
@@ -86,22 +104,30 @@ def refined(points: Floats, beside: Ints, double: float) -> bool:
     return bool((_edge(_double(points, beside)) <= REFINED * float(_edge(double))).any())
 
 
-def _keep(kept: Kept, topology: Topology, points: Floats, rows: NDArray[np.int64], rough: Floats, wall: Ints) -> None:
-    """Marks the corners of the simplices near one wall. rows: of ``topology.near``; rough: (len(rows),) their noise.
+def _levels(topology: Topology, rows: NDArray[np.int64]) -> Floats:
+    """The levels of noise of some rows of ``near``, by how many of them are of quads."""
+    quads = 0.0 if topology.near_shapes is None else float((topology.near_shapes[rows] != EQUILATERAL).mean())
+    return np.asarray((1.0 - quads) * NOISE[0] + quads * NOISE[1])
 
-    wall: (k, 2) its edges.
+
+def _keep(
+    kept: Kept, topology: Topology, points: Floats, rows: NDArray[np.int64], rough: Floats, levels: Floats, wall: Ints
+) -> None:
+    """Marks the corners of the simplices near one wall.
+
+    rows: of ``topology.near``; rough: (len(rows),) their noise, levels: of it. wall: (k, 2) its edges.
     """
     corners, columns = topology.near[rows], np.empty((4, len(rows)))
     quality.per_cell(points, corners, topology.near_orientation[rows], columns)
     shape, noise = columns[quality.SHAPE], float(np.median(rough))
     blend = np.maximum(_ramp(rough, ROUGH, BROKEN), _ramp(-shape, -SOUND, -POOR))
-    blend = np.maximum(blend, _ramp(np.array(noise), CALM, NOISY))
+    blend = np.maximum(blend, _ramp(np.array(noise), levels[CALM], levels[NOISY]))
     nodes = topology.memory[corners]
     kept.nodes[nodes] = True
     np.maximum.at(kept.blend, nodes, blend[:, None])
-    wider = WIDEST ** float(_ramp(np.array(noise), NOISY, RANDOM))
+    wider = WIDEST ** float(_ramp(np.array(noise), levels[NOISY], levels[RANDOM]))
     kept.room[nodes] = np.maximum(kept.room[nodes], wider)
-    kept.heights[topology.memory[wall]] = 1.0 - _ramp(np.array(noise), SURE, CALM)
+    kept.heights[topology.memory[wall]] = 1.0 - _ramp(np.array(noise), levels[SURE], levels[CALM])
 
 
 def _leave_out_inverted(kept: Kept, topology: Topology, points: Floats) -> None:
@@ -118,25 +144,32 @@ def _ramp(value: Floats, low: float, high: float) -> Floats:
     return np.asarray(np.clip((value - low) / (high - low), 0.0, 1.0))
 
 
-def _roughness(triangles: Ints, double: Floats, nodes: int) -> Floats:
-    """(T,) how far areas lie from the mean of their neighbours' (in logarithms), around the corners of each cell.
-
-    A steady growth from row to row cancels in it.
+def _roughness(topology: Topology, points: Floats) -> Floats:
+    """(T,) of each row of ``near``, how far areas lie from the mean of their neighbours' (in logarithms), around the
+    corners of its cell. A steady growth from row to row cancels in it.
     """
-    size = np.log(np.maximum(double, np.finfo(float).tiny))
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
-    key = edges[:, 0] * nodes + edges[:, 1]
+    rows, shapes, cells = topology.near, topology.near_shapes, topology.near_cells
+    cells = np.arange(len(rows)) if cells is None else cells
+    double, number = np.bincount(cells, _double(points, rows)), np.bincount(cells)
+    size = np.log(np.maximum(double / np.maximum(number, 1), np.finfo(float).tiny))
+    # Of a corner of a quad the corner itself, and the edge to the next one: so each of a cell counts once.
+    once = np.ones(rows.size, dtype=bool)
+    if shapes is not None:
+        once = np.repeat(shapes == EQUILATERAL, 3) | (np.arange(rows.size) % 3 == 0)
+    owner = np.repeat(cells, 3)[once]
+    edges = np.sort(rows[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)[once], axis=1).astype(np.int64)
+    key = edges[:, 0] * len(points) + edges[:, 1]
     order = np.argsort(key, kind="stable")
     same = np.flatnonzero(key[order[1:]] == key[order[:-1]])
-    one, other = order[same] // 3, order[same + 1] // 3
+    one, other = owner[order[same]], owner[order[same + 1]]
     both, across = np.concatenate([one, other]), np.concatenate([other, one])
     count = np.bincount(both, minlength=len(size))
     mean = np.bincount(both, size[across], minlength=len(size)) / np.maximum(count, 1)
     off = np.where(count > 0, np.abs(size - mean), 0.0)
-    corners = triangles.ravel()
-    number = np.maximum(np.bincount(corners, minlength=nodes), 1)
-    around = np.bincount(corners, np.repeat(off, 3), minlength=nodes) / number
-    return np.asarray(around[triangles].mean(axis=1))
+    corners = rows.ravel()[once]
+    each = np.maximum(np.bincount(corners, minlength=len(points)), 1)
+    around = np.bincount(corners, off[owner], minlength=len(points)) / each
+    return np.asarray((np.bincount(owner, around[corners]) / np.maximum(np.bincount(owner), 1))[cells])
 
 
 def _double(points: Floats, triangles: Ints) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,6 +14,7 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import bands
 from gmsnet.kernels.methods.bands import AREA, HEIGHT
 from gmsnet.kernels.star import stars
+from gmsnet.kernels.star.pattern import count_of, other_of, pair_of, pattern_at
 from gmsnet.methods.sized import places_of
 from gmsnet.topology.ordering import planar_points
 from gmsnet.topology.topology import Topology
@@ -58,7 +61,7 @@ def test_the_ends_of_bands_follow_from_areas(blend, room):
                 at = first + k * LANES + lane
                 low, high = found.low[at], found.high[at]
                 if not kept[corners].all():
-                    assert (low, high) == bands.ends_of(found, at, 1.0) == (-np.inf, np.inf)
+                    assert (low, high) == bands.ends_of(found, at, 0.0, 1.0) == (-np.inf, np.inf)
                     continue
                 own = doubles(points, corners)
                 goal = own * (np.exp(log_mean[corners].mean()) / own) ** blend
@@ -76,15 +79,59 @@ def test_the_ends_of_bands_follow_from_areas(blend, room):
                 assert (found.least[at], found.most[at]) == pytest.approx((shallow / length, tall / length))
                 if wall[corners[0]]:
                     assert wall[corners[found.edge[at] - 1]]
-                    assert bands.ends_of(found, at, length) == (low, high)
+                    assert bands.ends_of(found, at, 0.0, length) == (low, high)
                     continue
                 assert found.edge[at] == bands.OPPOSITE
                 for longer in (0.95, 1.0, 1.05):
                     ends = max(low, longer * shallow), min(high, longer * tall)
-                    assert bands.ends_of(found, at, longer * length) == pytest.approx(ends)
+                    assert bands.ends_of(found, at, 0.0, longer * length) == pytest.approx(ends)
                 over += 1
     assert seen > 300
     assert over > 30
+
+
+@pytest.mark.parametrize("cells", ["quad", "mixed"])
+def test_a_quad_has_a_band_for_its_area_and_one_for_each_height_over_its_edges_on_a_wall(cells):
+    mesh = gmsnet.generate.random_quad_mesh(150, cells=cells, seed=4)
+    topology = Topology.of(mesh)
+    points = planar_points(mesh)[topology.memory]
+    everywhere, firm = np.ones(len(points), dtype=bool), np.zeros(len(points))
+    firm[: len(points) // 3] = 1.0
+    found, _ = limited(points, topology, everywhere, firm)
+    quads = topology.places[topology.quads]
+    whole = {tuple(np.roll(quad, -k).tolist()) for quad in quads for k in range(4)}
+    blocks, places = topology.stars.blocks, Counter()
+    for block, first in enumerate(found.first):
+        n = blocks.degree[block]
+        pattern = pattern_at(blocks.patterns, blocks.pattern, block)
+        for k in range(count_of(pattern, n)):
+            (i, j), ring = pair_of(pattern, n, k), blocks.rings[blocks.offset[block] :]
+            other = other_of(pattern, k, i)
+            if other == i:
+                continue
+            for lane in range(blocks.filled[block]):
+                c = blocks.centre[block * LANES + lane]
+                a, b, o = (ring[row * LANES + lane] for row in (i, j, other))
+                at = first + k * LANES + lane
+                own = (c, a, o, b) in whole or (c, b, o, a) in whole
+                d, rest = doubles(points, np.array([[c, a, b], [o, b, a]]))
+                if own:
+                    assert (found.low[at], found.high[at]) == pytest.approx(
+                        ((1 - AREA) * (d + rest), (1 + AREA) * (d + rest))
+                    )
+                    low, high = bands.ends_of(found, at, rest, 1.0)
+                    assert (low, high) == pytest.approx((found.low[at] - rest, found.high[at] - rest))
+                else:
+                    assert (found.low[at], found.high[at]) == (-np.inf, np.inf)
+                sides = {(c, a), (c, b)} if own else {(c, a), (a, b)} if (c, a, b, o) in whole else {(c, b), (a, b)}
+                on_wall = [side for side in sides if firm[list(side)].all() and firm[[a, b, c]].sum() == 2.0]
+                assert (found.edge[at] != bands.NOWHERE) == (len(on_wall) == 1)
+                places[own, int(found.edge[at])] += 1
+                if on_wall:
+                    length = np.linalg.norm(points[on_wall[0][0]] - points[on_wall[0][1]])
+                    ends = (1 - HEIGHT) * d / length, (1 + HEIGHT) * d / length
+                    assert (found.least[at], found.most[at]) == pytest.approx(ends)
+    assert set(places) == {(own, edge) for own in (True, False) for edge in range(4)} - {(True, bands.OPPOSITE)}
 
 
 @given(seed=st.integers(0, 2**32 - 1), reach=st.sampled_from([1e-3, 0.03, 0.3, 10.0]))

@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from gmsnet.kernels.jit.compile import LANES, kernel, part
-from gmsnet.kernels.methods.bands import ends_of, shorten
+from gmsnet.kernels.methods.bands import ends_of, rest_in, shorten
 from gmsnet.kernels.methods.worst_first import power
 from gmsnet.kernels.simplex.objectives import aspect
 from gmsnet.kernels.star import stars
@@ -148,7 +148,8 @@ def sweep(points, blocks, bands, inverse, doublings, weight, first, last, guard,
             for lane in range(LANES):
                 p, q, over = 2 * i * LANES + lane, 2 * j * LANES + lane, 1.0 / (sizes[lane] * sizes[lane])
                 length = sizes[lane] * math.hypot(local[p] - local[q], local[LANES + p] - local[LANES + q])
-                least, most = ends_of(bands, start + k * LANES + lane, length)
+                rest = rest_in(pattern, k, i, j, local, lane, LANES) / over
+                least, most = ends_of(bands, start + k * LANES + lane, rest, length)
                 low[k * LANES + lane], high[k * LANES + lane] = over * least, over * most
         centre = stars.centre_of(blocks, block)
         descend(local, n, pattern, low, high, inverse, doublings, weight, centre, guard.constraint, state, shift)

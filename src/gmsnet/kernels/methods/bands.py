@@ -2,7 +2,9 @@
 
 Of a corner simplex (p, r_i, r_j) with what is around it fixed, D is an affine function of the free node's place p. So
 the places where D lies in a band form a strip, and those where all simplices of a star do form a convex polygon. Twice
-the area of a quad is the sum of the D at two opposite corners: it stays in the band with them.
+the area of a quad is the sum of the D at two opposite corners. As one of its nodes moves, the D opposite to that, its
+``rest``, does not change. So the band of a quad is one for the D at the moving node, less the rest; the D at the
+corners beside have none.
 
 A band reaches from 1 − AREA to 1 + AREA times what D is at the start. Where areas are noisy, so that nobody meant
 them, it is wider: it reaches to the share ``blend`` of the way (of logarithms) from there to the mean of the areas
@@ -26,7 +28,17 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES, kernel, part
 from gmsnet.kernels.star.constraint import snap
-from gmsnet.kernels.star.pattern import count_of, other_of, pair_of, pattern_at
+from gmsnet.kernels.star.pattern import (
+    AT_FIRST,
+    AT_SECOND,
+    NONE,
+    OWN,
+    corner_of,
+    count_of,
+    other_of,
+    pair_of,
+    pattern_at,
+)
 
 AREA, HEIGHT = 0.099, 0.0198  # a tenth and a fiftieth, and room for rounding, and for nodes that slide
 # Times the ends for areas those for heights are.
@@ -39,9 +51,10 @@ TINY = 1e-300
 
 
 class Bands(NamedTuple):
-    """The ends of the band of each simplex of the stars in blocks, [simplex][lane], as D; ±∞ where it has none.
+    """The ends of the band of each simplex of the stars in blocks, [simplex][lane]; ±∞ where it has none.
 
-    first: (B,) where those of each block begin. edge: int8, which two of its corners are on a wall. least, most: the
+    They are of twice the area of its cell: of D, and for a quad of D and the rest. first: (B,) where those of each
+    block begin. edge: int8, which two of its corners are on a wall. least, most: the
     ends for its height over these, where they are.
     """
 
@@ -79,43 +92,80 @@ def mean_areas(points, triangles, log_mean):
 def limit(start, kept, log_mean, blend, room, firm, blocks, bands):
     """Writes the bands of all stars. Cells have one that have all corners ``kept`` and, at the start, a positive D.
 
-    start: (N, 2). kept: (N,) bool. log_mean: as ``mean_areas`` leaves it. blend, room: (N,), of a simplex the means of
-    its corners'. firm: (N,), above 0 where a node is on a wall with bands for heights.
+    start: (N, 2). kept: (N,) bool. log_mean: as ``mean_areas`` leaves it; of a quad it is compared with half of its
+    sum of D. blend, room: (N,), of a simplex the means of its corners'. firm: (N,), above 0 where a node is on a wall
+    with bands for heights.
     """
     for block in range(len(blocks.degree)):
         n, offset, first = blocks.degree[block], blocks.offset[block], bands.first[block]
         pattern = pattern_at(blocks.patterns, blocks.pattern, block)
         for k in range(count_of(pattern, n)):
             i, j = pair_of(pattern, n, k)
-            other = other_of(pattern, k, i)
+            other, corner = other_of(pattern, k, i), corner_of(pattern, k)
             for lane in range(LANES):
                 at, c = first + k * LANES + lane, blocks.centre[block * LANES + lane]
                 a, b = blocks.rings[offset + i * LANES + lane], blocks.rings[offset + j * LANES + lane]
-                d = (start[a, 0] - start[c, 0]) * (start[b, 1] - start[c, 1])
-                d -= (start[a, 1] - start[c, 1]) * (start[b, 0] - start[c, 0])
+                o = blocks.rings[offset + other * LANES + lane]
+                ax, ay = start[a, 0] - start[c, 0], start[a, 1] - start[c, 1]
+                bx, by = start[b, 0] - start[c, 0], start[b, 1] - start[c, 1]
+                d = ax * by - ay * bx
                 bands.low[at], bands.high[at], bands.edge[at] = -np.inf, np.inf, NOWHERE
-                if d > 0.0 and kept[a] and kept[b] and kept[c] and kept[blocks.rings[offset + other * LANES + lane]]:
-                    noise = (blend[a] + blend[b] + blend[c]) / 3.0
-                    way = noise * ((log_mean[a] + log_mean[b] + log_mean[c]) / 3.0 - math.log(max(d, TINY)))
-                    far = (room[a] + room[b] + room[c]) / 3.0
-                    bands.low[at] = (1.0 - AREA) * d * math.exp(min(way, 0.0)) / far
-                    bands.high[at] = (1.0 + AREA) * d * math.exp(max(way, 0.0)) * far
-                    if firm[a] > 0.0 and firm[b] > 0.0 and firm[c] == 0.0:
-                        bands.edge[at], p, q = OPPOSITE, a, b
-                    elif firm[c] > 0.0 and (firm[a] > 0.0) != (firm[b] > 0.0):
-                        bands.edge[at], p, q = (FIRST, c, a) if firm[a] > 0.0 else (SECOND, c, b)
-                    else:
-                        continue
-                    calm = min(firm[p], firm[q]) * (1.0 - noise)
-                    length = math.hypot(start[p, 0] - start[q, 0], start[p, 1] - start[q, 1])
-                    bands.least[at] = bands.low[at] * LOWER**calm / length
-                    bands.most[at] = bands.high[at] * UPPER**calm / length
+                if not (d > 0.0 and kept[a] and kept[b] and kept[c] and kept[o]):
+                    continue
+                noise = (blend[a] + blend[b] + blend[c]) / 3.0
+                mean = (log_mean[a] + log_mean[b] + log_mean[c]) / 3.0
+                far = (room[a] + room[b] + room[c]) / 3.0
+                if corner == NONE:
+                    bands.low[at], bands.high[at] = band_about(d, mean, noise, far)
+                elif corner == OWN:
+                    rest = rest_of(ax, ay, bx, by, start[o, 0] - start[c, 0], start[o, 1] - start[c, 1])
+                    if rest > 0.0:
+                        low, high = band_about(0.5 * (d + rest), mean, noise, far)
+                        bands.low[at], bands.high[at] = 2.0 * low, 2.0 * high
+                if firm[a] > 0.0 and firm[b] > 0.0 and firm[c] == 0.0 and corner != OWN:
+                    bands.edge[at], p, q = OPPOSITE, a, b
+                elif firm[c] > 0.0 and firm[a] > 0.0 and firm[b] == 0.0 and corner != AT_SECOND:
+                    bands.edge[at], p, q = FIRST, c, a
+                elif firm[c] > 0.0 and firm[b] > 0.0 and firm[a] == 0.0 and corner != AT_FIRST:
+                    bands.edge[at], p, q = SECOND, c, b
+                else:
+                    continue
+                calm = min(firm[p], firm[q]) * (1.0 - noise)
+                length = math.hypot(start[p, 0] - start[q, 0], start[p, 1] - start[q, 1])
+                low, high = band_about(d, mean, noise, far)
+                bands.least[at] = low * LOWER**calm / length
+                bands.most[at] = high * UPPER**calm / length
 
 
 @part
-def ends_of(bands, at, length):
-    """The band of a simplex, as D, now that the pair's nodes are so far from each other."""
-    low, high = bands.low[at], bands.high[at]
+def band_about(d, mean, noise, far):
+    """The ends of a band for areas about ``d``. mean: the logarithm of the mean around; noise: the blend; far: room."""
+    way = noise * (mean - math.log(max(d, TINY)))
+    return (1.0 - AREA) * d * math.exp(min(way, 0.0)) / far, (1.0 + AREA) * d * math.exp(max(way, 0.0)) * far
+
+
+@part
+def rest_of(ax, ay, bx, by, ox, oy):
+    """D at the corner opposite to the free node in a quad, of which a and b are beside it, and o is opposite."""
+    return (ox - ax) * (by - ay) - (oy - ay) * (bx - ax)
+
+
+@part
+def rest_in(pattern, k, i, j, where, first, step):
+    """The rest of simplex k with the pair (i, j); 0 but at a quad's own corner.
+
+    where: x of the node in row r of those around at first + 2·r·LANES, y ``step`` further.
+    """
+    if pattern is None or corner_of(pattern, k) != OWN:
+        return 0.0
+    a, b, o = first + 2 * i * LANES, first + 2 * j * LANES, first + 2 * other_of(pattern, k, i) * LANES
+    return rest_of(where[a], where[a + step], where[b], where[b + step], where[o], where[o + step])
+
+
+@part
+def ends_of(bands, at, rest, length):
+    """The band of a simplex, as D, now that its rest is this, and the pair's nodes are so far from each other."""
+    low, high = bands.low[at] - rest, bands.high[at] - rest
     if bands.edge[at] == OPPOSITE:
         low, high = max(low, length * bands.least[at]), min(high, length * bands.most[at])
     return low, high
@@ -171,10 +221,12 @@ def share_in_all(bands, wider, blocks, block, lane, star, dx, dy):
     x, y = star[2 * lane], star[2 * lane + 1]
     for k in range(count_of(pattern, n)):
         i, j = pair_of(pattern, n, k)
-        low, high = bands.low[first + k * LANES + lane], bands.high[first + k * LANES + lane]
+        rest = rest_in(pattern, k, i, j, star, 2 * (LANES + lane), 1)
+        low = (1.0 - wider) * bands.low[first + k * LANES + lane] - rest
+        high = (1.0 + wider) * bands.high[first + k * LANES + lane] - rest
         p, q = 2 * ((i + 1) * LANES + lane), 2 * ((j + 1) * LANES + lane)
         px, py, qx, qy = star[p] - x, star[p + 1] - y, star[q] - x, star[q + 1] - y
-        share = min(share, share_inside((1.0 - wider) * low, (1.0 + wider) * high, px, py, qx, qy, dx, dy))
+        share = min(share, share_inside(low, high, px, py, qx, qy, dx, dy))
     return share
 
 

@@ -23,6 +23,8 @@ from gmsnet.kernels.jit.compile import inlined
 from gmsnet.kernels.jit.load import address, load
 from gmsnet.kernels.simplex.mean_ratio2 import Weights
 
+NONE, OWN, AT_FIRST, AT_SECOND = range(4)  # where the square corner of a simplex is: at the free node, at a or at b
+
 
 class Patterns(NamedTuple):
     """The patterns of all links of a mesh.
@@ -118,6 +120,19 @@ def weights_of(pattern, k, real):
     weight, at = pattern.weight, 3 * (pattern.first + k)
     a, b, opposite = load(np.float64, weight, at), load(np.float64, weight, at + 1), load(np.float64, weight, at + 2)
     return Weights(real(a), real(b), real(opposite), real(0.5))
+
+
+@inlined
+def corner_of(pattern, k):
+    """Where the square corner of simplex k is; NONE where its ideal is equilateral."""
+    if pattern is None:
+        return NONE
+    weight, at = pattern.weight, 3 * (pattern.first + k)
+    if load(np.float64, weight, at + 2) == 0.0:
+        return OWN
+    if load(np.float64, weight, at + 1) == 0.0:
+        return AT_FIRST
+    return AT_SECOND if load(np.float64, weight, at) == 0.0 else NONE
 
 
 @inlined
