@@ -148,8 +148,8 @@ def _roughness(topology: Topology, points: Floats) -> Floats:
     """(T,) of each row of ``near``, how far areas lie from the mean of their neighbours' (in logarithms), around the
     corners of its cell. A steady growth from row to row cancels in it.
     """
-    rows, shapes, cells = topology.near, topology.near_shapes, topology.near_cells
-    cells = np.arange(len(rows)) if cells is None else cells
+    rows, shapes = topology.near, topology.near_shapes
+    cells = np.arange(len(rows)) if topology.near_cells is None else topology.near_cells
     double, number = np.bincount(cells, _double(points, rows)), np.bincount(cells)
     size = np.log(np.maximum(double / np.maximum(number, 1), np.finfo(float).tiny))
     # Of a corner of a quad the corner itself, and the edge to the next one: so each of a cell counts once.
