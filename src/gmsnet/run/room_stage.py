@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import LEVELS, WORST
@@ -13,9 +15,12 @@ from gmsnet.methods.planar_cells import PlanarCells
 from gmsnet.methods.solid_cells import SolidCells
 from gmsnet.parallel.executor import Executor
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.second_order import judged, opened, rank_at
+from gmsnet.run.second_order import corners_alone, judged, opened, rank_at
 from gmsnet.run.state import State, with_corners
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS, NOTHING_TO_MOVE
+from gmsnet.run.sweep_stage import rank_to_target
+
+Floats = NDArray[np.float64]
 
 SWEEPS = 10
 ABOVE, HIGHEST = 0.3, 1.0  # bounds are raised towards the least one and so much more, and none is asked to be higher
@@ -33,14 +38,23 @@ def make_room(state: State, options: SmoothOptions, executor: Executor) -> State
     if given is None or state.stop_reason == CALLBACK or not given.free.any():
         return state
     cells = _with_room(state, options, executor, corners=True)
-    if cells is not None and not (options.target or given.invalid[0]):
-        straight = with_corners(state)
-        now, first = (rank_at(points, straight, options, executor) for points in (cells.points, state.start))
+    if cells is not None and not given.invalid[0]:
+        now, first = (_rank(state, points, options, executor) for points in (cells.points, state.start))
         if now > first:
             cells = _with_room(state, options, executor, corners=False)
     if state.stop_reason == NOTHING_TO_MOVE:
         state = state.ended(NO_PROGRESS)
     return state if cells is None else judged(state, cells)
+
+
+def _rank(state: State, points: Floats, options: SmoothOptions, executor: Executor) -> tuple[float, ...]:
+    """Of two places of the corners those of the lesser rank are the better: closer to the target, if there is one."""
+    rank = rank_at(points, with_corners(state), options, executor)
+    if not options.target:
+        return rank
+    assert state.second_order is not None
+    there = replace(state, points=points, protection=corners_alone(state.second_order))
+    return (*rank_to_target(there, options, executor)[:2], *rank)
 
 
 def _with_room(
