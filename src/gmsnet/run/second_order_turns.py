@@ -18,7 +18,7 @@ from gmsnet.run.stop import TARGET_REACHED
 from gmsnet.run.sweep_stage import rank_to_target
 
 TURN = (smooth_corners, make_room, raise_bounds)
-TURNS = 5  # at most
+TURNS = 8  # at most
 GAIN, PATIENCE = 0.01, 2  # after so many turns that gain less in that by which meshes are compared, they end
 
 
