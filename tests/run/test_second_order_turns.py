@@ -79,3 +79,61 @@ def test_a_turn_that_makes_the_mesh_worse_is_taken_back(monkeypatch):
     monkeypatch.setattr(second_order_turns, "TURNS", 1)
     calls.clear()
     assert (gmsnet.smooth(mesh).points == result.points).all()
+
+
+@pytest.mark.parametrize("patch", [1, 2, 3])
+def test_an_interruption_leaves_the_patches_that_are_mended(patch, monkeypatch):
+    """The first one mends all cells but one."""
+    from gmsnet.untangle import curved
+
+    mesh, search, begun = curved_meshes.thrown(12), curved._Patch._search, []
+
+    def interrupted(self, *arguments):
+        begun.append(self)
+        if len(begun) == patch:
+            raise KeyboardInterrupt
+        return search(self, *arguments)
+
+    monkeypatch.setattr(curved, "_untangle_straight", lambda *_: None)
+    monkeypatch.setattr(curved._Patch, "_search", interrupted)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        gmsnet.smooth(mesh)
+    result = caught.value.result
+    assert result.stop_reason == "interrupted"
+    assert result.invalid_curved == (60 if patch == 1 else 1)
+    assert result.moved.any() == (patch > 1)
+    told = [
+        note for note in result.notes if note.startswith("second order: 60 invalid cells before, 1 invalid cell after")
+    ]
+    assert len(told) == (patch > 1)
+
+
+@pytest.mark.parametrize("look", [3, 8])
+def test_an_interruption_leaves_the_best_state_of_a_patch(look, monkeypatch):
+    from gmsnet.untangle import curved
+
+    mesh, judge, looks = curved_meshes.thrown(12), curved._Patch._judge, []
+
+    def interrupted(self):
+        if len(looks) == look:
+            raise KeyboardInterrupt
+        looks.append(judge(self) or self.fewest)
+        return looks[-1] is True
+
+    monkeypatch.setattr(curved, "_untangle_straight", lambda *_: None)
+    monkeypatch.setattr(curved._Patch, "_judge", interrupted)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        gmsnet.smooth(mesh)
+    assert caught.value.result.invalid_curved == min(looks)
+
+
+@pytest.mark.parametrize("seed", [21, 119])
+@pytest.mark.parametrize("share", [0.5, 0.98])
+def test_room_costs_no_quality_where_a_target_is_met(seed, share):
+    """The input is valid, and has no cell below the target: so it is no worse afterwards."""
+    mesh = curved_meshes.known_valid(seed)
+    target = share * float(gmsnet.quality(mesh).shape.min())
+    result = gmsnet.smooth(mesh, target_quality=target)
+    assert result.stop_reason == "target reached"
+    assert result.judged.after.shape_min >= result.judged.before.shape_min
+    assert result.judged.after.shape_mean >= result.judged.before.shape_mean

@@ -26,6 +26,7 @@ from gmsnet.methods.curved import Curved
 from gmsnet.methods.planar_cells import PlanarCells
 from gmsnet.methods.solid_cells import SolidCells
 from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.interrupts import interruptible
 from gmsnet.preserve.protection import Protection, protected, protected_volume
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import merit_of
@@ -135,13 +136,19 @@ def untangle_second_order(state: State, options: SmoothOptions, executor: Execut
         return state
     from gmsnet.untangle.curved import untangle_curved  # untangling takes 0.15 s more to import
 
-    for_good = untangle_curved(cells, corners_alone(known).topology, executor).for_good
+    for_good, interruption = np.zeros(len(sign), dtype=bool), None
+    try:
+        with interruptible():
+            for_good = untangle_curved(cells, corners_alone(known).topology, executor).for_good
+    except KeyboardInterrupt as caught:  # whole patches are mended, or as they were
+        interruption = caught
     state = judged(state, cells)
     assert state.second_order is not None
     assert state.second_order.sign is not None
-    left = np.flatnonzero(state.second_order.sign != 1)
-    reasons = {int(given.numbers[k]): FOR_GOOD if for_good[k] else NOT_FOUND for k in left.tolist()}
-    return _protected_anew(replace(state, second_order=replace(state.second_order, reasons=reasons)), options)
+    left = [] if interruption is not None else np.flatnonzero(state.second_order.sign != 1).tolist()
+    reasons = {int(given.numbers[k]): FOR_GOOD if for_good[k] else NOT_FOUND for k in left}
+    state = _protected_anew(replace(state, second_order=replace(state.second_order, reasons=reasons)), options)
+    return state if interruption is None else state.interrupted(interruption)
 
 
 def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> State:

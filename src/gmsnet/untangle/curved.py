@@ -250,14 +250,18 @@ class _Patch:
         return self.curved.points[self.nodes], self.curved.offsets(self.at)
 
     def untangle(self, sweeps: int, thresholds: tuple[float, ...], budget: float) -> float:
-        """Leaves the best state that is found, the first one if there is no better; returns what it took of BUDGET."""
+        """Leaves the best state that is found, the first one if there is no better; returns what it took of BUDGET.
+
+        An interrupted search leaves its best state, too.
+        """
         if not (self.fewest and self.nodes.size):
             return 0.0
-        spent = self._search(sweeps, thresholds, budget)
-        points, offsets = self.best
-        self.curved.points[self.nodes] = points
-        self.curved.keep(self.at, offsets)
-        return spent
+        try:
+            return self._search(sweeps, thresholds, budget)
+        finally:
+            points, offsets = self.best
+            self.curved.points[self.nodes] = points
+            self.curved.keep(self.at, offsets)
 
     def _search(self, most: int, thresholds: tuple[float, ...], budget: float) -> float:
         bad = self.curved.mesh.cells[self.cells[self.open & (self.valid != 1)]]
