@@ -21,6 +21,8 @@ from support.ranks import nodes_lent, parts_at_random, same, spread
 import gmsnet.distributed.executor as executor
 from gmsnet.distributed import loan
 from gmsnet.kernels.topology import patch
+from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 
@@ -139,6 +141,20 @@ def test_angles(kind, target):
     told = same(MESHES[kind], aim(**target), strips(MESHES[kind]), 3)
     assert told.gathered == ""
     assert told.history
+
+
+def test_a_large_angle_where_a_target_of_angles_is_met_is_told():
+    """Of one quad among squares."""
+    at = np.arange(7.0)
+    points = np.array([[x, y] for y in at for x in at])
+    first = np.array([7 * row + column for row in range(6) for column in range(6)])
+    points[8] = 0.51, 0.51  # a corner of the first square: nearly on its diagonal
+    mesh = Mesh(points, (CellBlock("quad", first[:, None] + [0, 1, 8, 7], np.zeros(36, dtype=int)),))
+    told = same(mesh, aim(target_angle=20.0), strips(mesh), 3, fixed=np.arange(49) == 8)
+    assert told.missed == 0
+    assert any(
+        note.startswith("target: it is of small angles alone, and the greatest one is 17") for note in told.notes
+    )
 
 
 @pytest.mark.parametrize("kind", ["triangles", "quads", "tetrahedra", "solids"])

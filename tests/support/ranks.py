@@ -77,9 +77,12 @@ def nodes_lent(monkeypatch, module, name):
     return counts
 
 
+TOLD = ("untangling", "the mesh is refined", "slide:", "surface:", "target:", "feature angle")
+
+
 def _of_stages(notes):
     """What is said of inverted cells, of walls and of nodes that slide."""
-    return [note for note in notes if note.startswith(("untangling", "the mesh is refined", "slide:", "surface:"))]
+    return [note for note in notes if note.startswith(TOLD)]
 
 
 def _figures(result):

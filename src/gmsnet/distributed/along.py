@@ -29,7 +29,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.parallel.threads import serial
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.outcome import ranking
+from gmsnet.run.outcome import greatest_angle, ranking
 from gmsnet.run.set_up import first_state
 from gmsnet.run.state import State
 from gmsnet.topology.mixed_volume import volume_of, wound_of
@@ -41,6 +41,10 @@ from gmsnet.topology.volume import Volume
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Rail = Constraint | Surface
+
+
+# The totals of a mesh, how many cells miss the target, the greatest angle where that has one, by what it was compared.
+Figures = tuple[Totals | None, int | None, float, Judged]
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +153,9 @@ class Found:
     whole: Whole | None
     state: State | None
 
-    def judged(
-        self, points: Floats, piece: Piece, options: SmoothOptions, comm: Any
-    ) -> tuple[bool, Totals | None, int | None, Judged]:
-        """Of a surface: is the mesh with these points (n, dim) of the piece no worse than the input? And the figures of
-        the better one, how many of its cells miss the target, and by what it was compared. All ranks call it."""
+    def judged(self, points: Floats, piece: Piece, options: SmoothOptions, comm: Any) -> tuple[bool, Figures]:
+        """Of a surface: is the mesh with these points (n, dim) of the piece no worse than the input? And what to say of
+        the better one. All ranks call it."""
         every, told = brought(self.whole, points, piece, comm), None
         if self.state is not None and every is not None:
             before, target, topology = self.state.before, options.target, self.state.protection.base
@@ -164,8 +166,9 @@ class Found:
             better = rank(after, last) <= rank(before, first)
             final = after if better else before
             judged = Judged(first, last if better else first)
-            told = better, final.totals, len(target.missed_in(final)) if target else None, judged
-        found: tuple[bool, Totals | None, int | None, Judged] = comm.bcast(told)
+            missed = len(target.missed_in(final)) if target else None
+            told = better, (final.totals, missed, greatest_angle(final, options), judged)
+        found: tuple[bool, Figures] = comm.bcast(told)
         return found
 
     def note(self, points: Floats, moved: Flags, where: Floats | None, piece: Piece, comm: Any) -> list[str]:

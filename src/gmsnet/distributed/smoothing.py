@@ -38,7 +38,7 @@ from gmsnet.methods.banded import Kept
 from gmsnet.methods.base import CELLS
 from gmsnet.preserve.protection import LAYER, WALL
 from gmsnet.run.options import CPU, SmoothOptions
-from gmsnet.run.outcome import factors_of, merit_of
+from gmsnet.run.outcome import factors_of, greatest_angle, large_angles, merit_of
 from gmsnet.run.set_up import check_options, check_target, not_slid
 from gmsnet.run.state import State
 from gmsnet.topology.ordering import planar_points, space_points, taken
@@ -196,7 +196,8 @@ def _shared(
     state = swept(part, _meant(intent, piece, part), smoother, options, done, ready.inverted)
     if found is not None and isinstance(part.topology, Shell):
         before = found.before
-    points, moved, after, missed, judged = _written(piece, part, state, options, ready.inverted, before, found)
+    written = _written(piece, part, state, options, ready.inverted, before, found)
+    points, moved, after, missed, greatest, judged = written
     notes = [*intent.notes, *intent.of_walls[state.released :][:1], *([] if done is None else [done.note])]
     if found is not None:
         where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
@@ -204,6 +205,7 @@ def _shared(
     else:
         notes += not_slid(options)
     notes += judged.note(before, after, "η" if part.mesh.has_volumes else "1/q")
+    notes += large_angles(greatest, missed, options)
     return RankResult(
         points=points[at],
         moved=moved[at],
@@ -239,13 +241,15 @@ def _held(part: Part, topology: Topology | Volume) -> dict[str, int]:
 
 class _Written(NamedTuple):
     """The best mesh by global ids, that of the input if it is the better one as it is written. after: its figures;
-    missed: how many cells miss the target, None without one; judged: by what it was compared with the input.
+    missed: how many cells miss the target, None without one; greatest: angle, where angles have a target; judged: by
+    what it was compared with the input.
     """
 
     points: Floats
     moved: NDArray[np.bool_]
     after: Totals | None
     missed: int | None
+    greatest: float
     judged: Judged
 
 
@@ -260,29 +264,32 @@ def _written(
     put_back(state.points, part.points, topology.memory, plane, *factors_of(mesh.exponent), points, moved)
     if found is not None and isinstance(topology, Shell):  # whose figures are added up in the order of the cells
         at = np.searchsorted(part.around.nodes.ids, piece.ids)
-        better, after, missing, judged = found.judged(points[at], piece, options, part.comm)
-        if better:
-            return _Written(points, moved, after, missing, judged)
-        return _Written(mesh.points, np.zeros_like(moved), after, missing, judged)
+        better, figures = found.judged(points[at], piece, options, part.comm)
+        best = points if better else mesh.points
+        return _Written(best, moved & better, *figures)
     assert mesh.box is not None
     written = replace(mesh, points=points).as_part(mesh.plane, mesh.kinds_there, mesh.exponent, mesh.box)
     near = taken(planar_points(written) if mesh.plane else space_points(written), topology.memory)
     ranks, scored = Ranks(part), state.topology.scored
     after = totals_of(near, part.simplices, ranks)
     of_free = Judged(*(totals_of(places, scored, ranks) for places in (part.points, near)))
-    inverted, missed, missed_before = 0 if after is None else after.inverted, None, None
+    inverted, missed, missed_before, greatest = 0 if after is None else after.inverted, None, None, [0.0, 0.0]
     if target:
         first = state.before if isinstance(state.before, QualityReport) else measure(mesh, topology, part.points)
-        missed, least = _missing(part, measure(written, topology, near), options)
+        last = measure(written, topology, near)
+        missed, least = _missing(part, last, options)
         missed_before, least_before = _missing(part, first, options)
         better = (inverted, missed, -least) <= (inverted_before, missed_before, -least_before)
+        angles = [greatest_angle(report, options) for report in (first, last)]
+        greatest = [float(part.comm.allreduce(angle, mpi().MAX)) for angle in angles]
     else:
         merits = (merit_of(totals, options.best_by) for totals in (of_free.after, of_free.before))
         now, then = ((count, *merit) for count, merit in zip((inverted, inverted_before), merits, strict=True))
         better = now <= then
     if better:
-        return _Written(points, moved, after, missed, of_free)
-    return _Written(mesh.points, np.zeros_like(moved), before, missed_before, of_free._replace(after=of_free.before))
+        return _Written(points, moved, after, missed, greatest[1], of_free)
+    judged = of_free._replace(after=of_free.before)
+    return _Written(mesh.points, np.zeros_like(moved), before, missed_before, greatest[0], judged)
 
 
 def _missing(part: Part, report: QualityReport, options: SmoothOptions) -> tuple[int, float]:

@@ -76,7 +76,7 @@ def result_of(state: State, options: SmoothOptions, began: float) -> SmoothResul
         moved=moved,
         held=_held(state),
         history=list(state.history),
-        notes=[*_notes(state), *_large_angles(after, options)],
+        notes=[*_notes(state), *_of_angles(after, options)],
         unmended=still_inverted(after, _why_not_mended(state)),
         topology=with_corners(state),
         seconds=time.perf_counter() - began,
@@ -132,13 +132,19 @@ def _notes(state: State) -> list[str]:
     return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks, *held, *of_order]
 
 
-def _large_angles(after: QualityReport, options: SmoothOptions) -> list[str]:
+def _of_angles(after: QualityReport, options: SmoothOptions) -> list[str]:
+    missed = len(options.target.missed_in(after)) if options.target_angle is not None else None
+    return large_angles(greatest_angle(after, options), missed, options)
+
+
+def greatest_angle(report: QualityReport, options: SmoothOptions) -> float:
+    """In degrees, where angles have a target, else 0."""
+    return float(report.column(report.angles[1]).max(initial=0.0)) if options.target_angle is not None else 0.0
+
+
+def large_angles(greatest: float, missed: int | None, options: SmoothOptions) -> list[str]:
     """Says so where the target of angles is met, and a quad has a large one: it asks for the smallest alone."""
-    least = options.target_angle
-    if least is None or len(options.target.missed_in(after)):
-        return []
-    greatest = float(after.column(after.angles[1]).max(initial=0.0))
-    if greatest <= 180.0 - least:
+    if missed or options.target_angle is None or greatest <= 180.0 - options.target_angle:
         return []
     told = f"the greatest one is {greatest:.5g}°"
     return [f"target: it is of small angles alone, and {told}: a target of 1/q is of both"]
