@@ -12,7 +12,7 @@ import gmsnet
 from gmsnet.distributed.file_ranges import planned_format
 from gmsnet.distributed.file_run import FileTask, smooth_file
 from gmsnet.errors import InputError
-from gmsnet.generate import random_mesh, random_volume
+from gmsnet.generate import random_mesh, random_quad_mesh, random_volume
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.run.options import SmoothOptions
@@ -77,7 +77,48 @@ def volume() -> Mesh:
     return Mesh(random_volume(300, seed=1).points, (inside, of["triangle"]))
 
 
+def save_mixed(path: Path, mesh: Mesh, *, field: str = "", marks: str = "", each: int = 0) -> Path:
+    """The blocks of the mesh in one list of mixed types. each: cells of one type that follow one another; 0: all."""
+    last = Mesh(mesh.points, (mesh.cells[0], *mesh.cells[-1:]))
+    save(path, last, field=field, marks=marks)
+    blocks = mesh.cells[:-1] if marks else mesh.cells
+    rows = [[*CODES[block.kind], *nodes] for block in blocks for nodes in block.nodes.tolist()]
+    regions = np.concatenate([block.regions for block in blocks])
+    if each:
+        order = np.argsort([k // each for block in blocks for k in range(len(block.nodes))], kind="stable")
+        rows, regions = [rows[k] for k in order], regions[order]
+    listed = [number for row in rows for number in row]
+    with h5py.File(path.with_name("mesh.h5"), "r+") as file:
+        group = file["Mesh"]
+        del group["cells"]
+        group.create_dataset("cells", data=np.array(listed, dtype=np.int64))
+        if field:
+            del group["regions"]
+            group.create_dataset("regions", data=regions[:, None])
+    text, one = path.read_text(), mesh.cells[0]
+    old = f'TopologyType="{WORDS[one.kind]}" NumberOfElements="{len(one.nodes)}" NodesPerElement="{one.nodes.shape[1]}"'
+    text = text.replace(old, f'TopologyType="Mixed" NumberOfElements="{len(rows)}"', 1)
+    text = text.replace(f'Dimensions="{len(one.nodes)} {one.nodes.shape[1]}"', f'Dimensions="{len(listed)}"', 1)
+    path.write_text(text.replace(f'Dimensions="{len(one.nodes)} 1"', f'Dimensions="{len(rows)} 1"', 1))
+    return path
+
+
+CODES = {"triangle": (4,), "quad": (5,), "tetra": (6,), "hexahedron": (9,), "line": (2, 2), "vertex": (1, 1)}
+
+
+def plane_of_both() -> Mesh:
+    """Triangles and quads of several regions, and lines."""
+    mesh = random_quad_mesh(300, cells="mixed", seed=2)
+    of = {block.kind: block for block in mesh.cells}
+    many = [CellBlock(kind, of[kind].nodes, np.arange(len(of[kind].nodes)) % 3) for kind in ("triangle", "quad")]
+    return Mesh(mesh.points, (*many, of["line"]))
+
+
 SAVED = {
+    "mixed": lambda path: save_mixed(path, plane_of_both()),
+    "mixed, regions": lambda path: save_mixed(path, plane_of_both(), field="material"),
+    "mixed, in turns": lambda path: save_mixed(path, plane_of_both(), field="material", each=10),
+    "mixed, marks": lambda path: save_mixed(path, plane_of_both(), marks="facets"),
     "marks": lambda path: save(path, volume(), marks="facets"),
     "regions": lambda path: save(path, volume(), field="material"),
     "plane, single": lambda path: save(path, random_mesh(300, seed=1), np.float32),
@@ -152,3 +193,11 @@ def test_damage_is_named_on_all_ranks(tmp_path: Path) -> None:
     before = saved(tmp_path)
     assert "a cell names the node 1000000, but the nodes are 0 to" in heard(3, path, "xdmf")[0]
     assert saved(tmp_path) == before
+
+
+def test_a_list_of_mixed_types_with_many_runs_is_read_by_one(tmp_path: Path) -> None:
+    mesh = random_quad_mesh(6000, cells="mixed", seed=2)
+    blocks = {block.kind: block for block in mesh.cells}
+    path = save_mixed(tmp_path / "a.xdmf", Mesh(mesh.points, (blocks["triangle"], blocks["quad"])), each=1)
+    assert planned_format(str(path), "xdmf") == ""
+    assert len(gmsnet.read(path).cells) == 2

@@ -28,7 +28,7 @@ from gmsnet.io.splice import Points, Slots, TextSlots
 from gmsnet.io.stored import Part, coordinates
 from gmsnet.io.text import Text
 from gmsnet.io.xdmf_links import H5
-from gmsnet.io.xdmf_tags import MIXED, TABLE, TYPES, Mark, Tags, cell_word
+from gmsnet.io.xdmf_tags import COUNTED, MIXED, TABLE, TYPES, Mark, Tags, cell_word
 from gmsnet.io.xml_tree import Element, blame, check_plain, parse
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import combined, regions_of
@@ -37,8 +37,6 @@ name = "XDMF"
 suffixes: tuple[str, ...] = (".xdmf",)
 
 Ints = NDArray[np.int64]
-
-COUNTED = (1, 2, 3)  # in a list of mixed types the number of their nodes follows these
 
 
 class Items:

@@ -5,17 +5,21 @@ from __future__ import annotations
 import math
 import os
 
+import numpy as np
+
 from gmsnet.cells.table import CELLS, nodes_of
+from gmsnet.io.cells import MOST_BLOCKS
 from gmsnet.io.contents import Data
 from gmsnet.io.hdf5 import File, Node
 from gmsnet.io.hdf5_rows import numbers_of, rows_of, stored_points
-from gmsnet.io.ranges import Column, Plan, Table
+from gmsnet.io.ranges import Column, Plan, Table, blocks_of
 from gmsnet.io.rows import Listed, Ranges
 from gmsnet.io.vtk_runs import Field, told_by
 from gmsnet.io.xdmf_links import H5, links
-from gmsnet.io.xdmf_tags import TYPES, cell_word
+from gmsnet.io.xdmf_tags import COUNTED, MIXED, TYPES, cell_word
 from gmsnet.io.xml_tree import Element, check_plain, parse
 
+TOGETHER = 1 << 18  # cells of a list of mixed types that are looked at together
 _MOST = 1 << 22  # bytes of a text that only names numbers
 _AXES = {"XYZ": 3, "XY": 2, "X_Y_Z": 1, "X_Y": 1}  # type of a geometry → numbers in a row of each of its items
 _OF_ANY_SIZE = ("vertex", "line", "polygon")  # unless the text says of how many nodes
@@ -74,18 +78,22 @@ def plan(file: Ranges) -> Plan | None:
 def _planned(numbers: Numbers, name: str, grid: Element, others: list[Element]) -> Plan | None:
     """name: of the file with the numbers. grid: with points of its own."""
     columns, main = _points(numbers, grid.of("Geometry")[0]), _cells(numbers, grid)
-    if not columns or main is None:
+    if not columns or not main:
         return None
-    kind, nodes = main
-    counts = (next(iter(columns.values())).rows.rows, nodes.rows)
+    counts = (next(iter(columns.values())).rows.rows, sum(nodes.rows for _, nodes in main))
     told = told_by(numbers.file, _fields(numbers, grid, "Node"), _fields(numbers, grid, "Cell"), counts)
     if told is None:
         return None
-    blocks = [[Table(kind, nodes, 0, regions=told.regions)]]
+    tables, first = list[Table](), 0
+    for kind, nodes in main:
+        own = None if told.regions is None else told.regions.cut(first, nodes.rows, 1, 1)
+        tables.append(Table(kind, nodes, 0, regions=own))
+        first += nodes.rows
+    blocks = blocks_of(tables)
     for other in others:
         if not other.of("include") or len(other.of("Topology")) != 1 or not other.of("Topology")[0].of("DataItem"):
             continue  # no marks
-        table = _mark(numbers, other, CELLS[kind].dimension)
+        table = _mark(numbers, other, max(CELLS[table.kind].dimension for table in tables))
         if table is None:
             return None
         blocks.append([table])
@@ -108,19 +116,56 @@ def _points(numbers: Numbers, geometry: Element) -> dict[str, Column]:
     return columns if width and len(columns) == len(items) == axes // width and len(counts) == 1 else {}
 
 
-def _cells(numbers: Numbers, grid: Element) -> tuple[str, Listed] | None:
-    """The kind and the nodes of cells of one type."""
+def _cells(numbers: Numbers, grid: Element) -> list[tuple[str, Listed]]:
+    """The kind and the nodes of each run of cells of one type; none where these cannot be told."""
     topologies = grid.of("Topology")
     if len(topologies) != 1 or len(topologies[0].of("DataItem")) != 1:
-        return None
-    topology = topologies[0]
-    kind, given = TYPES.get(cell_word(topology), (0, ""))[1], topology.get("NodesPerElement", default="0").strip()
+        return []
+    topology, word = topologies[0], cell_word(topologies[0])
+    if topology.get("BaseOffset", default="0").strip() != "0":
+        return []
+    if word == "mixed":
+        return _mixed(numbers, topology.of("DataItem")[0])
+    kind, given = TYPES.get(word, (0, ""))[1], topology.get("NodesPerElement", default="0").strip()
     width = nodes_of(kind) if kind and kind not in _OF_ANY_SIZE else {"vertex": 1, "line": 2}.get(kind, 0)
     if not width or (kind in _OF_ANY_SIZE and given not in ("0", str(width))):
-        return None
+        return []
     nodes = numbers.rows(topology.of("DataItem")[0], width)
-    plain = topology.get("BaseOffset", default="0").strip() == "0"
-    return (kind, nodes) if plain and nodes is not None and nodes.rows and nodes.dtype[1] in "iu" else None
+    return [(kind, nodes)] if nodes is not None and nodes.rows and nodes.dtype[1] in "iu" else []
+
+
+def _mixed(numbers: Numbers, item: Element) -> list[tuple[str, Listed]]:
+    """The same of a list in which each cell has its type in front, and some the number of their nodes behind it.
+
+    None where runs are many, for each is a block, and where cells are polygons.
+    """
+    listed, runs, at = numbers.rows(item, 1), list[tuple[str, Listed]](), 0
+    if listed is None or listed.dtype[1] not in "iu":
+        return []
+    while at < listed.rows:
+        code = int(listed.of(numbers.file, at, at + 1)[0, 0])
+        kind = MIXED.get(code, "polygon")
+        if kind == "polygon" or len(runs) == MOST_BLOCKS:
+            return []
+        begin = [code, code] if code in COUNTED else [code]  # vertices have one node, lines two
+        width = code if code in COUNTED else nodes_of(kind)
+        step = len(begin) + width
+        cells = listed.cut(at, (listed.rows - at) // step, step, len(begin))
+        count = _alike(numbers.file, cells, begin)
+        if not count:
+            return []
+        runs.append((kind, listed.cut(at + len(begin), count, step, width)))
+        at += count * step
+    return runs
+
+
+def _alike(file: Ranges, rows: Listed, numbers: list[int]) -> int:
+    """How many of the rows up to the first other one are these numbers, some looked at at a time."""
+    for first in range(0, rows.rows, TOGETHER):
+        found = (rows.of(file, first, min(first + TOGETHER, rows.rows)) == numbers).all(axis=1)
+        if not found.all():
+            return first + int(np.argmin(found))
+    return rows.rows
 
 
 def _fields(numbers: Numbers, grid: Element, center: str) -> list[Field]:
@@ -138,8 +183,9 @@ def _fields(numbers: Numbers, grid: Element, center: str) -> list[Field]:
 def _mark(numbers: Numbers, grid: Element, dimension: int) -> Table | None:
     """Cells of fewer dimensions that another grid lists, each with its number; None for others."""
     main = _cells(numbers, grid)
-    if main is None or CELLS[main[0]].dimension >= dimension:
+    if len(main) != 1 or CELLS[main[0][0]].dimension >= dimension:
         return None
+    ((kind, nodes),) = main
     values = [field.rows for field in _fields(numbers, grid, "Cell")]
-    told = told_by(numbers.file, [], [Field("region", rows) for rows in values], (0, main[1].rows))
-    return None if told is None else Table(main[0], main[1], 0, regions=told.regions)
+    told = told_by(numbers.file, [], [Field("region", rows) for rows in values], (0, nodes.rows))
+    return None if told is None else Table(kind, nodes, 0, regions=told.regions)

@@ -24,6 +24,7 @@ TYPES = {  # lower case, without underscores → its number in a list of mixed t
 }  # fmt: skip
 SHORT = {"tri": "triangle", "quad": "quadrilateral", "tet": "tetrahedron", "hex": "hexahedron", "pyr": "pyramid"}
 MIXED = dict(TYPES.values())
+COUNTED = (1, 2, 3)  # in a list of mixed types the number of their nodes follows these
 TABLE = {code: Kind(kind) for code, kind in MIXED.items()}
 
 
