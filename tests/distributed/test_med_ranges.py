@@ -47,6 +47,8 @@ SAVED = {
     "volumes": lambda path: save(mixed(), path, groups={3: "wall", 4: "inlet", 9: "of no cell"}),
     "single": lambda path: save(mixed(), path, np.float32),
     "plane": lambda path: save(recombine(random_mesh(300, seed=3)), path),
+    "chunks": lambda path: save(mixed(), path, chunks=(50,), compression="gzip"),
+    "large chunks, single": lambda path: save(recombine(random_mesh(300, seed=3)), path, np.float32, chunks=(400,)),
 }
 
 
@@ -75,11 +77,6 @@ def test_sets_of_nodes_by_name_are_for_the_reader_of_the_whole(tmp_path: Path) -
     assert planned_format(str(path), "med") == "med"
     assert planned_format(str(path), "med", named=True) == ""
     assert_read_alike(path, "med", 3)
-
-
-def test_coordinates_in_parts_are_for_the_reader_of_the_whole(tmp_path: Path) -> None:
-    path = save(mixed(), tmp_path / "a.med", chunks=(50,), compression="gzip")
-    assert planned_format(str(path), "med") == ""
 
 
 @pytest.mark.parametrize("of", ["NOE/FAM", "MAI/HE8/NOD", "MAI/QU4/FAM"])

@@ -47,10 +47,10 @@ class Stored:
 
 @dataclass(frozen=True)
 class StoredPoints:
-    """Coordinates in data sets. parts: path → column, of data sets that are written together: by the library, unless
-    the numbers of all stand in the file as they are."""
+    """Coordinates in data sets. parts: path → columns, one behind the other, of data sets that are written together: by
+    the library, unless the numbers of all stand in the file as they are."""
 
-    parts: Sequence[Mapping[str, Column]]
+    parts: Sequence[Mapping[str, Sequence[Column]]]
 
     def contents(self, file: Ranges, moves: Moves, folder: str) -> Iterator[bytes]:
         """See Encoded."""
@@ -59,8 +59,9 @@ class StoredPoints:
                 stream.write(part)
             stream.raise_error()
             for columns in self.parts:
-                in_place = [(each, each.rows) for each in columns.values() if isinstance(each.rows, Rows)]
-                if len(in_place) == len(columns):
+                every = [each for listed in columns.values() for each in listed]
+                in_place = [(each, each.rows) for each in every if isinstance(each.rows, Rows)]
+                if len(in_place) == len(every):
                     for column, rows in in_place:
                         _splice(stream, column, rows, moves)
                 else:
@@ -71,8 +72,14 @@ class StoredPoints:
 
 
 def stored_points(parts: Sequence[Mapping[str, Column]]) -> StoredPoints | None:
-    """How coordinates in data sets are written again; None where all stand in the file as they are."""
-    in_place = all(isinstance(column.rows, Rows) for columns in parts for column in columns.values())
+    """How coordinates in data sets (path → column) are written again; see stored_columns."""
+    return stored_columns([{path: [column] for path, column in columns.items()} for columns in parts])
+
+
+def stored_columns(parts: Sequence[Mapping[str, Sequence[Column]]]) -> StoredPoints | None:
+    """See StoredPoints; None where all stand in the file as they are."""
+    every = (column for columns in parts for listed in columns.values() for column in listed)
+    in_place = all(isinstance(column.rows, Rows) for column in every)
     return None if in_place else StoredPoints(parts)
 
 
@@ -89,16 +96,33 @@ def _splice(stream: _Stream, column: Column, rows: Rows, moves: Moves) -> None:
     stream.raise_error()
 
 
-def _refill(stream: _Stream, columns: Mapping[str, Column], moves: Moves) -> None:
+def _refill(stream: _Stream, columns: Mapping[str, Sequence[Column]], moves: Moves) -> None:
     """Numbers that the library writes."""
     with _written(stream) as handle:
-        for path, column in columns.items():
+        for path, listed in columns.items():
 
-            def fill(begin: int, values: NDArray[Any], column: Column = column) -> bool:
-                rows = values.reshape(-1, column.rows.width)
-                return put(rows, moves, column.first + begin * len(rows) // len(values), column.axis)
+            def fill(begin: int, values: NDArray[Any], listed: Sequence[Column] = listed) -> bool:
+                numbers = values.reshape(-1)
+                return _put_some(numbers, begin * len(numbers) // len(values), listed, moves)
 
             _fill(handle[path], fill)
+
+
+def _put_some(numbers: NDArray[Any], first: int, columns: Sequence[Column], moves: Moves) -> bool:
+    """Puts moved nodes into some numbers of a data set, from number ``first`` on. Tells whether one is another now.
+
+    columns: of the data set, one behind the other.
+    """
+    start, changed = 0, False
+    for column in columns:
+        width = column.rows.width
+        end = start + column.rows.rows * width
+        low, high = max(first, start), min(first + len(numbers), end)
+        if low < high:
+            rows = numbers[low - first : high - first].reshape(-1, width)
+            changed |= put(rows, moves, column.first + (low - start) // width, column.axis)
+        start = end
+    return changed
 
 
 def rows_of(node: Node) -> Listed | None:

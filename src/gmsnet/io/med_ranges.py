@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS, nodes_of
 from gmsnet.io.hdf5 import Node
-from gmsnet.io.hdf5_rows import numbers_of
+from gmsnet.io.hdf5_rows import numbers_of, stored_columns
 from gmsnet.io.ranges import Column, Plan, Table, distinct_of
-from gmsnet.io.rows import Listed, Ranges, Rows
+from gmsnet.io.rows import Listed, Ranges
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,12 @@ class Apart:
 def planned(
     file: Ranges, step: Node, dimension: int, kinds: Mapping[str, str], groups: Mapping[int, str]
 ) -> Plan | None:
-    """How the numbers of a mesh lie; None where its coordinates are in parts, and where only a reader of the whole can
-    say what is wrong. step: with its coordinates and cells. kinds: type → kind. groups: names of families."""
-    columns = [*_columns(numbers_of(step.need("NOE/COO")), dimension)]
+    """How the numbers of a mesh lie; None where only a reader of the whole can say what is wrong.
+
+    step: with its coordinates and cells. kinds: type → kind. groups: names of families.
+    """
+    points = step.need("NOE/COO")
+    columns = [*_columns(numbers_of(points), dimension)]
     listed, blocks, names = step.get("MAI"), list[list[Table]](), dict[tuple[int, int], str]()
     if not columns or listed is None:
         return None
@@ -66,12 +69,15 @@ def planned(
         return None
     has_sets = sets is not None and any(groups.get(number) for number in distinct_of(file, sets))
     single = columns[0].rows.dtype[1:] == "f4"
-    return Plan(columns, blocks, single, names=None if has_sets else names) if blocks else None
+    if not blocks:
+        return None
+    encoded = stored_columns([{points.path: columns}])
+    return Plan(columns, blocks, single, names=None if has_sets else names, encoded=encoded)
 
 
 def _columns(listed: Listed | None, dimension: int) -> Iterator[Column]:
-    """The coordinates along each axis; none where these do not stand in the file as they are."""
-    if isinstance(listed, Rows) and listed.dtype[1:] in ("f4", "f8") and listed.rows % dimension == 0:
+    """The coordinates along each axis; none where they do not fit the axes."""
+    if listed is not None and listed.dtype[1:] in ("f4", "f8") and listed.rows % dimension == 0:
         nodes = listed.rows // dimension
         for axis in range(dimension):
             yield Column(listed.cut(axis * nodes, nodes, 1, 1), axis=axis)
