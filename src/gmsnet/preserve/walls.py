@@ -88,7 +88,7 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
         rows = _rows_near(points, triangles, points[wall], close)
         inside = _edge(_double(points, triangles[rows]))
         if not (most > 0.0 and all(len(some) and (some <= most).mean() >= MOST for some in (size, inside))):
-            coarse += bool(0.0 < np.median(size) <= COARSE * diameter)
+            coarse += bool(close < np.median(size) <= COARSE * diameter)
             continue
         rough = _roughness(topology, points) if rough is None else rough
         levels = _levels(topology, rows)

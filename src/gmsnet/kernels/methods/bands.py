@@ -54,8 +54,8 @@ class Bands(NamedTuple):
     """The ends of the band of each simplex of the stars in blocks, [simplex][lane]; ±∞ where it has none.
 
     They are of twice the area of its cell: of D, and for a quad of D and the rest. first: (B,) where those of each
-    block begin. edge: int8, which two of its corners are on a wall. least, most: the
-    ends for its height over these, where they are.
+    block begin. edge: int8, which two of its corners are on a wall. least, most: the ends for its height over these,
+    where they are.
     """
 
     first: NDArray[np.int64]
