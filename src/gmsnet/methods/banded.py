@@ -37,7 +37,7 @@ PLAN = (
 )  # fmt: skip
 
 
-POOREST = 0.3  # 1/q of a worst cell that others are measured by: by a worse one, the barrier would be all they see
+POOREST = 0.5  # 1/q of a worst cell that others are measured by: by a worse one, the barrier would be all they see
 
 
 class Kept(NamedTuple):

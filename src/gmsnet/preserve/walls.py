@@ -37,7 +37,7 @@ COARSE = 0.1  # of a wall's diameter: the edges on a body that is resolved at al
 MOST = 0.5  # at least this share of the cells near a wall is refined, or it is not refined towards that wall
 # How far a cell's area lies from the mean of its neighbours', in logarithms, averaged over the stars of its corners:
 # the noise. Meshes of triangles as they are made have a median of 0.02 to 0.08 near a wall, random ones 0.4 to 0.5; of
-# quads, recombined of triangles, 0.03 to 0.12 and 0.3 to 0.35. From the first to the second of these bands of heights
+# quads, recombined of triangles, 0.03 to 0.2 and 0.3 to 0.35. From the first to the second of these bands of heights
 # give way to those of areas; from there to the third these reach to the mean around; and from there to the fourth they
 # grow by the factor WIDEST.
 SURE, CALM, NOISY, RANDOM = range(4)
