@@ -1,4 +1,4 @@
-"""Quads whose corners are in a wrong order are inverted themselves; the cells around are as they are without them."""
+"""Quads and hexahedra whose corners are in a wrong order are inverted themselves; those around are as without them."""
 
 from __future__ import annotations
 
@@ -55,3 +55,50 @@ def test_two_crossed_quads_beside_each_other():
     assert sorted(each.cell for each in result.unmended) == [27, 28]
     assert result.before.inverted == result.after.inverted == 2
     assert result.moved.any()
+
+
+def thrown_block(side=6):
+    """(points, hexahedra) of a cube, inner nodes thrown."""
+    across = np.linspace(0.0, 1.0, side)
+    points = np.stack(np.meshgrid(across, across, across, indexing="ij"), axis=-1).reshape(-1, 3)
+    at = np.arange(side**3).reshape(side, side, side)
+    low, high = slice(None, -1), slice(1, None)
+    square = [(low, low), (high, low), (high, high), (low, high)]
+    hexahedra = np.stack([at[x, y, z] for z in (low, high) for x, y in square], axis=-1).reshape(-1, 8)
+    inner = at[1:-1, 1:-1, 1:-1].ravel()
+    points[inner] += np.random.default_rng(0).uniform(-0.05, 0.05, (len(inner), 3))
+    return points, hexahedra
+
+
+WRONG = {"voxel": (0, 1, 3, 2, 4, 5, 7, 6), "bottom": (1, 0, 3, 2, 4, 5, 6, 7), "diagonal": (0, 2, 1, 3, 4, 6, 5, 7)}
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("order", WRONG)
+@pytest.mark.parametrize("cell", [0, 12, 62, 124])
+def test_one_hexahedron_in_a_wrong_order_holds_its_own_nodes_alone(cell, order, backwards):
+    points, hexahedra = thrown_block()
+    if backwards:  # the file reads them inside out
+        hexahedra = hexahedra[:, [4, 5, 6, 7, 0, 1, 2, 3]]
+    wrong = hexahedra.copy()
+    wrong[cell] = wrong[cell, list(WRONG[order])]
+    result = gmsnet.smooth((points, [("hexahedron", wrong)]))
+    assert result.after.inverted == 1
+    assert [each.cell for each in result.unmended] == [cell]
+    inside = ((points > 0.0) & (points < 1.0)).all(axis=1)
+    inside[hexahedra[cell]] = False
+    assert result.moved[inside].all()
+    assert not result.moved[~inside].any()
+    assert result.judged.after.shape_min > 0.85 > result.judged.before.shape_min
+
+
+def test_wedges_and_hexahedra_beside_one_in_a_wrong_order():
+    points, hexahedra = thrown_block()
+    split = hexahedra[:25]
+    wedges = np.concatenate([split[:, [0, 1, 2, 4, 5, 6]], split[:, [0, 2, 3, 4, 6, 7]]])
+    rest = hexahedra[25:].copy()
+    rest[50] = rest[50, list(WRONG["voxel"])]
+    result = gmsnet.smooth((points, [("hexahedron", rest), ("wedge", wedges)]))
+    assert result.after.inverted == 1
+    assert [each.cell for each in result.unmended] == [50]
+    assert result.moved.sum() >= 64 - 8

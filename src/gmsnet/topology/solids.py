@@ -22,6 +22,7 @@ from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.topology.fans import Marks
 from gmsnet.topology.ordering import memory_order, space_points
 from gmsnet.topology.polygons import Ints
+from gmsnet.topology.solid_winding import wound
 from gmsnet.topology.wound import mark_of, refuse_flat
 
 Flags = NDArray[np.bool_]
@@ -125,7 +126,7 @@ class WoundSolids:
         used[near] = True
         twin = np.empty(FACETS * len(near), dtype=np.int32)
         kernels.match_solids(near, kind, tables(), nodes, twin)
-        orientation = _wound(points[memory], near, kind, twin, marks)
+        orientation = wound(points[memory], near, kind, tables(), twin, marks)
         corners, inside_out = CORNERS[kind].astype(np.int32), orientation < 0
         if inside_out.any():
             near[inside_out] = np.take_along_axis(near[inside_out], MIRRORED[kind[inside_out]], axis=1)
@@ -225,24 +226,6 @@ def repeats_a_node(block: CellBlock) -> Flags:
     ordered = np.sort(block.nodes, axis=1)
     found: Flags = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
     return found
-
-
-def _wound(points: Floats, near: Ints, kind: NDArray[np.uint8], twin: Ints, marks: Marks) -> NDArray[np.int8]:
-    """The orientation of each cell; marks the nodes of what cannot be wound, or has no volume."""
-    count = len(near)
-    piece, orientation = np.full(count, -1, dtype=np.int32), np.ones(count, dtype=np.int8)
-    consistent = kernels.wind_solids(near, kind, tables(), twin, piece, orientation)
-    volume, extent = np.zeros((2, count))
-    kernels.corner_volumes(points, near, kind, tables(), volume, extent)
-    parts = len(consistent)
-    signed = np.bincount(piece, orientation * volume, parts)
-    orientation[signed[piece] < 0.0] *= -1
-    for found, mark in (
-        (~consistent, connectivity.NON_ORIENTABLE),
-        (np.abs(signed) <= 1e-9 * np.bincount(piece, extent, parts), connectivity.ZERO_AREA),
-    ):
-        marks[near[found[piece]].ravel()] |= np.uint16(mark)
-    return orientation
 
 
 def _halved(near: Ints, kind: NDArray[np.uint8], twin: Ints) -> Flags:
