@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from support.surface_meshes import ball, box, surface_mesh, wavy
 import gmsnet
 from gmsnet.constraints.shell import FEATURE
 from gmsnet.errors import InputError
+from gmsnet.run import outcome
 
 
 @pytest.mark.parametrize("guard", ["valid", "worst", "star"])
@@ -175,3 +177,23 @@ def test_cells_of_second_order_are_held_and_named():
     result = gmsnet.smooth((points, [("triangle6", nodes)]))
     assert not result.moved.any()
     assert f"on a surface they are held: {len(nodes):,} triangle6 cells" in " ".join(result.notes)
+
+
+@pytest.mark.parametrize("guard", ["valid", "worst", "star"])
+@pytest.mark.parametrize("method", ["auto", "barrier", "laplacian", "worst-first"])
+def test_single_precision_far_from_the_origin(method, guard, monkeypatch):
+    """New places are rounded before they are judged, so that their rounding costs no room."""
+    mesh = ball()
+    far = replace(mesh, points=(1000.0 + mesh.points).astype(np.float32).astype(float), single=True)
+    exact, put_back = [], outcome.put_back
+
+    def seen(best, *others):
+        exact.append((best.astype(np.float32) == best).all())
+        return put_back(best, *others)
+
+    monkeypatch.setattr(outcome, "put_back", seen)
+    result = gmsnet.smooth(far, method, guard=guard)
+    assert exact == [True]
+    assert result.judged.after.shape_min > result.judged.before.shape_min + 0.05
+    assert result.after.inverted == 0
+    assert (result.points == result.points.astype(np.float32)).all()

@@ -65,6 +65,11 @@ class Precision(NamedTuple):
         grain = math.ldexp(1.0, -1075 - exponent)
         return cls(grain=grain if grain > 1e-290 else 0.0)  # a subnormal one would only be slow
 
+    @property
+    def as_stored(self) -> Precision:
+        """Of coordinates that are rounded to float32 before anything is told of them, and so are known exactly."""
+        return self._replace(unit=self.unit - 2.0**-24 + 2.0**-53) if self.single else self
+
     def coarser(self, unit: float, grain: float) -> Precision:
         """Of coordinates that are rounded once more, by the relative and the absolute error at most, when written."""
         return self._replace(unit=self.unit + unit, grain=self.grain + grain)
