@@ -101,3 +101,32 @@ def test_rows_that_do_not_grow_alike_are_smoothed():
     x, y = mesh.points[:, 0], mesh.points[:, 1] / mesh.points[:, 1].max()
     pressed = mesh.with_points(np.column_stack([x, 0.7 * y ** (1.05 + x)]))
     assert LAYER not in gmsnet.smooth(pressed).held
+
+
+@pytest.mark.parametrize("growth", [1.0, 1.05])
+@pytest.mark.parametrize("amount", [0.05, 0.15, 0.3])
+@pytest.mark.parametrize(("columns", "aspect", "rows"), [(30, 200, 12), (40, 100, 12), (60, 30, 20)])
+def test_rows_are_layers_where_only_what_is_behind_them_is_disturbed(columns, aspect, rows, amount, growth):
+    """Quads, and grown triangles behind them, whose nodes are thrown about by shares of their height."""
+    first = 1.0 / columns / aspect
+    height = list(np.append(0.0, np.cumsum(first * growth ** np.arange(rows))))
+    step = height[-1] - height[-2]
+    while height[-1] < 0.6:
+        step = min(1.2 * step, 1.0 / columns)
+        height.append(height[-1] + step)
+    x, y = np.linspace(0.0, 1.0, columns + 1), np.array(height)
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    node = np.arange(len(points)).reshape(len(y), len(x))
+    quads = np.stack([node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]], axis=-1)
+    layer, above = quads[:rows].reshape(-1, 4), quads[rows:].reshape(-1, 4)
+    thrown = node[rows + 1 : -1, 1:-1].ravel()
+    size = np.repeat(np.gradient(y)[rows + 1 : -1], len(x) - 2)[:, None]
+    points[thrown] += 0.5 * amount * size * np.random.default_rng(0).uniform(-1.0, 1.0, (len(thrown), 2))
+    triangles = np.concatenate([above[:, [0, 1, 2]], above[:, [0, 2, 3]]])
+    blocks = (("quad", layer), ("triangle", triangles))
+    mesh = Mesh(points, tuple(CellBlock(kind, rows_, np.zeros(len(rows_), dtype=int)) for kind, rows_ in blocks))
+    result = gmsnet.smooth(mesh)
+    inside = node[1:rows, 1:-1].ravel()
+    assert np.isin(inside, result.held[LAYER]).all()
+    assert not result.moved[inside].any()
+    assert result.moved[thrown].sum() > 0.2 * len(thrown)

@@ -34,6 +34,7 @@ STEADY = math.log(1.25)  # between most heights, or most ratios of length and he
 # Of one factor everywhere, from row to row as well: what nobody gets by chance, if heights differ along a wall by less
 # than UNSTEADY.
 CLOSELY, FACTOR, GROWN_BY_MUCH, UNSTEADY = 0.05, math.log(1.08), math.log(4.0), math.log(4.0)
+CALM = 6  # rows that are CLOSELY alike, and others behind them disturbed: fewer are so by chance
 SHARE = 0.66  # of a row: where so much of it is in a layer, all of it is
 GAP, AS_HIGH = 0.5, math.log(2.0)  # of the nodes of a wall; between the height of a cell there and the median
 
@@ -99,13 +100,13 @@ class Courses(NamedTuple):
         And which of the nodes of rows are as high over the row before as others.
         """
         label, rows, (found, as_high) = self.label.copy(), self.rows, np.zeros((2, len(inside)), dtype=bool)
-        made = {wall for wall, own in rows.items() if _are_layers(own)}
+        made = {wall: layers for wall, own in rows.items() if (layers := _layers_of(own))}
         nothing = ~np.isin(label, [*made]) & ~inside
         if (label[nothing] >= 0).any():  # what is no layer takes no rows from those that are
             label[nothing] = -1
             rows = _courses(self.graph, self.points, label)
         for wall, own in rows.items():
-            last = _last(own) if wall in made else 0
+            last = made.get(wall, 0)
             for k, row in enumerate(own):
                 if k < last or inside[row.nodes].mean() >= SHARE:
                     found[row.nodes] = True
@@ -124,12 +125,20 @@ def _graph(edges: Edges, count: int) -> Graph:
     return graph.indptr.astype(np.int64), graph.indices
 
 
-def _are_layers(rows: list[Course]) -> bool:
-    """Are the first rows layers by themselves?"""
+def _layers_of(rows: list[Course]) -> int:
+    """How many of the first rows are layers by themselves: all flat ones, or those before the first disturbed one."""
     last = _last(rows)
     if last < ROWS or rows[0].flatness < THIN:
-        return False
-    alike = float(np.median([_spread(row.growth) for row in rows[1:last]]))
+        return 0
+    spreads = [_spread(row.growth) for row in rows[1:last]]
+    calm = 1 + next((k for k, spread in enumerate(spreads) if spread > CLOSELY), last - 1)
+    if _are_layers(rows, last, float(np.median(spreads))):
+        return last
+    return calm if calm >= CALM and _are_layers(rows, last, float(np.median(spreads[: calm - 1]))) else 0
+
+
+def _are_layers(rows: list[Course], last: int, alike: float) -> bool:
+    """The same of the first ``last`` rows. alike: how little growth varies along a row."""
     steady = min(_spread(rows[0].height), _spread(rows[0].length - rows[0].height))
     grown = float(np.median(rows[last - 1].height) - np.median(rows[0].height))
     factors = [float(np.median(row.growth)) for row in rows[1:last]]
