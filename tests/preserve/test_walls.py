@@ -7,7 +7,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from support.layer_meshes import grid
+from support.layer_meshes import grid, rows_around
 
 import gmsnet
 from gmsnet.generate import Curve, disturb, good_mesh, layered_mesh, random_quad_mesh, recombine
@@ -172,6 +172,29 @@ def test_meshes_that_are_not_refined_towards_a_wall_have_none():
     for case in CASES.values():
         for run in range(3):
             assert not kept(case.mesh(run)).any()
+
+
+@pytest.mark.parametrize("cells", ["quad", "triangle"])
+def test_heights_over_a_wall_that_change_are_told(cells):
+    """Rows half as high as long, which grow: too long for layers."""
+    mesh = rows_around(80, 20, 0.04, 1.25, cells=cells)
+    told = [note for note in gmsnet.smooth(mesh).notes if note.startswith("cells that have one height over")]
+    assert len(told) == 1
+    found = re.match(
+        r"cells that have one height over 2 walls are ([\d.]+) times as high now, in the median: ", told[0]
+    )
+    assert float(found[1]) > 1.3
+    fixed = np.unique(mesh.cells[0].nodes)  # all that there are
+    assert not any(note.startswith("cells that") for note in gmsnet.smooth(mesh, fixed=fixed).notes)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_heights_that_nobody_made_are_not_told(ring, seed):
+    """Of random points, whose cells on a boundary become higher, and of a mesh whose cells stay."""
+    far = gmsnet.random_mesh(800, "circle", boundary_spacing=4.0, seed=seed)
+    assert gmsnet.smooth(far).moved.any()
+    for mesh in (far, ring, layered_mesh()):
+        assert not any(note.startswith("cells that have one height") for note in gmsnet.smooth(mesh).notes)
 
 
 def test_the_airfoil_of_the_real_meshes(real_meshes):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,7 @@ from gmsnet.preserve.anchored import split
 from gmsnet.preserve.columns import layers_of_volume
 from gmsnet.preserve.layers import Layers, stretched_layers
 from gmsnet.preserve.survey import Survey
-from gmsnet.preserve.walls import NEAR, near_walls
+from gmsnet.preserve.walls import HIGHER, NEAR, heights_now, near_walls
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -39,13 +39,15 @@ class Protection:
 
     base: the topology without any. layers: (N,) bool by id, the nodes that are held on account of stretched layers.
     walls: by id, the nodes next to walls that the mesh is refined towards, which move in a stage of their own
-    (wall_stage.py), and how exactly their cells keep their areas. None where there are none.
+    (wall_stage.py), and how exactly their cells keep their areas. None where there are none. survey: of the mesh, where
+    heights over walls are to be compared with it.
     """
 
     base: Topology | Volume
     notes: list[str]
     layers: Flags | None = None
     walls: Kept | None = None
+    survey: Survey | None = None
 
     @property
     def near_walls(self) -> Flags | None:
@@ -105,7 +107,8 @@ def protected(
     walls = walls.firm if firm else walls
     notes.extend(_coarse(coarse))
     walled = Protection(topology, notes, layers, walls)
-    return walled if walls.nodes.any() and WALL in walled.topology.held else protection
+    last = walled if walls.nodes.any() and WALL in walled.topology.held else protection
+    return replace(last, survey=survey)
 
 
 def protected_volume(topology: Volume, preserve: str, fix_layers: bool, near: Floats, *, firm: bool) -> Protection:
@@ -193,8 +196,21 @@ def _coarse(walls: int) -> list[str]:
         return []
     which = "a wall" if walls == 1 else f"{walls} walls"
     so = f"cells on it are larger than {NEAR:.0%} of its diameter, and smoothed like others"
-    mend = f"their heights may change by a third; preserve={SIZE!r} changes them less"
-    return [f"the mesh is refined towards {which}, but {so}: {mend}"]
+    return [f"the mesh is refined towards {which}, but {so}: preserve={SIZE!r} changes their heights less"]
+
+
+def height_note(protection: Protection, near: Floats) -> list[str]:
+    """Says so where cells of one height along a wall have another now. near: (N, 2) the points now, by places."""
+    if protection.survey is None or not isinstance(protection.base, Topology):
+        return []
+    times = heights_now(protection.base.simplices, protection.survey, near)
+    changed = times[np.abs(np.log(times)) > HIGHER]
+    if not len(changed):
+        return []
+    most = changed[np.argmax(np.abs(np.log(changed)))]
+    which = "a wall" if len(changed) == 1 else f"{len(changed)} walls"
+    mend = f"if they are meant, preserve={SIZE!r} changes them less, and nodes that fix names stay"
+    return [f"cells that have one height over {which} are {most:.2g} times as high now, in the median: {mend}"]
 
 
 def carried_note(nodes: int) -> str:

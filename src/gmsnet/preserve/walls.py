@@ -13,6 +13,7 @@ with that around single cells that are damaged. So a mesh that is a little worse
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +46,10 @@ NOISE = np.array([[0.08, 0.1, 0.2, 0.4], [0.12, 0.145, 0.17, 0.25]])  # of trian
 WIDEST = 4.0
 ROUGH, BROKEN = 0.4, 0.5  # the same for single cells, whose band reaches to the mean from the second on
 SOUND, POOR = 0.5, 0.3  # the same by their 1/q
+FEWEST = 12  # edges of a wall of which it is told how high cells are now
+HIGHER = math.log(1.3)  # than before, in the median of the cells on a wall: less is not told
+ONE_HEIGHT = math.log(1.25)  # between most heights along a wall: nobody gets them by chance
+TINY = 1e-300
 CANDIDATES = 8  # edges of the wall, by their middles, among which the nearest is looked for
 
 
@@ -181,6 +186,35 @@ def _double(points: Floats, triangles: Ints) -> Floats:
 def _edge(double: Floats | float) -> Floats:
     """The edges of equilateral triangles of such areas."""
     return np.asarray(np.sqrt(double * (2.0 / np.sqrt(3.0))))
+
+
+def heights_now(simplices: Simplices, survey: Survey, points: Floats) -> Floats:
+    """How many times as high as before cells are over the edges of a wall, in the median, for each wall along which
+    they had one height, or one ratio of height and length, and that has FEWEST edges or more.
+
+    simplices: those of the survey, which is of the mesh before. points: (N, 2) now, by places in memory. Without an
+    entry where fewer cells than half of a wall's have another area than HIGHER allows.
+    """
+    found, beside = list[float](), simplices.rows[survey.beside]
+    logs = [np.log(_double(each, beside) + TINY) for each in (survey.points, points)]
+    if np.count_nonzero(np.abs(logs[1] - logs[0]) > HIGHER) < FEWEST // 2:  # so it is with most meshes
+        return np.array(found)
+    for edges, cells in _walls(simplices, survey):
+        before, now = (_log_heights(each, simplices.rows[cells], edges) for each in (survey.points, points))
+        length = np.log(np.hypot(*(survey.points[edges[:, 1]] - survey.points[edges[:, 0]]).T) + TINY)
+        if len(edges) >= FEWEST and min(_spread(before), _spread(before - length)) <= ONE_HEIGHT:
+            found.append(float(np.exp(np.median(now - before))))
+    return np.array(found)
+
+
+def _spread(values: Floats) -> float:
+    """Between the tenth and the ninetieth of a hundred."""
+    return float(np.ptp(np.percentile(values, [10.0, 90.0])))
+
+
+def _log_heights(points: Floats, triangles: Ints, edges: Ints) -> Floats:
+    length = np.hypot(*(points[edges[:, 1]] - points[edges[:, 0]]).T)
+    return np.asarray(np.log(_double(points, triangles) + TINY) - np.log(length + TINY))
 
 
 def _walls(simplices: Simplices, survey: Survey) -> list[tuple[Ints, Ints]]:

@@ -22,7 +22,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.metric.conformity import Conformity, ConformityChange
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
-from gmsnet.preserve.protection import WALL, Protection, carried_note, wall_note
+from gmsnet.preserve.protection import WALL, Protection, carried_note, height_note, wall_note
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.state import Final, State, with_corners
@@ -57,6 +57,8 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
     claimed = state.second_order is not None and state.stop_reason == TARGET_REACHED  # by stages for their own cells
     if claimed and len(options.target.missed_in(final.after)):
         state = state.ended(NO_PROGRESS if state.history else NOTHING_TO_MOVE)
+    if final.moved.any() and not state.before.inverted and state.motion is None:
+        state = replace(state, remarks=(*state.remarks, *height_note(state.protection, state.points)))
     nothing = np.empty((0, 2))
     shapes = np.empty(0, dtype=np.float32)
     return replace(state, start=nothing, points=nothing, shapes=shapes, floor_of=None, final=final)
