@@ -148,7 +148,9 @@ def test_node_orders_of_second_order() -> None:
     hexa += "\n+," + ",".join(map(str, range(15, 21))) + "\n"
     penta = "CPENTA,2,1," + ",".join(map(str, range(1, 7))) + "\n+," + ",".join(map(str, range(7, 15))) + "\n+,15\n"
     others = "CTETRA,3,1,1,2,3,4,5,6\n+,7,8,9,10\nCQUAD8,4,1,1,2,3,4,5,6\n+,,8\n"
+    others += "CQUAD9,5,1,1,2,3,4,5,6\n+,7,8,9\n"  # as Gmsh writes them
     parsed = read(nastran, (head + hexa + penta + others).encode())
+    assert cells_of(parsed, "quad9") == [list(range(9))]
     assert cells_of(parsed, "hexahedron20") == [[*range(12), 16, 17, 18, 19, 12, 13, 14, 15]]
     assert cells_of(parsed, "wedge15") == [[*range(9), 12, 13, 14, 9, 10, 11]]
     assert cells_of(parsed, "tetra10") == [list(range(10))]

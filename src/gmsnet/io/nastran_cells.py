@@ -24,7 +24,7 @@ CELLS: dict[str, tuple[int, dict[int, Kind]]] = {
     **dict.fromkeys(("CQUAD4", "CQUADR", "CSHEAR", "CPLSTN4", "CPLSTS4"), (3, _QUAD)),
     **dict.fromkeys(("CTRIA6", "CPLSTN6", "CPLSTS6"), (3, _TRIANGLE | {6: Kind("triangle6")})),
     **dict.fromkeys(("CQUAD8", "CPLSTN8", "CPLSTS8"), (3, _QUAD | {8: Kind("quad8")})),
-    "CQUAD": (3, _QUAD | {8: Kind("quad8"), 9: Kind("quad9")}),
+    **dict.fromkeys(("CQUAD", "CQUAD9"), (3, _QUAD | {8: Kind("quad8"), 9: Kind("quad9")})),  # the second by Gmsh
     "CTRIAX6": (3, {6: Kind("triangle6", (0, 2, 4, 1, 3, 5))}),  # which goes round
     "CTETRA": (3, {4: Kind("tetra"), 10: Kind("tetra10")}),
     "CPENTA": (3, {6: Kind("wedge"), 15: _WEDGE15}),
