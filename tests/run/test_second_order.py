@@ -12,6 +12,7 @@ from gmsnet.generate.curved import second_order, throw
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import METHODS
+from gmsnet.preserve.protection import LAYER
 from gmsnet.run import stop
 
 CORNERS = {"triangle6": 3, "quad8": 4, "quad9": 4}
@@ -209,7 +210,10 @@ def test_stretched_layers_are_held_as_in_the_first_order_twin():
     layers = [note for note in result.notes if "anisotropic on purpose" in note]
     assert layers == [note for note in gmsnet.smooth(first).notes if "anisotropic on purpose" in note]
     assert len(layers) == 1
+    assert len(result.held[LAYER])
+    assert not result.moved[result.held[LAYER]].any()
     free = gmsnet.smooth(second_order(first), preserve="none")
+    assert LAYER not in free.held
     assert free.moved.sum() > result.moved.sum()
 
 

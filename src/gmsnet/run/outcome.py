@@ -22,7 +22,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.metric.conformity import Conformity, ConformityChange
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
-from gmsnet.preserve.protection import WALL, Protection, carried_note, height_note, wall_note
+from gmsnet.preserve.protection import LAYER, WALL, Protection, carried_note, height_note, wall_note
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.state import Final, State, with_corners
@@ -110,6 +110,8 @@ def _held(state: State) -> dict[str, NDArray[np.int64]]:
         still = still[~given.free[still]]
         if len(still):
             held[OF_SECOND_ORDER] = still
+        on_purpose = given.protection.topology.held
+        held |= {reason: on_purpose[reason] for reason in (LAYER, WALL) if reason in on_purpose}
     return held
 
 
