@@ -13,6 +13,7 @@ import gmsnet
 from gmsnet.constraints.shell import FEATURE
 from gmsnet.errors import InputError
 from gmsnet.run import outcome
+from gmsnet.run.account import Account
 
 
 @pytest.mark.parametrize("guard", ["valid", "worst", "star"])
@@ -197,3 +198,15 @@ def test_single_precision_far_from_the_origin(method, guard, monkeypatch):
     assert result.judged.after.shape_min > result.judged.before.shape_min + 0.05
     assert result.after.inverted == 0
     assert (result.points == result.points.astype(np.float32)).all()
+
+
+def test_a_quad_that_is_folded_over_is_not_said_to_have_no_area():
+    """One corner of a square in a tilted plane lies beyond the opposite edge."""
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [0.3, 0.2], [0.0, 1.0]])
+    points = np.column_stack([points, points[:, 0]])
+    mesh = surface_mesh(points, {"quad": [[0, 1, 2, 3]]})
+    result = gmsnet.smooth(mesh)
+    assert result.after.inverted == 1
+    told = Account(mesh, result).tangle()
+    assert "it is folded over" in told
+    assert "no area" not in told

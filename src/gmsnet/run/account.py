@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from itertools import groupby
+from itertools import groupby, islice
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from gmsnet.run.result import Result, free_nodes
 from gmsnet.run.sweep import Sweep
 
 UNKNOWN = "not untangled, or untangling was off"
+FOLDED = "it is folded over, and where facets in space fold, their nodes are held as those of a sharp edge"
 NO_AREA = "it has no area, and facets in space are not untangled: two of its corners are at one place, or all in a line"
 
 
@@ -134,11 +135,12 @@ class Account:
         after = self.result.after
         rows = np.flatnonzero(~after.valid)
         why = {cell.cell: cell.reason for cell in self.result.unmended}
-        other = NO_AREA if self.mesh.plane is None and not self.mesh.has_volumes else UNKNOWN
-        first = [
-            f"cell {cell} at {' '.join(f'{value:.6g}' for value in centre)}: {why.get(cell, other)}"
-            for cell, centre in zip(after.cell[rows].tolist(), after.centre[rows].tolist(), strict=True)
-        ][:NAMED]
+        on_surface = self.mesh.plane is None and not self.mesh.has_volumes
+        found = zip(after.cell[rows].tolist(), after.centre[rows].tolist(), after.shape[rows].tolist(), strict=True)
+        first = list[str]()
+        for cell, centre, shape in islice(found, NAMED):
+            other = (FOLDED if shape < 0.0 else NO_AREA) if on_surface else UNKNOWN
+            first.append(f"cell {cell} at {' '.join(f'{value:.6g}' for value in centre)}: {why.get(cell, other)}")
         more = f"; and {len(rows) - len(first):,} more" if len(rows) > len(first) else ""
         hint = "; stretched layers are held: --preserve none lets them move" if LAYER in self.result.held else ""
         cells = amount(len(rows), "cell")
