@@ -75,11 +75,10 @@ def smooth(
     fix_layers: hold all cells that are stretched alike, whatever ``preserve`` says. untangle: mend inverted cells
     first, where there are any. guard: what each sweep keeps besides validity: "valid" nothing (as the paper), "worst"
     that the worst 1/q of the cells with a free node never falls, "star" that the worst 1/q around any free node never
-    falls. seed:
-    for methods that draw random numbers (none does so far). callback: called after each look at the mesh, with most
-    methods after each sweep; a true answer stops the run. weights: a safetensors file for methods with weights.
-    best_by: which 1/q enters the q̂ that says which mesh is the best: "shape" (1/q) or "aspect" (1/q_V, with which
-    the paper's tables are formed). slide: whether nodes of boundaries, interfaces and line cells move along their
+    falls. seed: for methods that draw random numbers (none does so far). callback: called after each look at the mesh:
+    after each sweep with most methods, with auto after up to 20; a true answer stops the run. weights: a safetensors
+    file for methods with weights. best_by: which 1/q enters the q̂ that says which mesh is the best: "shape" (1/q) or
+    "aspect" (1/q_V, with which the paper's tables are formed). slide: whether nodes of boundaries, interfaces and line cells move along their
     curves, boundary nodes of volumes on their surface: None (they stay), True or "all", or names of markers whose
     nodes may. feature_angle: degrees; curves end, and edges of surfaces are sharp, where they turn by more. geometry:
     what to slide on instead of arcs through the input's nodes (docs/sliding.md). surface_tolerance: how far from
