@@ -78,10 +78,11 @@ def smooth(
     falls. seed: for methods that draw random numbers (none does so far). callback: called after each look at the mesh:
     after each sweep with most methods, with auto after up to 20; a true answer stops the run. weights: a safetensors
     file for methods with weights. best_by: which 1/q enters the q̂ that says which mesh is the best: "shape" (1/q) or
-    "aspect" (1/q_V, with which the paper's tables are formed). slide: whether nodes of boundaries, interfaces and line cells move along their
-    curves, boundary nodes of volumes on their surface: None (they stay), True or "all", or names of markers whose
-    nodes may. feature_angle: degrees; curves end, and edges of surfaces are sharp, where they turn by more. geometry:
-    what to slide on instead of arcs through the input's nodes (docs/sliding.md). surface_tolerance: how far from
+    "aspect" (1/q_V, with which the paper's tables are formed). slide: whether nodes of boundaries, interfaces and line
+    cells move along their curves, boundary nodes of volumes on their surface: None (they stay), True or "all", or names
+    of markers whose nodes may. feature_angle: degrees; curves end, and edges of surfaces are sharp, where they turn by
+    more. geometry: what to slide on instead of arcs through the input's nodes (docs/sliding.md). surface_tolerance: how
+    far from
     the input's facets nodes of surfaces may go, over the mean length of their edges (default: 0.05; with a geometry
     without a bound). hausdorff: how far their facets may go from the input's, over the diagonal of the box around it
     (default: no bound). free_needles: edges that look sharp only because a facet of a surface is thin are no features.
