@@ -21,6 +21,7 @@ from gmsnet.preserve.columns import layers_of_volume
 from gmsnet.preserve.layers import Layers, stretched_layers
 from gmsnet.preserve.survey import Survey
 from gmsnet.preserve.walls import HIGHER, NEAR, heights_now, near_walls
+from gmsnet.topology.stars import Ints
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -39,15 +40,15 @@ class Protection:
 
     base: the topology without any. layers: (N,) bool by id, the nodes that are held on account of stretched layers.
     walls: by id, the nodes next to walls that the mesh is refined towards, which move in a stage of their own
-    (wall_stage.py), and how exactly their cells keep their areas. None where there are none. survey: of the mesh, where
-    heights over walls are to be compared with it.
+    (wall_stage.py), and how exactly their cells keep their areas. None where there are none. beside: as of a survey,
+    where heights over walls are to be compared.
     """
 
     base: Topology | Volume
     notes: list[str]
     layers: Flags | None = None
     walls: Kept | None = None
-    survey: Survey | None = None
+    beside: Ints | None = None
 
     @property
     def near_walls(self) -> Flags | None:
@@ -108,7 +109,7 @@ def protected(
     notes.extend(_coarse(coarse))
     walled = Protection(topology, notes, layers, walls)
     last = walled if walls.nodes.any() and WALL in walled.topology.held else protection
-    return replace(last, survey=survey)
+    return replace(last, beside=survey.beside)
 
 
 def protected_volume(topology: Volume, preserve: str, fix_layers: bool, near: Floats, *, firm: bool) -> Protection:
@@ -199,11 +200,11 @@ def _coarse(walls: int) -> list[str]:
     return [f"the mesh is refined towards {which}, but {so}: preserve={SIZE!r} changes their heights less"]
 
 
-def height_note(protection: Protection, near: Floats) -> list[str]:
-    """Says so where cells of one height along a wall have another now. near: (N, 2) the points now, by places."""
-    if protection.survey is None or not isinstance(protection.base, Topology):
+def height_note(protection: Protection, before: Floats, now: Floats) -> list[str]:
+    """Says so where cells of one height along a wall have another now. before, now: (N, 2) points, by places."""
+    if protection.beside is None or not isinstance(protection.base, Topology):
         return []
-    times = heights_now(protection.base.simplices, protection.survey, near)
+    times = heights_now(protection.base, protection.beside, before, now)
     changed = times[np.abs(np.log(times)) > HIGHER]
     if not len(changed):
         return []

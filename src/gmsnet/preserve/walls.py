@@ -26,10 +26,11 @@ from gmsnet.kernels.topology.components import pieces
 from gmsnet.measure.signs import exact_signs
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.banded import Kept
-from gmsnet.preserve.survey import Survey
+from gmsnet.preserve.survey import Survey, rim_of
 from gmsnet.topology.stars import Ints
 from gmsnet.topology.topology import Topology
 
+Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 
 NEAR = 0.02  # of a wall's diameter: how far from it a cell's middle may lie
@@ -83,7 +84,7 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
     if not refined(points, triangles.take(survey.beside, axis=0), survey.double):
         return NearWalls(kept, 0)  # so it is with most meshes
     rough: Floats | None = None
-    for wall, cells in _walls(topology.simplices, survey):
+    for wall, cells in _walls(topology.simplices, _on_boundary(survey.rim), survey.beside):
         size = _edge(_double(points, triangles[cells]))
         if (size <= largest).mean() < MOST:
             continue
@@ -188,22 +189,22 @@ def _edge(double: Floats | float) -> Floats:
     return np.asarray(np.sqrt(double * (2.0 / np.sqrt(3.0))))
 
 
-def heights_now(simplices: Simplices, survey: Survey, points: Floats) -> Floats:
+def heights_now(topology: Topology, beside: Ints, before: Floats, now: Floats) -> Floats:
     """How many times as high as before cells are over the edges of a wall, in the median, for each wall along which
     they had one height, or one ratio of height and length, and that has FEWEST edges or more.
 
-    simplices: those of the survey, which is of the mesh before. points: (N, 2) now, by places in memory. Without an
-    entry where fewer cells than half of a wall's have another area than HIGHER allows.
+    beside: as of a survey. before, now: (N, 2) points by places in memory. Without an entry where the areas of fewer
+    cells than half of a wall's have changed by more than HIGHER.
     """
-    found, beside = list[float](), simplices.rows[survey.beside]
-    logs = [np.log(_double(each, beside) + TINY) for each in (survey.points, points)]
-    if np.count_nonzero(np.abs(logs[1] - logs[0]) > HIGHER) < FEWEST // 2:  # so it is with most meshes
+    found, rows = list[float](), topology.near[beside]
+    change = np.log(_double(now, rows) + TINY) - np.log(_double(before, rows) + TINY)
+    if np.count_nonzero(np.abs(change) > HIGHER) < FEWEST // 2:  # so it is with most meshes
         return np.array(found)
-    for edges, cells in _walls(simplices, survey):
-        before, now = (_log_heights(each, simplices.rows[cells], edges) for each in (survey.points, points))
-        length = np.log(np.hypot(*(survey.points[edges[:, 1]] - survey.points[edges[:, 0]]).T) + TINY)
-        if len(edges) >= FEWEST and min(_spread(before), _spread(before - length)) <= ONE_HEIGHT:
-            found.append(float(np.exp(np.median(now - before))))
+    for edges, cells in _walls(topology.simplices, _on_boundary(rim_of(topology)), beside):
+        first, last = (_log_heights(each, topology.near[cells], edges) for each in (before, now))
+        length = np.log(np.hypot(*(before[edges[:, 1]] - before[edges[:, 0]]).T) + TINY)
+        if len(edges) >= FEWEST and min(_spread(first), _spread(first - length)) <= ONE_HEIGHT:
+            found.append(float(np.exp(np.median(last - first))))
     return np.array(found)
 
 
@@ -217,20 +218,27 @@ def _log_heights(points: Floats, triangles: Ints, edges: Ints) -> Floats:
     return np.asarray(np.log(_double(points, triangles) + TINY) - np.log(length + TINY))
 
 
-def _walls(simplices: Simplices, survey: Survey) -> list[tuple[Ints, Ints]]:
-    """The boundary edges (k, 2) of each piece of the boundary that hangs together, and a row of the cell at each."""
-    boundary, shapes = (survey.rim & BOUNDARY) > 0, simplices.shapes
-    edges = simplices.rows[survey.beside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+def _on_boundary(rim: NDArray[np.uint8]) -> Flags:
+    return np.asarray((rim & BOUNDARY) > 0)
+
+
+def _walls(simplices: Simplices, boundary: Flags, beside: Ints) -> list[tuple[Ints, Ints]]:
+    """The boundary edges (k, 2) of each piece of the boundary that hangs together, and a row of the cell at each.
+
+    boundary: (N,) by places. beside: rows with two nodes of it or more.
+    """
+    shapes = simplices.shapes
+    edges = simplices.rows[beside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     at_rim = boundary[edges].all(axis=1)
     if shapes is not None:  # of a corner of a quad, the edge to the next one: so each edge of a cell counts once
-        at_rim &= np.repeat(shapes[survey.beside] == EQUILATERAL, 3) | (np.arange(len(edges)) % 3 == 0)
+        at_rim &= np.repeat(shapes[beside] == EQUILATERAL, 3) | (np.arange(len(edges)) % 3 == 0)
     outer = np.flatnonzero(at_rim)
     ends = np.sort(edges[outer], axis=1)
     key = ends[:, 0].astype(np.int64) * len(boundary) + ends[:, 1]
     # An edge between two of these nodes that is not on the boundary has both of its cells among these rows.
     _, place, count = np.unique(key, return_index=True, return_counts=True)
     once = place[count == 1]
-    ends, cells = ends[once], survey.beside[outer[once] // 3]
+    ends, cells = ends[once], beside[outer[once] // 3]
     piece = pieces(ends, boundary)[ends[:, 0]]
     order = np.argsort(piece, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)

@@ -58,7 +58,8 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
     if claimed and len(options.target.missed_in(final.after)):
         state = state.ended(NO_PROGRESS if state.history else NOTHING_TO_MOVE)
     if final.moved.any() and not state.before.inverted and state.motion is None:
-        state = replace(state, remarks=(*state.remarks, *height_note(state.protection, state.points)))
+        heights = height_note(state.protection, state.start, state.points)
+        state = replace(state, remarks=(*state.remarks, *heights))
     nothing = np.empty((0, 2))
     shapes = np.empty(0, dtype=np.float32)
     return replace(state, start=nothing, points=nothing, shapes=shapes, floor_of=None, final=final)
