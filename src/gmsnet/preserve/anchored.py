@@ -34,7 +34,7 @@ from gmsnet.kernels.simplex import stretch
 from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL
 from gmsnet.kernels.topology.components import pieces
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.preserve.courses import FLAT, Courses, Walls
+from gmsnet.preserve.courses import FLAT, Courses, Walls, spread
 from gmsnet.preserve.gaps import in_gaps
 from gmsnet.preserve.layers import Layers
 from gmsnet.preserve.survey import Survey
@@ -147,7 +147,7 @@ def _at_walls(
         change = _change(height[along], one[along], two[along])
         if thin < THIN or change > UNEVEN:
             return own[:0]
-        varies = min(_spread(height[along]), _spread((np.log(length) - height)[along]))
+        varies = min(spread(height[along]), spread((np.log(length) - height)[along]))
         regular = change <= EVEN and varies <= ALL_EVEN
         even = regular and len(own) <= PART * of_all
         grown = float(np.median(cells[row[along], stretch.LENGTH]) - np.median(cells[own, stretch.LENGTH]))
@@ -210,12 +210,6 @@ def _change(height: Floats, one: NDArray[np.int32], two: NDArray[np.int32]) -> f
     several = np.diff(np.append(start, len(node))) > 1
     change = np.maximum.reduceat(value, start) - np.minimum.reduceat(value, start)
     return float(np.mean(change[several])) if several.any() else math.inf
-
-
-def _spread(values: Floats) -> float:
-    """Between the tenth and the ninetieth of a hundred."""
-    low, high = np.percentile(values, [10.0, 90.0])
-    return float(high - low)
 
 
 def _along_nearest(

@@ -130,7 +130,7 @@ def _layers_of(rows: list[Course]) -> int:
     last = _last(rows)
     if last < ROWS or rows[0].flatness < THIN:
         return 0
-    spreads = [_spread(row.growth) for row in rows[1:last]]
+    spreads = [spread(row.growth) for row in rows[1:last]]
     calm = 1 + next((k for k, spread in enumerate(spreads) if spread > CLOSELY), last - 1)
     if _are_layers(rows, last, float(np.median(spreads))):
         return last
@@ -139,7 +139,7 @@ def _layers_of(rows: list[Course]) -> int:
 
 def _are_layers(rows: list[Course], last: int, alike: float) -> bool:
     """The same of the first ``last`` rows. alike: how little growth varies along a row."""
-    steady = min(_spread(rows[0].height), _spread(rows[0].length - rows[0].height))
+    steady = min(spread(rows[0].height), spread(rows[0].length - rows[0].height))
     grown = float(np.median(rows[last - 1].height) - np.median(rows[0].height))
     factors = [float(np.median(row.growth)) for row in rows[1:last]]
     if (
@@ -162,7 +162,7 @@ def _last(rows: list[Course]) -> int:
     return next((k for k, row in enumerate(rows) if row.flatness < STILL_FLAT), len(rows))
 
 
-def _spread(values: Floats) -> float:
+def spread(values: Floats) -> float:
     """Between the tenth and the ninetieth of a hundred."""
     low, high = np.percentile(values, [10.0, 90.0])
     return float(high - low)

@@ -26,6 +26,7 @@ from gmsnet.kernels.topology.components import pieces
 from gmsnet.measure.signs import exact_signs
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.banded import Kept
+from gmsnet.preserve.courses import spread
 from gmsnet.preserve.survey import Survey, rim_of
 from gmsnet.topology.stars import Ints
 from gmsnet.topology.topology import Topology
@@ -194,7 +195,7 @@ def heights_now(topology: Topology, beside: Ints, before: Floats, now: Floats) -
     they had one height, or one ratio of height and length, and that has FEWEST edges or more.
 
     beside: as of a survey. before, now: (N, 2) points by places in memory. No wall is looked at where the areas of few
-    cells have changed by more than HIGHER, and where those of three quarters are uneven.
+    cells have changed by more than HIGHER, or where those of three quarters are uneven.
     """
     found, rows = list[float](), topology.near[beside]
     first, last = (np.log(_double(each, rows) + TINY) for each in (before, now))
@@ -207,16 +208,10 @@ def heights_now(topology: Topology, beside: Ints, before: Floats, now: Floats) -
         if len(edges) < FEWEST:
             continue
         first, length = _log_heights(before, topology.near[cells], edges)
-        if min(_spread(first), _spread(first - length)) <= ONE_HEIGHT:
+        if min(spread(first), spread(first - length)) <= ONE_HEIGHT:
             last, _ = _log_heights(now, topology.near[cells], edges)
             found.append(float(np.exp(np.median(last - first))))
     return np.array(found)
-
-
-def _spread(values: Floats) -> float:
-    """Between a tenth of them and nine tenths."""
-    ordered, part = np.sort(values), len(values) // 10
-    return float(ordered[-1 - part] - ordered[part])
 
 
 def _log_heights(points: Floats, triangles: Ints, edges: Ints) -> tuple[Floats, Floats]:
