@@ -7,7 +7,9 @@ import shutil
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+from support.fluent import saved_faces
 
 import gmsnet
 from gmsnet.cli import fix
@@ -184,3 +186,22 @@ def test_a_list_of_nodes_is_no_larger_than_lists_are(run, square, tmp_path, monk
     told = f"{path}: too large for a list of {count} nodes, which takes at most {most} bytes"
     assert (done.code, done.err) == (2, f"gmsnet: error: {told}\n")
     assert not (tmp_path / "other.su2").exists()
+
+
+QUAD = saved_faces(
+    np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]), {3: (3, [([k, (k + 1) % 4], -1, 0) for k in range(4)])}, {}, {}
+)
+MFEM = b"MFEM mesh v1.0\n\ndimension\n2\n\nelements\n1\n1 3 0 1 2 3\nboundary\n0\nvertices\n4\n2\n0 0\n1 0\n1 1\n0 1\n"
+
+
+@pytest.mark.parametrize(("name", "data"), [("a.msh", QUAD), ("a.mesh", MFEM)], ids=["fluent", "mfem"])
+@pytest.mark.parametrize("way", ["out", "folder"])
+def test_of_two_formats_with_one_suffix_the_output_has_that_of_the_input(run, name, data, way, tmp_path):
+    """Fluent's .msh is no Gmsh, and MFEM's .mesh no Medit. All nodes of these are held."""
+    (tmp_path / name).write_bytes(data)
+    out = tmp_path / "out" / name
+    out.parent.mkdir()
+    done = run("smooth", tmp_path / name, *([out] if way == "out" else ["--out-dir", out.parent]))
+    assert (done.code, "lost" in done.out) == (0, False)
+    assert out.read_bytes() == data
+    assert run("smooth", tmp_path / name, out.with_suffix(".vtk")).code == 0

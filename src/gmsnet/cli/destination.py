@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Destination:
-    """path: of the output. format: its name in the table, None where the input's is kept.
+    """path: of the output. format: its name in the table; None where the suffix tells, or that of the input is kept.
 
     aside: the output is the standard output, so what is said goes to standard error.
     """
@@ -79,7 +79,7 @@ def destination_of(
     _refuse_input(group.paths if group is not None else _files(source), _files(output, key))
     for path in files_of(output, FORMATS[key]):
         check_writable(path)
-    return Destination(output, key, aside)
+    return Destination(output, key if key == OPENFOAM else format, aside)
 
 
 def _refuse_input(read: Sequence[str], written: Sequence[str]) -> None:
