@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.distributed.file_ranges import planned_format
+from gmsnet.distributed.planned import planned_format
 from gmsnet.io import cgns_elements
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")

@@ -11,7 +11,7 @@ import pytest
 
 import gmsnet
 from gmsnet.cells.table import nodes_of
-from gmsnet.distributed.file_ranges import planned_format
+from gmsnet.distributed.planned import planned_format
 from gmsnet.generate import random_mesh, random_volume, recombine
 from gmsnet.io import typed_rows
 from gmsnet.io.cgns_elements import CGNS_ORDERS, KINDS

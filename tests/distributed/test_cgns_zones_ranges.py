@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.distributed.file_ranges import planned_format
+from gmsnet.distributed.planned import planned_format
 from gmsnet.generate import random_mesh, random_volume
 from gmsnet.io.cgns_elements import CGNS_ORDERS
 from gmsnet.mesh.mesh import Mesh

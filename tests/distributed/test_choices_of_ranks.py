@@ -13,10 +13,11 @@ import gmsnet
 from gmsnet.cli.fix import chosen, fixed_nodes
 from gmsnet.distributed.chosen import holding
 from gmsnet.distributed.file_pieces import read_pieces
-from gmsnet.distributed.file_ranges import PLANNED, read_ranges
+from gmsnet.distributed.file_ranges import read_ranges
 from gmsnet.distributed.file_run import FileTask, smooth_file
 from gmsnet.distributed.gathered import Whole, gathered
 from gmsnet.distributed.layouts import shared_format
+from gmsnet.distributed.planned import PLANNED
 from gmsnet.errors import InputError
 from gmsnet.generate import random_mesh, random_volume
 from gmsnet.mesh.selection import fixed_mask

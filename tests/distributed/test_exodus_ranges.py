@@ -11,8 +11,8 @@ import pytest
 from scipy.io import netcdf_file
 
 import gmsnet
-from gmsnet.distributed.file_ranges import planned_format
 from gmsnet.distributed.layouts import shared_format
+from gmsnet.distributed.planned import planned_format
 from gmsnet.generate import random_mesh, random_volume, recombine
 from gmsnet.io import exodus_ranges, rows
 from gmsnet.io.exodus_elements import SIDES

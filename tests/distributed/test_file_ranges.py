@@ -11,10 +11,11 @@ import pytest
 
 import gmsnet
 from gmsnet.distributed import file_ranges, moved
-from gmsnet.distributed.file_ranges import planned_format, read_ranges
+from gmsnet.distributed.file_ranges import read_ranges
 from gmsnet.distributed.file_run import FileTask, smooth_file
 from gmsnet.distributed.gathered import gathered
 from gmsnet.distributed.layouts import shared_format
+from gmsnet.distributed.planned import planned_format
 from gmsnet.errors import InputError
 from gmsnet.generate import random_mesh, random_volume, recombine
 from gmsnet.io import ugrid

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.distributed.file_ranges import planned_format
+from gmsnet.distributed.planned import planned_format
 from gmsnet.generate import random_volume
 from gmsnet.io import hdf5_rows
 

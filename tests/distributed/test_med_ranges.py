@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.distributed.file_ranges import planned_format
+from gmsnet.distributed.planned import planned_format
 from gmsnet.generate import random_mesh, recombine
 from gmsnet.io.med import KINDS
 from gmsnet.mesh.mesh import Mesh

@@ -21,6 +21,8 @@ pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 from distributed.test_cgns_grids_ranges import save_grids
 from distributed.test_cgns_zones_ranges import save_zones
 from distributed.test_file_ranges import mixed, save_vtkhdf
+from distributed.test_fluent_ranges import volumes as of_fluent
+from distributed.test_foam_ranges import zoned
 from distributed.test_hdf5_ranges import packed
 from distributed.test_mpiexec import MPIEXEC, mpiexec, smooth, smooth_several
 
@@ -123,6 +125,18 @@ def test_a_truncated_piece_is_said_once(folder):
     assert saved(folder) == before
 
 
+def test_a_binary_case_has_the_bytes_of_one_process(tmp_path):
+    """And no rank has the whole, though zones hold nodes and a patch is named."""
+    for name in ("serial", "ranks"):
+        save({f"constant/polyMesh/{key}": data for key, data in zoned(merged=0).items()}, tmp_path / name)
+    found = gmsnet.smooth(mesh := gmsnet.read(tmp_path / "serial"), fixed=mesh.markers["low"])
+    gmsnet.write(found.mesh, tmp_path / "serial")
+    done = smooth(2, "ranks", "--in-place", "--fix", "low", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["gathered"] == ""
+    assert saved(tmp_path / "serial") == saved(tmp_path / "ranks")
+
+
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_a_decomposed_case_has_the_bytes_of_one_process(tmp_path, ranks):
     """As a solver leaves it: the mesh of the whole case is beside the processors."""
@@ -152,6 +166,7 @@ SHARED = {
     "vtu": lambda path: path.write_bytes(dict(vtu_variants(grid_of(mixed())))[COMPRESSED]),
     "cgns": lambda path: save_zones(mixed(), path, packed=(1,)),
     "lb8.ugrid": lambda path: gmsnet.write(random_volume(800, seed=1), path),
+    "cas": lambda path: path.write_bytes(of_fluent()),
 }
 COMPRESSED = "binary, header 32, order 1, compress True"
 

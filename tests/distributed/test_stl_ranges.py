@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.distributed.file_ranges import planned_format
+from gmsnet.distributed.planned import planned_format
 from gmsnet.generate import organic_surface
 from gmsnet.io import stl_ranges
 

@@ -13,8 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gmsnet
-from gmsnet.distributed.file_ranges import planned_format, read_ranges
+from gmsnet.distributed.file_ranges import read_ranges
 from gmsnet.distributed.layouts import shared_format
+from gmsnet.distributed.planned import planned_format
 from gmsnet.generate import random_mesh, random_volume, recombine
 from gmsnet.io import vtk_runs
 from gmsnet.io.rows import Ranges, Rows

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.distributed.file_ranges import planned_format
 from gmsnet.distributed.file_run import FileTask, smooth_file
+from gmsnet.distributed.planned import planned_format
 from gmsnet.io import vtu_skeleton, vtu_sources
 from gmsnet.io.vtu_compressors import COMPRESSORS
 from gmsnet.mesh.mesh import Mesh

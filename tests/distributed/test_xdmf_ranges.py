@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.distributed.file_ranges import planned_format
 from gmsnet.distributed.file_run import FileTask, smooth_file
+from gmsnet.distributed.planned import planned_format
 from gmsnet.errors import InputError
 from gmsnet.generate import random_mesh, random_quad_mesh, random_volume
 from gmsnet.mesh.cell_block import CellBlock

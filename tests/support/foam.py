@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+
+from gmsnet.mesh.mesh import Mesh
 
 Lists = dict[str, object]
 
@@ -122,3 +125,33 @@ FORMS = {
     "binary, 64": lambda lists: in_binary(lists, 64), "big endian": lambda lists: in_binary(lists, order=">"),
     "single": lambda lists: in_binary(lists, scalar=32),
 }  # fmt: skip
+
+# The faces of a cell of each kind, seen from outside counter-clockwise.
+OUTWARD = {
+    "tetra": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+    "pyramid": [[0, 3, 2, 1], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]],
+    "wedge": [[0, 2, 1], [3, 4, 5], [0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]],
+    "hexahedron": [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]],
+}
+
+
+def cells_of_mesh(mesh: Mesh) -> list[list[list[int]]]:
+    """The faces of each volume cell of a mesh, as ``poly_mesh`` takes them."""
+    return [
+        [[int(cell[k]) for k in face] for face in OUTWARD[block.kind]]
+        for block in mesh.cells if block.kind in OUTWARD for cell in block.nodes
+    ]  # fmt: skip
+
+
+def zones_in_binary(key: str, zones: Mapping[str, Sequence[int]]) -> bytes:
+    """A file of zones, whose faces have a side, too."""
+    kind = key[:-5]
+    body = b"%d\n(\n" % len(zones)
+    for name, members in zones.items():
+        raw = struct.pack(f"<{len(members)}i", *members)
+        body += f"{name}\n{{\n    type {kind}Zone;\n{kind}Labels      List<label> \n{len(members)}\n(".encode()
+        body += raw + b");\n"
+        if kind == "face":
+            body += b"flipMap      List<bool> \n%d\n(" % len(members) + b"\1" * len(members) + b");\n"
+        body += b"}\n"
+    return head("regIOobject", key, "binary", "LSB;label=32;scalar=64").encode() + body + b")\n"

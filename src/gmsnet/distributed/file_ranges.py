@@ -6,24 +6,29 @@ The first rank writes. It copies the file, and asks for moved nodes, some at a t
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar, cast
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.agreement import agreed, everywhere, raise_everywhere
 from gmsnet.distributed.by_rank import by_rank
+from gmsnet.distributed.from_faces import cells_of_faces, occurring
 from gmsnet.distributed.moved import Moved
 from gmsnet.distributed.partition import along_curve
 from gmsnet.distributed.piece import Cells, Piece
+from gmsnet.distributed.planned import path_of, plan_of, said
 from gmsnet.distributed.tags import nodes_of
 from gmsnet.distributed.zones import Shared, Zones, asked, homes, in_zones, named_here, with_vertices
 from gmsnet.errors import FormatError, GmsnetError, InputError
 from gmsnet.io.atomic import replace_files
 from gmsnet.io.formats import FORMATS, Entry
 from gmsnet.io.linked import links_of, placed
+from gmsnet.io.output import paths_of
+from gmsnet.io.packed import is_packed, packed
 from gmsnet.io.pieces import Piece as Bytes
 from gmsnet.io.pieces import Pieces
 from gmsnet.io.ranges import Column, Plan, put
@@ -31,31 +36,24 @@ from gmsnet.io.rows import AT_ONCE, Ranges, Rows
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.vtk_ghosts import GHOST_CELLS
 
-# Formats whose files can tell how their numbers lie.
-PLANNED = ("cgns", "exodus", "gmsh", "med", "ply", "stl", "ugrid", "vtk", "vtkhdf", "vtu", "xdmf")
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
 Value = TypeVar("Value")
-
-
-def plan_of(file: Ranges, format: str) -> Plan | None:
-    """How the numbers of a file lie; None where only a reader of the whole can tell. Raises FormatError."""
-    plan: Callable[[Ranges], Plan | None] = cast(Any, FORMATS[format].load()).plan
-    return _said(file, lambda: plan(file))
 
 
 @dataclass(frozen=True, eq=False)
 class FileRanges:
     """What one rank has of a file. piece: its share of the cells, and their nodes. rows: (ranks + 1,) where the rows of
     coordinates begin that each rank keeps. zones: where the nodes are not the points of the file. index: the file that
-    names it, with its format, where it is not the one that was asked for."""
+    names it, where it is not the one that was asked for."""
 
     file: Ranges
+    entry: Entry
     plan: Plan
     piece: Piece
     rows: Ids
     zones: Zones | None = None
-    index: tuple[Ranges, Entry] | None = None
+    index: Ranges | None = None
 
     def write(self, target: str, points: Floats, comm: Any) -> None:
         """All ranks call it: a file of the same bytes but for the points (n, dim) of the piece that are elsewhere.
@@ -79,17 +77,21 @@ class FileRanges:
         raise_everywhere(comm, wrong)
 
     def _replace(self, target: str, contents: Iterator[Bytes]) -> None:
-        """On the first rank. target: of the file that names the one with these contents, where there are two."""
+        """On the first rank. target: of the file that is asked for, which may name the one with these contents."""
+        opened = [self.file, *self.plan.companions.values(), *([] if self.index is None else [self.index])]
+        stamps = Stamps.of([(each.path, None, each.stamp) for each in opened])
+        main = self.entry.suffixes[0]
         if self.index is None:
-            replace_files({target: contents}, Stamps.of([(self.file.path, None, self.file.stamp)]))
-            return
-        index, entry = self.index
-        stamps = Stamps.of([(each.path, None, each.stamp) for each in (index, self.file)])
-        text = bytes(index.read(0, index.size))
-        (key,) = links_of(entry, text)
-        given = {entry.suffixes[0]: Pieces(lambda: [text]), key: Pieces(lambda: contents)}
-        files, targets = placed(entry, given, target, stamps)
-        replace_files({path: files[each] for each, path in targets.items()}, stamps)
+            files = {main: Pieces(lambda: contents)}
+            files |= {key: Pieces(partial(each.copied, 0, each.size)) for key, each in self.plan.companions.items()}
+            targets = paths_of(target, self.entry, list(files), stamps)
+        else:
+            text = bytes(self.index.read(0, self.index.size))
+            (key,) = links_of(self.entry, text)
+            given = {main: Pieces(lambda: [text]), key: Pieces(lambda: contents)}
+            files, targets = placed(self.entry, given, target, stamps)
+        every = {path: packed(files[key]) if is_packed(path) else files[key] for key, path in targets.items()}
+        replace_files(every, stamps)
 
     def _brought(self, points: Floats, comm: Any) -> tuple[Ids, Floats]:
         """Of the rows that this rank keeps: the nodes that have moved on any rank, ascending, and where they are."""
@@ -134,39 +136,44 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
 
     The mesh is that of ``gmsnet.read``. Raises InputError, on all ranks, with what it says.
     """
-    file, index = _opened(comm, name), None
+    file, index, entry = _opened(comm, path_of(name, format)), None, FORMATS[format]
     plan = comm.bcast(everywhere(comm, lambda: _planned(file, format) if comm.rank == 0 else None))
     if plan.beside:
-        index = file, FORMATS[format]
+        index = file
         file = _opened(comm, os.path.join(os.path.dirname(name), plan.beside))
     rows = np.array([plan.nodes * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
     first, last = rows[comm.rank : comm.rank + 2].tolist()
-    read = everywhere(comm, lambda: _said(file, lambda: _blocks(file, plan, comm)))
-    ghosts = everywhere(comm, lambda: _said(file, lambda: _ghosts(file, plan, comm)))
-    images = np.empty(0, dtype=np.int64)
+    names, images, called = plan.names or {}, np.empty(0, dtype=np.int64), GHOST_CELLS
+    if plan.faces is None:
+        read = everywhere(comm, lambda: said(file, lambda: _blocks(file, plan, comm)))
+        ghosts = everywhere(comm, lambda: said(file, lambda: _ghosts(file, plan, comm)))
+    else:
+        read, images, stay = cells_of_faces(comm, file, plan.faces, plan.nodes, partial(said, file))
+        names, called = occurring(comm, read, names), "zones"
     if plan.tags:
         read, images = _renumbered(comm, file, plan, read, first, last)
-    nodes = everywhere(comm, lambda: _said(file, lambda: _nodes(file, plan, rows, comm.rank)))
+    nodes = everywhere(comm, lambda: said(file, lambda: _nodes(file, plan, rows, comm.rank)))
     nodes = nodes._replace(held=nodes.held | nodes.marked(comm, images))
-    zones, stay = None, _ids_of([block.nodes[marks] for block, marks in zip(read, ghosts, strict=True)])
+    if plan.faces is None:
+        stay = _ids_of([block.nodes[marks] for block, marks in zip(read, ghosts, strict=True)])
+    zones = None
     if plan.zones:
         named = _ids_of([block.nodes for block in read])
         zones, nodes, stay = in_zones(comm, plan.zones, nodes, named)
         node = zones.of_points(comm, named)
         read = [replace(block, nodes=node[np.searchsorted(named, block.nodes)]) for block in read]
-    read, names = with_vertices(
-        comm, read, plan.names or {}, named_here(comm, nodes.rows, stay), "coincident points" if zones else GHOST_CELLS
-    )
+        called = "coincident points"
+    read, names = with_vertices(comm, read, names, named_here(comm, nodes.rows, stay), called)
     ids = _ids_of([block.nodes[:, 0] for block in read])
     blocks = _shared_out(comm, read, ids, asked(comm, nodes.rows, nodes.points, ids))
     ids = _ids_of([block.nodes for block in blocks])
     lonely = np.flatnonzero(~nodes.marked(comm, ids)) + nodes.rows[comm.rank]  # of no cell
     ids = np.sort(np.concatenate([ids, lonely]))
     points, fixed = (asked(comm, nodes.rows, mine, ids) for mine in (nodes.points, nodes.held))
-    for each in [file] if index is None else [file, index[0]]:
+    for each in [file, *plan.companions.values(), *([] if index is None else [index])]:
         everywhere(comm, each.check)
     piece = everywhere(comm, lambda: Piece(ids, points, fixed, tuple(blocks), plan.single, names))
-    return FileRanges(file, plan, piece, nodes.rows, zones, index)
+    return FileRanges(file, entry, plan, piece, nodes.rows, zones, index)
 
 
 def _opened(comm: Any, name: str) -> Ranges:
@@ -209,7 +216,7 @@ def _renumbered(
 ) -> tuple[list[Cells], Ids]:
     """Cells by nodes, of cells by tags, and the nodes of a share of the images. first, last: the nodes whose tags this
     rank reads."""
-    tags = everywhere(comm, lambda: _said(file, lambda: plan.tags_of(file, first, last)))
+    tags = everywhere(comm, lambda: said(file, lambda: plan.tags_of(file, first, last)))
     images = np.array_split(plan.images, comm.size)[comm.rank]
     named = _ids_of([*(block.nodes for block in read), images])
     nodes, twice = nodes_of(comm, tags, first, plan.nodes, named)
@@ -228,17 +235,7 @@ def _renumbered(
         return found
 
     pairs = nodes[np.searchsorted(named, images)]
-    return everywhere(comm, lambda: _said(file, checked)), pairs[(pairs >= 0).all(axis=1)].ravel()
-
-
-def _said(file: Ranges, make: Callable[[], Value]) -> Value:
-    """What is made of a file, with its name in front of what is wrong."""
-    try:
-        return make()
-    except FormatError as error:
-        raise FormatError(f"{file.path}: {error}") from None
-    except MemoryError:
-        raise InputError(f"{file.path}: there is not enough memory for this mesh") from None
+    return everywhere(comm, lambda: said(file, checked)), pairs[(pairs >= 0).all(axis=1)].ravel()
 
 
 def _ids_of(nodes: Sequence[Ids]) -> Ids:
@@ -260,14 +257,3 @@ def _shared_out(comm: Any, blocks: Sequence[Cells], ids: Ids, points: Floats) ->
         whole = Cells(block.kind, *parts)
         found.append(whole.take(np.argsort(whole.numbers)))
     return found
-
-
-def planned_format(source: str, format: str, *, named: bool = False) -> str:
-    """The format where a file of it can be shared by ranks, "" where not. named: markers are asked for by name."""
-    if format not in PLANNED or not os.path.isfile(source):
-        return ""
-    try:
-        plan = plan_of(Ranges(source), format)
-    except GmsnetError:  # told by the reader of the whole
-        return ""
-    return format if plan is not None and not (named and plan.names is None) else ""

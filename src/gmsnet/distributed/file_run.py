@@ -8,7 +8,8 @@ from typing import Any
 
 from gmsnet.distributed.chosen import Chosen, holding
 from gmsnet.distributed.file_pieces import read_pieces
-from gmsnet.distributed.file_ranges import PLANNED, read_ranges
+from gmsnet.distributed.file_ranges import read_ranges
+from gmsnet.distributed.planned import PLANNED
 from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.smoothing import smoothed
 from gmsnet.run.options import SmoothOptions

@@ -7,11 +7,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
-from gmsnet.distributed.file_ranges import planned_format
+from gmsnet.distributed.planned import planned_format
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io import vtk_links
 from gmsnet.io.contents import Data
 from gmsnet.io.files import loaded
+from gmsnet.io.foam_case import OPENFOAM, mesh_folder
 from gmsnet.io.formats import BY_SUFFIX, FORMATS, check_contents
 from gmsnet.io.merge import Part
 from gmsnet.io.packed import is_packed, split_name
@@ -159,6 +160,10 @@ def shared_format(
     """
     if (group := group_of(source, read_as)) is not None:
         return group.format if write_as in (None, group.format) and takes_parts(target, group.format) else ""
+    folders = mesh_folder(source), mesh_folder(target)
+    if any(folders):
+        ours = {read_as, write_as} <= {None, OPENFOAM} and all(folders)
+        return planned_format(source, OPENFOAM, named=named) if ours else ""
     if read_as or write_as:
         return ""
     first, second = (BY_SUFFIX.get(split_name(path)[1].lower(), "") for path in (source, target))

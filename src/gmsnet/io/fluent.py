@@ -11,26 +11,23 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.cells.table import face_name
 from gmsnet.errors import FormatError
 from gmsnet.io.cells import distinct
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
+from gmsnet.io.fluent_faces import PARENT, PERIODIC, outward, polygons
+from gmsnet.io.fluent_ranges import plan as plan
 from gmsnet.io.fluent_sections import CELLS, FACES, NAMES, NODES, Section, face_lists, sections
-from gmsnet.io.foam_cells import Faces, Sides, volumes
-from gmsnet.io.places import Lattice, Places, ranges
+from gmsnet.io.foam_cells import Sides, volumes, walls
+from gmsnet.io.places import Lattice, Places
 from gmsnet.io.splice import BinarySlots, Points, TextSlots
 from gmsnet.io.text import Text, fail
-from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
 name = "Fluent"
 suffixes: tuple[str, ...] = (".msh",)
 
 Ints = NDArray[np.int64]
-
-PARENT = 31  # the type of boundary of a refined cell's whole side
-PERIODIC = (8, 12)  # types of boundary: a periodic one, and its image
 
 
 def read(files: Mapping[str, Data]) -> Parsed:
@@ -48,21 +45,14 @@ def read(files: Mapping[str, Data]) -> Parsed:
     if dimension == 2 and (sizes != 2).any():
         raise FormatError("a face of a mesh in the plane has two nodes")
     regions = _regions(found, count)
-    inner = (sides > 0).all(axis=1)
-    order = np.concatenate([np.flatnonzero(inner), np.flatnonzero(~inner)])
-    faces = _outward(sizes, nodes, sides, order)
-    blocks = volumes(faces, count, regions) if dimension == 3 else _polygons(faces, count, regions)
+    inner = sides.min(axis=1) > 0
+    faces = outward(sizes, nodes, sides, inner)
+    around = Sides.of(faces, 0, count)
+    blocks = volumes(faces, around, regions) if dimension == 3 else polygons(faces, around, regions)
+    blocks += walls(sizes[~inner], nodes[np.repeat(~inner, sizes)], zones[~inner])
     names = dict[tuple[int, int], str]()
     titles = {k.zone: k.title for k in found if k.key in NAMES}
-    starts = np.cumsum(sizes) - sizes
-    for zone in distinct(zones):
-        own = np.flatnonzero((zones == zone) & ~inner)
-        for size in np.unique(sizes[own]).tolist():
-            some = own[sizes[own] == size]
-            table = nodes[starts[some][:, None] + np.arange(size)]
-            blocks.append(CellBlock("line" if size == 2 else face_name(size), table, np.full(len(some), zone)))
-        if len(own) and zone in titles:
-            names[dimension - 1, zone] = titles[zone]
+    names |= {(dimension - 1, zone): titles[zone] for zone in distinct(zones[~inner]) if zone in titles}
     names |= {(dimension, zone): titles[zone] for zone in distinct(regions) if zone in titles}
     known = {0, 1, 2, *NODES, *FACES, *CELLS, *NAMES}
     unread = [f"sections of the number {key}" for key in sorted({k.key for k in found} - known)]
@@ -158,49 +148,6 @@ def _regions(found: list[Section], count: int) -> Ints:
             if 1 <= first <= last:
                 regions[first - 1 : last] = section.zone
     return regions
-
-
-def _outward(sizes: Ints, nodes: Ints, sides: Ints, order: Ints) -> Faces:
-    """The faces with those between cells first, each with its normal out of its owner.
-
-    A file lists a face so that its normal points into the first of its cells.
-    """
-    first = np.cumsum(sizes) - sizes
-    pair = sides[order]
-    turned = pair[:, 0] > 0
-    owner = np.where(turned, pair[:, 0], pair[:, 1]) - 1
-    length = sizes[order]
-    rank = ranges(np.zeros(len(order), dtype=np.int64), length)
-    forward = np.repeat(~turned, length)
-    step = np.where(forward, rank, np.repeat(length, length) - 1 - rank)
-    listed = nodes[np.repeat(first[order], length) + step]
-    between = int((pair > 0).all(axis=1).sum())
-    return Faces(length, listed, owner, pair[:between, 1] - 1)
-
-
-def _polygons(faces: Faces, count: int, regions: Ints) -> list[CellBlock]:
-    """Cells in the plane, from edges that all run around them in one sense."""
-    sides = Sides.of(faces)
-    edges = faces.points.reshape(-1, 2)[sides.face]
-    edges = np.where(sides.out[:, None], edges, edges[:, ::-1])
-    number = np.bincount(sides.cell, minlength=count)
-    if number.min(initial=3) < 3:
-        raise FormatError(f"cell {int(np.argmin(number)) + 1} has only {number.min()} faces")
-    start = np.cumsum(number) - number
-    blocks = []
-    for size in distinct(number):
-        cells = np.flatnonzero(number == size)
-        around = edges[start[cells][:, None] + np.arange(size)]
-        nodes = np.empty((len(cells), size), dtype=np.int64)
-        nodes[:, 0], here = around[:, 0, 0], around[:, 0, 1]
-        for k in range(1, size):
-            nodes[:, k] = here
-            here = around[np.arange(len(cells)), np.argmax(around[:, :, 0] == here[:, None], axis=1), 1]
-        good = (np.sort(nodes, axis=1) == np.sort(around[:, :, 0], axis=1)).all(axis=1) & (here == nodes[:, 0])
-        if not good.all():
-            raise FormatError(f"the faces of cell {int(cells[np.argmin(good)]) + 1} do not run around it")
-        blocks.append(CellBlock(face_name(size), nodes, regions[cells]))
-    return blocks
 
 
 def write(mesh: Mesh) -> Written:

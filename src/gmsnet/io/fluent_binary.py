@@ -18,8 +18,8 @@ from gmsnet.io.text import fail
 MIXED, POLYGONS = 0, 5  # kinds of faces that say how many nodes each has
 NODES, CELLS, FACES = 10, 12, 13
 
-_HEAD = re.compile(rb"\s*\(\s*([0-9A-Fa-f]{1,15}(?:\s+[0-9A-Fa-f]{1,15}){0,8})\s*\)\s*\(")
-_END = rb"End of Binary Section\s+%d\s*\)"
+HEAD = re.compile(rb"\s*\(\s*([0-9A-Fa-f]{1,15}(?:\s+[0-9A-Fa-f]{1,15}){0,8})\s*\)\s*\(")
+END = rb"End of Binary Section\s+%d\s*\)"
 
 
 class Binary(NamedTuple):
@@ -42,8 +42,8 @@ def binary(data: Data, key: int, at: int, dimension: int, order: str) -> Binary:
 
     dimension: of the mesh. order: of bytes, "<" or ">". Raises FormatError where the numbers do not fit the head.
     """
-    head = _HEAD.match(data, at)
-    mark = re.compile(_END % key).search(data, head.end() if head else at)
+    head = HEAD.match(data, at)
+    mark = re.compile(END % key).search(data, head.end() if head else at)
     if mark is None:
         fail(data, at, f"the binary section {key} is not closed: is the file cut off?")
     if head is None or key % 1000 not in (NODES, CELLS, FACES):
@@ -51,7 +51,7 @@ def binary(data: Data, key: int, at: int, dimension: int, order: str) -> Binary:
     numbers, begin = tuple(int(word, 16) for word in head[1].split()), head.end()
     dtype, count = _layout(data, key, numbers, begin, mark.start(), dimension, order)
     stop = begin + count * np.dtype(dtype).itemsize
-    closed = re.compile(rb"\s*\)\s*" + _END % key).match(data, stop) if stop <= len(data) else None
+    closed = re.compile(rb"\s*\)\s*" + END % key).match(data, stop) if stop <= len(data) else None
     if closed is None:
         fail(data, at, f"{count} numbers do not fill the binary section {key}: is the file damaged?")
     return Binary(numbers, (begin, stop), dtype, closed.end())
@@ -61,14 +61,22 @@ def _layout(
     data: Data, key: int, head: tuple[int, ...], begin: int, end: int, dimension: int, order: str
 ) -> tuple[str, int]:
     """The type of the numbers of a section, and how many there are. end: a byte behind them all."""
-    members = head[2] - head[1] + 1 if len(head) > 2 and 0 < head[1] <= head[2] else 0
-    kind = head[4] if len(head) > 4 else 0
+    dtype, count = layout(key, head, dimension, order)
+    return dtype, _listed(data, begin, end, members_of(head), order) if count is None else count
+
+
+def members_of(head: tuple[int, ...]) -> int:
+    """How many members a section has by its head."""
+    return head[2] - head[1] + 1 if len(head) > 2 and 0 < head[1] <= head[2] else 0
+
+
+def layout(key: int, head: tuple[int, ...], dimension: int, order: str) -> tuple[str, int | None]:
+    """The type of the numbers of a section, and how many there are; None where each face tells how many it has."""
+    members, kind = members_of(head), head[4] if len(head) > 4 else 0
     if key % 1000 == NODES:
         return f"{order}f{4 if key < 3000 else 8}", members * (kind or dimension)
     if key % 1000 == FACES:
-        if kind in (MIXED, POLYGONS):
-            return f"{order}i4", _listed(data, begin, end, members, order)
-        return f"{order}i4", members * (kind + 2)
+        return f"{order}i4", None if kind in (MIXED, POLYGONS) else members * (kind + 2)
     return f"{order}i4", members
 
 

@@ -21,7 +21,7 @@ NODES, CELLS, FACES, NAMES = (10,), (12,), (13,), (39, 45)
 MACHINE, LITTLE = 4, b"60"  # the section of the machine that wrote, and its first number for bytes of that order
 MOST_DEEP, MOST_SECTIONS = 50, 100_000
 
-_OPEN = re.compile(rb"\s*\(\s*(\d{1,5})(?=[\s()\"])")
+OPEN = re.compile(rb"\s*\(\s*(\d{1,5})(?=[\s()\"])")
 _NEXT = re.compile(rb"[()\"]")
 _COUNT = re.compile(rb"\d{1,15}")
 _HEX = re.compile(rb"[0-9A-Fa-f]{1,15}")
@@ -60,7 +60,7 @@ def sections(data: Data) -> Iterator[Section]:
     """All sections in the order of the file. Raises FormatError where brackets do not match."""
     at, dimension, order = 0, 3, "<"
     for _ in range(MOST_SECTIONS):
-        found = _OPEN.match(data, at)
+        found = OPEN.match(data, at)
         if found is None:
             if re.compile(rb"\s*\Z").match(data, at) is None:
                 fail(data, at, "a section was expected, as in (10 (1 1 4 1)( … )): is the file damaged?")
@@ -69,10 +69,10 @@ def sections(data: Data) -> Iterator[Section]:
         if is_binary(key):
             there = binary(data, key, found.end(), dimension, order)
             at = there.stop
-            yield _in_binary(key, start, there)
+            yield binary_section(key, start, there)
             continue
-        lists, at = _lists(data, found.end())
-        section = _section(data, key, start, found.end(), lists, at)
+        lists, at = lists_in(data, found.end())
+        section = text_section(data, key, start, found.end(), lists, at)
         if key == 2 and section.head:
             dimension = section.head[0]
         if key == MACHINE and lists:
@@ -81,7 +81,7 @@ def sections(data: Data) -> Iterator[Section]:
     fail(data, at, f"there are more than {MOST_SECTIONS} sections")
 
 
-def _lists(data: Data, at: int) -> tuple[list[tuple[int, int]], int]:
+def lists_in(data: Data, at: int) -> tuple[list[tuple[int, int]], int]:
     """The lists inside a section that is open, and the byte behind its end."""
     depth, lists, first, begin = 1, list[tuple[int, int]](), 0, at
     while (found := _NEXT.search(data, at)) is not None:
@@ -105,14 +105,15 @@ def _lists(data: Data, at: int) -> tuple[list[tuple[int, int]], int]:
     return fail(data, begin, "the section is not closed: is the file cut off?")
 
 
-def _in_binary(key: int, start: int, there: Binary) -> Section:
+def binary_section(key: int, start: int, there: Binary) -> Section:
     """A binary section under the number that it would have as text, where it holds nodes, cells or faces."""
     key = key % 1000 if there.dtype else key
     declared = not there.head or there.head[0] == 0
     return Section(key, start, there.head, None if declared else there.body, "", there.dtype)
 
 
-def _section(data: Data, key: int, start: int, begin: int, lists: list[tuple[int, int]], stop: int) -> Section:
+def text_section(data: Data, key: int, start: int, begin: int, lists: list[tuple[int, int]], stop: int) -> Section:
+    """A section of text from byte ``start`` to ``stop``, its number before ``begin``. Raises FormatError."""
     if key == 2:
         words = bytes(data[begin : stop - 1]).split()
         return Section(key, start, (int(words[0]),) if words and _COUNT.fullmatch(words[0]) else (), None, "")
@@ -147,7 +148,12 @@ def face_lists(data: Data, section: Section) -> tuple[Ints, Ints, Ints]:
     """Of a section of faces: how many nodes each has, all nodes, and (F, 2) the cells; all counted from 1."""
     if len(section.head) < 5:
         fail(data, section.start, "the head of a section of faces has five numbers")
-    listed, kind, count = numbers(data, section), section.head[4], section.head[2] - section.head[1] + 1
+    return faces_in(data, section, numbers(data, section), section.head[2] - section.head[1] + 1)
+
+
+def faces_in(data: Data, section: Section, listed: Ints, count: int) -> tuple[Ints, Ints, Ints]:
+    """The same of so many faces of a section, from their numbers."""
+    kind = section.head[4]
     if kind in (MIXED, POLYGONS):
         sizes, first = _counted(data, section, listed, count)
     elif kind in (2, 3, 4):

@@ -1,4 +1,4 @@
-"""Cells of an OpenFOAM mesh from its faces: tetrahedra, pyramids, wedges and hexahedra are known; others are polyhedra.
+"""Cells from their faces: tetrahedra, pyramids, wedges and hexahedra are known; others are polyhedra.
 
 A face is listed as its owner sees it from inside: its normal points out of the owner, into the neighbour.
 """
@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import face_name
 from gmsnet.io.places import ranges
 from gmsnet.mesh.cell_block import CellBlock
 
@@ -17,7 +18,8 @@ Ints = NDArray[np.int64]
 
 
 class Faces(NamedTuple):
-    """sizes: (F,) how many points each face has; points: of all, one after another; owner: (F,); neighbour: (I,)."""
+    """sizes: (F,) how many points each face has; points: of all, one after another; owner: (F,); neighbour: (I,) of the
+    first faces, −1 where there is none."""
 
     sizes: Ints
     points: Ints
@@ -49,11 +51,12 @@ class Sides(NamedTuple):
     out: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, faces: Faces) -> Sides:
-        """The owners' faces and the neighbours'."""
-        cell = np.concatenate([faces.owner, faces.neighbour])
+    def of(cls, faces: Faces, first: int, last: int) -> Sides:
+        """The owners' faces and the neighbours' of the cells from one to another, which are numbered from 0."""
         face = np.concatenate([np.arange(len(faces.owner)), np.arange(len(faces.neighbour))])
-        order = np.argsort(cell, kind="stable")
+        cell = np.concatenate([faces.owner, faces.neighbour]) - first
+        here = np.flatnonzero((cell >= 0) & (cell < last - first))
+        order = here[np.argsort(cell[here], kind="stable")]
         return cls(cell[order], face[order], order < len(faces.owner))
 
 
@@ -62,10 +65,9 @@ SHAPES = {"tetra": (4, 0, 3), "pyramid": (4, 1, 4), "wedge": (2, 3, 3), "hexahed
 CORNERS = {"tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8}
 
 
-def volumes(faces: Faces, count: int, regions: Ints) -> list[CellBlock]:
-    """The cells by kind: those of one kind together, polyhedra by how many points they have."""
-    sides = Sides.of(faces)
-    size = faces.sizes[sides.face]
+def volumes(faces: Faces, sides: Sides, regions: Ints) -> list[CellBlock]:
+    """The cells by kind: those of one kind together, polyhedra by how many points they have. regions: of each cell."""
+    size, count = faces.sizes[sides.face], len(regions)
     triangles, quads, all_faces = (np.bincount(sides.cell, chosen, count).astype(np.int64) for chosen in (
         size == 3, size == 4, np.ones(len(size))))  # fmt: skip
     blocks, left = [], np.ones(count, dtype=bool)
@@ -127,6 +129,27 @@ def _checked(faces: Faces, face: Ints, size: Ints, nodes: Ints) -> Ints:
         known |= points == column[rows]
     nodes[np.bincount(rows, ~known, len(nodes)) > 0] = -1
     return nodes
+
+
+def turned(sizes: Ints, points: Ints, which: NDArray[np.bool_]) -> Ints:
+    """The points of faces, one face after another, those of some faces in the other order."""
+    rank = ranges(np.zeros(len(sizes), dtype=np.int64), sizes)
+    first, last = (np.repeat(each, sizes) for each in (np.cumsum(sizes) - sizes, np.cumsum(sizes) - 1))
+    found: Ints = points[np.where(np.repeat(which, sizes), last - rank, first + rank)]
+    return found
+
+
+def walls(sizes: Ints, points: Ints, markers: Ints) -> list[CellBlock]:
+    """Faces as cells, those of one marker and one size together, in ascending order of both. markers: (F,)."""
+    order, starts = np.lexsort((sizes, markers)), np.cumsum(sizes) - sizes
+    keys = np.column_stack([markers, sizes])[order]
+    cuts = 1 + np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1))
+    blocks = []
+    for some in np.split(order, cuts) if len(order) else ():
+        size = int(sizes[some[0]])
+        table = points[starts[some][:, None] + np.arange(size)]
+        blocks.append(CellBlock("line" if size == 2 else face_name(size), table, markers[some]))
+    return blocks
 
 
 def _polyhedra(faces: Faces, sides: Sides, cells: Ints, regions: Ints) -> list[CellBlock]:

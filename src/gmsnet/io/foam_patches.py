@@ -15,8 +15,8 @@ from gmsnet.io.foam_lists import head_of, labels, list_at
 Ints = NDArray[np.int64]
 _REMARK = re.compile(rb"//[^\r\n]*|/\*.*?\*/", re.DOTALL)
 _WORD = re.compile(rb"\"[^\"]*\"|[{};]|[^\s{};\"]+")
-_LABELS = re.compile(rb"(?:cell|face|point)Labels\s+List<label>\s*")
-_NAMED = re.compile(rb"([^\s{};\"()]+)\s*\{\s*type\s+(cellZone|faceZone|pointZone)\s*;")
+LABELS = re.compile(rb"(?:cell|face|point)Labels\s+List<label>\s*")
+NAMED = re.compile(rb"([^\s{};\"()]+)\s*\{\s*type\s+(cellZone|faceZone|pointZone)\s*;")
 MOST = 100_000  # patches, and zones
 ZONES = ("cellZones", "faceZones", "pointZones")
 
@@ -85,8 +85,8 @@ def _number(entries: dict[str, str], name: str, key: str) -> int:
 def zones(data: Data, name: str, most: int) -> list[tuple[str, Ints]]:
     """The name and the numbers of each zone. Raises FormatError for one that is not below ``most``."""
     head, found = head_of(data, name), list[tuple[str, Ints]]()
-    for named in _NAMED.finditer(data, head.body):
-        where = _LABELS.search(data, named.end())
+    for named in NAMED.finditer(data, head.body):
+        where = LABELS.search(data, named.end())
         numbers = np.empty(0, dtype=np.int64)
         if where:
             numbers, _ = labels(data, head, where.end(), name)

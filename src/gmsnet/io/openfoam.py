@@ -12,15 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gmsnet.cells.table import face_name
 from gmsnet.errors import FormatError
-from gmsnet.io.cells import sealed
+from gmsnet.io.cells import distinct, sealed
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.foam_cells import Faces, Ints, volumes
+from gmsnet.io.foam_cells import Faces, Ints, Sides, volumes, walls
 from gmsnet.io.foam_lists import coordinates, faces, head_of, labels, list_at
 from gmsnet.io.foam_patches import ZONES, Patch, patches, zones
 from gmsnet.io.foam_plane import Plane, cells_in, plane_of
+from gmsnet.io.foam_ranges import plan as plan
 from gmsnet.io.places import Places
 from gmsnet.io.splice import BinarySlots, Slots, TextSlots
 from gmsnet.mesh.cell_block import CellBlock
@@ -67,9 +67,9 @@ def facts(files: Mapping[str, Data], whole: bool = True) -> Facts:
         points, held = sealed(points[plane.points][:, plane.axes]), np.unique(plane.node[held])
         images = np.unique(plane.node[images])
     else:
-        blocks = volumes(found, cells, regions) + _walls(found, known)
+        blocks = volumes(found, Sides.of(found, 0, cells), regions) + _walls(found, known)
     dimension = 2 if plane is not None else 3
-    names = {(dimension, number): text for number, text in region_names.items()}
+    names = {(dimension, number): region_names[number] for number in distinct(regions) if number}
     names |= {(dimension - 1, number): patch.name for number, patch in enumerate(known, 1) if patch.faces
               and (plane is None or patch.kind != "empty")}  # fmt: skip
     if len(held):
@@ -127,14 +127,11 @@ def _of_zones(files: Mapping[str, Data], found: Faces, points: int) -> Ints:
 
 
 def _walls(found: Faces, known: list[Patch]) -> list[CellBlock]:
-    """The faces of all patches, those of one size together."""
-    blocks = []
-    for number, patch in enumerate(known, 1):
-        own = patch.members
-        for size in np.unique(found.sizes[own]).tolist():
-            some = own[found.sizes[own] == size]
-            blocks.append(CellBlock(face_name(size), found.corners(some, size), np.full(len(some), number)))
-    return blocks
+    """The faces of all patches, those of one size together. They stand one after another, behind the other faces."""
+    first = len(found.neighbour)
+    markers = np.repeat(np.arange(1, len(known) + 1), [patch.faces for patch in known])
+    end = first + len(markers)
+    return walls(found.sizes[first:end], found.points[int(found.sizes[:first].sum()) :], markers)
 
 
 def _in_plane(slots: Slots, plane: Plane) -> Slots:

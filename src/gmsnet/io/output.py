@@ -70,7 +70,7 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     if name in STANDARD_OUTPUT:
         _to_standard_output(*pieces.values())
     else:
-        targets = targets or _targets(name, entry, list(files), stamps)
+        targets = targets or paths_of(name, entry, list(files), stamps)
         with folders_for(name, targets.values() if entry.linked else ()):
             replace_files(
                 {path: packed(pieces[key]) if is_packed(path) else pieces[key] for key, path in targets.items()}, stamps
@@ -78,7 +78,7 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     return lost
 
 
-def _targets(name: str, entry: Entry, keys: list[str], stamps: Stamps) -> dict[str, str]:
+def paths_of(name: str, entry: Entry, keys: list[str], stamps: Stamps) -> dict[str, str]:
     """Suffix → the path of each file that is written. Files of a case that were read and do not change are not."""
     if entry.parts:
         return targets_of(name, entry.key, keys, stamps.known)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
 from gmsnet.io.cells import MOST_BLOCKS, distinct
+from gmsnet.io.face_ranges import FaceLists
 from gmsnet.io.pieces import Piece
 from gmsnet.io.rows import AT_ONCE, AnyRows, Listed, Ranges, Rows
 from gmsnet.io.vtk_ghosts import marked
@@ -82,6 +83,8 @@ class Plan:
     zones: Sequence[int] = ()
     names: Mapping[tuple[int, int], str] | None = field(default_factory=dict)
     beside: str = ""
+    faces: FaceLists | None = None
+    companions: Mapping[str, Ranges] = field(default_factory=dict)
 
     @property
     def nodes(self) -> int:
