@@ -6,7 +6,9 @@ GMSNET_GUARD_EXAMPLES: how many meshes for each method and level.
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 import pytest
@@ -17,8 +19,11 @@ from support.exact import whole
 from support.surface_meshes import ball, box, surface_mesh, wavy
 from support.surfaces import turned
 
+import gmsnet
 from gmsnet import METHODS
 from gmsnet.kernels.star.guard import LEVELS, STAR, VALID
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.rounding import Rounding
 from gmsnet.methods import Field
 from gmsnet.parallel.threads import serial
 from gmsnet.run.options import SmoothOptions
@@ -159,3 +164,56 @@ def test_each_sweep_keeps_what_the_level_promises(
         before = after
     still = ~topology.near_free
     assert np.array_equal(field.points[still], state.start[still])
+
+
+@pytest.mark.parametrize("level", range(3), ids=LEVELS)
+@settings(max_examples=EXAMPLES, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    kind=st.sampled_from(["ball", "box", "triangle", "quad", "mixed"]),
+    thrown=st.sampled_from([0.2, 0.4, 0.8]),
+    grain=st.sampled_from([1e-2, 1e-3, 1e-4, 1e-6]),
+)
+def test_what_is_written_with_few_digits_keeps_the_level_too(level, seed, kind, thrown, grain):
+    """Coordinates may be off by the grain that a file has, each one up or down: the extent of the mesh times this."""
+    mesh = some_mesh(seed, kind, thrown, 0.0, (0.0, 1.0), False, False)
+    options = SmoothOptions(method="barrier", threads=1, feature_angle=60.0, surface_tolerance=0.3)
+    method = options.smoother()
+    state = first_state(mesh, None, method, options, serial)
+    topology = state.topology
+    assert isinstance(topology, Shell)
+    assume(len(topology.free))
+    off = grain * float(np.ptp(state.start))
+    precision = state.precision.coarser(0.0, off)
+    field = Field(state.start.copy(), topology, precision, level, constraint=state.constraint)
+    simplices = topology.changeable
+    cells = simplices.cells if simplices.cells is not None else np.arange(len(simplices.rows))
+    places = np.flatnonzero(topology.near_free)
+    stars = [np.unique(cells[(simplices.rows == place).any(axis=1)]).tolist() for place in places]
+    before, rng = worth(field.points, simplices), np.random.default_rng(seed)
+    method.sweep(field, serial, lambda: False)
+    moved = (field.points != state.start).any(axis=1)
+    for _ in range(3):
+        written = field.points.copy()
+        written[moved] += off * rng.choice([-1.0, 1.0], written[moved].shape)
+        check(level, before, worth(written, simplices), stars)
+
+
+def test_shells_of_few_digits_move():
+    """Fields of 8 columns far from the origin keep a two-thousandth of an edge."""
+    mesh = wavy(12, 3, 0.4, "triangle")
+    points = mesh.points * 96.0 / np.ptp(mesh.points[:, 0]) - [3000.0, 0.0, 0.0]
+    grain = 0.005
+    rounding = Rounding(0.0, grain, partial(_rounded, 2.0 * grain), "fields of 8 columns")
+    mesh = Mesh(_rounded(2.0 * grain, points, None), mesh.cells, rounding=rounding)
+    exact = gmsnet.smooth(replace(mesh, rounding=None), threads=1)
+    found = gmsnet.smooth(mesh, threads=1)
+    assert found.moved.any()
+    assert found.points[:, 0].tolist() == _rounded(2.0 * grain, found.points, None)[:, 0].tolist()
+    gain = [result.after.shape.min() - result.before.shape.min() for result in (found, exact)]
+    assert gain[0] > 0.8 * gain[1] > 0.1
+
+
+def _rounded(grid, points, nodes):
+    """To multiples of a number."""
+    return np.round(points / grid) * grid

@@ -19,7 +19,7 @@ from gmsnet.kernels.methods.shell import MOST, improve
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.certificate import COARSE, WIDER
 from gmsnet.kernels.star.landing import ask_for_facets, land, landing_place
-from gmsnet.kernels.star.shell import LEAN, crossed, square
+from gmsnet.kernels.star.shell import DATA, LEAN, crossed, square
 from gmsnet.kernels.star.surface import on_curves
 
 FLAT = 300.0  # mean Q of a star: beyond, float32 does not tell enough
@@ -180,7 +180,8 @@ def settle(points, surface, blocks, block, unit, grain, most, centre, inverse, w
         m = np.float64(max(wide[lane], max(tx, max(ty, tz))))
         reach = max(abs(centre[lane]), max(abs(centre[LANES + lane]), abs(centre[2 * LANES + lane])))
         delta = WIDER * (unit * (reach + m / inverse[lane]) + grain) * inverse[lane]
-        certain = sums[MARGIN * LANES + lane] > WIDER * ROUNDING * m * (COARSE * m + delta)
+        doubt = ROUNDING * COARSE * (m * m) + 2.0 * DATA * delta * (m + delta)  # E of spokes up to 2m
+        certain = sums[MARGIN * LANES + lane] > WIDER * doubt
         value, after = sums[VALUE * LANES + lane], sums[AFTER * LANES + lane]
         inside = sums[LEAST * LANES + lane] > 0.0 and sums[LEANS * LANES + lane] > 0.0
         if certain and inside and value < most and after < value:

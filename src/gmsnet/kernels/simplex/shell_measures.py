@@ -35,7 +35,7 @@ def shape_of_row(points, simplices, t):
     ax, ay, az, bx, by, bz = spokes_of(points, simplices.rows, t, forth)
     cx, cy, cz = crossed(ax, ay, az, bx, by, bz)
     lengths = 2.0 * half_lengths3(ax, ay, az, bx, by, bz, weights_at_first(simplices.shapes, t, forth))
-    double, _ = double_of_row(points, simplices.rows, simplices.shapes, simplices.cells, t, cx, cy, cz)
+    double, _ = double_of_row(points, simplices.rows, simplices.shapes, simplices.cells, t, cx, cy, cz, 0.0, 0.0)
     shape = TWO_SQRT3 * double / max(lengths, TINY)
     shows = (cx * simplices.side[t, 0] + cy * simplices.side[t, 1]) + cz * simplices.side[t, 2]
     return shape if shows > 0.0 else -abs(shape)

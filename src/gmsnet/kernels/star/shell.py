@@ -13,10 +13,11 @@ D does not tell on which side a simplex shows. So each has a *side*: a vector n 
 - does not lean further from the reference's normal at the place where the node comes to lie than LEAN, or than before.
 
 In float64, with coordinates known up to ±δ and the components of spokes up to m, a component of a spoke is off by
-e = u·m + 2δ, one of c by 4me + 2e² + 6u·m². So D is off by less than 18u·m² + 14mδ and its own rounding, 14u·m²; c·n,
-with |n| ≤ 1 + 2⁻²⁰, by as much; L is at most 18m² (of a quad's corner 6√3m²), off by 36me + 12e² + 144u·m², and φ is at
-most 1/(2√3). In all that is less than 256·m(u·m + δ) = E. Of a quad, let m be of its edges and diagonals, too. The
-product d of the diagonals is off by less than E/2, and so their unit normal by E/|d|: D by |c|E/|d| more.
+e = u·m + 2δ, one of c by 4me + 2e² + 6u·m². So D is off by less than 18u·m² + 14mδ + 14δ² and its own rounding,
+14u·m²; c·n, with |n| ≤ 1 + 2⁻²⁰, by as much; L is at most 18m² (of a quad's corner 6√3m²), off by 36me + 12e² +
+144u·m², and φ is at most 1/(2√3). In all that is less than 84u·m² + 35mδ + 28δ², and less than
+E = 256u·m² + 40mδ + 40δ². L is off by less than 2E. Of a quad, let m be of its edges and diagonals, too. The product d
+of the diagonals is off by less than E/2, and so their unit normal by E/|d|: D by |c|E/|d| more.
 What is proven of the levels in the plane (docs/guarantees.md) holds of D and L here word for word.
 """
 
@@ -35,7 +36,7 @@ from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.pattern import Patterns, count_of, other_of, pair_of, weights_of
 
 LEAN = 0.5  # the cosine of the angle up to which a triangle may lean
-ROUNDING = 256.0
+ROUNDING, DATA = 256.0, 40.0  # of E
 ROOT_3 = math.sqrt(3.0)
 
 
@@ -98,7 +99,7 @@ def largest6(ax, ay, az, bx, by, bz):
 @inlined
 def error_bound_of(m, delta):
     """See the module."""
-    return ROUNDING * m * (UNIT * m + delta) + ROUNDING * delta * delta + UNDERFLOW
+    return ROUNDING * UNIT * (m * m) + DATA * delta * (m + delta) + UNDERFLOW
 
 
 @inlined

@@ -51,10 +51,10 @@ def spokes_of(points, rows, t, forth):
 
 
 @inlined
-def double_of_row(points, rows, shapes, cells, t, cx, cy, cz):
-    """D of row t, whose c is given, and how much wider its error bound is; all rows of a quad must be there."""
+def double_of_row(points, rows, shapes, cells, t, cx, cy, cz, m, delta):
+    """D of row t, whose c is given, and its error bound; all rows of a quad must be there. m: of its spokes."""
     if shapes is None or cells is None:
-        return math.sqrt(square(cx, cy, cz)), 1.0
+        return math.sqrt(square(cx, cy, cz)), error_bound_of(m, delta)
     if shapes[t] == SQUARE:
         first = t
         while first > 0 and cells[first - 1] == cells[t]:
@@ -65,8 +65,9 @@ def double_of_row(points, rows, shapes, cells, t, cx, cy, cz):
         r = rows[opposite, 0]
         ax, ay, az = points[r, 0] - points[p, 0], points[r, 1] - points[p, 1], points[r, 2] - points[p, 2]
         bx, by, bz = points[s, 0] - points[q, 0], points[s, 1] - points[q, 1], points[s, 2] - points[q, 2]
-        return facing(cx, cy, cz, ax, ay, az, bx, by, bz, largest6(ax, ay, az, bx, by, bz), 1.0)
-    return math.sqrt(square(cx, cy, cz)), 1.0
+        wide = max(m, largest6(ax, ay, az, bx, by, bz))
+        return facing(cx, cy, cz, ax, ay, az, bx, by, bz, wide, error_bound_of(wide, delta))
+    return math.sqrt(square(cx, cy, cz)), error_bound_of(m, delta)
 
 
 @inlined
@@ -77,15 +78,18 @@ def ratio_of_row(points, simplices, t, unit, grain):
     v, side = simplices.rows[t, 0], simplices.side
     m = largest6(ax, ay, az, bx, by, bz)
     reach = max(max(abs(points[v, 0]), abs(points[v, 1])), abs(points[v, 2])) + m
-    bound = error_bound_of(m, unit * reach + grain)
+    delta = unit * reach + grain
+    bound = error_bound_of(m, delta)
     cx, cy, cz = crossed(ax, ay, az, bx, by, bz)
     if not (cx * side[t, 0] + cy * side[t, 1]) + cz * side[t, 2] > -bound:
         return 0.0
-    lengths = 2.0 * half_lengths3(ax, ay, az, bx, by, bz, weights_at_first(simplices.shapes, t, forth)) - bound
+    lengths = 2.0 * half_lengths3(ax, ay, az, bx, by, bz, weights_at_first(simplices.shapes, t, forth))
+    lengths -= 2.0 * bound
     if not lengths > 0.0:
         return LARGEST
-    double, wider = double_of_row(points, simplices.rows, simplices.shapes, simplices.cells, t, cx, cy, cz)
-    return min(max(double + 4.0 * wider * bound, 0.0) / lengths * (1.0 + 16.0 * UNIT), LARGEST)
+    rows, shapes, cells = simplices.rows, simplices.shapes, simplices.cells
+    double, bound = double_of_row(points, rows, shapes, cells, t, cx, cy, cz, m, delta)
+    return min(max(double + bound, 0.0) / lengths * (1.0 + 16.0 * UNIT), LARGEST)
 
 
 @kernel
