@@ -210,3 +210,15 @@ def test_a_quad_that_is_folded_over_is_not_said_to_have_no_area():
     told = Account(mesh, result).tangle()
     assert "it is folded over" in told
     assert "no area" not in told
+
+
+def test_surfaces_are_compared_by_their_least_and_not_by_qhat():
+    """q̂ likes the right angles of thin facets: of a flat box it falls where the least and the mean 1/q rise."""
+    mesh = box(8, 1, 0.2)[0]
+    flat = replace(mesh, points=mesh.points * [1.0, 1.0, 0.05])
+    result = gmsnet.smooth(flat, slide="all", threads=1)
+    before, after = result.judged
+    assert after.qhat < before.qhat
+    assert after.shape_min > 2.0 * before.shape_min
+    assert result.moved.any()
+    assert all(np.isnan(sweep.qhat) for sweep in result.history)

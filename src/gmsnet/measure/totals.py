@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -86,6 +86,7 @@ class Totals:
     inverted: int
     uncertain: int
     looked: Looked | None = field(default=None, repr=False, compare=False)
+    in_plane: bool = field(default=True, repr=False)
 
     @classmethod
     def of(cls, looked: Looked) -> Totals:
@@ -106,7 +107,7 @@ class Totals:
     def joined(self, other: Totals) -> Totals | None:
         """Those of the cells of both, to the bit; None where their sums are on other grids."""
         found = None if self.looked is None or other.looked is None else self.looked.joined(other.looked)
-        return None if found is None else Totals.of(found)
+        return None if found is None else replace(Totals.of(found), in_plane=self.in_plane)
 
     @classmethod
     def of_columns(cls, columns: Floats) -> Totals:
@@ -171,7 +172,8 @@ def totals_of(
             return figures
 
         parts = executor.map(part_of_surface, 0, blocks)
-        return Totals.of(Looked.of(summary, parts, grids, count if summary is TRIANGLES else None, executor))
+        looked = Looked.of(summary, parts, grids, count if summary is TRIANGLES else None, executor)
+        return replace(Totals.of(looked), in_plane=False)
     if simplices.shapes is not None:
         seen = _parts(CELLS, points, (simplices,), blocks, grids, executor)
         return Totals.of(Looked.of(CELLS, seen, grids, None, executor))

@@ -235,9 +235,9 @@ def rank_by(best_by: str) -> Rank:
 
 
 def merit_of(totals: Totals | None, best_by: str) -> tuple[float, ...]:
-    """Less for a larger q̂, or for a larger least and then mean 1/q if not all are triangles."""
+    """Less for a larger q̂, or for a larger least and then mean 1/q if not all are triangles in a plane."""
     if totals is None:
         return ()
-    if math.isnan(totals.qhat):
+    if math.isnan(totals.qhat) or not totals.in_plane:
         return -totals.shape_min, -totals.shape_mean
     return (-(totals.qhat_aspect if best_by == ASPECT else totals.qhat),)

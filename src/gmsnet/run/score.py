@@ -67,8 +67,8 @@ class Score:
 
     @property
     def qhat(self) -> float:
-        """q̂ with 1/q or 1/q_V, as asked for."""
-        if self.totals is None:
+        """q̂ with 1/q or 1/q_V, as asked for; nan where meshes are not compared by it (see ``better_than``)."""
+        if self.totals is None or not self.totals.in_plane:
             return math.nan
         return self.totals.qhat_aspect if self.best_by == ASPECT else self.totals.qhat
 
@@ -91,8 +91,8 @@ class Score:
     def better_than(self, other: Score) -> bool:
         """Fewer inverted cells first, then fewer that miss the target, then a larger q̂, by more than rounding.
 
-        Where not all cells are triangles, and in a metric: then the larger minimum 1/q of the cells that are compared,
-        then their mean.
+        Where not all cells are triangles, on surfaces and in a metric: then the larger minimum 1/q of the cells that
+        are compared, then their mean.
         """
         if self.counts != other.counts:
             return self.counts < other.counts
