@@ -77,7 +77,7 @@ def nodes_lent(monkeypatch, module, name):
     return counts
 
 
-TOLD = ("untangling", "the mesh is refined", "slide:", "surface:", "target:", "feature angle")
+TOLD = ("untangling", "the mesh is refined", "slide:", "surface:", "target:", "feature angle", "hausdorff:")
 
 
 def _of_stages(notes):

@@ -11,9 +11,9 @@ from gmsnet.constraints.features import COLLINEAR, dot, rounding_of
 from gmsnet.constraints.on_geometry import PER_EDGE, OnGeometry
 from gmsnet.constraints.outline import Flags, Longs
 from gmsnet.constraints.patches import NOTHING, Patches
-from gmsnet.constraints.smooth_patches import Vertices, handles, skin_of, summed
+from gmsnet.constraints.smooth_patches import Skin, Vertices, handles, skin_of, summed
 from gmsnet.kernels.star.pieces import NOWHERE
-from gmsnet.kernels.star.surface import CURVE, CURVED, FLAT, LINE, Surface
+from gmsnet.kernels.star.surface import CURVE, CURVED, FLAT, LINE, Bound, Surface
 from gmsnet.kernels.whole import skin as kernels
 from gmsnet.topology.polygons import Ints
 
@@ -53,6 +53,10 @@ def surface_of(
     found = [Rows(inner[level], FLAT, number[level], np.zeros(level.sum(), dtype=np.int64))]
     curved = inner[~level]
     kept = np.isin(patches.patch, patches.patch[facet[curved]])
+    sides = None if bound is None else _sides(patches)
+    if sides is not None:
+        kept[sides[sides != NOTHING]] = True
+        kept = np.isin(patches.patch, patches.patch[kept])
     skin = skin_of(patches, points, kept, vertices) if geometry is None else geometry.skin(patches, points, kept)
     found.append(Rows(curved, CURVED, np.zeros(len(curved), dtype=np.int64), skin.at[curved]))
     lines, line_frame, pieces, before, after = _along_curves(patches, points, len(frame[0]), geometry)
@@ -68,8 +72,26 @@ def surface_of(
         origin, direction, same, skin.vertex, skin.facet, pieces, before, after, bool(single),
         np.full(len(nodes), np.inf) if limit is None else limit[nodes[order]],
         *_around(patches.rows if folds else patches.rows[:0], patches.unit, row, memory),
-        bound,
+        None if bound is None or sides is None else Bound(bound, _seeds(sides, kept, skin, nodes[order])),
     )  # fmt: skip
+
+
+def _sides(patches: Patches) -> Longs:
+    """(N, 2) for each node that slides along a curve a facet of each of two patches at it, else NOTHING."""
+    found = np.full((len(patches.slides), 2), NOTHING, dtype=np.int64)
+    number = np.repeat(np.arange(len(patches.rows)), 3)[patches.curves.slides[patches.rows].ravel()]
+    node = patches.rows.ravel()[patches.curves.slides[patches.rows].ravel()]
+    found[node, 0] = number
+    other = patches.patch[found[node, 0]] != patches.patch[number]
+    found[node[other], 1] = number[other]
+    return found
+
+
+def _seeds(sides: Longs, kept: Flags, skin: Skin, nodes: Longs) -> Ints:
+    """The same by rows, numbered as the facets of the skin. nodes: (R,) of rows. kept: (F,) facets that it has."""
+    several = len(skin.facet) // max(int(kept.sum()), 1)  # for each of these
+    number = np.append(np.where(kept, several * (np.cumsum(kept) - 1), NOWHERE), NOWHERE)
+    return number[sides[nodes]].astype(np.int32)
 
 
 def _around(rows: Longs, unit: Floats, row: Ints, memory: Ints) -> tuple[Ints, Ints, Floats]:

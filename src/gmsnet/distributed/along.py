@@ -29,7 +29,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.parallel.threads import serial
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.outcome import greatest_angle, ranking
+from gmsnet.run.outcome import bound_note, compared_of, greatest_angle, ranking
 from gmsnet.run.set_up import first_state
 from gmsnet.run.state import State
 from gmsnet.topology.mixed_volume import volume_of, wound_of
@@ -171,9 +171,11 @@ class Found:
         found: tuple[bool, Figures] = comm.bcast(told)
         return found
 
-    def note(self, points: Floats, moved: Flags, where: Floats | None, piece: Piece, comm: Any) -> list[str]:
-        """What to say of nodes that have slid. points, moved: of the piece; where: (n,) likewise, see ``where_on``. All
-        ranks call it."""
+    def note(
+        self, points: Floats, moved: Flags, where: Floats | None, hausdorff: float | None, piece: Piece, comm: Any
+    ) -> list[str]:
+        """What to say of nodes that have slid. points, moved: of the piece; where: (n,) likewise, see ``where_on``.
+        hausdorff: that was asked for. All ranks call it."""
         on = np.zeros(len(points)) if where is None else where
         every, said = brought(self.whole, np.column_stack([points, moved, on]), piece, comm), None
         if self.whole is not None and self.state is not None and every is not None:
@@ -181,7 +183,9 @@ class Found:
             if isinstance(sliding, Sliding | SurfaceSliding):
                 if sliding.constraint is not None:
                     put_on(sliding.constraint, every[self.state.protection.base.memory, -1])
-                said = [sliding.note(self.whole.mesh.with_points(every[:, :-2]), every[:, -2] > 0.0)]
+                mesh = self.whole.mesh.with_points(every[:, :-2])
+                compared = compared_of(sliding, self.whole.mesh.points, mesh.points)
+                said = [sliding.note(mesh, every[:, -2] > 0.0), *bound_note(compared, hausdorff)]
         found: list[str] = comm.bcast(said)
         return [*found, *self.remarks]
 

@@ -201,7 +201,7 @@ def _shared(
     notes = [*intent.notes, *intent.of_walls[state.released :][:1], *([] if done is None else [done.note])]
     if found is not None:
         where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
-        notes += found.note(points[at], moved[at], where, piece, part.comm)
+        notes += found.note(points[at], moved[at], where, options.hausdorff, piece, part.comm)
     else:
         notes += not_slid(options)
     notes += judged.note(before, after, "η" if part.mesh.has_volumes else "1/q")

@@ -16,7 +16,7 @@ from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import ASPECT, QualityReport, measure, measured_again
-from gmsnet.measure.surface_change import Compared
+from gmsnet.measure.surface_change import Compared, surface_change
 from gmsnet.measure.totals import Totals, totals_of, totals_with_others
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.metric.conformity import Conformity, ConformityChange
@@ -79,7 +79,7 @@ def result_of(state: State, options: SmoothOptions, began: float) -> SmoothResul
         moved=moved,
         held=_held(state),
         history=list(state.history),
-        notes=[*_notes(state), *_of_angles(after, options)],
+        notes=[*_notes(state, options), *_of_angles(after, options)],
         unmended=still_inverted(after, _why_not_mended(state)),
         topology=with_corners(state),
         seconds=time.perf_counter() - began,
@@ -98,9 +98,25 @@ def _why_not_mended(state: State) -> Mapping[int, str]:
 
 def _compared(state: State, points: Floats) -> Compared | None:
     """The boundary along which nodes slide, in the input and now."""
-    if not isinstance(state.sliding, SurfaceSliding) or state.sliding.constraint is None:
+    return compared_of(state.sliding, state.mesh.points, points)
+
+
+def compared_of(sliding: object, before: Floats, after: Floats) -> Compared | None:
+    """A surface with its points (N, 3) before and after; None where no node slides on one."""
+    if not isinstance(sliding, SurfaceSliding) or sliding.constraint is None:
         return None
-    return Compared(state.sliding.facets.rows, state.mesh.points, points)
+    return Compared(sliding.facets.rows, before, after)
+
+
+def bound_note(compared: Compared | None, asked: float | None) -> list[str]:
+    """What to say where facets have gone further than they were asked to, over the diagonal of their box."""
+    change = None if compared is None or asked is None else surface_change(compared)
+    if change is None or asked is None or change.hausdorff <= asked * change.diagonal:
+        return []
+    return [
+        f"hausdorff: the bound is not kept, the distance is {change.hausdorff / change.diagonal:.2g} of the diagonal; "
+        "facets beside folds and needles, and quadrilaterals that are warped by more than the bound, may go further"
+    ]
 
 
 def _held(state: State) -> dict[str, NDArray[np.int64]]:
@@ -116,7 +132,7 @@ def _held(state: State) -> dict[str, NDArray[np.int64]]:
     return held
 
 
-def _notes(state: State) -> list[str]:
+def _notes(state: State, options: SmoothOptions) -> list[str]:
     protection, near_walls, of_order = state.protection, [], []
     if protection.walls is not None:
         carried = carried_note(len(protection.topology.held.get(WALL, ())))
@@ -124,6 +140,7 @@ def _notes(state: State) -> list[str]:
     slid = []
     if isinstance(state.sliding, Sliding | SurfaceSliding) and state.final is not None:
         slid.append(state.sliding.note(state.mesh.with_points(state.final.points), state.final.moved))
+        slid.extend(bound_note(_compared(state, state.final.points), options.hausdorff))
     given = state.second_order
     if given is not None and given.sign is not None and state.final is not None:
         of_order.append(given.note(state.final.moved))

@@ -26,6 +26,27 @@ def test_facets_stay_within_what_is_asked(name, asked):
     assert change.hausdorff <= 1.05 * asked * change.diagonal
 
 
+@pytest.mark.parametrize("name", ["cylinder", "bracket"])
+def test_nodes_on_curves_keep_facets_within_it_too(name):
+    """Edges of curved patches slide: facets on both sides of them are bound. They went eight times as far."""
+    mesh = disturb_on(getattr(generate, name)(700), 0.2, seed=3).mesh
+    result = gmsnet.smooth(mesh, hausdorff=0.0005, slide="all")
+    change = result.surface_change
+    assert result.moved.any()
+    assert change.hausdorff <= 1.05 * 0.0005 * change.diagonal
+    assert not any(note.startswith("hausdorff:") for note in result.notes)
+
+
+def test_a_bound_that_is_not_kept_is_told():
+    """Needles are features, whose neighbours cannot be told from what folds."""
+    mesh = disturb_on(generate.torus_surface(700), 0.45, seed=1).mesh
+    result = gmsnet.smooth(mesh, hausdorff=0.0002)
+    (said,) = (note for note in result.notes if note.startswith("hausdorff:"))
+    change = result.surface_change
+    assert f"the distance is {change.hausdorff / change.diagonal:.2g} of the diagonal" in said
+    assert change.hausdorff > 0.0002 * change.diagonal
+
+
 def test_facets_would_go_further_without_a_bound():
     mesh = thrown("torus_surface")
     free, bound = gmsnet.smooth(mesh), gmsnet.smooth(mesh, hausdorff=0.004)

@@ -2,7 +2,7 @@
 
 A node may lie on a surface while the facets at it cut off a bend. So distances are taken at places on these, too: in
 the middle, on the edges that move, and between. Each is from the facet of the reference to which a walk leads; and
-places on that one count, too, where they lie over the facet.
+places on that one and on those beside it count, too, where they lie over the facet.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import numpy as np
 from gmsnet.kernels.jit.compile import inlined, part
 from gmsnet.kernels.star.cubics import on_facet, walk
 from gmsnet.kernels.star.pattern import count_of, pair_of
-from gmsnet.kernels.star.surface import CURVED
+from gmsnet.kernels.star.pieces import NOWHERE
+from gmsnet.kernels.star.surface import CURVED, FLAT
 
 # Barycentric coordinates on a facet: of the node that moves, and of the two others.
 PLACES = np.array([[3, 0, 3], [3, 3, 0], [2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
@@ -39,8 +40,8 @@ def off_plane(px, py, pz, ux, uy, uz, vx, vy, vz):
 @part
 def off_reference(vertex, facet, f, x, y, z, ax, ay, az, bx, by, bz):
     """The largest squared distance of these places on a facet from the reference, by walks from its facet f on; and of
-    the corners of the facets there from this one."""
-    most = 0.0
+    places on the facets there, and beside these, from this one."""
+    most, last = 0.0, np.int64(NOWHERE)
     ux, uy, uz, vx, vy, vz = ax - x, ay - y, az - z, bx - x, by - y, bz - z
     for k in range(len(PLACES)):
         p, q, r = PLACES[k, 0], PLACES[k, 1], PLACES[k, 2]
@@ -49,11 +50,28 @@ def off_reference(vertex, facet, f, x, y, z, ax, ay, az, bx, by, bz):
         dx, dy, dz = on_facet(vertex, facet, f, a, b, c)
         dx, dy, dz = dx - sx, dy - sy, dz - sz
         most = max(most, dx * dx + dy * dy + dz * dz)
-        for j in range(len(BACK)):
-            p, q, r = BACK[j, 0], BACK[j, 1], BACK[j, 2]
-            px, py, pz = on_facet(vertex, facet, f, p, q, r)
-            most = max(most, off_plane(px - x, py - y, pz - z, ux, uy, uz, vx, vy, vz))
+        for side in range(4 if f != last else 0):
+            other = f if side == 3 else np.int64(facet[f, 3 + side])
+            for j in range(len(BACK) if other != NOWHERE else 0):
+                p, q, r = BACK[j, 0], BACK[j, 1], BACK[j, 2]
+                px, py, pz = on_facet(vertex, facet, other, p, q, r)
+                most = max(most, off_plane(px - x, py - y, pz - z, ux, uy, uz, vx, vy, vz))
+        last = f
     return most
+
+
+@inlined
+def off_nearest(surface, row, place, x, y, z, ax, ay, az, bx, by, bz):
+    """The same from the facet of the node of a row; of one on a line or curve from a facet of either patch beside."""
+    vertex, facet = surface.vertex, surface.facet
+    if surface.kind[row] == CURVED:
+        return off_reference(vertex, facet, place, x, y, z, ax, ay, az, bx, by, bz)
+    least = np.inf
+    for k in range(2):
+        seed = np.int64(surface.bound.seeds[row, k])
+        if seed != NOWHERE:
+            least = min(least, off_reference(vertex, facet, seed, x, y, z, ax, ay, az, bx, by, bz))
+    return least if least < np.inf else 0.0
 
 
 @inlined
@@ -64,16 +82,16 @@ def near(bound, surface, row, star, n, pattern, place, x, y, z, was):
     """
     if bound is None:
         return True
-    if surface.kind[row] != CURVED:
+    if surface.kind[row] == FLAT:
         return True
-    vertex, facet, here = surface.vertex, surface.facet, np.int64(surface.place[row])
+    here = np.int64(surface.place[row])
     for k in range(count_of(pattern, n)):
         i, j = pair_of(pattern, n, k)
         ax, ay, az = star[3 * i], star[3 * i + 1], star[3 * i + 2]
         bx, by, bz = star[3 * j], star[3 * j + 1], star[3 * j + 2]
-        off = off_reference(vertex, facet, place, x, y, z, ax, ay, az, bx, by, bz)
-        if off > bound * bound:
-            before = off_reference(vertex, facet, here, was[0], was[1], was[2], ax, ay, az, bx, by, bz)
+        off = off_nearest(surface, row, place, x, y, z, ax, ay, az, bx, by, bz)
+        if off > bound.most * bound.most:
+            before = off_nearest(surface, row, here, was[0], was[1], was[2], ax, ay, az, bx, by, bz)
             if not off < before:
                 return False
     return True

@@ -21,6 +21,16 @@ from gmsnet.kernels.star.pieces import follow_curve, on_piece, piece_tangent
 FLAT, CURVED, LINE, CURVE = range(4)  # kinds of rows; the last two have one way to go
 
 
+class Bound(NamedTuple):
+    """How far places on facets may lie from those of the reference (kernels.star.chords).
+
+    seeds: (R, 2) int32, for each row on a line or curve a facet of each of two patches beside it, else NOWHERE.
+    """
+
+    most: float
+    seeds: NDArray[np.int32]
+
+
 class Surface(NamedTuple):
     """What nodes slide on, and where they are; nodes by places in memory.
 
@@ -32,8 +42,7 @@ class Surface(NamedTuple):
     the rim. Of pieces (P,): piece (P, 4, 3) control points, before, after (P,) int32. single: new coordinates are
     rounded to float32. limit: (R,) how far from the facets, or edges, themselves each row may go. Of facets of a
     volume's boundary around each row (M,), in CSR form by start (R + 1,): ring (M, 2) int32, the other two nodes, seen
-    counter-clockwise from outside; own (M, 3) its unit normal at first. bound: how far places on facets may lie from
-    the reference's (kernels.star.chords).
+    counter-clockwise from outside; own (M, 3) its unit normal at first.
     """
 
     row: NDArray[np.int32]
@@ -53,7 +62,7 @@ class Surface(NamedTuple):
     start: NDArray[np.int32]
     ring: NDArray[np.int32]
     own: NDArray[np.float64]
-    bound: float | None = None
+    bound: Bound | None = None
 
 
 @part
