@@ -38,13 +38,12 @@ def test_nodes_on_curves_keep_facets_within_it_too(name):
 
 
 def test_a_bound_that_is_not_kept_is_told():
-    """Needles are features, whose neighbours cannot be told from what folds."""
-    mesh = disturb_on(generate.torus_surface(700), 0.45, seed=1).mesh
-    result = gmsnet.smooth(mesh, hausdorff=0.0002)
+    """Facets at a tip lie over one another."""
+    result = gmsnet.smooth(generate.cone_surface(700).mesh, hausdorff=0.0005, slide="all")
     (said,) = (note for note in result.notes if note.startswith("hausdorff:"))
     change = result.surface_change
     assert f"the distance is {change.hausdorff / change.diagonal:.2g} of the diagonal" in said
-    assert change.hausdorff > 0.0002 * change.diagonal
+    assert 1.0 < change.hausdorff / (0.0005 * change.diagonal) < 1.25
 
 
 def test_facets_would_go_further_without_a_bound():
@@ -54,12 +53,12 @@ def test_facets_would_go_further_without_a_bound():
     assert bound.after.shape.mean() > bound.before.shape.mean() + 0.05
 
 
-def test_quads_that_are_not_plane_may_come_nearer():
+def test_quads_that_are_not_plane_move_too():
     mesh = wavy()
     result = gmsnet.smooth(mesh, hausdorff=0.002)
     assert result.moved.any()
     assert result.after.shape.min() > result.before.shape.min()
-    assert result.surface_change.hausdorff < 0.004 * result.surface_change.diagonal
+    assert result.surface_change.hausdorff < 0.002 * result.surface_change.diagonal
 
 
 def test_the_bound_holds_for_any_number_of_threads():

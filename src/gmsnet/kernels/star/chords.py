@@ -17,14 +17,15 @@ from gmsnet.kernels.star.surface import CURVED, FLAT
 
 # Barycentric coordinates on a facet: of the node that moves, and of the two others.
 PLACES = np.array([[3, 0, 3], [3, 3, 0], [2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
-# The same on a facet of the reference.
+# The same on a facet of the reference; the first few also on those beside it.
 BACK = np.array([[6, 0, 0], [0, 6, 0], [0, 0, 6], [2, 2, 2], [3, 3, 0], [0, 3, 3], [3, 0, 3]]) / 6.0
+FEW = 4
 BESIDE = 0.15  # in barycentric coordinates: so far beside a facet what lies over its edge counts, too
 CLOSER = 0.85  # times what is asked for, since there are places between
 
 
 @inlined
-def off_plane(px, py, pz, ux, uy, uz, vx, vy, vz):
+def off_plane(px, py, pz, ux, uy, uz, vx, vy, vz, beside):
     """The squared distance of the point p from the plane of the triangle 0, u, v if it lies over that, else 0."""
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     square = nx * nx + ny * ny + nz * nz
@@ -33,7 +34,7 @@ def off_plane(px, py, pz, ux, uy, uz, vx, vy, vz):
     s = (py * vz - pz * vy) * nx + (pz * vx - px * vz) * ny + (px * vy - py * vx) * nz
     t = (uy * pz - uz * py) * nx + (uz * px - ux * pz) * ny + (ux * py - uy * px) * nz
     height = px * nx + py * ny + pz * nz
-    least = -BESIDE * square
+    least = -beside * square
     return height * height / square if s >= least and t >= least and s + t <= square - least else 0.0
 
 
@@ -52,10 +53,12 @@ def off_reference(vertex, facet, f, x, y, z, ax, ay, az, bx, by, bz):
         most = max(most, dx * dx + dy * dy + dz * dz)
         for side in range(4 if f != last else 0):
             other = f if side == 3 else np.int64(facet[f, 3 + side])
-            for j in range(len(BACK) if other != NOWHERE else 0):
+            for j in range(0 if other == NOWHERE else len(BACK) if side == 3 else FEW):
                 p, q, r = BACK[j, 0], BACK[j, 1], BACK[j, 2]
                 px, py, pz = on_facet(vertex, facet, other, p, q, r)
-                most = max(most, off_plane(px - x, py - y, pz - z, ux, uy, uz, vx, vy, vz))
+                most = max(
+                    most, off_plane(px - x, py - y, pz - z, ux, uy, uz, vx, vy, vz, BESIDE if side == 3 else 0.0)
+                )
         last = f
     return most
 
@@ -75,23 +78,19 @@ def off_nearest(surface, row, place, x, y, z, ax, ay, az, bx, by, bz):
 
 
 @inlined
-def near(bound, surface, row, star, n, pattern, place, x, y, z, was):
-    """Do all facets of a star stay within the bound with its node at (x, y, z), or come nearer than they are?
+def near(bound, surface, row, star, n, pattern, place, x, y, z):
+    """Do all facets of a star stay within the bound with its node at (x, y, z)?
 
-    bound: None where there is none. place: the reference's facet there. was: (3,) where the node is.
+    bound: None where there is none. place: the reference's facet there.
     """
     if bound is None:
         return True
     if surface.kind[row] == FLAT:
         return True
-    here = np.int64(surface.place[row])
     for k in range(count_of(pattern, n)):
         i, j = pair_of(pattern, n, k)
         ax, ay, az = star[3 * i], star[3 * i + 1], star[3 * i + 2]
         bx, by, bz = star[3 * j], star[3 * j + 1], star[3 * j + 2]
-        off = off_nearest(surface, row, place, x, y, z, ax, ay, az, bx, by, bz)
-        if off > bound.most * bound.most:
-            before = off_nearest(surface, row, here, was[0], was[1], was[2], ax, ay, az, bx, by, bz)
-            if not off < before:
-                return False
+        if off_nearest(surface, row, place, x, y, z, ax, ay, az, bx, by, bz) > bound.most * bound.most:
+            return False
     return True
