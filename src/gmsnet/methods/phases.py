@@ -20,7 +20,7 @@ from gmsnet.topology.volume import Volume
 SMALL, LARGE_VOLUME = 5000, 50_000  # free nodes
 ALWAYS = 10**9  # sweeps
 RELAXATION = 1.6  # of the Newton steps
-LONGER = 1.8  # the same of quads, where long waves are left
+LONGER, LONGEST = 1.8, 1.9  # the same of quads, and of surfaces, where long waves are left
 IDEAL = 0.99  # a least 1/q at which the worst cells have no turn, nor what follows
 
 
@@ -102,9 +102,13 @@ LARGE_VOLUME_PLAN = (
     ROOM,
     VOLUME_PLAN[-1]._replace(create=lambda: Above(0.0, 4, 0.05), rounds=10, gain=0.0015),
 )
-# Of surfaces; what high powers take from the mean comes back last.
+LONG_WAVES = Phase("Newton on q", lambda: newton(LONGEST), 2, rounds=500, gain=0.0003, least=0.0001)._replace(
+    lasting=0.85, looks=False, often=1000
+)
+# Of surfaces; long waves are left to sweeps, and what high powers take from the mean comes back last.
 SURFACE_PLAN = (
     NEWTON._replace(looks=False),
+    LONG_WAVES,
     WORST._replace(create=lambda: worst_first(3, IDEAL), looks=False),
     MEAN._replace(gain=0.001),
 )
