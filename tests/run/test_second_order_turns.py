@@ -85,8 +85,9 @@ def test_a_turn_that_makes_the_mesh_worse_is_taken_back(monkeypatch):
 def test_an_interruption_leaves_the_patches_that_are_mended(patch, monkeypatch):
     """The first one mends all cells but one."""
     from gmsnet.untangle import curved
+    from gmsnet.untangle.curved_patch import CurvedPatch
 
-    mesh, search, begun = curved_meshes.thrown(12), curved._Patch._search, []
+    mesh, search, begun = curved_meshes.thrown(12), CurvedPatch.untangle, []
 
     def interrupted(self, *arguments):
         begun.append(self)
@@ -95,7 +96,7 @@ def test_an_interruption_leaves_the_patches_that_are_mended(patch, monkeypatch):
         return search(self, *arguments)
 
     monkeypatch.setattr(curved, "_untangle_straight", lambda *_: None)
-    monkeypatch.setattr(curved._Patch, "_search", interrupted)
+    monkeypatch.setattr(CurvedPatch, "untangle", interrupted)
     with pytest.raises(KeyboardInterrupt) as caught:
         gmsnet.smooth(mesh)
     result = caught.value.result
@@ -111,8 +112,9 @@ def test_an_interruption_leaves_the_patches_that_are_mended(patch, monkeypatch):
 @pytest.mark.parametrize("look", [3, 8])
 def test_an_interruption_leaves_the_best_state_of_a_patch(look, monkeypatch):
     from gmsnet.untangle import curved
+    from gmsnet.untangle.curved_patch import CurvedPatch
 
-    mesh, judge, looks = curved_meshes.thrown(12), curved._Patch._judge, []
+    mesh, judge, looks = curved_meshes.thrown(12), CurvedPatch.judge, []
 
     def interrupted(self):
         if len(looks) == look:
@@ -121,10 +123,25 @@ def test_an_interruption_leaves_the_best_state_of_a_patch(look, monkeypatch):
         return looks[-1] is True
 
     monkeypatch.setattr(curved, "_untangle_straight", lambda *_: None)
-    monkeypatch.setattr(curved._Patch, "_judge", interrupted)
+    monkeypatch.setattr(CurvedPatch, "judge", interrupted)
     with pytest.raises(KeyboardInterrupt) as caught:
         gmsnet.smooth(mesh)
     assert caught.value.result.invalid_curved == min(looks)
+
+
+@pytest.mark.parametrize("amount", [0.3, 0.6])
+def test_held_middles_of_volumes_that_are_wrong_cost_only_cells_around_them(amount):
+    """At 0.6 straight cells are inverted, too."""
+    mesh, rng = thrown(lattice_volume(4), amount, 1), np.random.default_rng(1)
+    block, low, high = mesh.cells[0], mesh.points.min(axis=0), mesh.points.max(axis=0)
+    within = np.flatnonzero(((mesh.points > low + 1e-9) & (mesh.points < high - 1e-9)).all(axis=1))
+    wrong = rng.choice(np.setdiff1d(within, block.nodes[:, :4]), 4, replace=False)
+    points = mesh.points.copy()
+    points[wrong] += 0.3 * (high - low)[0] * rng.normal(size=(4, 3))
+    result = gmsnet.smooth(mesh.with_points(points), fixed=wrong.tolist())
+    assert result.before.inverted > 80
+    assert result.after.inverted <= np.isin(block.nodes, wrong).any(axis=1).sum() < 20
+    np.testing.assert_array_equal(result.mesh.points[wrong], points[wrong])
 
 
 @pytest.mark.parametrize("seed", [21, 119])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support import curved_meshes
 
+from gmsnet.kernels.curved.stars import curved_mesh
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.measure.curved import judge_curved
 from gmsnet.methods.planar_cells import PlanarCells
@@ -46,6 +47,22 @@ def test_what_cannot_be_mended_is_left_and_no_valid_cell_is_lost():
     after = judge_curved(points, tables.cells, tables.kinds)[0]
     assert 1 <= score.after < score.before
     assert (after[before == 1] == 1).all()
+
+
+@pytest.mark.parametrize(("seed", "held", "most"), [(0, 6, 12), (6, 3, 8), (10, 6, 8)])
+def test_held_middles_that_are_wrong_cost_only_cells_around_them(seed, held, most):
+    mesh, rng = curved_meshes.thrown(seed), np.random.default_rng(seed)
+    points, tables, free = curved_meshes.tables(mesh)
+    wrong = rng.choice(np.flatnonzero(PlanarCells(points, tables, free).inner), held, replace=False)
+    points[wrong] += 0.3 * rng.normal(size=(held, 2))
+    free[wrong] = False
+    first, tables = points.copy(), curved_mesh(points, tables.cells, tables.kinds, ~free)
+    before = judge_curved(points, tables.cells, tables.kinds)[0]
+    score = untangle_curved(PlanarCells(points, tables, free))
+    after = judge_curved(points, tables.cells, tables.kinds)[0]
+    assert score.after == (after != 1).sum() <= most < score.before
+    assert (after[before == 1] == 1).all()
+    np.testing.assert_array_equal(points[~free], first[~free])
 
 
 def test_in_single_precision_the_result_is_valid_as_the_file_keeps_it():
