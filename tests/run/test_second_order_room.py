@@ -50,6 +50,14 @@ def test_cells_get_room_where_the_straight_ones_are_at_their_best(kind, guard):
     assert result.after.inverted == 0
 
 
+@pytest.mark.parametrize("bend", [0.2, 0.3])
+def test_valid_cells_get_room_though_some_of_their_coefficients_are_negative(bend):
+    result = gmsnet.smooth(second_order_volume(block_volume(4), bend=bend, seed=1))
+    assert result.before.inverted > 20
+    assert result.after.inverted == 0
+    assert least_bound(result.mesh) > 0.45
+
+
 @pytest.mark.parametrize("seed", [1, 8, 9, 11, 12])
 def test_corners_stay_where_their_moves_would_have_the_input_taken(seed):
     """The worst straight cell cannot become better, so that a lower mean would."""

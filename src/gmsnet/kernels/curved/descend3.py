@@ -3,8 +3,8 @@
 In the place of a node alone a coefficient is affine, for its share in the Jacobian matrix has rank one. With followers
 it is of higher degree: a model of degree 2 stands for it, from its values at ten places. With these values v over the
 mean size of the cell's coefficients, t the place in units of the star's size, and t₀ the straight place of a follower,
-the objectives are Σ max(0, τ − v)² and −Σ log v, with κ|t − t₀|² for followers. Steps are of Gauss and Newton, halved
-until the objective of the model falls.
+the objectives are Σ max(0, τ − v)², with κ|t − t₀|² for followers, and −Σ log v. Where a v is not positive, the first
+stands for the second, without κ. Steps are of Gauss and Newton, halved until the objective of the model falls.
 """
 
 from __future__ import annotations
@@ -185,6 +185,9 @@ def descent3(points, mesh, i, mode, threshold, work):
     rows = fit3(points, mesh, i, size, work)
     tx, ty, tz = 0.0, 0.0, 0.0
     value = objective3(work.model, rows, mode, threshold, tx, ty, tz, kappa, ox, oy, oz, out)
+    if mode == IMPROVE and not np.isfinite(value):  # valid cells may have coefficients that are not positive
+        mode = UNTANGLE
+        value = objective3(work.model, rows, mode, threshold, tx, ty, tz, kappa, ox, oy, oz, out)
     if not np.isfinite(value):
         return x, y, z, False
     for _ in range(STEPS):
@@ -227,7 +230,7 @@ def improve_nodes3(points, mesh, nodes, threshold, guard, tally):
         before = least_quality3(points, mesh, i, threshold, guard, work)
         if not 0.0 < before < threshold:
             continue
-        x, y, z, fell = descent3(points, mesh, i, IMPROVE, 0.0, work)
+        x, y, z, fell = descent3(points, mesh, i, IMPROVE, threshold, work)
         if not fell:
             continue
         count = commit3(points, mesh, i, x, y, z, guard, work, tally)
