@@ -89,16 +89,6 @@ class PlanarCells(NamedTuple):
         """Keeps that of them."""
         self.mesh.ratio[at[0]], self.mesh.centre_ratio[at[1]] = offsets
 
-    def copied(self) -> PlanarCells:
-        """The same, that changes for itself."""
-        mesh = self.mesh._replace(ratio=self.mesh.ratio.copy(), centre_ratio=self.mesh.centre_ratio.copy())
-        return self._replace(points=self.points.copy(), mesh=mesh)
-
-    def become(self, other: PlanarCells) -> None:
-        """Takes over the places and offsets of a copy."""
-        self.points[:], self.mesh.ratio[:] = other.points, other.mesh.ratio
-        self.mesh.centre_ratio[:] = other.mesh.centre_ratio
-
     def go(self, nodes: Ints, places: Floats) -> None:
         """Puts corners at their places (K, 2) with what they drag along; nothing is judged."""
         dragged(self.points, self.mesh, nodes, places, self.precision.single)

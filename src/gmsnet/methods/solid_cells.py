@@ -96,14 +96,6 @@ class SolidCells(NamedTuple):
         """Keeps that of them."""
         self.mesh.kept[at] = offsets
 
-    def copied(self) -> SolidCells:
-        """The same, that changes for itself."""
-        return self._replace(points=self.points.copy(), mesh=self.mesh._replace(kept=self.mesh.kept.copy()))
-
-    def become(self, other: SolidCells) -> None:
-        """Takes over the places and offsets of a copy."""
-        self.points[:], self.mesh.kept[:] = other.points, other.mesh.kept
-
     def go(self, nodes: Ints, places: Floats) -> None:
         """Puts corners at their places (K, 3 or more) with what follows them; nothing is judged."""
         put_all(self.points, self.points.copy(), self.mesh, nodes, places[:, :3], self.precision.single)
