@@ -239,3 +239,19 @@ def test_long_waves_are_evened_out_in_one_call():
     assert result.before.shape.min() < 0.65
     assert result.after.shape.min() > 0.8
     assert again.after.shape.min() < result.after.shape.min() + 0.01
+
+
+NORMALS = {"stl": "of facets", "obj": "normals (vn)", "ply": "nx, ny, nz", "off": ""}
+
+
+@pytest.mark.parametrize("suffix", NORMALS)
+def test_normals_that_become_stale_are_told(suffix, tmp_path):
+    mesh, path, said = ball(60, seed=1), tmp_path / f"a.{suffix}", NORMALS[suffix]
+    if suffix == "ply":
+        mesh = replace(mesh, point_data=dict(zip(("nx", "ny", "nz"), mesh.points.T, strict=True)))
+    gmsnet.write(mesh, path)
+    if suffix == "obj":
+        path.write_text(path.read_text() + "vn 0 0 1\n")
+    found = [note for note in gmsnet.smooth(gmsnet.read(path)).notes if note.startswith("normals")]
+    note = f"normals in the file ({said}) stay as they are, though nodes move: have them computed anew"
+    assert found == [note] * bool(said)

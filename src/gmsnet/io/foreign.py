@@ -39,6 +39,7 @@ class ForeignSource:
 
     title: str
     format: str = ""
+    normals: str = ""
 
     def images_in(self, mesh: Mesh) -> NDArray[np.int64]:
         """None: they are not read."""

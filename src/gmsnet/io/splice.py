@@ -197,6 +197,11 @@ class FileSource:
             self.form, dict(self.shares),
         )  # fmt: skip
 
+    @property
+    def normals(self) -> str:
+        """See Source."""
+        return "of facets" if self.format == "stl" else next((each for each in self.unread if "normals" in each), "")
+
     def fits(self, mesh: Mesh) -> bool:
         """Whether the file can stand for a mesh once its coordinates are replaced: all else is as it was read."""
         return (

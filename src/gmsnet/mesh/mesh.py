@@ -41,6 +41,11 @@ class Source(Protocol):
         """Its name in the table of formats."""
         ...
 
+    @property
+    def normals(self) -> str:
+        """Normals of facets or points in it that no field of the mesh holds, in words; "" for none."""
+        ...
+
     def images_in(self, mesh: Mesh) -> NDArray[np.int64]:
         """(n,) the nodes of periodic boundaries, if the mesh has the cells of the file: they must go on to match."""
         ...

@@ -25,6 +25,7 @@ from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
+AXES = ("nx", "ny", "nz")  # how PLY calls the components of a normal
 
 
 def first_of_surface(
@@ -63,6 +64,8 @@ def first_of_surface(
             f"{int(torn.sum()):,} nodes of the boundary have another one in their place, to rounding: facets are not "
             "joined there, so these nodes are held. Make equal points one point first, and they can move",
         )
+    if stale := _normals_of(given):
+        remarks += (f"normals in the file ({stale}) stay as they are, though nodes move: have them computed anew",)
     given = given.without_cells()
     before = measure(given, shell, start, executor.for_blocks(0))
     nothing = np.empty(0, dtype=np.float32)
@@ -70,6 +73,13 @@ def first_of_surface(
         given, restore, smoother, before, Protection(shell, []), start, start, nothing, remarks, sliding=sliding
     )
     return state, shell
+
+
+def _normals_of(mesh: Mesh) -> str:
+    """What a mesh or its file knows of normals, in words; "" for nothing."""
+    fields = [name for name in (*mesh.point_data, *mesh.cell_data) if "normal" in name.lower() or name in AXES]
+    source = "" if mesh.source is None else mesh.source.normals
+    return ", ".join(filter(None, [*fields, source]))
 
 
 def _flagged(nodes: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
