@@ -128,3 +128,15 @@ def test_facets_that_do_not_match_are_seen_by_the_first_rank():
     told = same(mesh, options, parts_at_random(mesh, 3, np.random.default_rng(2), "interleaved"), 3)
     assert told.gathered == "parts of the mesh, or facets that do not match, have to be seen whole"
     assert told.held["facet against others of other nodes"] == 8
+
+
+@pytest.mark.parametrize("slide", [None, "all"])
+def test_cells_that_name_a_node_twice_are_told(slide):
+    mesh = block(4, 4, 4, jitter=0.2, seed=5)
+    nodes = mesh.cells[0].nodes.copy()
+    nodes[[7, 50], 3], nodes[[7, 50], 7] = nodes[[7, 50], 2], nodes[[7, 50], 6]
+    mesh = Mesh(mesh.points, [cells_of("hexahedron", nodes)])
+    options = SmoothOptions(method="barrier", max_sweeps=2, preserve="none", threads=1, slide=slide)
+    told = same(mesh, options, parts_at_random(mesh, 3, np.random.default_rng(2), "interleaved"), 3)
+    assert told.gathered == ""
+    assert "not measured, and their nodes are held: 2 cells that name a node twice" in told.notes

@@ -10,6 +10,7 @@ from support import blocks
 
 import gmsnet
 from gmsnet.cells.table import CELLS
+from gmsnet.errors import InputError
 from gmsnet.generate import random_quad_mesh, structured_mesh
 from gmsnet.measure.bounds.bounds import limits
 from gmsnet.measure.bounds.groups import HELD, HELD_CORNER
@@ -127,3 +128,15 @@ def test_a_quad_whose_held_corner_misses_a_target_is_not_called_reached():
     result = gmsnet.smooth(mesh, target_quality=0.9)
     assert result.stop_reason in (stop.NO_PROGRESS, stop.NOTHING_TO_MOVE)
     assert result.after.shape.min() <= result.limits.ceiling < 0.9
+
+
+@pytest.mark.parametrize("more", [{}, {"method": "laplacian"}, {"slide": "all"}], ids=str)
+def test_cells_that_all_name_a_node_twice_have_no_bound_and_are_told(more):
+    mesh = Mesh(np.eye(6, 3), [blocks.cells_of("hexahedron", [[0, 1, 2, 2, 3, 4, 5, 5]])])
+    found = gmsnet.smooth(mesh, **more)
+    assert found.limits.ceiling == 1.0
+    assert not len(found.limits.bound)
+    assert found.stop_reason == stop.NOTHING_TO_MOVE
+    assert "not measured, and their nodes are held: 1 cell that names a node twice" in found.notes
+    with pytest.raises(InputError, match="this mesh has none: 1 cell that names a node twice"):
+        gmsnet.smooth(mesh, target_quality=0.3, **more)

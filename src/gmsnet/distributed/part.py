@@ -101,6 +101,11 @@ class Part:
         )  # fmt: skip
 
     @property
+    def own_cells(self) -> Flags:
+        """(C,) which cells of ``mesh`` are its own."""
+        return np.concatenate([*self.around.own, np.empty(0, dtype=bool)])
+
+    @property
     def simplices(self) -> Rows:
         """Those of its own cells."""
         return self.topology.simplices.take(self.own_rows)

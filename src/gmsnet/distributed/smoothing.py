@@ -27,6 +27,7 @@ from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.stages import Meant, swept
+from gmsnet.distributed.told import held, missing, not_measured
 from gmsnet.distributed.winding import Winding
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology.write_back import put_back
@@ -44,8 +45,6 @@ from gmsnet.run.state import State
 from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.solids import KINDS
-from gmsnet.topology.topology import Topology
-from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -77,7 +76,7 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
         ready = _ready(piece, part, options, before, known)
         if ready.why:
             return smoothed_on_first(piece, options, comm, ready.why, began, known)
-        return _shared(piece, part, smoother, options, ready, before, began, found)
+        return _shared(piece, part, smoother, options, ready, before, began, found, counts)
     finally:
         part.halo.free()
 
@@ -187,7 +186,7 @@ def _meant(intent: Intent, piece: Piece, part: Part) -> Meant:
 
 def _shared(
     piece: Piece, part: Part, smoother: Smoother, options: SmoothOptions, ready: _Ready, before: Totals | None,
-    began: float, found: Found | None,
+    began: float, found: Found | None, counts: Mapping[str, int],
 ) -> RankResult:  # fmt: skip
     at = np.searchsorted(part.around.nodes.ids, piece.ids)
     intent, done = ready.intent, ready.mended
@@ -203,7 +202,7 @@ def _shared(
         where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
         notes += found.note(points[at], moved[at], where, options.hausdorff, piece, part.comm)
     else:
-        notes += not_slid(options)
+        notes += [*not_measured(part, counts), *not_slid(options)]
     notes += judged.note(before, after, "η" if part.mesh.has_volumes else "1/q")
     notes += large_angles(greatest, missed, options)
     return RankResult(
@@ -215,7 +214,7 @@ def _shared(
         stop_reason=state.stop_reason,
         history=[*state.history],
         notes=notes,
-        held=_held(part, state.protection.base),
+        held=held(part, state.protection.base),
         nodes=int(part.comm.allreduce(int(part.moves.sum()))),
         cells=sum(part.around.sizes),
         gathered="",
@@ -226,17 +225,6 @@ def _shared(
         missed=missed,
         judged=judged,
     )
-
-
-def _held(part: Part, topology: Topology | Volume) -> dict[str, int]:
-    """Reason → how many nodes of the mesh, the first reason that applies to each."""
-    own = part.around.nodes.owner == part.comm.rank
-    mine = {reason: int(np.count_nonzero(own[ids])) for reason, ids in topology.held.items()}
-    found: dict[str, int] = {}
-    for each in part.comm.allgather(mine):
-        for reason, number in each.items():
-            found[reason] = found.get(reason, 0) + number
-    return {reason: number for reason, number in found.items() if number}
 
 
 class _Written(NamedTuple):
@@ -277,8 +265,8 @@ def _written(
     if target:
         first = state.before if isinstance(state.before, QualityReport) else measure(mesh, topology, part.points)
         last = measure(written, topology, near)
-        missed, least = _missing(part, last, options)
-        missed_before, least_before = _missing(part, first, options)
+        missed, least = missing(part, last, options)
+        missed_before, least_before = missing(part, first, options)
         better = (inverted, missed, -least) <= (inverted_before, missed_before, -least_before)
         angles = [greatest_angle(report, options) for report in (first, last)]
         greatest = [float(part.comm.allreduce(angle, mpi().MAX)) for angle in angles]
@@ -290,11 +278,3 @@ def _written(
         return _Written(points, moved, after, missed, greatest[1], of_free)
     judged = of_free._replace(after=of_free.before)
     return _Written(mesh.points, np.zeros_like(moved), before, missed_before, greatest[0], judged)
-
-
-def _missing(part: Part, report: QualityReport, options: SmoothOptions) -> tuple[int, float]:
-    """How many cells of all ranks miss the target, and the least 1/q among them. report: of the part."""
-    rows, shape = options.target.missed_with_shapes(report)
-    own = np.concatenate([*part.around.own, np.empty(0, dtype=bool)])[report.cell[rows]]
-    count = int(part.comm.allreduce(int(np.count_nonzero(own))))
-    return count, float(part.comm.allreduce(float(shape[own].min(initial=np.inf)), mpi().MIN))

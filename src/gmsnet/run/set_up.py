@@ -20,11 +20,12 @@ from gmsnet.measure.report import ASPECT, QualityReport, measure
 from gmsnet.measure.target import Target
 from gmsnet.measure.totals import Totals, totals_of, totals_with_others
 from gmsnet.mesh.adapters import to_mesh
+from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured, unmoved
 from gmsnet.mesh.selection import fixed_mask, images
 from gmsnet.methods import Smoother, StarSmoother
 from gmsnet.methods.auto import Auto
-from gmsnet.methods.cells import check_cells
+from gmsnet.methods.cells import check_cells, counts_of
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
@@ -38,6 +39,7 @@ from gmsnet.run.state import SecondOrder, State
 from gmsnet.topology.held import REASONS
 from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
 from gmsnet.topology.ordering import space_points, taken
+from gmsnet.topology.solids import KINDS
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 from gmsnet.topology.wound import refuse_flat
@@ -47,6 +49,7 @@ Floats = NDArray[np.float64]
 MANY = 20_000  # nodes: for the set-up of fewer a second thread is not worth starting
 # That a call takes at most on a mesh of triangles, copies of them included; ``auto`` takes 251, all nodes at once 550.
 BYTES_PER_NODE = 600
+NOT_MEASURED = "not measured, and their nodes are held: "
 
 
 def first_state(
@@ -162,6 +165,15 @@ def held_anyway(
     ]
 
 
+def repeating(counts: Mapping[str, int], known: int) -> str:
+    """How many volumes name a node twice, in words; "" if none do. They count as invalid in ``measure`` alone.
+
+    counts: kind → how many cells. known: how many of them have a connectivity (``WoundSolids``).
+    """
+    many = sum(counts.get(kind, 0) for kind in KINDS) - known
+    return f"{amount(many, 'cell')} that {'names' if many == 1 else 'name'} a node twice" if many else ""
+
+
 def _first_of_volume(
     given: Mesh, restore: Callable[[Floats], Any], asked: NDArray[np.bool_], fixed: Any, smoother: Smoother,
     options: SmoothOptions, executor: Executor, moved: NDArray[np.bool_] | None,
@@ -177,17 +189,22 @@ def _first_of_volume(
         topology = volume_of(wound, surface[1].slides | surface[1].curves.slides)
         sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, options.distance, options.geometry)
     remarks = held_anyway(given, asked, topology, fixed, options.slides)
-    if others := unmoved(given):
-        remarks.append(f"not measured, and their nodes are held: {others}")
+    second = second_order_solids_of(given, topology, options)
+    others = [unmoved(given)]
+    if second is None and isinstance(topology, MixedVolume):
+        others.append(repeating(counts_of(given), len(topology.cell)))
+    if left_out := ", ".join(filter(None, others)):
+        remarks.append(NOT_MEASURED + left_out)
     if isinstance(topology, MixedVolume) and (turned := topology.inside_out):
         remarks.append(f"read with their corners in the other order, for they are inside out: {turned}")
     start = taken(space_points(given), topology.memory)
-    second = second_order_solids_of(given, topology, options)
     remarks += not_slid(options, second)
     if second is None:
         before = measure(given.without_cells(), topology, start, executor.for_blocks(0))
     else:
         before = measure(given)
+    if options.target and not len(before.cell):
+        raise InputError(f"a target is asked of cells that can be measured, and this mesh has none: {left_out}")
     given = given.without_cells()
     nothing = np.empty(0, dtype=np.float32)
     protection = protected_volume(topology, options.preserved, options.fix_layers, start, firm=before.inverted > 0)

@@ -22,7 +22,8 @@ def held_corners(cells: MeasuredCells | MeasuredSolids, free: Flags, below: floa
 
     free: (N,) by id. Of triangles and tetrahedra, whose corners are all alike, there is none.
     """
-    parts = [_least_of_cells(*block, free) for block in _blocks(cells)]
+    nothing = np.empty(0, dtype=np.intp), np.empty(0)
+    parts = [nothing, *(_least_of_cells(*block, free) for block in _blocks(cells))]
     node, bound = (np.concatenate(each) for each in zip(*parts, strict=True))
     if cells.order is not None:
         node, bound = node[cells.order], bound[cells.order]

@@ -1,0 +1,44 @@
+"""What all ranks know together of their parts: which nodes are held, which cells miss a target or are not measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gmsnet.distributed.library import mpi
+from gmsnet.distributed.part import Part
+from gmsnet.measure.report import QualityReport
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.set_up import NOT_MEASURED, repeating
+from gmsnet.topology.mixed_volume import MixedVolume
+from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
+
+
+def held(part: Part, topology: Topology | Volume) -> dict[str, int]:
+    """Reason → how many nodes of the mesh, the first reason that applies to each."""
+    own = part.around.nodes.owner == part.comm.rank
+    mine = {reason: int(np.count_nonzero(own[ids])) for reason, ids in topology.held.items()}
+    found: dict[str, int] = {}
+    for each in part.comm.allgather(mine):
+        for reason, number in each.items():
+            found[reason] = found.get(reason, 0) + number
+    return {reason: number for reason, number in found.items() if number}
+
+
+def not_measured(part: Part, counts: Mapping[str, int]) -> list[str]:
+    """The volumes that are left out, in words. counts: kind → how many cells the mesh has."""
+    if not isinstance(part.topology, MixedVolume):
+        return []
+    known = int(part.comm.allreduce(int(np.count_nonzero(part.own_cells[part.topology.cell]))))
+    left_out = repeating(counts, known)
+    return [NOT_MEASURED + left_out] if left_out else []
+
+
+def missing(part: Part, report: QualityReport, options: SmoothOptions) -> tuple[int, float]:
+    """How many cells of all ranks miss the target, and the least 1/q among them. report: of the part."""
+    rows, shape = options.target.missed_with_shapes(report)
+    own = part.own_cells[report.cell[rows]]
+    count = int(part.comm.allreduce(int(np.count_nonzero(own))))
+    return count, float(part.comm.allreduce(float(shape[own].min(initial=np.inf)), mpi().MIN))
