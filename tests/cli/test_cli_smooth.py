@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.generate import random_mesh
+from gmsnet.generate import random_mesh, random_volume, second_order_volume
 from gmsnet.run import stop
 from gmsnet.run.account import Account
 
@@ -286,3 +286,7 @@ def test_a_mesh_of_boundary_nodes_is_told_of_sliding(run, tmp_path):
     assert hint not in run("smooth", tmp_path / "a.su2", tmp_path / "b.su2", "--slide", "all").out
     gmsnet.write(random_mesh(200, seed=1), tmp_path / "a.su2")
     assert hint not in run("smooth", tmp_path / "a.su2", tmp_path / "b.su2").out
+    gmsnet.write(second_order_volume(random_volume(40, seed=1)), tmp_path / "a.vtu")  # whose boundary does not slide
+    told = run("smooth", tmp_path / "a.vtu", tmp_path / "b.vtu").out
+    assert "(boundary: " in told
+    assert hint not in told

@@ -140,3 +140,19 @@ def test_cells_that_name_a_node_twice_are_told(slide):
     told = same(mesh, options, parts_at_random(mesh, 3, np.random.default_rng(2), "interleaved"), 3)
     assert told.gathered == ""
     assert "not measured, and their nodes are held: 2 cells that name a node twice" in told.notes
+
+
+@pytest.mark.parametrize("slide", [None, "all"])
+@pytest.mark.parametrize("kind", ["tetrahedra", "hexahedra"])
+def test_faces_of_a_marker_between_cells_hold_their_nodes(kind, slide):
+    mesh = MESHES[kind]
+    block = mesh.cells[0]
+    facets = block.nodes[:, list(block.cell.facets[0])]
+    free = gmsnet.smooth(mesh, max_sweeps=1, preserve="none").topology.free
+    inside = facets[np.isin(facets, free).all(axis=1)][:5]
+    faces = CellBlock("triangle" if kind == "tetrahedra" else "quad", inside, np.full(len(inside), 9))
+    marked = Mesh(mesh.points, (*mesh.cells, faces))
+    options = SmoothOptions(method="barrier", max_sweeps=2, preserve="none", threads=1, slide=slide)
+    told = same(marked, options, parts_at_random(marked, 3, np.random.default_rng(2), "interleaved"), 3)
+    assert told.gathered == ""
+    assert told.held["node of a face cell"] == len(np.unique(inside))

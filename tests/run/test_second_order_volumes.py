@@ -294,3 +294,34 @@ def test_slide_beside_lines_of_curved_volumes() -> None:
     result = gmsnet.smooth(marked, slide=True)
     assert "slide: no node of the boundary can move along it" in result.notes
     assert result.after.inverted == 0
+
+
+@pytest.mark.parametrize("regions", [1, 2])
+def test_nodes_of_the_boundary_are_told_as_such(regions):
+    """The file has its faces there, as Gmsh writes them, and one between cells."""
+    _, mesh = twins("tetra10")
+    block, outside = mesh.cells[0], rim(mesh)
+    faces = np.concatenate([block.nodes[:, list(facet)] for facet in CELLS["tetra10"].facets])
+    at_rim = outside[faces].all(axis=1)
+    shown = np.concatenate([faces[at_rim], faces[~outside[faces].any(axis=1)][:1]])
+    halves = np.arange(len(block.nodes)) % regions
+    marked = Mesh(
+        mesh.points,
+        (CellBlock("tetra10", block.nodes, halves), CellBlock("triangle6", shown, np.zeros(len(shown), dtype=int))),
+    )
+    held = gmsnet.smooth(marked).held
+    assert held["boundary"].tolist() == np.flatnonzero(outside).tolist()
+    assert held["node of a face cell"].tolist() == sorted(shown[-1])
+    assert len(np.unique(np.concatenate(list(held.values())))) == sum(map(len, held.values()))
+    assert gmsnet.smooth(mesh).held["boundary"].tolist() == np.flatnonzero(outside).tolist()
+
+
+def test_beside_cells_that_are_held_or_of_the_first_order_facets_of_one_cell_alone_may_be_no_boundary():
+    first, _ = twins("tetra10")
+    mesh = second_order_volume(first)
+    nodes = mesh.cells[0].nodes
+    straight = CellBlock("tetra", nodes[:9, :4], np.zeros(9, dtype=int))
+    mixed = Mesh(mesh.points, (CellBlock("tetra10", nodes[9:], np.zeros(len(nodes) - 9, dtype=int)), straight))
+    between = np.setdiff1d(np.intersect1d(nodes[9:], nodes[:9]), nodes[:, :4])
+    assert len(between)
+    assert not np.isin(between, gmsnet.smooth(mixed).held.get("boundary", [])).any()

@@ -19,7 +19,8 @@ from gmsnet.topology.volume import MOST, Volume
 BOUNDARY, INTERFACE, CHOSEN = "boundary", "interface between regions", "fixed by the user"
 NO_SIDE, UNWOUND = "part of zero volume, which has no positive side", "part that cannot be wound consistently"
 CURVED = "node of a second-order cell"
-MARKED, OTHER, UNUSED = "node of a line or vertex cell", "node of a cell that is not smoothed", "not used by any cell"
+MARKED, FACE = "node of a line or vertex cell", "node of a face cell"
+OTHER, UNUSED = "node of a cell that is not smoothed", "not used by any cell"
 
 
 def counts(topology):
@@ -148,7 +149,7 @@ def test_marker_triangles_and_lines_hold_their_nodes_and_tell_nothing_else():
     assert (
         set(topology.free) == {26, 37, 38, 41, 42} == set(Volume.of(volumes.mesh_of(points, cells)).free) - set(inner)
     )
-    assert counts(topology) == {BOUNDARY: 56, MARKED: 3}
+    assert counts(topology) == {BOUNDARY: 56, MARKED: 2, FACE: 1}
     vertex = volumes.mesh_of(points, cells, more=[("vertex", [[41]], 7)])
     assert counts(Volume.of(vertex)) == {BOUNDARY: 56, MARKED: 1}
 

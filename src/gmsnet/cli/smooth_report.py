@@ -10,7 +10,7 @@ from gmsnet.cli import output
 from gmsnet.cli import report as tables
 from gmsnet.cli.destination import shown
 from gmsnet.mesh.display import amount
-from gmsnet.mesh.mesh import counts
+from gmsnet.mesh.mesh import counts, has_second_order
 from gmsnet.run.account import Account
 from gmsnet.topology.held import ON_BOUNDARY
 
@@ -53,7 +53,8 @@ class Outcome(Account):
         if result.held and self.free:
             held = len(self.mesh.points) - self.free
             console.print(f"held: {held:,} of {amount(len(self.mesh.points), 'node')} ({self.reasons()})")
-            if len(result.held.get(ON_BOUNDARY, ())) > self.free and not any("slide:" in note for note in result.notes):
+            may_slide = not has_second_order(self.mesh) and not any("slide:" in note for note in result.notes)
+            if may_slide and len(result.held.get(ON_BOUNDARY, ())) > self.free:
                 console.print("most nodes are at the boundary and stay there: --slide all lets them move along it")
         if self.written is None:
             console.print(f"left as it is: {self.input}")

@@ -28,7 +28,7 @@ from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.state import Final, State, with_corners
 from gmsnet.run.stop import NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.run.untangle_stage import still_inverted
-from gmsnet.topology.held import OF_SECOND_ORDER
+from gmsnet.topology.held import OF_FACE, OF_LINE, OF_SECOND_ORDER, ON_BOUNDARY
 from gmsnet.topology.ordering import near_points
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
@@ -120,15 +120,27 @@ def bound_note(compared: Compared | None, asked: float | None) -> list[str]:
 
 
 def _held(state: State) -> dict[str, NDArray[np.int64]]:
-    """Reason → ids; nodes of second-order cells that could move in their stages are not among them."""
+    """Reason → ids; nodes of second-order cells that could move in their stages are not among them.
+
+    Nodes of their boundary are told as such, whatever faces and lines the file has there.
+    """
     held, given = dict(state.topology.held), state.second_order
-    if given is not None and OF_SECOND_ORDER in held:
+    if given is None:
+        return held
+    if OF_SECOND_ORDER in held:
         still = held.pop(OF_SECOND_ORDER)
         still = still[~given.free[still]]
         if len(still):
             held[OF_SECOND_ORDER] = still
         on_purpose = given.protection.topology.held
         held |= {reason: on_purpose[reason] for reason in (LAYER, WALL) if reason in on_purpose}
+    for reason in (OF_LINE, OF_FACE, OF_SECOND_ORDER):
+        outside = np.isin(held.get(reason, given.outer[:0]), given.outer)
+        if outside.any():
+            ids = held.pop(reason)
+            held[ON_BOUNDARY] = np.union1d(held.get(ON_BOUNDARY, given.outer[:0]), ids[outside])
+            if not outside.all():
+                held[reason] = ids[~outside]
     return held
 
 

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.protection import protected_volume
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import SecondOrder
-from gmsnet.topology.curved_solids import CORNERS3, at_odds, has_curved, of_positive_sense, on_rim, straight, table_of
+from gmsnet.topology.curved_solids import (
+    CORNERS3,
+    CURVED,
+    at_odds,
+    has_curved,
+    of_positive_sense,
+    on_rim,
+    straight,
+    table_of,
+)
 from gmsnet.topology.held import OF_SECOND_ORDER
 from gmsnet.topology.mixed_volume import volume_of, wound_of
 from gmsnet.topology.ordering import space_points, taken
@@ -29,7 +39,8 @@ def second_order_solids_of(mesh: Mesh, topology: Volume, options: SmoothOptions)
     regions = np.concatenate([block.regions for block in mesh.cells])[number]
     may = np.zeros(nodes, dtype=bool)
     may[topology.held.get(OF_SECOND_ORDER, np.empty(0, dtype=np.int64))] = True
-    may &= ~(others | on_rim(table, kinds, regions, nodes) | at_odds(table, kinds, nodes))
+    rim = on_rim(table, kinds, regions, nodes)
+    may &= ~(others | rim | at_odds(table, kinds, nodes))
     first = np.zeros(nodes, dtype=bool)
     first[topology.free] = True
     twin = straight(mesh)
@@ -45,4 +56,19 @@ def second_order_solids_of(mesh: Mesh, topology: Volume, options: SmoothOptions)
     may &= corner | ~at_corners
     corners, near = whole.holding(first, FIRST_ORDER), taken(space_points(mesh), whole.memory)
     protection = protected_volume(corners, options.preserved, options.fix_layers, near, firm=False)
-    return SecondOrder(table, kinds, may, whole, protection, number)
+    outer = _outer(mesh, rim if (regions == regions[0]).all() else on_rim(table, kinds, 0 * regions, nodes))
+    return SecondOrder(table, kinds, may, whole, protection, number, outer=outer)
+
+
+def _outer(mesh: Mesh, rim: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """The nodes of the boundary, without those of cells that are held; none where first-order cells are beside others.
+
+    rim: (N,) which nodes are of facets of one cell alone, of those that move.
+    """
+    outer = rim.copy()
+    for block in mesh.cells:
+        if block.dimension in (3, None) and block.kind not in CURVED and len(block.nodes):
+            if block.dimension is None or block.cell.order == 1:
+                return np.empty(0, dtype=np.int64)
+            outer[block.nodes] = False
+    return np.flatnonzero(outer)

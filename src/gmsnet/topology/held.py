@@ -17,6 +17,7 @@ from gmsnet.topology.polygons import Ints
 SMOOTHED = ("triangle", "quad")  # the cell types whose nodes may move
 SECOND_ORDER = ("triangle6", "quad8", "quad9")  # whose nodes move in a stage of their own (run/second_order.py)
 ON_BOUNDARY = "boundary"
+OF_LINE, OF_FACE = "node of a line or vertex cell", "node of a face cell"  # of faces in a mesh of volumes
 OF_SECOND_ORDER = "node of a second-order cell"
 MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would no longer fit any cache
 
@@ -24,7 +25,8 @@ REASONS = {  # mark → text, in the order in which they count
     marks_of.UNUSED: "not used by any cell",
     marks_of.BOUNDARY: ON_BOUNDARY,
     marks_of.INTERFACE: "interface between regions",
-    marks_of.LINE: "node of a line or vertex cell",
+    marks_of.LINE: OF_LINE,
+    marks_of.FACE: OF_FACE,
     marks_of.UNSUPPORTED_CELL: "node of a cell that is not smoothed",
     marks_of.NON_MANIFOLD: "non-manifold edge",
     marks_of.NON_ORIENTABLE: "part that cannot be wound consistently",
@@ -76,7 +78,7 @@ def _mark_of(mesh: Mesh, block: CellBlock) -> int:
 
 
 ON_CURVE = marks_of.BOUNDARY | marks_of.INTERFACE | marks_of.LINE  # what does not hold a node that slides
-AT_BOUNDARY = marks_of.BOUNDARY | marks_of.LINE  # the same in space, where interfaces stay
+AT_BOUNDARY = marks_of.BOUNDARY | marks_of.LINE | marks_of.FACE  # the same in space, where interfaces stay
 
 
 def released(

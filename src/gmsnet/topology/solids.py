@@ -23,7 +23,7 @@ from gmsnet.topology.fans import Marks
 from gmsnet.topology.ordering import memory_order, space_points
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.solid_winding import wound
-from gmsnet.topology.wound import mark_of, refuse_flat
+from gmsnet.topology.wound import OF_OTHER_CELLS, mark_of, refuse_flat
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -133,8 +133,7 @@ class WoundSolids:
             near = np.where(np.arange(8) < corners[:, None], near, near[:, :1])
             kernels.match_solids(near, kind, tables(), nodes, twin)
         kernels.mark_solids(near, kind, tables(), twin, region, _halved(near, kind, twin), *BITS, marks)
-        others = np.uint16(connectivity.LINE | connectivity.UNSUPPORTED_CELL | connectivity.SECOND_ORDER)
-        marks[~used & (marks & others == 0)] |= np.uint16(connectivity.UNUSED)
+        marks[~used & (marks & OF_OTHER_CELLS == 0)] |= np.uint16(connectivity.UNUSED)
         solids = Solids(near, kind, form_of("hexahedron"), form_of("wedge"))
         return cls(cell, cells, solids, corners, orientation, region, origin, twin, marks, memory, position)
 

@@ -24,6 +24,9 @@ Floats = NDArray[np.float64]
 
 SMOOTHED = ("tetra",)  # the kinds whose nodes may move
 BITS = connectivity.BOUNDARY, connectivity.INTERFACE, connectivity.NON_MANIFOLD
+OF_OTHER_CELLS = np.uint16(
+    connectivity.LINE | connectivity.FACE | connectivity.UNSUPPORTED_CELL | connectivity.SECOND_ORDER
+)
 BYTES_PER_CELL = 190  # that the set-up takes at most
 
 
@@ -62,8 +65,7 @@ class Wound:
         rows, region = place.take(origin, axis=0), region.take(origin) if len(region) else region
         marks = _known_marks(mesh, fixed, position)
         orientation = _wound(points[memory], rows, region, marks)
-        others = np.uint16(connectivity.LINE | connectivity.UNSUPPORTED_CELL | connectivity.SECOND_ORDER)
-        marks[~used & (marks & others == 0)] |= np.uint16(connectivity.UNUSED)
+        marks[~used & (marks & OF_OTHER_CELLS == 0)] |= np.uint16(connectivity.UNUSED)
         return cls(cell, cells, rows, orientation, region, origin, marks, memory, position)
 
     @cached_property
@@ -121,7 +123,7 @@ def _tetrahedra(mesh: Mesh) -> tuple[Ints, NDArray[np.int64], NDArray[np.int64]]
 def mark_of(block: CellBlock) -> int:
     """Why the nodes of cells of other kinds are held."""
     if block.dimension not in (3, None):
-        return connectivity.LINE
+        return connectivity.FACE if block.dimension == 2 else connectivity.LINE
     curved = has_form(block.kind) and block.cell.order > 1
     return connectivity.SECOND_ORDER if curved else connectivity.UNSUPPORTED_CELL
 

@@ -21,6 +21,7 @@ from gmsnet.kernels.topology.layout import corners_before, span
     BOUNDARY,
     INTERFACE,
     LINE,
+    FACE,
     UNSUPPORTED_CELL,
     NON_MANIFOLD,
     NON_ORIENTABLE,
@@ -30,7 +31,7 @@ from gmsnet.kernels.topology.layout import corners_before, span
     HIGH_VALENCE,
     SECOND_ORDER,
     MISMATCHED,
-) = (1 << k for k in range(13))
+) = (1 << k for k in range(14))
 
 WIDTH = 8  # neighbours: also of nodes with fewer, loops make so many rounds, so that processors foresee their end
 AHEAD = 256  # nodes whose corners are listed at a time
