@@ -36,12 +36,12 @@ CHOICES: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "size": (
         '`preserve="size"` holds layers, too, and weighs the areas of all cells of the mesh against their shapes, '
-        "without a bound.",
+        "without a bound. It is of meshes in a plane.",
         {"preserve": "size"},
     ),
     "metric": (
         '`preserve="metric"` takes the stretch and the sizes of the cells for a smooth field, and smooths all cells '
-        "towards it, layers too.",
+        "towards it, layers too. It is of meshes in a plane.",
         {"preserve": "metric"},
     ),
     "none": ('`preserve="none"` smooths all free nodes for shape alone.', {"preserve": "none"}),

@@ -166,7 +166,8 @@ def test_quality_of_a_file_with_inverted_cells(run, tmp_path):
         (["--slide", "hul"], "there is no marker 'hul' to slide on"),
         (["--target-angle", "10"], "this mesh has volumes: give target_dihedral"),
         (["--method", "getme"], "the variant sequential of getme moves cells in a plane alone"),
-        (["--preserve", "size"], "tetrahedra: choose auto"),
+        (["--preserve", "size"], "preserve='size' is of meshes in a plane, and this one is in space: leave it out"),
+        (["--preserve", "metric"], "preserve='metric' is of meshes in a plane"),
     ],
 )
 def test_what_cannot_be_asked_leaves_no_file(run, tmp_path, options, words):

@@ -161,6 +161,8 @@ def test_what_cannot_be_asked_of_surfaces_is_told():
         ({"method": "getme"}, "not for surfaces"),
         ({"method": "laplacian", "variant": "area"}, "not for surfaces"),
         ({"size": np.ones(100)}, "metric"),
+        ({"preserve": "size"}, "preserve='size' is of meshes in a plane"),
+        ({"preserve": "metric"}, "preserve='metric' is of meshes in a plane"),
         ({"best_by": "aspect"}, "best_by"),
     ):
         with pytest.raises(InputError, match=message):

@@ -104,7 +104,13 @@ def test_a_named_marker_can_be_held(cube, free):
     ("options", "message"),
     [
         ({"target_angle": 10}, "target_angle is of the angles of triangles and quads, .*: give target_dihedral"),
-        ({"preserve": "size"}, r"and this mesh has [\d,]+ tetrahedra: choose auto, "),
+        ({"preserve": "size"}, "preserve='size' is of meshes in a plane, .*: leave it out, or give 'shape' or 'none'"),
+        ({"preserve": "metric"}, "preserve='metric' is of meshes in a plane, .*: leave it out, or give 'shape'"),
+        ({"size": 1.0}, "cannot be smoothed towards a metric yet: leave out metric and size"),
+        (
+            {"method": "sized"},
+            r"sized moves cells in a plane alone, and this mesh has [\d,]+ tetrahedra: choose auto, ",
+        ),
         ({"method": "getme"}, "the variant sequential of getme moves .*: choose one of its variants simultaneous, or"),
         ({"method": "optimize", "objective": "cosine"}, "choose one of its objectives metric, q, q2, or another"),
         ({"method": "gmsnet"}, "gmsnet moves triangles alone"),

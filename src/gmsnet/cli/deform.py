@@ -62,7 +62,8 @@ def deform(
     preserve: Annotated[
         str,
         typer.Option(
-            help="shape: carry layers of stretched cells along with their walls; size: weigh areas, too; none.",
+            help="shape: carry layers of stretched cells along with their walls; none; in a plane also size: weigh "
+            "areas, too.",
             autocompletion=lambda: ["shape", "size", "none"],
         ),
     ] = "shape",

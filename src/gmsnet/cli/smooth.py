@@ -70,8 +70,8 @@ def smooth(
     preserve: Annotated[
         str,
         typer.Option(
-            help="shape: hold layers of stretched cells along walls; size: weigh areas of cells, too; metric: keep all "
-            "stretch and sizes as a smooth metric; none.",
+            help="shape: hold layers of stretched cells along walls; none; in a plane also size: weigh areas of cells, "
+            "too, or metric: keep all stretch and sizes as a smooth metric.",
             autocompletion=lambda: ["shape", "size", "metric", "none"],
         ),
     ] = "shape",

@@ -71,7 +71,8 @@ def smooth(
     dihedral angle of tetrahedra, in (0, 70.5] degrees; target_quality is of their η. fixed: nodes to hold besides
     boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. preserve: "shape" holds the
     nodes of stretched layers along walls, "size" besides weighs the areas of cells, without a bound, "none" neither;
-    "metric" holds nothing, and moves nodes towards a smooth metric that is recovered from the cells as they are.
+    "metric" holds nothing, and moves nodes towards a smooth metric that is recovered from the cells as they are;
+    "size" and "metric" are of meshes in a plane alone.
     fix_layers: hold all cells that are stretched alike, whatever ``preserve`` says. untangle: mend inverted cells
     first, where there are any. guard: what each sweep keeps besides validity: "valid" nothing (as the paper), "worst"
     that the worst 1/q of the cells with a free node never falls, "star" that the worst 1/q around any free node never

@@ -16,7 +16,7 @@ from gmsnet.constraints.sliding import Sliding, curves_to_slide_on
 from gmsnet.constraints.sliding_in_space import SurfaceSliding, patches_to_slide_on
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology.connectivity import CHOSEN
-from gmsnet.measure.report import ASPECT, QualityReport, measure
+from gmsnet.measure.report import ASPECT, SHAPE, QualityReport, measure
 from gmsnet.measure.target import Target
 from gmsnet.measure.totals import Totals, totals_of, totals_with_others
 from gmsnet.mesh.adapters import to_mesh
@@ -29,7 +29,7 @@ from gmsnet.methods.cells import check_cells, counts_of
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
-from gmsnet.preserve.protection import Protection, protected, protected_volume
+from gmsnet.preserve.protection import METRIC, NONE, SIZE, Protection, protected, protected_volume
 from gmsnet.run.metric_stage import check_given
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.second_order import second_order_of
@@ -216,10 +216,10 @@ def _first_of_volume(
 
 def check_options(mesh: Mesh, options: SmoothOptions, counts: Mapping[str, int] | None = None) -> None:
     """InputError for options that a mesh of these cells does not take. counts: kind → cells, where it is a part."""
-    check_cells(mesh, options.method_name, options.objective or options.variant, counts)
-    check_surface_options(mesh, options)
     if mesh.plane is None:
         check_in_space(options)
+    check_cells(mesh, options.method_name, options.objective or options.variant, counts)
+    check_surface_options(mesh, options)
 
 
 def check_surface_options(mesh: Mesh, options: SmoothOptions) -> None:
@@ -233,6 +233,11 @@ def check_surface_options(mesh: Mesh, options: SmoothOptions) -> None:
 
 def check_in_space(options: SmoothOptions) -> None:
     """InputError for what cannot be asked of volumes and surfaces yet."""
+    if options.preserve in (SIZE, METRIC):
+        raise InputError(
+            f"preserve={options.preserve!r} is of meshes in a plane, and this one is in space: "
+            f"leave it out, or give {SHAPE!r} or {NONE!r}"
+        )
     if options.adapts:
         raise InputError("meshes in space cannot be smoothed towards a metric yet: leave out metric and size")
     if options.best_by == ASPECT:
