@@ -185,6 +185,7 @@ What else these formats have:
   They are told by the keyword that follows.
 - Nastran: nodes in another coordinate system (CP), INCLUDE and superelements are refused. Nodes of loads, supports,
   rigid elements, springs, masses and unknown elements are held. Regions are properties.
+- VTK, VTU: polyhedra are read, with their nodes held, and stay in the file with their faces. No conversion holds them.
 - UGRID: the form is part of the name (`.b8.ugrid`, `.lb8.ugrid`, `.r8.ugrid`, …; `.ugrid` is text).
 
 ## Smoothing: the same file with other coordinates

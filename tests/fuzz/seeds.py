@@ -43,7 +43,7 @@ import test_vtu
 import test_xdmf
 from support import binary_meshes, decomposed, gmsh_split, gmsh_variants, pieces
 from support.damage import triangle_grid
-from support.vtk_variants import grid_of, legacy_variants, mixed_mesh, polydata_of, vtu_variants
+from support.vtk_variants import grid_of, legacy_variants, mixed_mesh, polydata_of, polyhedral_grid, vtu_variants
 from test_su2_volumes import VOLUMES
 
 SU2 = b"""% made up
@@ -202,10 +202,12 @@ def seeds() -> Iterator[tuple[str, bytes]]:
         for single in (False, True):
             for grid in (grid_of(mixed_mesh(1), single), polydata_of(mixed_mesh(1), single)):
                 yield from (("vtk", data) for _, data in legacy_variants(grid, Path(folder)))
+        yield from (("vtk", data) for _, data in legacy_variants(polyhedral_grid()[0], Path(folder)))
     yield "vtu", test_vtu.PLAIN.encode()
     yield "vtu", test_vtu.PLAIN.replace("<Piece", ENTITIES + "<Piece").replace("Float64", "Float32").encode()
     for single in (False, True):
         yield from (("vtu", data) for _, data in vtu_variants(grid_of(mixed_mesh(1), single)))
+    yield from (("vtu", data) for _, data in vtu_variants(polyhedral_grid()[0]))
     yield from (("abaqus", data) for data in (test_abaqus.PLAIN, test_abaqus.PARTS, ABAQUS))
     yield from (("nastran", data) for data in (test_nastran.PLAIN, NASTRAN))
     yield "ugrid", test_ugrid.PLAIN

@@ -22,7 +22,7 @@ from support.contracts import (
     refused,
 )
 from support.damage import ENDS, GAPS, NUMBERS, cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
-from support.vtk_variants import grid_of, legacy_variants, mixed_mesh, points_by_vtk, polydata_of
+from support.vtk_variants import grid_of, legacy_variants, mixed_mesh, points_by_vtk, polydata_of, polyhedral_grid
 
 from gmsnet.errors import FormatError
 from gmsnet.io import vtk as vtk_format
@@ -149,6 +149,53 @@ def test_kinds_of_cells() -> None:
     assert cells_of(parsed, "polygon") == [[0, 1, 2, 3, 0]]
     assert cells_of(parsed, "vertex") == [[3], [2], [1]]
     assert [a.tolist() for a in parsed.cell_data["id"]] == [[1, 2, 2], [3], [4], [5], [6], [7, 7, 7]]
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_polyhedra_are_cells_of_all_their_nodes(single: bool, tmp_path: Path) -> None:
+    grid, mesh = polyhedral_grid(single)
+    for how, data in legacy_variants(grid, tmp_path):
+        parsed = read(vtk_format, data)
+        found = [(block.kind, sorted(map(sorted, block.nodes.tolist()))) for block in parsed.cells]
+        assert found == [(b.kind, sorted(map(sorted, b.nodes.tolist()))) for b in mesh.cells], how
+        out = check_splice(vtk_format, data)
+        points, again = points_by_vtk(vtk.vtkUnstructuredGridReader(), out, tmp_path / "out.vtk")
+        assert np.array_equal(points, moved_points(parsed).astype(points.dtype)), how
+        assert [again.GetCell(k).GetNumberOfFaces() for k in (0, 11)] == [10, 10], how
+    with pytest.raises(FormatError, match="VTK cannot be written with polyhedra"):
+        vtk_format.write(mesh_of(parsed))
+
+
+def test_a_polyhedron_between_other_cells_is_as_it_is_listed() -> None:
+    faces = "4 3 0 3 1 3 3 0 2 3 0 1 2 3 1 3 2"
+    parsed = read(vtk_format, mesh_with(f"CELLS 3 26\n3 0 1 2\n17 {faces}\n3 0 2 3\nCELL_TYPES 3\n5 42 5\n"))
+    assert cells_of(parsed, "polyhedron") == [[0, 3, 1, 2]]
+    assert cells_of(parsed, "triangle") == [[0, 1, 2], [0, 2, 3]]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "match"),
+    [
+        ("", "cell 0 .* is a polyhedron without faces"),
+        ("0", "line 8: a polyhedron of 0 faces in a list of 1 numbers"),
+        ("-1 3 0 1 2", "line 8: a polyhedron of -1 faces in a list of 5 numbers"),
+        ("99999999999 3 0 1 2", "line 8: a polyhedron of 99999999999 faces"),
+        ("2 3 0 1 2", "line 8: a polyhedron of 2 faces does not fill its list of 5 numbers"),
+        ("1 3 0 1 2 3", "line 8: a polyhedron of 1 face does not fill"),
+        ("2 3 0 1 2 3 0 1", "line 8: a polyhedron of 2 faces does not fill"),
+        ("2 3 0 1 2 -3 0 1 2", "line 8: a polyhedron of 2 faces does not fill"),
+        ("2 3 0 1 2 3 0 1 9", "line 8: a cell names the node 9"),
+        ("2 3 0 1 -2 3 0 1 2", "line 8: a cell names the node -2"),
+        ("2 3 0 1 2 3 0 1 2", "cell 0 .* has only 3 nodes"),
+    ],
+)
+def test_faces_that_do_not_fill_a_polyhedron_are_refused(numbers: str, match: str) -> None:
+    count = len(numbers.split())
+    whole = "17 4 3 0 3 1 3 3 0 2 3 0 1 2 3 1 3 2"
+    cells = f"CELLS 3 {count + 23}\n{count} {numbers}\n3 0 1 2\n{whole}\nCELL_TYPES 3\n42 5 42\n"
+    refused(vtk_format, mesh_with(cells), match)
+    behind = f"CELLS 2 {count + 5}\n{count} {numbers}\n3 0 1 4\nCELL_TYPES 2\n42 5\n"
+    refused(vtk_format, mesh_with(behind), "|".join([match, "line 9: a cell names the node 4"]))
 
 
 def test_types_that_alternate_make_few_blocks() -> None:

@@ -25,7 +25,7 @@ from support.contracts import (
     refused,
 )
 from support.damage import cells_of, damaged, facts, read_or_refuse, regions_of, triangle_grid
-from support.vtk_variants import grid_of, mixed_mesh, points_by_vtk, vtu_variants
+from support.vtk_variants import grid_of, mixed_mesh, points_by_vtk, polyhedral_grid, vtu_variants
 
 from gmsnet.errors import FormatError, MissingExtraError
 from gmsnet.io import gmsh, ply, stl, vtu
@@ -104,6 +104,39 @@ def test_vtk_reads_moved_points_back(single: bool, tmp_path: Path) -> None:
                 assert np.array_equal(np.array(was), np.array(now)), how
 
 
+@pytest.mark.parametrize("single", [False, True])
+def test_polyhedra_are_cells_of_all_their_nodes(single: bool, tmp_path: Path) -> None:
+    grid, mesh = polyhedral_grid(single)
+    for how, data in vtu_variants(grid):
+        assert b"face" in data
+        parsed = read(vtu, data)
+        found = [(block.kind, sorted(map(sorted, block.nodes.tolist()))) for block in parsed.cells]
+        assert found == [(b.kind, sorted(map(sorted, b.nodes.tolist()))) for b in mesh.cells], how
+        out = check_splice(vtu, data)
+        points, again = points_by_vtk(vtk.vtkXMLUnstructuredGridReader(), out, tmp_path / "out.vtu")
+        assert np.array_equal(points, moved_points(parsed).astype(points.dtype)), how
+        assert [again.GetCell(k).GetNumberOfFaces() for k in (0, 11)] == [10, 10], how
+    with pytest.raises(FormatError, match="VTU cannot be written with polyhedra"):
+        vtu.write(mesh)
+
+
+def test_faces_in_the_older_arrays_stay_as_they_are(tmp_path: Path) -> None:
+    """Until VTK 9.4: the faces of all polyhedra in one array, and where each ends, -1 for other cells."""
+    faces = "4 3 0 1 2 3 0 1 3 3 0 2 3 3 1 2 3"
+    old = (
+        f'<DataArray type="Int64" Name="faces" format="ascii">{faces}</DataArray>\n'
+        '<DataArray type="Int64" Name="faceoffsets" format="ascii">-1 17</DataArray>'
+    )
+    text = PLAIN.replace("<!-- 7 7 7 --> 0 1 0", "0 1 1").replace("0 2 3<", "0 1 2 3<")
+    data = text.replace("3 6<", "3 7<").replace("5 5<", "5 42<").replace("</Cells>", f"{old}</Cells>").encode()
+    parsed = read(vtu, data)
+    assert cells_of(parsed, "polyhedron") == [[0, 1, 2, 3]]
+    out = check_splice(vtu, data)
+    assert out[out.index(b"<Cells>") :] == data[data.index(b"<Cells>") :]
+    _, grid = points_by_vtk(vtk.vtkXMLUnstructuredGridReader(), out, tmp_path / "out.vtu")
+    assert grid.GetCell(1).GetNumberOfFaces() == 4
+
+
 def test_only_the_points_and_the_offsets_behind_them_change() -> None:
     for how, data in variants().items():
         if "binary" in how or "raw, " in how or "base64" in how:
@@ -138,7 +171,7 @@ def test_a_file_cut_anywhere_is_refused(single: bool) -> None:
         ('Points="4"', 'Points="-4"', "no NumberOfPoints, or one that is no count: '-4'"),
         ('Cells="2"', 'Cells="3"', "expected 1 more number"),
         ('Cells="2"', 'Cells="0"', "more than the expected 0 numbers"),
-        ("5 5", "5 42", "polyhedra are not supported"),
+        ("5 5", "5 42", "cell 1 .* has only 3 nodes"),
         ("5 5", "5 9", "cell 1 .* is a quad with 3 nodes instead of 4"),
         ("3 6", "6 3", "the array 'offsets': the offsets do not rise"),
         ("3 6", "3 7", "expected 1 more number"),

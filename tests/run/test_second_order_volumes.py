@@ -7,7 +7,6 @@ import pytest
 
 import gmsnet
 from gmsnet.cells.table import CELLS
-from gmsnet.errors import InputError
 from gmsnet.generate import ball_volume, block_volume, disturb, lattice_volume, o_grid_section, swept_volume
 from gmsnet.generate.curved_volumes import on_sphere, second_order_volume
 from gmsnet.measure.report import connectivity_of
@@ -263,14 +262,6 @@ def test_threads_make_the_same_bits():
     _, mesh = twins("hexahedron27", bend=0.1)
     one, two = gmsnet.smooth(mesh, threads=1), gmsnet.smooth(mesh, threads=2)
     np.testing.assert_array_equal(one.points, two.points)
-
-
-def test_kinds_without_a_known_determinant_are_refused():
-    mesh = Mesh(
-        np.random.default_rng(1).random((13, 3)), (CellBlock("pyramid13", np.arange(13)[None], np.zeros(1, dtype=int)),)
-    )
-    with pytest.raises(InputError, match="second order without pyramids"):
-        gmsnet.smooth(mesh)
 
 
 @pytest.mark.parametrize("kind", BASES)

@@ -123,11 +123,16 @@ def test_what_cannot_be_asked_is_refused(cube, options, message):
         gmsnet.smooth(cube, **options)
 
 
-@pytest.mark.parametrize(("kind", "nodes"), [("pyramid13", 13), ("pyramid14", 14)])
-def test_volumes_of_other_kinds_alone_are_refused(cube, kind, nodes):
-    mesh = gmsnet.Mesh(cube.points, (volumes.block(kind, [range(nodes)]),))
-    with pytest.raises(InputError, match=f"mesh of {kind} cells: of volumes, only tetrahedra, hexahedra, wedges"):
-        gmsnet.smooth(mesh)
+@pytest.mark.parametrize(("kind", "nodes"), [("pyramid13", 13), ("pyramid14", 14), ("polyhedron", 9)])
+def test_volumes_of_other_kinds_alone_stay_and_are_told(cube, kind, nodes):
+    mesh = gmsnet.Mesh(cube.points, (volumes.block(kind, [np.arange(nodes) * 29]),))
+    for options in ({}, {"slide": True}, {"method": "getme"}, {"fixed": [0]}):
+        result = gmsnet.smooth(mesh, **options)
+        assert result.stop_reason == stop.NOTHING_TO_MOVE
+        assert not result.moved.any()
+        assert f"not measured, and their nodes are held: 1 {kind} cell" in result.notes
+    with pytest.raises(InputError, match=f"a target is asked of cells .*, and this mesh has none: 1 {kind} cell"):
+        gmsnet.smooth(mesh, target_quality=0.3)
 
 
 def test_cells_of_other_kinds_are_carried_through_and_told(cube, free):

@@ -12,9 +12,11 @@ import vtk
 from numpy.typing import NDArray
 from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 
+from gmsnet.cells.table import CELLS
 from gmsnet.io import vtk_cells
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from support.blocks import lattice
 
 
 def mixed_mesh(n: int = 3, seed: int = 1) -> Mesh:
@@ -58,6 +60,27 @@ def grid_of(mesh: Mesh, single: bool = False) -> Any:
             grid.InsertNextCell(vtk_cells.CODES[block.kind], len(nodes), nodes)
     _add_fields(grid, mesh)
     return grid
+
+
+def polyhedral_grid(single: bool = False) -> tuple[Any, Mesh]:
+    """A block of 4 x 3 x 3 cubes, of which two pairs are one polyhedron each, as VTK's grid, and as a Mesh."""
+    points, cubes, _ = lattice(4, 3, 3)
+    pairs, rest = {k: [cubes[k], cubes[k + 9]] for k in (4, 18)}, np.delete(cubes, [4, 13, 18, 27], axis=0)
+    grid = grid_of(Mesh(points, ()), single)
+    blocks = list[CellBlock]()
+    for k, (one, other) in pairs.items():
+        sides = [cube[list(facet)] for cube in (one, other) for facet in CELLS["hexahedron"].facets]
+        sides = [side for side in sides if not set(side.tolist()) <= {*one.tolist()} & {*other.tolist()}]
+        stream = vtk.vtkIdList()
+        for number in [len(sides), *(n for side in sides for n in [len(side), *side.tolist()])]:
+            stream.InsertNextId(number)
+        grid.InsertNextCell(vtk.VTK_POLYHEDRON, stream)
+        blocks.append(CellBlock("polyhedron", np.unique([one, other])[None], np.zeros(1, dtype=int)))
+        cells = rest[:10] if k == 4 else rest[10:]
+        for cube in cells.tolist():
+            grid.InsertNextCell(vtk.VTK_HEXAHEDRON, 8, cube)
+        blocks.append(CellBlock("hexahedron", cells, np.zeros(len(cells), dtype=int)))
+    return grid, Mesh(points, tuple(blocks))
 
 
 def polydata_of(mesh: Mesh, single: bool = False) -> Any:

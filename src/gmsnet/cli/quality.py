@@ -62,9 +62,10 @@ def quality(
         found, others = measure(mesh), unmeasured(mesh)
     except InputError as error:
         raise InputError(f"{shown(input)}: {error}") from error
+    wanted = "volumes that can be measured" if mesh.has_volumes else "triangles or quads"
     if threshold is not None and others and not len(found.cell):
         raise InputError(
-            f"{shown(input)}: a threshold is asked of triangles and quads, and this mesh has none: "
+            f"{shown(input)}: a threshold is asked of {wanted}, and this mesh has none: "
             f"{others} cannot be measured so far"
         )
     worst = worst_cells(mesh, found)
@@ -93,8 +94,8 @@ def quality(
             console.print("\nworst cells (numbers from 0)")
             console.print(tables.worst_table(worst))
         else:
-            console.print("there are no triangles or quads to measure")
-        if others and len(found.cell):
+            console.print(f"there are no {wanted}{'' if mesh.has_volumes else ' to measure'}")
+        if others:
             console.print(f"not measured: {others}")
         for remark in found.remarks:
             console.print(remark)

@@ -50,6 +50,10 @@ def in_space(mesh: Mesh) -> NDArray[np.float64]:
 def check_kinds(mesh: Mesh, title: str, kinds: Collection[str]) -> None:
     """Raises FormatError where the mesh has cells whose type is not among ``kinds``."""
     for block in mesh.cells:
+        if block.kind == "polyhedron" and len(block.nodes):
+            raise FormatError(
+                f"{title} cannot be written with polyhedra: only the format of the input keeps their faces"
+            )
         if block.kind not in kinds and len(block.nodes):
             raise FormatError(f"{title} cannot hold cells of type {block.kind!r}: write another format, such as .vtu")
 

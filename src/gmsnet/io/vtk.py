@@ -23,11 +23,12 @@ from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Addresses, Lattice, Places, lists, pick
 from gmsnet.io.ranges import Plan
 from gmsnet.io.rows import Ranges
+from gmsnet.io.vtk_faces import nodes_once
 from gmsnet.io.vtk_fields import attribute, field_arrays, keyword
 from gmsnet.io.vtk_stream import OWN_TYPES, Array, Line, Stream, opened, word_of
 from gmsnet.kernels.text import text as kernels
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX
+from gmsnet.mesh.vtk_types import POLYGON, POLYHEDRON, POLYLINE, POLYVERTEX
 
 name = "VTK"
 suffixes: tuple[str, ...] = (".vtk",)
@@ -159,12 +160,20 @@ def _assemble(stream: Stream, found: Contents, polygonal: bool) -> Parsed:
             announced, line = found.counts[key]
             stream.fail(line.start, f"{key} has {announced} rows instead of {expected}")
 
-    def blame(index: int, message: str) -> NoReturn:
+    def blame_number(index: int, message: str) -> NoReturn:
         for part in parts.values():
             if index < len(part.nodes):
                 part.array.fail(int(part.at[index]), message)
             index -= len(part.nodes)
         raise FormatError(message)
+
+    blame, polyhedra = blame_number, codes == POLYHEDRON
+    if polyhedra.any():
+        sizes, kept = nodes_once(polyhedra, sizes, nodes, len(points), blame_number)
+        nodes = nodes[kept]
+
+        def blame(index: int, message: str) -> NoReturn:
+            blame_number(int(kept[index]), message)
 
     return vtk_cells.parsed(
         points,

@@ -22,9 +22,10 @@ from gmsnet.mesh.vtk_types import POLYGON, POLYHEDRON, POLYLINE, POLYVERTEX, STR
 
 Fields = Sequence[tuple[str, NDArray[Any]]]  # name and values, in the order of the file
 
-UNSUPPORTED = {STRIP: "triangle strips", POLYHEDRON: "polyhedra"}  # the others have no name that users know
+UNSUPPORTED = {STRIP: "triangle strips"}  # the others have no name that users know
 KINDS = {code: Kind(kind, VTK_ORDERS.get(code)) for code, kind in VTK_KINDS.items() if code not in UNSUPPORTED}
-CODES = {kind.name: code for code, kind in KINDS.items() if kind.order is None and code not in (POLYVERTEX, POLYLINE)}
+UNWRITTEN = (POLYVERTEX, POLYLINE, POLYHEDRON)  # nothing is known of a polyhedron but its nodes
+CODES = {kind.name: code for code, kind in KINDS.items() if kind.order is None and code not in UNWRITTEN}
 
 _TOGETHER = 1 << 16  # cells that are written at once
 _WIDTH = 12  # integers in a line
@@ -42,7 +43,8 @@ def parsed(
     fail: Callable[[int, str], NoReturn],
     unread: Sequence[str],
 ) -> Parsed:
-    """The facts of a VTK file. codes: (n,) VTK's types; sizes: (n,) numbers of nodes; nodes: of all cells in turn.
+    """The facts of a VTK file. codes: (n,) VTK's types; sizes: (n,) numbers of nodes; nodes: of all cells in turn,
+    those of a polyhedron once each.
 
     Raises FormatError where there are no cells, for a type that is not supported and, through
     ``fail(index into nodes, message)``, for a node that does not exist.
@@ -58,7 +60,7 @@ def parsed(
     check_range(nodes, len(points), fail)
     small = codes.astype(np.int8)
     least = np.ones(128, dtype=np.int8)
-    least[POLYLINE], least[POLYGON] = 2, 3
+    least[POLYLINE], least[POLYGON], least[POLYHEDRON] = 2, 3, 4
     if (short := np.flatnonzero(sizes < least[small])).size:
         raise FormatError(f"cell {short[0]} (counted from 0) has only {sizes[short[0]]} nodes")
     regions = regions_of(cell_fields, len(small))

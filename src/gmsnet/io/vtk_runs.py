@@ -17,11 +17,11 @@ from gmsnet.io.ranges import Table
 from gmsnet.io.rows import Listed, Ranges
 from gmsnet.io.vtk_ghosts import BITS
 from gmsnet.mesh.region_fields import NUMBERED, names_a_region
-from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX
+from gmsnet.mesh.vtk_types import POLYGON, POLYHEDRON, POLYLINE, POLYVERTEX
 
 Some = Callable[[int, int], NDArray[Any]]
 
-CODES = {*vtk_cells.KINDS} - {POLYGON, POLYLINE, POLYVERTEX}  # types of a certain number of nodes
+CODES = {*vtk_cells.KINDS} - {POLYGON, POLYHEDRON, POLYLINE, POLYVERTEX}  # types of a certain number of nodes
 SIZES = np.array([nodes_of(vtk_cells.KINDS[code].name) if code in CODES else 0 for code in range(max(CODES) + 1)])
 AT_ONCE = 1 << 18  # cells that are looked at together
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.cells.jacobian import has_form
 from gmsnet.constraints.options import FEATURE_ANGLE, check_slide
 from gmsnet.constraints.sliding import Sliding, curves_to_slide_on
 from gmsnet.constraints.sliding_in_space import SurfaceSliding, patches_to_slide_on
@@ -275,12 +274,6 @@ def check_mesh(mesh: Mesh, target: Target) -> None:
             f"a target is asked of triangles and quads, and this mesh has none: {others} cannot be measured so far"
         )
     if mesh.has_volumes:
-        if not any(has_form(block.kind) and len(block.nodes) for block in mesh.cells):
-            kinds = sorted({block.kind for block in mesh.cells if block.dimension == 3 and len(block.nodes)})
-            raise InputError(
-                f"this is a mesh of {', '.join(kinds)} cells: of volumes, only tetrahedra, hexahedra, wedges and "
-                "pyramids move so far, those of second order without pyramids"
-            )
         refuse_flat(mesh)
         return
     if mesh.plane is None and (unknown := unknown_cells(mesh)):
