@@ -12,6 +12,7 @@ from support.contracts import check_splice, read, refused
 from support.damage import cells_of, damaged, read_or_refuse, regions_of
 
 import gmsnet
+from gmsnet.errors import InputError
 from gmsnet.io import fluent
 
 # Two triangles and a quadrilateral; the cells of the second zone are the third.
@@ -186,6 +187,22 @@ def test_errors() -> None:
     refused(fluent, PLAIN.replace(b"5 6 3 0\n", b"5 2 3 0\n"), "the faces of cell 3 do not run around it")
     refused(fluent, PLAIN.replace(b"2.0 1.0))", b"2.0))"), "line 6: 11 coordinates do not fit the nodes 1 to 6")
     refused(fluent, PLAIN[:300], "is the file cut off|is the file damaged")
+
+
+@pytest.mark.parametrize("binary", [True, False])
+@pytest.mark.parametrize("kind", ["triangle", "tetra"])
+def test_the_form_of_meshio_is_named(kind: str, binary: bool, tmp_path: Path) -> None:
+    """What meshio makes of the suffix, where it is not told the format."""
+    meshio = pytest.importorskip("meshio")
+    size, dimension = (3, 2) if kind == "triangle" else (4, 3)
+    points = np.random.default_rng(1).random((600, dimension))
+    mesh = meshio.Mesh(points, [(kind, np.arange(600).reshape(-1, size))])
+    meshio.write(tmp_path / "a.msh", mesh, **({} if binary else {"file_format": "ansys", "binary": False}))
+    with pytest.raises(InputError, match=r'a.msh: meshio wrote this file in a form of its own, .*"gmsh22", or as .vtu'):
+        gmsnet.read(tmp_path / "a.msh")
+    meshio.write(tmp_path / "b.msh", mesh, file_format="gmsh22")
+    assert len(gmsnet.read(tmp_path / "b.msh").points) == 600
+    assert read(fluent, b'(1 "meshio 9.9")' + PLAIN).points.shape == (6, 2)
 
 
 @given(data=damaged(PLAIN))

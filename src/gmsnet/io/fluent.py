@@ -6,6 +6,7 @@ zones of faces on the boundary are markers. Source: the mesh file format in the 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -29,10 +30,17 @@ suffixes: tuple[str, ...] = (".msh",)
 
 Ints = NDArray[np.int64]
 
+_BY_MESHIO, _A_FACE_SECTION = re.compile(rb'\s*\(1 "meshio '), re.compile(rb"\((20|30)?13\s*\(")
+
 
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
     data = files[".msh"]
+    if _BY_MESHIO.match(data) and _A_FACE_SECTION.search(data) is None:
+        raise FormatError(
+            "meshio wrote this file in a form of its own, with the nodes of cells where Fluent's format has faces: "
+            'write it with file_format="gmsh22", or as .vtu'
+        )
     found = list(sections(data))
     dimension = next((k.head[0] for k in found if k.key == 2 and k.head), 3)
     if dimension not in (2, 3):
