@@ -62,7 +62,7 @@ def quality(
         found, others = measure(mesh), unmeasured(mesh)
     except InputError as error:
         raise InputError(f"{shown(input)}: {error}") from error
-    wanted = "volumes that can be measured" if mesh.has_volumes else "triangles or quads"
+    wanted = "volumes that can be measured" if mesh.has_volumes else "triangles and quads"
     if threshold is not None and others and not len(found.cell):
         raise InputError(
             f"{shown(input)}: a threshold is asked of {wanted}, and this mesh has none: "
@@ -94,7 +94,7 @@ def quality(
             console.print("\nworst cells (numbers from 0)")
             console.print(tables.worst_table(worst))
         else:
-            console.print(f"there are no {wanted}{'' if mesh.has_volumes else ' to measure'}")
+            console.print(f"there are no {wanted if mesh.has_volumes else 'triangles or quads to measure'}")
         if others:
             console.print(f"not measured: {others}")
         for remark in found.remarks:
