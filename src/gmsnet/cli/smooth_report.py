@@ -10,7 +10,7 @@ from gmsnet.cli import output
 from gmsnet.cli import report as tables
 from gmsnet.cli.destination import shown
 from gmsnet.mesh.display import amount
-from gmsnet.mesh.mesh import counts, has_second_order
+from gmsnet.mesh.mesh import Mesh, counts
 from gmsnet.run.account import Account
 from gmsnet.topology.held import ON_BOUNDARY
 
@@ -53,7 +53,7 @@ class Outcome(Account):
         if result.held and self.free:
             held = len(self.mesh.points) - self.free
             console.print(f"held: {held:,} of {amount(len(self.mesh.points), 'node')} ({self.reasons()})")
-            may_slide = not has_second_order(self.mesh) and not any("slide:" in note for note in result.notes)
+            may_slide = not _has_second_order(self.mesh) and not any("slide:" in note for note in result.notes)
             if may_slide and len(result.held.get(ON_BOUNDARY, ())) > self.free:
                 console.print("most nodes are at the boundary and stay there: --slide all lets them move along it")
         if self.written is None:
@@ -95,3 +95,8 @@ class Outcome(Account):
         """The whole outcome as plain values."""
         files = {"input": self.input, "output": self.written, "plot": self.plot, "report": self.report}
         return {**files, **super().document(), "lost": self.lost}
+
+
+def _has_second_order(mesh: Mesh) -> bool:
+    """Are some faces or volumes of second order? The nodes of their boundaries do not slide."""
+    return any((block.dimension or 0) > 1 and block.cell.order > 1 and len(block.nodes) for block in mesh.cells)

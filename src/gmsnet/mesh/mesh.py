@@ -285,11 +285,6 @@ def measured(mesh: Mesh, block: CellBlock) -> bool:
     return block.triangular or (block.dimension == 2 and block.corners == 4)
 
 
-def has_second_order(mesh: Mesh) -> bool:
-    """Are some faces or volumes of second order? The nodes of their boundaries do not slide."""
-    return any((block.dimension or 0) > 1 and block.cell.order > 1 and len(block.nodes) for block in mesh.cells)
-
-
 def unknown_cells(mesh: Mesh) -> str:
     """How many cells are of a kind that is not known, in words: their nodes are held. "" if there are none."""
     return _counted(block for block in mesh.cells if block.dimension is None)
