@@ -21,6 +21,7 @@ pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 from distributed.test_file_ranges import SIZE, assert_read_alike, heard, mixed
 from support.comm import together
 from support.foam import FORMS, Lists, cells_of_mesh, in_binary, in_text, layer, poly_mesh, zones_in_binary
+from support.foam_processors import save as save_below
 
 SIDES = ("low", "high", "rest")
 
@@ -52,11 +53,7 @@ def _merged(cells: list[list[list[int]]], pairs: int) -> list[list[list[int]]]:
 
 
 def save(files: dict[str, bytes], case: Path) -> Path:
-    folder = case / "constant" / "polyMesh"
-    folder.mkdir(parents=True)
-    for name, data in files.items():
-        (folder / name).write_bytes(data)
-    return case
+    return save_below({f"constant/polyMesh/{name}": data for name, data in files.items()}, case)
 
 
 def zoned(periodic: bool = False, merged: int = 2) -> dict[str, bytes]:
