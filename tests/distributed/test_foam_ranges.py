@@ -20,44 +20,45 @@ from gmsnet.run.options import SmoothOptions
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 from distributed.test_file_ranges import SIZE, assert_read_alike, heard, mixed
 from support.comm import together
-from support.foam import FORMS, Lists, cells_of_mesh, in_binary, in_text, layer, poly_mesh, zones_in_binary
+from support.foam import FORMS, Lists, cells_of_mesh, in_binary, in_text, layer, merged, poly_mesh, zones_in_binary
 from support.foam_processors import save as save_below
 
 SIDES = ("low", "high", "rest")
 
 
-def lists_of(mesh: Mesh, merged: int = 2) -> Lists:
-    """Cells in a wild order, of which some pairs are one polyhedron each; and three patches."""
+def lists_of(mesh: Mesh, pairs: int = 2) -> Lists:
+    """Cells in a wild order, of which some pairs are one polyhedron each; a prism beside; and three patches."""
     cells = cells_of_mesh(mesh)
     cells = [cells[k] for k in np.random.default_rng(1).permutation(len(cells))]
-    points = mesh.points
+    points = mesh.points.tolist()
+    _with_prism(points, cells)
 
     def patch(face: list[int]) -> str:
-        where = points[face, 0]
+        where = np.array(points)[face, 0]
         return SIDES[0 if (where == 0).all() else 1 if (where == SIZE).all() else 2]
 
-    return poly_mesh(points.tolist(), _merged(cells, merged), patch)
+    return poly_mesh(points, merged(cells, pairs), patch)
 
 
-def _merged(cells: list[list[list[int]]], pairs: int) -> list[list[list[int]]]:
-    """Pairs of cells with a common face become one cell each."""
-    for _ in range(pairs):
-        at = {tuple(sorted(face)): k for k, cell in enumerate(cells) for face in cell if len(cell) < 7}
-        one, other, common = next(
-            (k, at[key], key) for k, cell in enumerate(cells) if len(cell) < 7
-            for key in (tuple(sorted(face)) for face in cell) if at[key] != k
-        )  # fmt: skip
-        both = [face for face in cells[one] + cells[other] if tuple(sorted(face)) != common]
-        cells = [cell for k, cell in enumerate(cells) if k not in (one, other)] + [both]
-    return cells
+def _with_prism(points: list[list[float]], cells: list[list[list[int]]]) -> None:
+    """A prism over pentagons beside a face at the end of the block."""
+    face = next(f for cell in cells for f in cell if len(f) == 4 and all(points[k][0] == SIZE for k in f))
+    ends, out = [[face[0], face[1]], [face[3], face[2]]], [0.5, 1.0, 0.5]
+    for end in ends:
+        one, two = (np.array(points[k]) for k in end)
+        for share, far in zip((0.9, 0.5, 0.1), out, strict=True):
+            end.append(len(points))
+            points.append((one + share * (two - one) + [far, 0.0, 0.0]).tolist())
+    low, high = ends
+    cells.append([low, high[::-1], *([low[k - 1], high[k - 1], high[k], low[k]] for k in range(5))])
 
 
 def save(files: dict[str, bytes], case: Path) -> Path:
     return save_below({f"constant/polyMesh/{name}": data for name, data in files.items()}, case)
 
 
-def zoned(periodic: bool = False, merged: int = 2) -> dict[str, bytes]:
-    lists = lists_of(mixed(), merged)
+def zoned(periodic: bool = False) -> dict[str, bytes]:
+    lists = lists_of(mixed())
     if periodic:
         lists["boundary"] = [(n, "cyclic" if n != "rest" else t, c, s) for n, t, c, s in lists["boundary"]]  # type: ignore[attr-defined]
     files = in_binary(lists)
@@ -81,7 +82,7 @@ def test_ranks_read_the_mesh_of_one_process(kind: str, ranks: int, tmp_path: Pat
     assert_read_alike(case, "openfoam", ranks)
     mesh = gmsnet.read(case)
     kinds = {block.kind for block in mesh.cells}
-    assert {"tetra", "pyramid", "wedge", "hexahedron", "polyhedron", "triangle", "quad"} <= kinds
+    assert {"tetra", "pyramid", "wedge", "hexahedron", "polyhedron", "triangle", "quad", "polygon"} <= kinds
     assert set(mesh.markers) >= {"low", "high", "rest"}
     assert set(mesh.region_names.values()) >= ({"one", "two"} if "cellZones" in CASES[kind]() else set())
 
@@ -100,6 +101,23 @@ def test_the_bytes_of_a_serial_run(kind: str, ranks: int, method: str, tmp_path:
         wanted, found = bytes_in(serial), bytes_in(target)
         assert found == wanted
         assert wanted["points"] != CASES[kind]()["points"]
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("slide", [None, "all"])
+def test_polyhedra_are_held_where_they_are(slide: str | None, ranks: int, tmp_path: Path) -> None:
+    """No rank takes the whole for them, and all is told as by one process."""
+    case = save(zoned(), tmp_path / "case")
+    serial = gmsnet.smooth(gmsnet.read(case), "barrier", max_sweeps=3, slide=slide)
+    options = SmoothOptions(method="barrier", max_sweeps=3, threads=1, slide=slide)
+    task = FileTask(str(case), None, "openfoam", options)
+    result = together(ranks, lambda comm: smooth_file(task, comm))[0]
+    assert result.gathered == ""
+    assert result.held == {reason: len(ids) for reason, ids in serial.held.items()}
+    left_out = [note for note in serial.notes if "polyhedron" in note]
+    assert left_out == ["not measured, and their nodes are held: 3 polyhedron cells"]
+    assert [note for note in result.notes if "polyhedron" in note] == left_out
+    assert repr(result.after) == repr(serial.after.totals)
 
 
 def bytes_in(case: Path) -> dict[str, bytes]:

@@ -128,7 +128,7 @@ def test_a_truncated_piece_is_said_once(folder):
 def test_a_binary_case_has_the_bytes_of_one_process(tmp_path):
     """And no rank has the whole, though zones hold nodes and a patch is named."""
     for name in ("serial", "ranks"):
-        save({f"constant/polyMesh/{key}": data for key, data in zoned(merged=0).items()}, tmp_path / name)
+        save({f"constant/polyMesh/{key}": data for key, data in zoned().items()}, tmp_path / name)
     found = gmsnet.smooth(mesh := gmsnet.read(tmp_path / "serial"), fixed=mesh.markers["low"])
     gmsnet.write(found.mesh, tmp_path / "serial")
     done = smooth(2, "ranks", "--in-place", "--fix", "low", "--json", cwd=tmp_path)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.decomposed import block, plane, strips
-from support.foam import in_binary, in_text
+from support.decomposed import Case, block, plane, strips
+from support.foam import in_binary, in_text, merged
 from support.foam_processors import save
 from support.gmsh_split import save_split
 
@@ -32,8 +32,15 @@ SAVED = {  # what is written into a folder, and what stands for it
     "decomposed, binary": lambda folder, parts: save(
         block().parts(strips(block(), parts), in_binary, ids=False), folder / "a"
     ),
+    "decomposed, polyhedra": lambda folder, parts: save(polyhedral().parts(strips(polyhedral(), parts)), folder / "a"),
     "decomposed plane": lambda folder, parts: save(plane().parts(strips(plane(), parts), in_text), folder / "a"),
 }
+
+
+def polyhedral() -> Case:
+    """Some pairs of cells are polyhedra of 12 and of 10 points."""
+    case = block()
+    return case._replace(cells=merged(case.cells, 5))
 
 
 def _flat() -> Mesh:

@@ -155,3 +155,16 @@ def zones_in_binary(key: str, zones: Mapping[str, Sequence[int]]) -> bytes:
             body += b"flipMap      List<bool> \n%d\n(" % len(members) + b"\1" * len(members) + b");\n"
         body += b"}\n"
     return head("regIOobject", key, "binary", "LSB;label=32;scalar=64").encode() + body + b")\n"
+
+
+def merged(cells: list[list[list[int]]], pairs: int) -> list[list[list[int]]]:
+    """Pairs of cells with a common face become one cell each."""
+    for _ in range(pairs):
+        at = {tuple(sorted(face)): k for k, cell in enumerate(cells) for face in cell if len(cell) < 7}
+        one, other, common = next(
+            (k, at[key], key) for k, cell in enumerate(cells) if len(cell) < 7
+            for key in (tuple(sorted(face)) for face in cell) if at[key] != k
+        )  # fmt: skip
+        both = [face for face in cells[one] + cells[other] if tuple(sorted(face)) != common]
+        cells = [cell for k, cell in enumerate(cells) if k not in (one, other)] + [both]
+    return cells

@@ -126,9 +126,6 @@ def _piece(comm: Any, parts: Sequence[Part], nodes: Joined) -> Piece:
     """The cells of the parts but copies of others, by global ids, with vertices at nodes that are held."""
     mine = [(block.kind, block.nodes.shape[1]) for part in parts for block in part.parsed.cells]
     kinds = list(dict.fromkeys(key for each in comm.allgather(mine) for key in each))
-    names = [kind for kind, _ in kinds]
-    if len(set(names)) < len(names):
-        raise InputError("cells of one kind have different numbers of nodes: smooth this file without ranks")
     cuts = np.cumsum([0, *(len(part.parsed.points) for part in parts)])
     images = [nodes.node[start + part.parsed.images] for part, start in zip(parts, cuts[:-1], strict=True)]
     blocks, stay = list[Cells](), [nodes.node[nodes.unsure]]
@@ -137,7 +134,7 @@ def _piece(comm: Any, parts: Sequence[Part], nodes: Joined) -> Piece:
         regions = [np.empty(0, dtype=np.int64)]
         for part, start in zip(parts, cuts[:-1], strict=True):
             for block, ghost in zip(part.parsed.cells, ghosts(part.parsed), strict=True):
-                if block.kind == kind:
+                if (block.kind, block.nodes.shape[1]) == (kind, width):
                     here = nodes.node[start + block.nodes]
                     own.append(here[~ghost])
                     copies.append(here[ghost])

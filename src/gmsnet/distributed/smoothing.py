@@ -49,6 +49,7 @@ from gmsnet.topology.solids import KINDS
 Floats = NDArray[np.float64]
 
 SHARED = (*CELLS, *KINDS, "line", "vertex")  # the kinds of cells that sweeps over ranks know
+BESIDE = ("polyhedron", "polygon")  # beside volumes of these kinds: their nodes are held
 
 
 def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | None = None) -> RankResult:
@@ -101,7 +102,8 @@ def _not_shared(counts: Mapping[str, int], smoother: Smoother, options: SmoothOp
         return f"{options.method_name} has steps that follow one another"
     if options.adapts:
         return "a metric is one of the whole mesh"
-    others = sorted(set(counts) - set(SHARED))
+    held = BESIDE if counts.keys() & {*KINDS} else ()
+    others = sorted(set(counts) - {*SHARED, *held})
     return f"cells of the kind {', '.join(others)} are not shared out" if others else ""
 
 

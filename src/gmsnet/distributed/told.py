@@ -9,6 +9,7 @@ import numpy as np
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Part
 from gmsnet.measure.report import QualityReport
+from gmsnet.mesh.mesh import unmoved
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.set_up import NOT_MEASURED, repeating
 from gmsnet.topology.mixed_volume import MixedVolume
@@ -29,10 +30,13 @@ def held(part: Part, topology: Topology | Volume) -> dict[str, int]:
 
 def not_measured(part: Part, counts: Mapping[str, int]) -> list[str]:
     """The volumes that are left out, in words. counts: kind → how many cells the mesh has."""
-    if not isinstance(part.topology, MixedVolume):
+    if not isinstance(part.topology, Volume):
         return []
-    known = int(part.comm.allreduce(int(np.count_nonzero(part.own_cells[part.topology.cell]))))
-    left_out = repeating(counts, known)
+    others = [unmoved(counts)]
+    if isinstance(part.topology, MixedVolume):
+        known = int(part.comm.allreduce(int(np.count_nonzero(part.own_cells[part.topology.cell]))))
+        others.append(repeating(counts, known))
+    left_out = ", ".join(filter(None, others))
     return [NOT_MEASURED + left_out] if left_out else []
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.cells.jacobian import has_form
+from gmsnet.cells.table import CELLS
 from gmsnet.errors import InputError
 from gmsnet.mesh.arrays import plain_array
 from gmsnet.mesh.cell_block import CellBlock, cells_in_words
@@ -267,9 +268,10 @@ def unmeasured(mesh: Mesh) -> str:
     return _counted(block for block in mesh.cells if block.dimension in (dimension, None) and not measured(mesh, block))
 
 
-def unmoved(mesh: Mesh) -> str:
-    """How many volumes are of kinds whose nodes are held, in words. "" if there are none."""
-    return _counted(block for block in mesh.cells if block.dimension in (3, None) and not has_form(block.kind))
+def unmoved(counts: Mapping[str, int]) -> str:
+    """How many volumes are of kinds whose nodes are held, in words; "" if there are none. counts: kind → cells."""
+    volumes = [kind for kind in counts if kind not in CELLS or CELLS[kind].dimension == 3]
+    return _in_words({kind: counts[kind] for kind in volumes if not has_form(kind)})
 
 
 def unmoved_faces(mesh: Mesh) -> str:
@@ -295,4 +297,8 @@ def _counted(blocks: Iterable[CellBlock]) -> str:
     for block in blocks:
         if len(block.nodes):
             counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
-    return ", ".join(f"{count:,} {kind} cell{'s' if count > 1 else ''}" for kind, count in counts.items())
+    return _in_words(counts)
+
+
+def _in_words(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{count:,} {kind} cell{'s' if count > 1 else ''}" for kind, count in counts.items() if count)

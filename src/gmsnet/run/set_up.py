@@ -189,7 +189,7 @@ def _first_of_volume(
         sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, options.distance, options.geometry)
     remarks = held_anyway(given, asked, topology, fixed, options.slides)
     second = second_order_solids_of(given, topology, options)
-    others = [unmoved(given)]
+    others = [unmoved(counts_of(given))]
     if second is None and isinstance(topology, MixedVolume):
         others.append(repeating(counts_of(given), len(topology.cell)))
     if left_out := ", ".join(filter(None, others)):
