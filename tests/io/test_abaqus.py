@@ -28,7 +28,8 @@ from gmsnet.errors import FormatError
 from gmsnet.io import abaqus
 from gmsnet.io.abaqus_types import WRITTEN, kind_of
 from gmsnet.mesh.cell_block import CellBlock
-from gmsnet.mesh.mesh import Mesh, unknown_cells
+from gmsnet.mesh.known_cells import unknown_cells
+from gmsnet.mesh.mesh import Mesh
 
 MESHES = os.environ.get("GMSNET_MESHES", "")
 

@@ -11,7 +11,7 @@ from gmsnet.cells.table import CELLS
 from gmsnet.io.gmsh_sections import KINDS as GMSH_KINDS
 from gmsnet.io.medit import KINDS as MEDIT_KINDS
 from gmsnet.io.su2 import CODES as SU2_CODES
-from gmsnet.mesh.mesh import unknown_cells, unmeasured
+from gmsnet.mesh.known_cells import unknown_cells, unmeasured
 from gmsnet.mesh.vtk_types import VTK_KINDS, VTK_ORDERS
 from gmsnet.topology.topology import Topology
 

@@ -15,7 +15,8 @@ from gmsnet.errors import InputError
 from gmsnet.measure.report import QualityReport
 from gmsnet.measure.worst import named_cells
 from gmsnet.mesh.display import amount, plain
-from gmsnet.mesh.mesh import Mesh, counts
+from gmsnet.mesh.known_cells import counts
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.run.api import quality
 
 

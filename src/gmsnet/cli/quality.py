@@ -52,7 +52,7 @@ def quality(
     from gmsnet.cli import output
     from gmsnet.cli import report as tables
     from gmsnet.measure.worst import named_cells, worst_cells
-    from gmsnet.mesh.mesh import counts, unmeasured
+    from gmsnet.mesh.known_cells import counts, unmeasured
     from gmsnet.run.api import quality as measure
 
     mesh = io.read(input, format)

@@ -10,7 +10,8 @@ from gmsnet.cli.destination import shown
 from gmsnet.measure.report import QualityReport
 from gmsnet.measure.worst import worst_cells
 from gmsnet.mesh.display import amount
-from gmsnet.mesh.mesh import Mesh, unmeasured
+from gmsnet.mesh.known_cells import unmeasured
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.page import Contents, write_page
 
 WORST = 20  # cells are listed

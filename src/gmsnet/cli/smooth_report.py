@@ -10,7 +10,8 @@ from gmsnet.cli import output
 from gmsnet.cli import report as tables
 from gmsnet.cli.destination import shown
 from gmsnet.mesh.display import amount
-from gmsnet.mesh.mesh import Mesh, counts
+from gmsnet.mesh.known_cells import counts
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.run.account import Account
 from gmsnet.topology.held import ON_BOUNDARY
 

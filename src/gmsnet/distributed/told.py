@@ -9,7 +9,7 @@ import numpy as np
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Part
 from gmsnet.measure.report import QualityReport
-from gmsnet.mesh.mesh import unmoved
+from gmsnet.mesh.known_cells import unmoved
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.set_up import NOT_MEASURED, repeating
 from gmsnet.topology.mixed_volume import MixedVolume

@@ -9,7 +9,7 @@ from gmsnet.measure.figures import Figure, at, figures_of
 from gmsnet.measure.summary import BEST_IS_LOW
 from gmsnet.measure.worst import worst_rows
 from gmsnet.mesh.display import amount
-from gmsnet.mesh.mesh import counts
+from gmsnet.mesh.known_cells import counts
 from gmsnet.page.contents import LISTED, Contents
 from gmsnet.page.markup import grid, listed, row, section, table, text
 

@@ -16,7 +16,8 @@ from gmsnet.constraints.shell import patches_of_surface, sides_of
 from gmsnet.constraints.smooth_patches import vertices_of
 from gmsnet.measure.palette import AFTER, BEFORE, INVERTED
 from gmsnet.measure.report import QualityReport, measure
-from gmsnet.mesh.mesh import Mesh, measured
+from gmsnet.mesh.known_cells import measured
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.plot.figure import new_figure
 from gmsnet.plot.histogram import histogram
 from gmsnet.plot.view import bad_to_good

@@ -14,7 +14,8 @@ from gmsnet.kernels.simplex.bernstein import NAMES
 from gmsnet.measure.palette import AFTER, BAD_TO_GOOD, INVERTED, OTHER_CELLS
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.mesh.cell_block import CellBlock
-from gmsnet.mesh.mesh import Mesh, measured
+from gmsnet.mesh.known_cells import measured
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.topology import Topology
 
 if TYPE_CHECKING:

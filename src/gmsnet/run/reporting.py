@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gmsnet.measure.worst import worst_cells
-from gmsnet.mesh.mesh import unmeasured
+from gmsnet.mesh.known_cells import unmeasured
 from gmsnet.page import Contents, Grid
 from gmsnet.run.account import Account
 

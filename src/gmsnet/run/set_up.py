@@ -20,7 +20,8 @@ from gmsnet.measure.target import Target
 from gmsnet.measure.totals import Totals, totals_of, totals_with_others
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.display import amount
-from gmsnet.mesh.mesh import Mesh, measured, unknown_cells, unmeasured, unmoved
+from gmsnet.mesh.known_cells import measured, unknown_cells, unmeasured, unmoved
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.selection import fixed_mask, images
 from gmsnet.methods import Smoother, StarSmoother
 from gmsnet.methods.auto import Auto

@@ -13,7 +13,8 @@ from gmsnet.constraints.shell import FEATURE, patches_of_surface, sides_of, torn
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.constraints.smooth_patches import vertices_of
 from gmsnet.measure.report import measure
-from gmsnet.mesh.mesh import Mesh, unmeasured, unmoved_faces
+from gmsnet.mesh.known_cells import unmeasured, unmoved_faces
+from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.parallel.executor import Executor
 from gmsnet.preserve.protection import Protection
