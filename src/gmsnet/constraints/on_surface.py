@@ -79,8 +79,8 @@ def surface_of(
 def _sides(patches: Patches) -> Longs:
     """(N, 2) for each node that slides along a curve a facet of each of two patches at it, else NOTHING."""
     found = np.full((len(patches.slides), 2), NOTHING, dtype=np.int64)
-    number = np.repeat(np.arange(len(patches.rows)), 3)[patches.curves.slides[patches.rows].ravel()]
-    node = patches.rows.ravel()[patches.curves.slides[patches.rows].ravel()]
+    number, corner = np.nonzero(patches.curves.slides[patches.rows])
+    node = patches.rows[number, corner]
     found[node, 0] = number
     other = patches.patch[found[node, 0]] != patches.patch[number]
     found[node[other], 1] = number[other]

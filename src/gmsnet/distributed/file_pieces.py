@@ -20,6 +20,7 @@ from gmsnet.io.contents import Data
 from gmsnet.io.merge import HELD, Part
 from gmsnet.io.packed import is_packed, packed
 from gmsnet.io.pieces import Pieces
+from gmsnet.io.rows import share
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.vtk_ghosts import ghosts
 from gmsnet.mesh.selection import held_by_data
@@ -87,7 +88,7 @@ def read_pieces(name: str, format: str, comm: Any) -> FilePieces:
     The mesh is that of ``gmsnet.read``. Raises InputError, on all ranks, with what it says.
     """
     layout = comm.bcast(everywhere(comm, lambda: layout_of(name, format) if comm.rank == 0 else None))
-    first, last = (len(layout.parts) * rank // comm.size for rank in (comm.rank, comm.rank + 1))
+    first, last = share(len(layout.parts), comm.rank, comm.size)
     opened, found, told = everywhere(comm, lambda: _opened(name, layout, layout.parts[first:last]))
     everyone = [each for some in comm.allgather(told) for each in some]
     everywhere(comm, lambda: _checked(name, layout, everyone))

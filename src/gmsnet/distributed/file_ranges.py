@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.agreement import agreed, everywhere, raise_everywhere
-from gmsnet.distributed.by_rank import by_rank
+from gmsnet.distributed.by_rank import by_rank, cuts
 from gmsnet.distributed.from_faces import cells_of_faces, occurring
 from gmsnet.distributed.moved import Moved
 from gmsnet.distributed.partition import along_curve
@@ -141,7 +141,7 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
     if plan.beside:
         index = file
         file = _opened(comm, os.path.join(os.path.dirname(name), plan.beside))
-    rows = np.array([plan.nodes * rank // comm.size for rank in range(comm.size + 1)], dtype=np.int64)
+    rows = cuts(plan.nodes, comm.size)
     first, last = rows[comm.rank : comm.rank + 2].tolist()
     names, images, called = plan.names or {}, np.empty(0, dtype=np.int64), GHOST_CELLS
     if plan.faces is None:

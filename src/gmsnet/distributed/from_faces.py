@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS
 from gmsnet.distributed.agreement import everywhere
-from gmsnet.distributed.by_rank import by_rank
+from gmsnet.distributed.by_rank import by_rank, cuts
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.piece import Cells
 from gmsnet.distributed.zones import Names, homes
@@ -18,7 +18,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io.cells import distinct
 from gmsnet.io.face_ranges import FaceLists, SomeFaces
 from gmsnet.io.foam_cells import SHAPES, Sides, walls
-from gmsnet.io.rows import Ranges
+from gmsnet.io.rows import Ranges, share
 from gmsnet.mesh.cell_block import CellBlock
 
 Ids = NDArray[np.int64]
@@ -40,7 +40,7 @@ def cells_of_faces(comm: Any, file: Ranges, lists: FaceLists, nodes: int, said: 
 
     nodes: how many the mesh has. said: names the file where it is damaged.
     """
-    first, last = _share(lists.count, comm.rank, comm.size)
+    first, last = share(lists.count, comm.rank, comm.size)
 
     def read() -> SomeFaces:
         return _checked(lists.some(file, first, last), nodes, lists.count)
@@ -50,7 +50,7 @@ def cells_of_faces(comm: Any, file: Ranges, lists: FaceLists, nodes: int, said: 
     count = 1 + int(comm.allreduce(int(most), mpi().MAX))
     if not 0 < count <= lists.count:
         everywhere(comm, lambda: said(lambda: _fail(f"{lists.count} faces name {count} cells: is the file damaged?")))
-    cells = np.array([_share(count, rank, comm.size)[0] for rank in range(comm.size)] + [count], dtype=np.int64)
+    cells = cuts(count, comm.size)
     begin, end = cells[comm.rank : comm.rank + 2].tolist()
     regions = _regions(comm, lists, cells, said)
 
@@ -70,11 +70,6 @@ def occurring(comm: Any, blocks: Sequence[Cells], names: Names) -> Names:
     mine = {(CELLS[block.kind].dimension, region) for block in blocks for region in distinct(block.regions)}
     there = {key for each in comm.allgather(mine & names.keys()) for key in each}
     return {key: name for key, name in names.items() if key in there}
-
-
-def _share(total: int, rank: int, ranks: int) -> tuple[int, int]:
-    """The first that is the share of one of so many, and the one behind the last."""
-    return total * rank // ranks, total * (rank + 1) // ranks
 
 
 def _fail(text: str) -> None:
@@ -119,8 +114,8 @@ def _held(comm: Any, lists: FaceLists, mine: SomeFaces, first: int, nodes: int, 
     faces, points = everywhere(comm, lambda: said(lambda: lists.held(comm.rank, comm.size)))
     everywhere(comm, lambda: said(lambda: _within(faces, lists.count, "faces")))
     everywhere(comm, lambda: said(lambda: _within(points, nodes, "points")))
-    starts = np.array([_share(lists.count, rank, comm.size)[0] for rank in range(comm.size)] + [lists.count])
-    here = np.concatenate(comm.alltoall([faces[rows] for rows in by_rank(homes(starts, faces), comm.size)]))
+    lists_of = by_rank(homes(cuts(lists.count, comm.size), faces), comm.size)
+    here = np.concatenate(comm.alltoall([faces[rows] for rows in lists_of]))
     return np.concatenate([mine.take(np.unique(here - first)).nodes, points])
 
 

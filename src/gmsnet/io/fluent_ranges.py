@@ -26,7 +26,7 @@ from gmsnet.io.fluent_sections import (
 )
 from gmsnet.io.foam_cells import Faces, Ints, Sides, volumes
 from gmsnet.io.ranges import Column, Plan
-from gmsnet.io.rows import Ranges, Rows
+from gmsnet.io.rows import Ranges, Rows, share
 from gmsnet.mesh.cell_block import CellBlock
 
 WINDOW, MOST_TEXT, MOST_SECTIONS = 1 << 16, 1 << 24, 100_000
@@ -85,7 +85,7 @@ class FluentFaces:
         found = []
         for number, first, many in self.heads:
             there = max(0, min(many, count - first))
-            found.append((number, first + np.arange(there * rank // ranks, there * (rank + 1) // ranks)))
+            found.append((number, first + np.arange(*share(there, rank, ranks))))
         return found
 
     def held(self, rank: int, ranks: int) -> tuple[Ints, Ints]:

@@ -17,7 +17,7 @@ from gmsnet.io.foam_lists import Head, head_of, list_at
 from gmsnet.io.foam_patches import LABELS, NAMED, ZONES, Patch, patches
 from gmsnet.io.packed import is_packed
 from gmsnet.io.ranges import Column, Plan
-from gmsnet.io.rows import HEAD, Ranges, Rows
+from gmsnet.io.rows import HEAD, Ranges, Rows, share
 from gmsnet.mesh.cell_block import CellBlock
 
 FILES = ("faces", "owner", "neighbour", "boundary")
@@ -37,8 +37,7 @@ class Stored(NamedTuple):
 
     def share(self, rank: int, ranks: int) -> Ints:
         """What one of so many reads."""
-        count = self.rows.rows
-        return self.of(count * rank // ranks, count * (rank + 1) // ranks)[:, 0]
+        return self.of(*share(self.rows.rows, rank, ranks))[:, 0]
 
 
 @dataclass(frozen=True)
@@ -80,8 +79,8 @@ class FoamFaces:
         starts = [patch.start for patch in self.patches]
         markers = np.searchsorted(starts, np.arange(first, last), side="right") if starts else np.zeros_like(other)
         nodes = self.points.of(int(offsets[0]), int(offsets[-1]))[:, 0]
-        outward = np.zeros(last - first, dtype=bool)
-        return SomeFaces(sizes, nodes, self.owner.of(first, last)[:, 0], other, outward, markers.astype(np.int64))
+        inward = np.zeros(last - first, dtype=bool)
+        return SomeFaces(sizes, nodes, self.owner.of(first, last)[:, 0], other, inward, markers.astype(np.int64))
 
     def cells(self, faces: Faces, sides: Sides, regions: Ints, before: int) -> list[CellBlock]:
         """See FaceLists."""

@@ -18,7 +18,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io.cells import MOST_BLOCKS, distinct
 from gmsnet.io.face_ranges import FaceLists
 from gmsnet.io.pieces import Piece
-from gmsnet.io.rows import AT_ONCE, AnyRows, Listed, Ranges, Rows
+from gmsnet.io.rows import AT_ONCE, AnyRows, Listed, Ranges, Rows, share
 from gmsnet.io.vtk_ghosts import marked
 
 
@@ -166,7 +166,7 @@ class Plan:
     def _share(self, block: int, rank: int, ranks: int) -> tuple[int, int]:
         """The first cell of a block that is the share of one of so many, and the one behind the last."""
         total = sum(table.nodes.rows for table in self.blocks[block])
-        return total * rank // ranks, total * (rank + 1) // ranks
+        return share(total, rank, ranks)
 
     def _parts(self, block: int, first: int, last: int) -> Iterator[tuple[Table, int, int]]:
         """The tables in which some cells of a block are, each with its first one and the one behind the last."""

@@ -21,6 +21,11 @@ AT_ONCE = 1 << 22  # bytes that are copied together
 HEAD = 1 << 16  # bytes at the beginning that are read together
 
 
+def share(total: int, rank: int, ranks: int) -> tuple[int, int]:
+    """The first of so many things that is the share of one of several processes, and the one behind the last."""
+    return total * rank // ranks, total * (rank + 1) // ranks
+
+
 class Ranges:
     """A file as it is now. It is open only while some of it is read."""
 
