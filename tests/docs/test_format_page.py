@@ -41,9 +41,9 @@ def test_the_page_is_what_is_measured(formats, tmp_path):
 def test_a_change_that_is_made_on_purpose_is_seen(formats, tmp_path, monkeypatch):
     variant = next(v for v in formats.VARIANTS if v.title == "SU2")
     assert formats.entry(variant, "comments", tmp_path) == "kept"
-    splice = gmsnet.io.splice.FileSource.splice
+    splice = gmsnet.io.file_source.FileSource.splice
     monkeypatch.setattr(
-        gmsnet.io.splice.FileSource,
+        gmsnet.io.file_source.FileSource,
         "splice",
         lambda self, points: {suffix: [bytes(pieces).upper()] for suffix, pieces in splice(self, points).items()},
     )

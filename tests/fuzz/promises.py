@@ -17,8 +17,8 @@ import numpy as np
 import gmsnet
 from gmsnet.errors import InputError
 from gmsnet.io import cells, contents, gmsh_sections, places, splice, stl, text
+from gmsnet.io.file_source import FileSource
 from gmsnet.io.formats import FORMATS
-from gmsnet.io.splice import FileSource
 from gmsnet.io.split_files import DECOMPOSED, FILES, SPLIT
 from gmsnet.mesh.mesh import Mesh
 

@@ -15,8 +15,9 @@ from support.damage import triangle_grid
 from support.formats import FILES
 
 from gmsnet.io import FORMATS, read, write
+from gmsnet.io.file_source import FileSource
 from gmsnet.io.places import Lattice, Places
-from gmsnet.io.splice import BinarySlots, FileSource, TextSlots
+from gmsnet.io.splice import BinarySlots, TextSlots
 from gmsnet.io.text import Text
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh

@@ -13,6 +13,7 @@ from gmsnet.io.atomic import reason, refuse_folder
 from gmsnet.io.cells import sealed
 from gmsnet.io.contents import Data, is_open_pipe, load, refuse_unless_regular
 from gmsnet.io.document import Parsed
+from gmsnet.io.file_source import FileSource
 from gmsnet.io.foam_case import OPENFOAM, case_of, file_in
 from gmsnet.io.formats import (
     FORMATS,
@@ -26,7 +27,6 @@ from gmsnet.io.formats import (
 from gmsnet.io.linked import links_of, nested
 from gmsnet.io.packed import MAGIC, is_packed, split_name, unpacked
 from gmsnet.io.paths import beside, name_of
-from gmsnet.io.splice import FileSource
 from gmsnet.io.split_files import group_of
 from gmsnet.io.stamps import Stamp, Stamps
 from gmsnet.io.streams import STANDARD_INPUT

@@ -9,6 +9,7 @@ from gmsnet.errors import FormatError, InputError
 from gmsnet.io import foreign
 from gmsnet.io.atomic import reason, refuse_folder, replace_files
 from gmsnet.io.convert import listed
+from gmsnet.io.file_source import FileSource
 from gmsnet.io.foam_case import OPENFOAM, case_of, file_in
 from gmsnet.io.formats import (
     FORMATS,
@@ -20,7 +21,7 @@ from gmsnet.io.linked import folders_for, placed
 from gmsnet.io.packed import is_packed, packed, split_name
 from gmsnet.io.paths import beside, name_of
 from gmsnet.io.pieces import Piece, Pieces
-from gmsnet.io.splice import FileSource, most_rounded
+from gmsnet.io.splice import most_rounded
 from gmsnet.io.split_files import takes_parts, targets_of
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.streams import STANDARD_OUTPUT, is_special, standard_output
