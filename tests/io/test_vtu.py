@@ -262,7 +262,7 @@ def test_offsets_are_found_where_they_are_written() -> None:
 def test_points_that_share_their_bytes_are_refused() -> None:
     for kind, offset in (("Int32", 0), ("String", 4), ("String", 135)):
         shared = appended('offset="0"', kind, f'format="appended" offset="{offset}"')
-        refused(vtu, shared, "the array 'f': it (shares bytes with the points|has 96 bytes)")
+        refused(vtu, shared, "the array 'f': it (shares bytes with points|has 96 bytes)")
     refused(
         vtu, appended('offset="0"', "Float64", 'NumberOfComponents="3" format="appended" offset="0"'), "shares bytes"
     )

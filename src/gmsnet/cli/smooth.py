@@ -135,6 +135,9 @@ def smooth(
         bool,
         typer.Option(help="Edges of surfaces that look sharp only because a facet is thin are no features."),
     ] = False,
+    update_normals: Annotated[
+        bool, typer.Option(help="Of surfaces: compute normals that the file keeps anew where nodes have moved.")
+    ] = False,
     threads: Annotated[
         int | None,
         typer.Option(min=1, help="Use at most so many processors (default: all). Same result for any number."),
@@ -225,11 +228,11 @@ def smooth(
         preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, weights=weights,
         best_by=best_by,
         slide=slide or None, feature_angle=feature_angle,
-        surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles, device=device,
-        **values_at_nodes(metric, size),
+        surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles,
+        update_normals=update_normals, device=device, **values_at_nodes(metric, size),
     )  # fmt: skip
 
-    held, whole_on_first = fix or [], any((plot, report, metric, size))
+    held, whole_on_first = fix or [], any((plot, report, metric, size, update_normals))
 
     def one(job: Job, destination: Destination | None) -> tuple[int, bool]:
         work = FileWork(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.sliding import REASON
-from gmsnet.distributed.agreement import everywhere
+from gmsnet.distributed.agreement import everywhere, raise_everywhere
 from gmsnet.distributed.along import Found, found_on_first, where_on
 from gmsnet.distributed.answered import Answered
 from gmsnet.distributed.executor import Ranks
@@ -49,6 +49,7 @@ from gmsnet.topology.solids import KINDS
 Floats = NDArray[np.float64]
 
 SHARED = (*CELLS, *KINDS, "line", "vertex")  # the kinds of cells that sweeps over ranks know
+NO_NORMALS = "update_normals is of a whole mesh, and here each rank has its part of one: leave it out"
 BESIDE = ("polyhedron", "polygon")  # beside volumes of these kinds: their nodes are held
 
 
@@ -58,6 +59,8 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
     known: the whole mesh, if the first rank has it anyway.
     """
     began = time.perf_counter()
+    lacking = options.update_normals and comm.rank == 0 and known is None
+    raise_everywhere(comm, NO_NORMALS if lacking else "")
     smoother = everywhere(comm, partial(_smoother, options))
     around, counts = surrounded(piece, comm), _counts(piece, comm)
     why = _not_shared(counts, smoother, options)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.io.contents import Data
-from gmsnet.io.pieces import Pieces
+from gmsnet.io.normals import Find, Normals, all_rewritten
+from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.splice import Points, Share, Slots
 from gmsnet.io.stamps import Stamps
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.normals import CellData, PointData, fields_in
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +28,8 @@ class FileSource:
     points, cells, region_names, point_data, cell_data, node_sets: as read (see Mesh). companions: other files of the
     same mesh by suffix, which never change (Triangle's ``.ele``). unread: what else there is in the file (see Parsed).
     stamps: of the files, so that what others write into them meanwhile is not overwritten. images, form, shares: see
-    Parsed.
+    Parsed. find: what finds normals in the file. renews: they are computed anew where nodes have moved. stale: those
+    that are to be, but cannot be found in the file, in words.
     """
 
     format: str
@@ -45,6 +48,9 @@ class FileSource:
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict, repr=False)
     form: str = ""
     shares: Mapping[str, Share] = field(default_factory=dict, repr=False)
+    find: Find | None = field(default=None, repr=False)
+    renews: bool = False
+    stale: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle: the bytes of the files themselves."""
@@ -53,13 +59,24 @@ class FileSource:
         return FileSource, (
             self.format, self.main, self.data[:], self.points, self.slots, self.cells, files,
             names, fields, cell_fields, self.unread, self.stamps, self.images, dict(self.node_sets),
-            self.form, dict(self.shares),
+            self.form, dict(self.shares), self.find, self.renews, self.stale,
         )  # fmt: skip
 
     @property
     def normals(self) -> str:
         """See Source."""
         return "of facets" if self.format == "stl" else next((each for each in self.unread if "normals" in each), "")
+
+    def renewing(self, point_data: PointData, cell_data: CellData) -> tuple[FileSource, list[str]]:
+        """See Source."""
+        found = [each.what for each in self._found({self.main: self.data})]
+        stale = tuple(sorted({*fields_in(self.point_data, self.cell_data)} - {*found})) or (self.normals,) * bool(
+            self.normals and not found
+        )
+        return replace(self, point_data=point_data, cell_data=cell_data, renews=bool(found), stale=stale), found
+
+    def _found(self, files: Mapping[str, Data]) -> list[Normals]:
+        return [] if self.find is None or self.shares else self.find(files, self.cells)
 
     def fits(self, mesh: Mesh) -> bool:
         """Whether the file can stand for a mesh once its coordinates are replaced: all else is as it was read."""
@@ -91,10 +108,17 @@ class FileSource:
         same = points.shape == self.points.shape and bool((points == self.points).all())
         whole = {suffix: _whole(data) for suffix, data in ((self.main, self.data), *self.companions.items())}
         if not same:
-            whole[self.main] = Pieces(lambda: self.slots.replace(self.data, self.points, points))
+            whole[self.main] = Pieces(lambda: self._replaced(points))
             for key, share in self.shares.items():
                 whole[key] = Pieces(partial(share.replace, self.companions[key], self.points, points))
         return whole
+
+    def _replaced(self, points: Points) -> Iterable[Piece]:
+        """The file with the coordinates of other points, and with its normals computed anew where that is asked."""
+        pieces = self.slots.replace(self.data, self.points, points)
+        if self.find is None or not self.renews:
+            return pieces
+        return all_rewritten(pieces, self.main, self.find, self.cells, self.points, points)
 
 
 def _whole(data: Data) -> Pieces:

@@ -194,6 +194,6 @@ def _mesh(parsed: Parsed, entry: Entry, files: Mapping[str, Data], stamps: Stamp
     source = FileSource(
         entry.key, main, files[main], mesh.points, parsed.slots, mesh.cells, companions,
         mesh.region_names, mesh.point_data, mesh.cell_data, tuple(parsed.unread), stamps, parsed.images,
-        mesh.node_sets, parsed.form, parsed.shares,
+        mesh.node_sets, parsed.form, parsed.shares, getattr(entry.load(), "normals", None),
     )  # fmt: skip
     return replace(mesh, source=source)

@@ -24,6 +24,7 @@ from gmsnet.io.pieces import Pieces
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.normals import CellData, PointData
 
 READ = {  # suffix → what the format is called
     ".meshb": "binary Medit", ".avs": "AVS UCD", ".cdb": "Ansys CDB", ".f3grid": "FLAC3D", ".h5m": "MOAB",
@@ -40,6 +41,10 @@ class ForeignSource:
     title: str
     format: str = ""
     normals: str = ""
+
+    def renewing(self, point_data: PointData, cell_data: CellData) -> tuple[ForeignSource, list[str]]:
+        """See Source: it is only converted, and the data of the mesh are all that can be computed anew."""
+        return self, []
 
     def images_in(self, mesh: Mesh) -> NDArray[np.int64]:
         """None: they are not read."""

@@ -6,7 +6,7 @@ The region of a cell is its material (``usemtl``) together with its group (``g``
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from gmsnet.io import convert
 from gmsnet.io.cells import cell_blocks, check_nodes, distinct, polygon_kinds
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.normals import Normals, in_text
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import ranges
 from gmsnet.io.splice import TextSlots
@@ -27,7 +28,7 @@ name = "OBJ"
 suffixes: tuple[str, ...] = (".obj",)
 
 KEYS = (b"v", b"vt", b"vn", b"vp", b"f", b"l", b"p", b"o", b"g", b"s", b"usemtl", b"mtllib")
-POINT, GROUP, MATERIAL = (KEYS.index(key) for key in (b"v", b"g", b"usemtl"))
+POINT, NORMAL, GROUP, MATERIAL = (KEYS.index(key) for key in (b"v", b"vn", b"g", b"usemtl"))
 LEAST = {KEYS.index(b"f"): 3, KEYS.index(b"l"): 2, KEYS.index(b"p"): 1}  # nodes
 FACE, LINE, DOT = LEAST
 OTHERS = {b"vt": "texture (vt)", b"vn": "normals (vn)", b"vp": "parameters (vp)", b"o": "objects (o)",
@@ -51,6 +52,38 @@ def read(files: Mapping[str, Data]) -> Parsed:
     used = {(b.cell.dimension, r) for b in cells for r in distinct(b.regions)}
     region_names = {(dim, r): names[r] for dim, r in sorted(used) if names[r]}
     return Parsed(points, cells, TextSlots(starts, ends), region_names, unread=_unread(rows, keys))
+
+
+def normals(files: Mapping[str, Data], cells: Sequence[CellBlock]) -> list[Normals]:
+    """See ``io.normals.Find``. A normal is that of all corners of faces that name it."""
+    text = Text(files[".obj"], b"#")
+    rows = text.rows(0)
+    keys = _keys(text, rows)
+    first, faces = rows.first[:-1].astype(np.int64), keys == FACE
+    chosen = keys == NORMAL
+    if not chosen.any():
+        return []
+    if (short := np.flatnonzero(chosen & (rows.lengths != 4))).size:
+        text.fail(rows.where(int(short[0])), f"'vn' takes three numbers, found {rows.lengths[short[0]] - 1}")
+    starts = rows.starts[first[chosen][:, None] + np.arange(1, 4)]
+    corners = rows.starts[ranges(first[faces] + 1, rows.lengths[faces].astype(np.int64) - 1)]
+    named = _third(text, corners)
+    before = np.repeat(np.cumsum(chosen)[faces], rows.lengths[faces] - 1)
+    row = np.where(named > 0, named - 1, np.where(named < 0, before + named, -1))
+    if (bad := np.flatnonzero((row >= len(starts)) | ((named < 0) & (row < 0)))).size:
+        text.fail(int(corners[bad[0]]), f"the normal {named[bad[0]]} is named, but there are {len(starts)}")
+    return [in_text(OTHERS[b"vn"], text, starts, row)]
+
+
+def _third(text: Text, starts: Starts) -> NDArray[np.int64]:
+    """(n,) the third of the integers that slashes separate in each token, 0 where there is none."""
+    slashes = np.append(np.flatnonzero(text.raw == ord("/")), [len(text.raw)] * 2)
+    blanks = np.append(np.flatnonzero(text.raw <= ord(" ")), len(text.raw))
+    second = slashes[np.minimum(np.searchsorted(slashes, starts) + 1, len(slashes) - 1)]
+    found = np.zeros(len(starts), dtype=np.int64)
+    inside = second + 1 < blanks[np.searchsorted(blanks, starts)]
+    found[inside] = text.integers(second[inside] + 1)
+    return found
 
 
 def _unread(rows: Rows, keys: NDArray[np.int8]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -12,12 +12,14 @@ from gmsnet.io import convert
 from gmsnet.io.cells import cell_blocks, check_nodes, polygon_kinds
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.normals import Normals, in_text
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import ranges
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Rows, Text
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.normals import FaceCorners
 
 name = "OFF"
 suffixes: tuple[str, ...] = (".off",)
@@ -28,8 +30,33 @@ _HEADER = re.compile(rb"(ST)?(C)?(N)?OFF")
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format. What follows the coordinates (normals, colours, texture) and the corners (colours) is kept."""
     text = Text(files[".off"], b"#")
+    rows, end, faces, _ = _points_in(text)
+    number = len(rows)
+    points, ends = text.spans(starts := rows.columns(0, 3))
+    cell_rows = text.rows(end, faces)
+    cells = _faces(text, cell_rows, number)
+    sizes = text.integers(cell_rows.column(0))
+    unread = ["normals, colours or texture of points"] * bool((rows.lengths > 3).any())
+    unread += ["colours of faces"] * bool((cell_rows.lengths > 1 + sizes).any())
+    rest = text.rows(cell_rows.end if len(cell_rows) else end)
+    if len(rest):
+        text.fail(rest.where(0), f"the file goes on behind the {number} points and {faces} faces that it announces")
+    return Parsed(points, cells, TextSlots(starts, ends), unread=unread)
+
+
+def normals(files: Mapping[str, Data], cells: Sequence[CellBlock]) -> list[Normals]:
+    """See ``io.normals.Find``."""
+    text = Text(files[".off"], b"#")
+    rows, _, _, has_normals = _points_in(text)
+    if not has_normals or (rows.lengths < 6).any():
+        return []
+    return [in_text("of points", text, rows.columns(3, 3), FaceCorners.of(cells).node)]
+
+
+def _points_in(text: Text) -> tuple[Rows, int, int, bool]:
+    """The lines of the points, the byte behind them, the number of faces, and whether normals follow the points."""
     head = text.rows(0, 1)
-    if not _HEADER.fullmatch(text.token(head.starts[0])):
+    if not (header := _HEADER.fullmatch(text.token(head.starts[0]))):
         text.fail(head.where(0), f"an OFF file must start with OFF, found {text.word(head.starts[0])}")
     counts, end = head.starts[1:], head.end
     if len(counts) and text.token(counts[0]) == b"BINARY":
@@ -47,17 +74,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
     if odd.size:
         found, usual = rows.lengths[odd[0]], max(3, int(rows.lengths[0]))
         text.fail(rows.where(int(odd[0])), f"a point takes {usual} numbers here, found {found} words")
-    points, ends = text.spans(starts := rows.columns(0, 3))
-    end = rows.end if len(rows) else end
-    cell_rows = text.rows(end, faces)
-    cells = _faces(text, cell_rows, number)
-    sizes = text.integers(cell_rows.column(0))
-    unread = ["normals, colours or texture of points"] * bool((rows.lengths > 3).any())
-    unread += ["colours of faces"] * bool((cell_rows.lengths > 1 + sizes).any())
-    rest = text.rows(cell_rows.end if len(cell_rows) else end)
-    if len(rest):
-        text.fail(rest.where(0), f"the file goes on behind the {number} points and {faces} faces that it announces")
-    return Parsed(points, cells, TextSlots(starts, ends), unread=unread)
+    return rows, rows.end if len(rows) else end, faces, bool(header[3])
 
 
 def _faces(text: Text, rows: Rows, count: int) -> list[CellBlock]:

@@ -52,7 +52,7 @@ def write(mesh: Mesh, path: str | os.PathLike[str], format: str | None = None) -
     try:
         form = _form_for(source, entry, name)
         if isinstance(source, FileSource) and (source.format, source.form) == (entry.key, form) and source.fits(mesh):
-            lost = _rounded(mesh, source)
+            lost = [*_rounded(mesh, source), *_stale(source, entry)]
             files = source.splice(mesh.points)
         else:
             written = entry.write(mesh, form)
@@ -106,6 +106,15 @@ def _rounded(mesh: Mesh, source: FileSource) -> list[str]:
     return (
         [f"coordinates were rounded to {mesh.rounding.words}, by at most {most:.2g}"] if mesh.rounding and most else []
     )
+
+
+def _stale(source: FileSource, entry: Entry) -> Iterator[str]:
+    """In words, which normals were to be computed anew in a file and are not."""
+    if source.stale:
+        yield (
+            f"normals ({', '.join(source.stale)}) stay as they are in {entry.title} files, though nodes moved: to have "
+            "them computed anew write another format, such as .vtu"
+        )
 
 
 def _unread(source: Source | None) -> Iterator[str]:

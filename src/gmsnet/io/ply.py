@@ -6,7 +6,7 @@ Other properties that are one number are data; those of faces whose names say so
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from gmsnet.io.cell_table import Kind, check_range, table_blocks
 from gmsnet.io.cells import joined
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.normals import Normals, in_words
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import side_by_side
 from gmsnet.io.ply_rows import Column, Table, tables
@@ -25,7 +26,9 @@ from gmsnet.io.ranges import Plan
 from gmsnet.io.rows import Ranges
 from gmsnet.io.text import fail
 from gmsnet.io.words import Words, typed
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.normals import AXES, FaceCorners
 from gmsnet.mesh.region_fields import names_a_region, regions_of
 
 name = "PLY"
@@ -75,6 +78,19 @@ def read(files: Mapping[str, Data]) -> Parsed:
 def plan(file: Ranges) -> Plan | None:
     """See ``ply_ranges.plan``."""
     return ply_ranges.plan(file, LISTS)
+
+
+def normals(files: Mapping[str, Data], cells: Sequence[CellBlock]) -> list[Normals]:
+    """See ``io.normals.Find``."""
+    data, corners, result = files[".ply"], FaceCorners.of(cells), []
+    words, found = tables(data, ply_header.parse(data))
+    for element, row in (("vertex", corners.node), ("face", corners.face)):
+        axes = [found[element][axis] for axis in AXES if axis in found.get(element, {})]
+        kinds = {axis.property.kind for axis in axes if axis.sizes is None}
+        if len(axes) == 3 and kinds in ({"f4"}, {"f8"}):
+            places = side_by_side(*(axis.at for axis in axes))
+            result.append(in_words(", ".join(AXES), words, places, kinds.pop(), row))
+    return result
 
 
 def _unread(header: ply_header.Header) -> list[str]:

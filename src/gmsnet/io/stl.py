@@ -7,7 +7,7 @@ triangles, whatever it begins with; a text file has one or more solids, which ar
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 
 import numpy as np
@@ -18,6 +18,7 @@ from gmsnet.io import convert, stl_ranges
 from gmsnet.io.cells import distinct, joined, sealed
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.normals import Normals, in_text, in_words
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Lattice, Places
 from gmsnet.io.ranges import Plan
@@ -29,13 +30,16 @@ from gmsnet.io.words import ByteWords
 from gmsnet.kernels.topology import weld as kernels
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.normals import FaceCorners
 
 name = "STL"
 suffixes: tuple[str, ...] = (".stl",)
+NORMALS = "of facets"
 
 _VERTEX = [b"vertex", b"", b"", b""]
 _FACET = [b"facet", b"normal", b"", b"", b"", b"outer", b"loop", *_VERTEX * 3, b"endloop", b"endfacet"]
 _CORNERS = [8, 9, 10, 12, 13, 14, 16, 17, 18]  # where the coordinates are among the words of a facet
+_NORMAL = [2, 3, 4]  # and those of its normal
 _SOLID = re.compile(rb"(?i)(end)?solid\b([^\r\n]*)")
 _LONG_EXPONENT = re.compile(rb"[eE][+-]?\d{7}")
 _TOGETHER = 1 << 17  # corners that are welded at once
@@ -73,28 +77,23 @@ def plan(file: Ranges) -> Plan | None:
     return stl_ranges.plan(file)
 
 
+def normals(files: Mapping[str, Data], cells: Sequence[CellBlock]) -> list[Normals]:
+    """See ``io.normals.Find``."""
+    data, corners = files[".stl"], FaceCorners.of(cells)
+    count = len(corners.face) // 3
+    if len(data) == HEAD + RECORD * count:
+        places = Places(Lattice(HEAD, count, RECORD, (0, 4, 8)))
+        return [in_words(NORMALS, ByteWords(data, "<"), places, "f4", corners.face)]
+    text = Text(data)
+    starts, _, _ = _solids_in(text, _NORMAL)
+    return [in_text(NORMALS, text, joined(starts).reshape(-1, 3), corners.face)]
+
+
 def _text(data: Data) -> Parsed:
-    text, names = Text(data), dict[tuple[int, int], str]()
-    tokens, _ = text.tokens(0)
-    found: list[Starts] = []
-    body, last = -1, 0  # where the facets of the open solid begin, and where the last solid ended
-    for start, is_end, title, stop in _solid_lines(text, tokens):
-        if is_end != (body >= 0):
-            text.fail(start, "'endsolid' without 'solid'" if is_end else "the solid before has no 'endsolid'")
-        if is_end:
-            found.append(
-                _facets(text, tokens[slice(*np.searchsorted(tokens, np.array([body, start], tokens.dtype)))], start)
-            )
-            body, last = -1, stop
-        else:
-            if title:
-                names[2, len(found) + 1] = title
-            body = stop
-    if body >= 0:
-        text.fail(len(data), "'endsolid' is missing: the file is cut off")
+    text = Text(data)
+    found, names, last = _solids_in(text, _CORNERS)
     if (behind := text.next(last)) is not None:
         text.fail(behind[0], "unknown words behind the last 'endsolid'")
-    del tokens
     region = np.repeat(np.arange(1, len(found) + 1), list(map(len, found)))
     starts = joined(found).reshape(-1, 3)
     del found
@@ -107,6 +106,28 @@ def _text(data: Data) -> Parsed:
     points, node = _told_apart(text, starts, ends, weld)
     cells = [CellBlock("triangle", sealed(node).reshape(-1, 3), sealed(region))]
     return Parsed(points, cells, TextSlots(starts, ends, node), names)
+
+
+def _solids_in(text: Text, columns: list[int]) -> tuple[list[Starts], dict[tuple[int, int], str], int]:
+    """Some of the words of all facets, an array for each solid, the names of these, and the byte behind the last."""
+    names = dict[tuple[int, int], str]()
+    tokens, _ = text.tokens(0)
+    found: list[Starts] = []
+    body, last = -1, 0  # where the facets of the open solid begin, and where the last solid ended
+    for start, is_end, title, stop in _solid_lines(text, tokens):
+        if is_end != (body >= 0):
+            text.fail(start, "'endsolid' without 'solid'" if is_end else "the solid before has no 'endsolid'")
+        if is_end:
+            inside = tokens[slice(*np.searchsorted(tokens, np.array([body, start], tokens.dtype)))]
+            found.append(_facets(text, inside, start, columns))
+            body, last = -1, stop
+        else:
+            if title:
+                names[2, len(found) + 1] = title
+            body = stop
+    if body >= 0:
+        text.fail(len(text.data), "'endsolid' is missing: the file is cut off")
+    return found, names, last
 
 
 def _solid_lines(text: Text, tokens: Starts) -> Iterator[tuple[int, bool, str, int]]:
@@ -127,8 +148,8 @@ def _solid_lines(text: Text, tokens: Starts) -> Iterator[tuple[int, bool, str, i
                 yield start, match[1] is not None, match[2].strip().decode("utf-8", "replace"), at
 
 
-def _facets(text: Text, tokens: Starts, stop: int) -> Starts:
-    """The tokens (triangles × 9) of the coordinates among those of a solid, which must be whole facets."""
+def _facets(text: Text, tokens: Starts, stop: int, columns: list[int]) -> Starts:
+    """Some words (triangles × columns) of the facets of a solid, which must be whole, out of all its tokens."""
     size = len(_FACET)
     count = len(tokens) // size
     wrong = text.until(stop).mismatch(tokens[: count * size], _FACET)
@@ -137,7 +158,7 @@ def _facets(text: Text, tokens: Starts, stop: int) -> Starts:
         text.fail(int(tokens[wrong]), f"expected {_FACET[wrong % size].decode()!r}, found {found!r}")
     if len(tokens) > count * size:
         text.fail(int(tokens[count * size]), "the facet that begins here is not complete")
-    return np.stack([tokens[j::size][:count] for j in _CORNERS], axis=1)
+    return np.stack([tokens[j::size][:count] for j in columns], axis=1)
 
 
 class Weld:

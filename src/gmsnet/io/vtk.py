@@ -6,7 +6,7 @@ nodes has its length in front; since version 5 there are two arrays, OFFSETS and
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NoReturn
 from urllib.parse import quote
@@ -19,15 +19,18 @@ from gmsnet.io import convert, vtk_cells, vtk_ranges
 from gmsnet.io.cells import joined
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.normals import Normals, in_words
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Addresses, Lattice, Places, lists, pick
 from gmsnet.io.ranges import Plan
 from gmsnet.io.rows import Ranges
 from gmsnet.io.vtk_faces import nodes_once
-from gmsnet.io.vtk_fields import attribute, field_arrays, keyword
+from gmsnet.io.vtk_fields import Take, attribute, field_arrays, keyword, vectors
 from gmsnet.io.vtk_stream import OWN_TYPES, Array, Line, Stream, opened, word_of
 from gmsnet.kernels.text import text as kernels
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.normals import FaceCorners, names_normals
 from gmsnet.mesh.vtk_types import POLYGON, POLYHEDRON, POLYLINE, POLYVERTEX
 
 name = "VTK"
@@ -71,7 +74,26 @@ def read(files: Mapping[str, Data]) -> Parsed:
     return _assemble(stream, found, polygonal)
 
 
-def _section(stream: Stream, line: Line, found: Contents) -> None:
+def normals(files: Mapping[str, Data], cells: Sequence[CellBlock]) -> list[Normals]:
+    """See ``io.normals.Find``."""
+    stream, _ = opened(files[".vtk"])
+    found, corners, result = Contents(), FaceCorners.of(cells), []
+    while (line := stream.line()).words:
+        _section(stream, line, found, vectors)
+    count = sum(len(block.nodes) for block in cells)
+    for key, row in (("POINT_DATA", corners.node), ("CELL_DATA", corners.cell)):
+        for called, array in found.fields.get(key, []):
+            if (
+                isinstance(array, Array)
+                and names_normals(called)
+                and (key == "POINT_DATA" or len(array.at) == 3 * count)
+            ):
+                result.append(in_words(called, array.source, array.at, array.kind, row))
+    return result
+
+
+def _section(stream: Stream, line: Line, found: Contents, take: Take | None = None) -> None:
+    """Reads on. take: see ``field_arrays``."""
     key = line.key
     if key in found.lists or key in found.counts or (key == "POINTS" and found.points is not None):
         stream.fail(line.start, f"{key} is given twice")
@@ -97,7 +119,7 @@ def _section(stream: Stream, line: Line, found: Contents) -> None:
         field_arrays(stream, line, None, found.others)  # facts about the whole grid
     else:
         place = list(found.fields)[-1]
-        found.fields[place] += attribute(stream, line, found.counts[place][0], found.others)
+        found.fields[place] += attribute(stream, line, found.counts[place][0], found.others, take)
 
 
 def _lists(stream: Stream, line: Line) -> CellLists:

@@ -103,3 +103,10 @@ def _values(stream: Stream, line: Line, rows: int, width: int, kind: str) -> NDA
         array = stream.array(line, rows * width, kind)
         values = typed(array.values(), array.kind)
     return values if width == 1 else values.reshape(rows, width)
+
+
+def vectors(stream: Stream, line: Line, rows: int, width: int, kind: str) -> Any:
+    """A Take: of vectors of floats where their numbers stand, an Array, of others the values."""
+    if width == 3 and kind.lower() in ("float", "double"):
+        return stream.array(line, 3 * rows, kind)
+    return _values(stream, line, rows, width, kind)

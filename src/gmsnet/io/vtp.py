@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NoReturn
 
 import numpy as np
@@ -11,7 +11,9 @@ from gmsnet.errors import FormatError
 from gmsnet.io import vtk_ghosts, vtu
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
+from gmsnet.io.normals import Normals
 from gmsnet.io.vtu_reader import Reader
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.vtk_types import POLYGON, POLYLINE, POLYVERTEX, STRIP
 
@@ -24,6 +26,12 @@ SECTIONS = {"Verts": POLYVERTEX, "Lines": POLYLINE, "Strips": STRIP, "Polys": PO
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
     return vtk_ghosts.held(facts(Reader(files[".vtp"], "PolyData")))
+
+
+def normals(files: Mapping[str, Data], cells: Sequence[CellBlock]) -> list[Normals]:
+    """See ``io.normals.Find``."""
+    reader = Reader(files[".vtp"], "PolyData")
+    return vtu.normals_in(reader, cells, sum(_count(reader, section) for section in SECTIONS))
 
 
 def is_empty(reader: Reader) -> bool:

@@ -6,7 +6,7 @@ of the arrays behind it follow.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, NoReturn
@@ -19,6 +19,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io import convert, vtk_cells, vtk_ghosts, vtu_ranges
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
+from gmsnet.io.normals import Normals
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Lattice, Places
 from gmsnet.io.ranges import Plan
@@ -27,7 +28,9 @@ from gmsnet.io.splice import BinarySlots, EncodedSlots, Slots
 from gmsnet.io.vtu_arrays import Encoded
 from gmsnet.io.vtu_reader import TYPES, Reader, one_word
 from gmsnet.io.vtu_xml import DataArray, Document
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.normals import FaceCorners, names_normals
 
 name = "VTU"
 suffixes: tuple[str, ...] = (".vtu",)
@@ -122,8 +125,29 @@ def parsed(reader: Reader, codes: NDArray[np.int64], cells: Listed) -> Parsed:
     return vtk_cells.parsed(points, slots, single, codes, sizes, nodes, fields[0], fields[1], blame, unread)
 
 
+def normals(files: Mapping[str, Data], cells: Sequence[CellBlock]) -> list[Normals]:
+    """See ``io.normals.Find``."""
+    reader = Reader(files[".vtu"])
+    return normals_in(reader, cells, reader.count("NumberOfCells"))
+
+
+def normals_in(reader: Reader, cells: Sequence[CellBlock], count: int) -> list[Normals]:
+    """The normals in a file with so many cells; none of these where lines were cut into their pieces."""
+    corners, result, whole = FaceCorners.of(cells), [], sum(len(block.nodes) for block in cells)
+    sections = [("PointData", reader.count("NumberOfPoints"), corners.node)]
+    sections += [("CellData", count, corners.cell)] * (count == whole)
+    for section, rows, row in sections:
+        for array in reader.section(section):
+            called, kind = array.attributes.get("Name", ""), array.attributes.get("type")
+            if names_normals(called) and kind in ("Float32", "Float64") and reader.width(array) == 3:
+                values, slots = _points(reader, array, rows)
+                reader.check_apart(array)
+                result.append(Normals(called, values, slots, row))
+    return result
+
+
 def _points(reader: Reader, place: DataArray, count: int) -> tuple[NDArray[np.float64], Slots]:
-    """The points, and the places of their coordinates in whatever form they are stored."""
+    """The points, or other vectors, and the places of their coordinates in whatever form they are stored."""
     name = TYPES[place.attributes["type"]]
     if place.attributes.get("format", "ascii") == "ascii":
         words = reader.words(place, 3 * count)

@@ -147,7 +147,7 @@ class Reader:
         return start + offset, memoryview(self.data)[start + offset : stop], encoding == "base64"
 
     def check_apart(self, place: DataArray) -> None:
-        """Appended points must share no bytes with another array, which would change along with them."""
+        """Appended points, or normals, must share no bytes with another array, which would change along with them."""
         if place.offset is None or place.offset[1] not in self.spans:
             return
         assert self.document.appended is not None
@@ -157,7 +157,9 @@ class Reader:
                 start = self.document.appended[1] + array.offset[0]
                 start, stop = self.spans.get(array.offset[1], (start, start + 1))
                 if start < end and first < stop:
-                    self.fail(array, "it shares bytes with the points: write the file anew, each array with its own")
+                    self.fail(
+                        array, "it shares bytes with points or normals: write the file anew, each array with its own"
+                    )
 
 
 def one_word(text: memoryview) -> tuple[int, int] | None:

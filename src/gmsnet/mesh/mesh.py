@@ -45,6 +45,12 @@ class Source(Protocol):
         """Normals of facets or points in it that no field of the mesh holds, in words; "" for none."""
         ...
 
+    def renewing(
+        self, point_data: dict[str, NDArray[Any]], cell_data: dict[str, tuple[NDArray[Any], ...]]
+    ) -> tuple[Source, list[str]]:
+        """The same with these data, whose ``splice`` computes normals anew, and which these are in it, in words."""
+        ...
+
     def images_in(self, mesh: Mesh) -> NDArray[np.int64]:
         """(n,) the nodes of periodic boundaries, if the mesh has the cells of the file: they must go on to match."""
         ...

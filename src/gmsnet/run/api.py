@@ -51,6 +51,7 @@ def smooth(
     surface_tolerance: float | None = None,
     hausdorff: float | None = None,
     free_needles: bool = False,
+    update_normals: bool = False,
     device: str = "cpu",
     metric: Any = None,
     size: Any = None,
@@ -87,6 +88,8 @@ def smooth(
     the input's facets nodes of surfaces may go, over the mean length of their edges (default: 0.05; with a geometry
     without a bound). hausdorff: how far their facets may go from the input's, over the diagonal of the box around it
     (default: no bound). free_needles: edges that look sharp only because a facet of a surface is thin are no features.
+    update_normals: normals of faces and points, in the data of a surface and in the file that it was read from, are
+    computed anew where nodes have moved (docs/surfaces.md).
     device: "cpu", or "cuda": a GPU of NVIDIA does what it can, sweeps in a plane, with the same bits (docs/cuda.md).
     metric: the tensors of which the cells are to be unit cells, by shape and size (docs/metric.md): an array (N, 3) of
     m11, m12, m22 at the nodes, or a function from points (n, 2) to such an array. size: the same for lengths h of
@@ -101,8 +104,8 @@ def smooth(
         target_quality=target_quality, target_angle=target_angle, target_dihedral=target_dihedral,
         preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, callback=callback,
         weights=weights, best_by=best_by, slide=slide, feature_angle=feature_angle, geometry=geometry,
-        surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles, device=device,
-        metric=metric, size=size,
+        surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles,
+        update_normals=update_normals, device=device, metric=metric, size=size,
     )  # fmt: skip
     return smooth_with(mesh, options, fixed)
 

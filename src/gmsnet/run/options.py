@@ -58,6 +58,7 @@ class SmoothOptions:
     surface_tolerance: float | None = None
     hausdorff: float | None = None
     free_needles: bool = False
+    update_normals: bool = False
     device: str = CPU
     metric: Any = field(default=None, compare=False)
     size: Any = field(default=None, compare=False)
@@ -102,6 +103,7 @@ class SmoothOptions:
                 f"it, and must lie in (0, 1], got {self.hausdorff!r}"
             )
         _check_flag("free_needles", self.free_needles)
+        _check_flag("update_normals", self.update_normals)
         _check_name("device", self.device, DEVICES)
         if self.device == CUDA:
             gpu_library()  # whether there is one is told before a file is read

@@ -34,7 +34,7 @@ from gmsnet.run.metric_stage import check_given
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.second_order import second_order_of
 from gmsnet.run.second_order_volumes import second_order_solids_of
-from gmsnet.run.set_up_surface import first_of_surface
+from gmsnet.run.set_up_surface import first_of_surface, renewing
 from gmsnet.run.state import SecondOrder, State
 from gmsnet.topology.held import REASONS
 from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
@@ -70,6 +70,8 @@ def first_state(
     if given.has_volumes:
         return _first_of_volume(given, restore, asked, fixed, smoother, options, executor, moved)
     if given.plane is None:
+        if options.update_normals:
+            restore = renewing(given, mesh)
         state, shell = first_of_surface(given, restore, asked, smoother, options, executor)
         return replace(state, remarks=(*state.remarks, *held_anyway(given, asked, shell, fixed, options.slides)))
     threads = options.thread_count if len(given.points) >= MANY else 1
@@ -226,7 +228,8 @@ def check_surface_options(mesh: Mesh, options: SmoothOptions) -> None:
     """InputError for options of surfaces where the mesh is none."""
     if mesh.plane is None and not mesh.has_volumes:
         return
-    for name, given in (("hausdorff", options.hausdorff is not None), ("free_needles", options.free_needles)):
+    for name, given in (("hausdorff", options.hausdorff is not None), ("free_needles", options.free_needles),
+                        ("update_normals", options.update_normals)):  # fmt: skip
         if given:
             raise InputError(f"{name} is of surfaces in space, and this mesh is none: leave it out")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,11 @@ from gmsnet.constraints.options import check_slide
 from gmsnet.constraints.shell import FEATURE, patches_of_surface, sides_of, torn_apart
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
 from gmsnet.constraints.smooth_patches import vertices_of
+from gmsnet.errors import InputError
 from gmsnet.measure.report import measure
 from gmsnet.mesh.known_cells import unmeasured, unmoved_faces
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.normals import fields_in, normals_in, renewed_mesh
 from gmsnet.methods import Smoother
 from gmsnet.parallel.executor import Executor
 from gmsnet.preserve.protection import Protection
@@ -26,7 +29,6 @@ from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
-AXES = ("nx", "ny", "nz")  # how PLY calls the components of a normal
 
 
 def first_of_surface(
@@ -65,8 +67,7 @@ def first_of_surface(
             f"{int(torn.sum()):,} nodes of the boundary have another one in their place, to rounding: facets are not "
             "joined there, so these nodes are held. Make equal points one point first, and they can move",
         )
-    if stale := _normals_of(given):
-        remarks += (f"normals in the file ({stale}) stay as they are, though nodes move: have them computed anew",)
+    remarks += _of_normals(given, options.update_normals)
     given = given.without_cells()
     before = measure(given, shell, start, executor.for_blocks(0))
     nothing = np.empty(0, dtype=np.float32)
@@ -76,11 +77,28 @@ def first_of_surface(
     return state, shell
 
 
-def _normals_of(mesh: Mesh) -> str:
-    """What a mesh or its file knows of normals, in words; "" for nothing."""
-    fields = [name for name in (*mesh.point_data, *mesh.cell_data) if "normal" in name.lower() or name in AXES]
+def _of_normals(mesh: Mesh, update: bool) -> tuple[str, ...]:
+    """What becomes of normals in a mesh or its file, in words. update: whether they are to be computed anew."""
+    if update:
+        found = normals_in(mesh)
+        told = f"normals ({', '.join(found)}) are computed anew where nodes move"
+        return (told if found else "update_normals: there are no normals in the mesh or its file that are known",)
     source = "" if mesh.source is None else mesh.source.normals
-    return ", ".join(filter(None, [*fields, source]))
+    if stale := ", ".join(filter(None, [*fields_in(mesh.point_data, mesh.cell_data), source])):
+        return (
+            f"normals in the file ({stale}) stay as they are, though nodes move: update_normals computes them anew",
+        )
+    return ()
+
+
+def renewing(given: Mesh, mesh: Any) -> Callable[[Floats], Mesh]:
+    """What makes a mesh of new points, with new normals. mesh: what came in. InputError where that is no Mesh."""
+    if given is not mesh:
+        raise InputError(
+            f"update_normals is of files and of meshes that gmsnet.read gives, and this is a {type(mesh).__name__}: "
+            "leave it out, and have its own library compute normals of the result"
+        )
+    return partial(renewed_mesh, given)
 
 
 def _flagged(nodes: NDArray[np.int32], count: int) -> NDArray[np.bool_]:
