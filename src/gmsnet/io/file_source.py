@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
 from gmsnet.io.normals import Find, Normals, all_rewritten
 from gmsnet.io.pieces import Piece, Pieces
@@ -76,7 +77,12 @@ class FileSource:
         return replace(self, point_data=point_data, cell_data=cell_data, renews=bool(found), stale=stale), found
 
     def _found(self, files: Mapping[str, Data]) -> list[Normals]:
-        return [] if self.find is None or self.shares else self.find(files, self.cells)
+        if self.find is None or self.shares:
+            return []
+        try:
+            return self.find(files, self.cells)
+        except FormatError as error:
+            raise FormatError(f"{next(iter(self.stamps.known), 'the file')}: its normals: {error}") from None
 
     def fits(self, mesh: Mesh) -> bool:
         """Whether the file can stand for a mesh once its coordinates are replaced: all else is as it was read."""
