@@ -85,6 +85,24 @@ def test_nodes_of_features_stay_where_nothing_else_is_asked(kind):
     assert same(mesh, slid(slide=None), cut(mesh, 2), 2).gathered == ""
 
 
+@pytest.mark.parametrize(
+    ("count", "seed", "how"), [(200, 1, "interleaved"), (400, 0, "strips"), (600, 1, "interleaved")]
+)
+def test_nodes_on_facets_stay_where_only_their_rank_knows_them(count, seed, how):
+    """The first rank gets cells around the worst ones, and with them nodes that do not move there."""
+    mesh = ball(count, seed)
+    parts = cut(mesh, 3 if how == "strips" else 2, how)
+    assert same(mesh, slid(slide=None), parts, 3 if how == "strips" else 2).gathered == ""
+
+
+@pytest.mark.parametrize(("count", "seed"), [(130, 2), (200, 3), (280, 2)])
+def test_nodes_beside_a_round_of_a_target_are_located_alike(count, seed):
+    """One process locates all nodes in each round, several those of the patches alone."""
+    mesh = ball(count, seed, 0.4)
+    told = same(mesh, slid(slide=None, target_quality=0.8, hausdorff=0.01), cut(mesh, 3, "interleaved"), 3)
+    assert told.gathered == ""
+
+
 @pytest.mark.parametrize("kind", ["circle", "quads", "cube", "hexahedra", "sphere", "sheet of quads"])
 def test_inverted_cells(kind):
     mesh, rng = MESHES[kind], np.random.default_rng(7)

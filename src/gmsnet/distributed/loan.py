@@ -110,14 +110,16 @@ class Loan(NamedTuple):
             self._slid_back(part, part.rail)
 
     def _slid_back(self, part: Part, rail: Rail) -> None:
-        """So do the places on the rail."""
+        """So do the places on the rail, of the nodes that were free to move: of others only their rank knows them."""
         parcels: list[Floats] | None = None
         if self.field is not None and self.all is not None and self.sent is not None:
             assert self.field.constraint is not None
-            now = where_on(self.field.constraint)[self.field.topology.places]
-            parcels = [now[np.searchsorted(self.all, ids)] for ids in self.sent]
-        now = where_on(rail)
-        now[self._places(part)] = part.comm.scatter(parcels)
+            found = np.where(self.field.topology.near_free, where_on(self.field.constraint), np.nan)
+            found = found[self.field.topology.places]
+            parcels = [found[np.searchsorted(self.all, ids)] for ids in self.sent]
+        came, now, places = part.comm.scatter(parcels), where_on(rail), self._places(part)
+        known = ~np.isnan(came)
+        now[places[known]] = came[known]
         put_on(rail, part.halo.spread(now))
 
 

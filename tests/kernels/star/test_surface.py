@@ -266,6 +266,26 @@ def test_curves_end():
     assert np.array(snap3(closed, closed.row[4], *points[2])[:3]) == pytest.approx(points[2], abs=1e-15)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_nodes_that_stay_are_located_once(seed):
+    """Off a ridge or a peak the nearest place is on several facets: which one is told does not depend on how often."""
+    points, rows = sphere(300, seed)
+    _, surface = constraint(points, rows)
+    start, rng, other = surface.place.copy(), np.random.default_rng(seed), 0
+    for _ in range(20):
+        moved = points + rng.normal(size=points.shape) * 0.05
+        surface.place[:] = start
+        locate3(surface, moved)
+        once = surface.place.copy()
+        for _ in range(3):
+            locate3(surface, moved)
+            assert np.array_equal(surface.place, once)
+        for row in range(len(start)):
+            x, y, z = moved[np.flatnonzero(surface.row == row)[0]]
+            other += walk(surface.vertex, surface.facet, once[row], x, y, z)[0] != once[row]
+    assert other > 20  # a walk alone goes on
+
+
 def test_kernels_over_all_nodes():
     points, rows = cylinder(24, 5)
     _, surface = constraint(points, rows)

@@ -18,6 +18,7 @@ from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.star.cubics import normal_on, over_facet, walk, within
 from gmsnet.kernels.star.pieces import follow_curve, on_piece, piece_tangent
 
+MOST_WALKS = 8  # around a peak, until the first one is come to again
 FLAT, CURVED, LINE, CURVE = range(4)  # kinds of rows; the last two have one way to go
 
 
@@ -143,9 +144,30 @@ def directions_at(surface, row, x, y, z):
     return surface.direction[e, 0], surface.direction[e, 1], surface.direction[e, 2]
 
 
+@part
+def located(vertex, facet, f, x, y, z):
+    """The facet nearest to a point, from facet f on; from where it leads to, the same one again.
+
+    Walks to a ridge or a peak end on one of its facets, and those from there on another one: of these the first.
+    """
+    place, a, b, c = walk(vertex, facet, f, x, y, z)
+    if a > 0.0 and b > 0.0 and c > 0.0:
+        return place
+    least = onward = place
+    for _ in range(MOST_WALKS):
+        onward, _, _, _ = walk(vertex, facet, onward, x, y, z)
+        if onward == place:
+            break
+        least = min(least, onward)
+    return least
+
+
 @kernel
 def locate3(surface, points):
-    """Writes anew where each node that slides is, of coordinates (N, 3 or 4) that were kept without that."""
+    """Writes anew where each node that slides is, of coordinates (N, 3 or 4) that were kept without that.
+
+    Once it has, it changes nothing: so it does not matter how often nodes that stay are located.
+    """
     rows, kind, kept, vertex, facet = surface.row, surface.kind, surface.place, surface.vertex, surface.facet
     for node in range(len(rows)):
         row = rows[node]
@@ -153,7 +175,7 @@ def locate3(surface, points):
             continue
         x, y, z = points[node, 0], points[node, 1], points[node, 2]
         if kind[row] == CURVED:
-            place, _, _, _ = walk(vertex, facet, np.int64(kept[row]), x, y, z)
+            place = located(vertex, facet, np.int64(kept[row]), x, y, z)
         else:
             _, _, _, place = snap3(surface, row, x, y, z)
         kept[row] = place
