@@ -10,6 +10,7 @@ import gmsnet
 from gmsnet.generate import block_volume, disturb, lattice_volume
 from gmsnet.generate.curved_volumes import second_order_volume
 from gmsnet.run import second_order_turns, stop
+from gmsnet.run.second_order import AS_FAR
 
 
 def thrown(volume, amount, seed):
@@ -26,6 +27,7 @@ MESHES = {
     **{f"tetra10 {seed}": (lambda seed=seed: thrown(lattice_volume(4), 0.3, seed)) for seed in range(4)},
     "hexahedron27": lambda: thrown(block_volume(3), 0.6, 1),
 }
+ROOMY = ((lambda: lattice_volume(4), 0.3, 7, 0.78), (lambda: block_volume(3, "wedge"), 0.4, 0, 0.89))
 
 
 def least_of_two_calls(mesh):
@@ -48,6 +50,31 @@ def test_turns_are_what_makes_it_so(name, monkeypatch):
     one, second = least_of_two_calls(MESHES[name]())
     assert second > one + 0.05
     assert several >= second
+
+
+@pytest.mark.parametrize(("volume", "amount", "seed", "least"), ROOMY)
+def test_corners_use_the_room_that_the_first_turn_has_made(volume, amount, seed, least):
+    """Cells that were to keep all of it stopped corners at .70 and .76."""
+    result = gmsnet.smooth(thrown(volume(), amount, seed))
+    assert result.after.shape.min() > least
+
+
+@pytest.mark.parametrize(("volume", "amount", "seed", "least"), ROOMY)
+def test_turns_go_on_where_straight_cells_alone_meet_the_target(volume, amount, seed, least):
+    result = gmsnet.smooth(thrown(volume(), amount, seed), target_quality=least)
+    assert result.stop_reason == stop.TARGET_REACHED
+    assert result.after.shape.min() >= least
+    assert result.invalid_curved == 0
+
+
+def test_where_corners_are_stopped_is_a_stage_of_its_own():
+    """The sweeps before it tell of the straight cells that the method saw."""
+    history = gmsnet.smooth(MESHES["tetra10 1"]()).history
+    at = [k for k, look in enumerate(history) if look.stage == AS_FAR]
+    assert at
+    for k in at:
+        assert history[k].index == history[k - 1].index
+        assert history[k].min_shape < history[k - 1].min_shape
 
 
 @pytest.mark.parametrize("look", [2, 4, 8])

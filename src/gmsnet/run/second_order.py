@@ -9,7 +9,6 @@ them. A move is taken if all cells around it are certified valid by the coeffici
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.stars import counter_clockwise, curved_mesh
 from gmsnet.kernels.simplex.bernstein import CORNERS, KINDS, NAMES, WIDEST
-from gmsnet.kernels.star.guard import LEVELS, VALID
+from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -41,6 +40,7 @@ from gmsnet.topology.volume import Volume
 
 FOR_GOOD = "its determinant is not positive where held nodes alone decide it"
 NOT_FOUND = "no valid shape of it was found"
+AS_FAR = "corners as far as curved cells let them"  # a stage
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -159,12 +159,8 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
     given = state.second_order
     if given is None or given.unable or state.stop_reason == CALLBACK or not given.free.any():
         return state
-    cells, room = opened(state), -math.inf
-    if options.guard != LEVELS[VALID]:
-        assert given.quality is not None
-        room = float(given.quality[(given.sign == 1) & given.curved].min(initial=cells.low))
-    corners = corners_alone(given)
-    curved = Curved(cells.mesh, room) if isinstance(cells, PlanarCells) else None
+    cells, corners = opened(state), corners_alone(given)
+    curved = Curved(cells.mesh, given.room) if isinstance(cells, PlanarCells) else None
     ready = replace(
         state, points=cells.points, totals=None, protection=corners, released=False, sliding=None,
         smoother=options.smoother(), curved=curved, stop_reason="",
@@ -181,7 +177,7 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
         return stopped(state, np.minimum(given.quality, state.second_order.quality) < cells.low)
     level = LEVELS.index(options.guard)
     guard = Field(cells.points, corners.topology, state.precision, level).guard(executor)
-    cells.advance(done.points, guard, room, np.asarray(given.sign == 1))
+    cells.advance(done.points, guard, given.room, np.asarray(given.sign == 1))
     state = stopped(state, (cells.points != done.points).any(axis=1)[cells.corner])
     topology = with_corners(state)
     after, before = (totals_of(points, topology.scored, executor) for points in (cells.points, state.points))
@@ -191,11 +187,17 @@ def smooth_corners(state: State, options: SmoothOptions, executor: Executor) -> 
 
 
 def _as_they_are(state: State, totals: Totals | None) -> State:
-    """The state with its last look at the cells as they are: the method saw straight ones where corners did not go."""
+    """The state with its last look at the cells as they are: the method saw straight ones where corners did not go.
+
+    That is a stage of its own where some did not.
+    """
     if totals is None or not state.history:
         return state
+    assert state.second_order is not None
     *looks, last = state.history
     seen = replace(last, inverted=totals.inverted, min_shape=totals.shape_min, mean_shape=totals.shape_mean)
+    if last.stage and state.second_order.stopped:
+        looks, seen = [*looks, last], replace(seen, stage=AS_FAR, moved=0, truncated=0, dropped=0)
     return replace(state, history=(*looks, seen))
 
 

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from gmsnet.kernels.star.guard import LEVELS, VALID
+from gmsnet.methods import planar_cells, solid_cells
 from gmsnet.parallel.executor import Executor
 from gmsnet.run.carry_out import carry_out_all
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.room_stage import make_room, raise_bounds
 from gmsnet.run.second_order import corners_alone, rank_at, smooth_corners
-from gmsnet.run.state import State, with_corners
-from gmsnet.run.stop import TARGET_REACHED
+from gmsnet.run.state import SecondOrder, State, with_corners
 from gmsnet.run.sweep_stage import rank_to_target
 
 TURN = (smooth_corners, make_room, raise_bounds)
 TURNS = 8  # at most
+MISSING = 2  # where a worth has the cells that miss a target
 GAIN, PATIENCE = 0.01, 2  # after so many turns that gain less in that by which meshes are compared, they end
 
 
@@ -28,8 +30,11 @@ def take_turns(state: State, options: SmoothOptions, executor: Executor) -> Stat
     Room that one turn makes is what the next one gains by. What comes after the best mesh by the rule of the last stage
     is taken back.
     """
-    if state.second_order is None or not state.second_order.free.any():
+    given = state.second_order
+    if given is None or not given.free.any():
         return state
+    if options.guard != LEVELS[VALID]:
+        state = replace(state, second_order=replace(given, room=_room(given)))
     best, most, idle = state, _worth(state, options, executor), 0
     for turn in range(TURNS):
         state = carry_out_all(state, options, executor, TURN)
@@ -38,19 +43,27 @@ def take_turns(state: State, options: SmoothOptions, executor: Executor) -> Stat
         idle = 0 if gained >= GAIN else idle + 1
         if not turn or worth > most:
             best, most = state, worth
-        if not _goes_on(state) or idle == PATIENCE:
+        if not _goes_on(state, worth, options) or idle == PATIENCE:
             break
     return best.ended_as(state)
 
 
-def _goes_on(state: State) -> bool:
+def _room(given: SecondOrder) -> float:
+    """The least bound of a valid cell, LOW at most. Later turns may use what room the first one makes."""
+    assert given.quality is not None
+    low = (solid_cells if given.solid else planar_cells).LOW
+    return float(given.quality[(given.sign == 1) & given.curved].min(initial=low))
+
+
+def _goes_on(state: State, worth: tuple[float, ...], options: SmoothOptions) -> bool:
+    """Not where a target is met by the corners as they are: the method may have met it by straight cells alone."""
     given = state.second_order
     assert given is not None
-    return given.stopped and not state.cut_short and state.stop_reason != TARGET_REACHED
+    return given.stopped and not state.cut_short and not (options.target and worth[MISSING] == 0)
 
 
 def _worth(state: State, options: SmoothOptions, executor: Executor) -> tuple[float, ...]:
-    """Of two states that of the greater one is the better."""
+    """Of two states that of the greater one is the better. With a target, minus those that miss it at MISSING."""
     given = state.second_order
     assert given is not None
     rank: tuple[float, ...]

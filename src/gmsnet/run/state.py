@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -59,8 +60,9 @@ class SecondOrder:
     over its least determinant at a corner, both at first and now. quality: (C,) these bounds now, sharp where they are
     low. linked: volumes and what follows their corners, by places in memory. None is known before the first stage.
     unable: why the method does not move corners. numbers: (C,) of each cell among all of the mesh. reasons: why cells,
-    by these, could not be made valid. stopped: some corners may not have gone where the method put them. outer: the ids
-    of nodes on facets of one cell alone, of a mesh that has volumes of the second order alone.
+    by these, could not be made valid. stopped: some corners may not have gone where the method put them. room: no bound
+    of a valid cell falls below it while corners move; −∞ before that is known. outer: the ids of nodes on facets of one
+    cell alone, of a mesh that has volumes of the second order alone.
     """
 
     cells: NDArray[np.int32]
@@ -77,6 +79,7 @@ class SecondOrder:
     unable: str = ""
     reasons: Mapping[int, str] = field(default_factory=dict)
     stopped: bool = False
+    room: float = -math.inf
     outer: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @property
