@@ -5,7 +5,7 @@ of the straight cell, is a quadratic polynomial in the node's place: six values 
 the mean size of the cell's coefficients, and t the place in units of the star's size, the objectives are
 
 - to untangle, Σ max(0, τ − v)²: zero where all v ≥ τ; and
-- to improve, −Σ log v, infinite where a v ≤ 0.
+- to improve, −Σ log v, or the first one where a v is not positive at first.
 
 To both κ|t − t₀|² is added for a middle or a centre, t₀ its straight place. For these two kinds of nodes v is affine
 and both objectives are convex. Steps are of Gauss and Newton (∇v ∇vᵀ, without second derivatives of v). They are
@@ -157,6 +157,9 @@ def descent(points, mesh, i, mode, threshold, work):
     ox, oy = (sx - x) / size, (sy - y) / size
     tx, ty = 0.0, 0.0
     value, gx, gy, xx, xy, yy = objective(work.model, rows, mode, threshold, tx, ty, kappa, ox, oy)
+    if mode == IMPROVE and not np.isfinite(value):  # valid cells may have coefficients that are not positive
+        mode, kappa = UNTANGLE, STRAIGHTENING[UNTANGLE] if inner else 0.0
+        value, gx, gy, xx, xy, yy = objective(work.model, rows, mode, threshold, tx, ty, kappa, ox, oy)
     if not np.isfinite(value):
         return x, y, False
     for _ in range(STEPS):
@@ -210,7 +213,7 @@ def improve_nodes(points, mesh, nodes, threshold, guard, tally):
         before = least_quality(points, mesh, i, guard, work)
         if not 0.0 < before < threshold:
             continue
-        x, y, fell = descent(points, mesh, i, IMPROVE, 0.0, work)
+        x, y, fell = descent(points, mesh, i, IMPROVE, threshold, work)
         if not fell:
             continue
         count = commit_curved(points, mesh, i, x, y, guard, -np.inf, work, tally)
