@@ -167,7 +167,7 @@ def test_held_middles_of_volumes_that_are_wrong_cost_only_cells_around_them(amou
     points[wrong] += 0.3 * (high - low)[0] * rng.normal(size=(4, 3))
     result = gmsnet.smooth(mesh.with_points(points), fixed=wrong.tolist())
     assert result.before.inverted > 80
-    assert result.after.inverted <= np.isin(block.nodes, wrong).any(axis=1).sum() < 20
+    assert result.after.inverted <= 5 < np.isin(block.nodes, wrong).any(axis=1).sum() < 20
     np.testing.assert_array_equal(result.mesh.points[wrong], points[wrong])
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES
+from gmsnet.kernels.methods.barrier3 import K3
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.block import DROPPED, TRUNCATED
@@ -104,3 +105,8 @@ def _least(
 
     executor.map(look, 0, len(blocks))
     return least
+
+
+def floor_of(shape: float) -> float:
+    """c of D/S^(3/2) for an η."""
+    return math.sqrt(shape**3 / K3)

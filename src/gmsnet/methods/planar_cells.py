@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.curved.descend import improve_nodes, straighten, untangling_sweep
+from gmsnet.kernels.curved.descend import guarded_sweep, improve_nodes, straighten, untangling_sweep
 from gmsnet.kernels.curved.stars import CENTRE, NO_EDGE, CurvedMesh, dragged
 from gmsnet.kernels.simplex.bernstein import KINDS, QUAD9
 from gmsnet.kernels.simplex.jacobian import judge_cells, straight_signs
-from gmsnet.kernels.star.guard import Guard, Precision
+from gmsnet.kernels.star.block import MOVED
+from gmsnet.kernels.star.guard import LARGEST, Guard, MeshGuard, Precision
 from gmsnet.measure.curved import judge_curved
 
 Floats = NDArray[np.float64]
@@ -101,6 +102,12 @@ class PlanarCells(NamedTuple):
         """See kernels.curved.descend."""
         moved: int = untangling_sweep(self.points, self.mesh, nodes, threshold, self.precision.single)
         return moved
+
+    def guarded_sweep(self, nodes: Ints, threshold: float, shape: float) -> int:
+        """See kernels.curved.descend. shape: the least 1/q of straight cells around a corner that moves."""
+        tally = np.zeros(3, dtype=np.int64)
+        guarded_sweep(self.points, self.mesh, nodes, threshold, MeshGuard(*self.precision, shape * LARGEST), tally)
+        return int(tally[MOVED])
 
     def improve(self, nodes: Ints, low: float, guard: Guard, tally: Ints) -> None:
         """Moves those of the nodes whose cells are low, by the guard; see kernels.curved.descend."""

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.curved.commit3 import judge_curved_solids, refused, straight_signs3
-from gmsnet.kernels.curved.descend3 import improve_nodes3, straighten3, untangling_sweep3
+from gmsnet.kernels.curved.descend3 import guarded_sweep3, improve_nodes3, straighten3, untangling_sweep3
 from gmsnet.kernels.curved.raise3 import raise_nodes3
 from gmsnet.kernels.curved.stars3 import NO_FOLLOWER, CurvedSolids, put_all
-from gmsnet.kernels.star.guard import Guard, Precision
+from gmsnet.kernels.star.block import MOVED
+from gmsnet.kernels.star.guard import Guard, MeshGuard, Precision
 from gmsnet.measure.solid import exact_signs_of
+from gmsnet.methods.floor import floor_of
 from gmsnet.topology.curved_solids import CURVED
 
 Floats = NDArray[np.float64]
@@ -108,6 +110,12 @@ class SolidCells(NamedTuple):
         """See kernels.curved.descend3."""
         moved: int = untangling_sweep3(self.points, self.mesh, nodes, threshold, self.precision.single)
         return moved
+
+    def guarded_sweep(self, nodes: Ints, threshold: float, shape: float) -> int:
+        """See kernels.curved.descend3. shape: the least η of straight cells around a corner that moves."""
+        tally, guard = np.zeros(3, dtype=np.int64), MeshGuard(*self.precision, floor_of(shape))
+        guarded_sweep3(self.points, self.mesh, nodes, threshold, guard, tally)
+        return int(tally[MOVED])
 
     def improve(self, nodes: Ints, low: float, guard: Guard, tally: Ints) -> None:
         """Moves those of the nodes whose cells are low, by the guard; see kernels.curved.descend3."""

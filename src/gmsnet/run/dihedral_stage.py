@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
-from gmsnet.kernels.methods.barrier3 import K3
 from gmsnet.kernels.star.guard import LEVELS, VALID
 from gmsnet.kernels.star.surface import Surface, locate3
 from gmsnet.measure.dihedral import REGULAR, Floats
@@ -15,7 +13,7 @@ from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.methods.auto import Auto
 from gmsnet.methods.base import Field, Tally
 from gmsnet.methods.dihedral import CYCLES, LARGE_CYCLES, Dihedral
-from gmsnet.methods.floor import Floor
+from gmsnet.methods.floor import Floor, floor_of
 from gmsnet.methods.phases import LARGE_VOLUME
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
@@ -112,11 +110,6 @@ def floor_for_angles(state: State, level: int, shape: float, executor: Executor)
         return floor
     known = state.floor if state.floor_of is start else None
     return max(floor, Floor().of(start, state.topology, state.precision, executor) if known is None else known)
-
-
-def floor_of(shape: float) -> float:
-    """c of D/S^(3/2) for an η."""
-    return math.sqrt(shape**3 / K3)
 
 
 def merit(totals: Totals, least: float) -> float:

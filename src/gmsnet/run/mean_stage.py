@@ -14,9 +14,10 @@ from gmsnet.kernels.star.guard import LEVELS, STAR
 from gmsnet.kernels.star.surface import Surface, locate3
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.methods.base import Field, Tally
+from gmsnet.methods.floor import floor_of
 from gmsnet.methods.mean_in_space import MeanInSpace
 from gmsnet.parallel.executor import Executor
-from gmsnet.run.dihedral_stage import floor_of, totals_at_end, with_sweep
+from gmsnet.run.dihedral_stage import totals_at_end, with_sweep
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.topology.volume import Volume

@@ -37,6 +37,10 @@ TRIES = (
 LARGE, BUDGET = 4, 2e8
 CLOSE = tuple(row for row in TRIES if row[0] < LARGE)  # around what no try has mended: it is given back
 
+# Of what is given back, sweeps by guarded moves go on while they mend a cell: rounds at most, sweeps for each τ.
+ROUNDS, SWEEPS, TAUS = 8, 12, (0.3, 0.1, 0.03)
+LEAST_SHAPE = 0.3  # of a straight cell, 1/q or η, to which they may flatten it
+
 
 class CurvedScore(NamedTuple):
     """How many cells are not certainly valid, before and after. for_good: (C,) those that cannot be valid."""
@@ -61,6 +65,8 @@ def untangle_curved(
         after, for_good = _mend(curved, give_back)
         if after == np.count_nonzero(for_good):
             break
+    else:
+        after = _guarded(curved)
     return CurvedScore(before, after, for_good)
 
 
@@ -110,6 +116,24 @@ def _mend(curved: Cells, give_back: bool) -> tuple[int, Mask]:
         if not bad.size or left <= 0.0:
             break
     return len(bad) + int(np.count_nonzero(for_good)), for_good
+
+
+def _guarded(curved: Cells) -> int:
+    """Mends more of what has been given back by moves that lose no valid cell; returns how many stay invalid."""
+    mesh, may = curved.mesh, curved.inner | curved.corner
+    bad = np.flatnonzero(curved.signs(_all(curved)) != 1)
+    for _ in range(ROUNDS):
+        before, nodes = len(bad), np.unique(mesh.cells[_around(mesh, bad)])
+        nodes = nodes[nodes >= 0]
+        nodes = nodes[may[nodes]]
+        for threshold in TAUS:
+            for _ in range(SWEEPS):
+                if not curved.guarded_sweep(nodes, threshold, LEAST_SHAPE):
+                    break
+        bad = bad[curved.signs(bad) != 1]
+        if len(bad) == before or not bad.size:
+            break
+    return len(bad)
 
 
 def _around(mesh: Any, cells: Ints) -> Ints:

@@ -79,3 +79,7 @@ class Cells(Protocol):
     def untangling_sweep(self, nodes: Ints, threshold: float) -> int:
         """A step of descent for each node; how many have moved."""
         ...
+
+    def guarded_sweep(self, nodes: Ints, threshold: float, shape: float) -> int:
+        """The same where no valid cell is lost; how many have moved. shape: the least of straight cells, 1/q or η."""
+        ...

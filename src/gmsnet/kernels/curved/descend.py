@@ -239,6 +239,16 @@ def untangling_sweep(points, mesh, nodes, threshold, single):
 
 
 @kernel
+def guarded_sweep(points, mesh, nodes, threshold, guard, tally):
+    """The same where ``commit_curved`` allows it: what is valid stays so."""
+    work = curved_workspace(mesh)
+    for k in range(len(nodes)):
+        x, y, fell = descent(points, mesh, nodes[k], UNTANGLE, threshold, work)
+        if fell:
+            commit_curved(points, mesh, nodes[k], x, y, guard, -np.inf, work, tally)
+
+
+@kernel
 def straighten(points, mesh, nodes, single):
     """Puts middles and centres (nodes, K) at their straight places and forgets their offsets."""
     for k in range(len(nodes)):

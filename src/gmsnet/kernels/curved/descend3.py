@@ -259,6 +259,16 @@ def untangling_sweep3(points, mesh, nodes, threshold, single):
 
 
 @kernel
+def guarded_sweep3(points, mesh, nodes, threshold, guard, tally):
+    """See descend.guarded_sweep."""
+    work = around_workspace(mesh, ROWS_OF_CELL, SAMPLES)
+    for k in range(len(nodes)):
+        x, y, z, fell = descent3(points, mesh, nodes[k], UNTANGLE, threshold, work)
+        if fell:
+            commit3(points, mesh, nodes[k], x, y, z, guard, work, tally)
+
+
+@kernel
 def straighten3(points, mesh, nodes, single):
     """See descend.straighten."""
     for k in range(len(nodes)):
