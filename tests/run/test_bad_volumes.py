@@ -1,9 +1,10 @@
 """Volumes that are wrong as cells: named, their nodes held, and what is around them smoothed all the same."""
 
 import numpy as np
+import pytest
 
 import gmsnet
-from gmsnet.generate import block_volume, disturb
+from gmsnet.generate import block_volume, disturb, lattice_volume
 from gmsnet.measure import defects
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -68,3 +69,19 @@ def test_a_quadrilateral_on_two_triangles():
     result = gmsnet.smooth(Mesh(mesh.points, cells))
     assert not result.moved[middle].any()
     assert set(middle.tolist()) <= set(result.held["facet against others of other nodes"].tolist())
+
+
+@pytest.mark.parametrize("kind", ["tetra", "hexahedron"])
+def test_cells_that_are_there_twice_are_told_with_their_numbers(kind):
+    """The copies are in a block of their own, and name their nodes in another order."""
+    mesh = thrown(kind) if kind == "hexahedron" else lattice_volume(4)
+    block = next(each for each in mesh.cells if each.dimension == 3)
+    copies = CellBlock(kind, np.roll(block.nodes[[50, 7]], 1, axis=1)[:, ::-1], block.regions[[50, 7]])
+    first = sum(len(each.nodes) for each in mesh.cells)
+    result = gmsnet.smooth(Mesh(mesh.points, (*mesh.cells, copies)))
+    assert (
+        "doubled: 2 cells have all nodes of another one, and what is around is held; "
+        f"the first is cell {first}, with the nodes of cell 50 (numbers from 0)"
+    ) in result.notes
+    assert not result.moved[copies.nodes].any()
+    assert not [note for note in gmsnet.smooth(mesh).notes if "doubled" in note]

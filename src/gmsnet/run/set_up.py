@@ -36,6 +36,7 @@ from gmsnet.run.second_order import second_order_of
 from gmsnet.run.second_order_volumes import second_order_solids_of
 from gmsnet.run.set_up_surface import first_of_surface, renewing
 from gmsnet.run.state import SecondOrder, State
+from gmsnet.topology.doubled import doubled_note
 from gmsnet.topology.held import REASONS
 from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
 from gmsnet.topology.ordering import space_points, taken
@@ -191,6 +192,7 @@ def _first_of_volume(
         topology = volume_of(wound, surface[1].slides | surface[1].curves.slides)
         sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, options.distance, options.geometry)
     remarks = held_anyway(given, asked, topology, fixed, options.slides)
+    remarks += doubled_note(given, topology)
     second = second_order_solids_of(given, topology, options)
     others = [unmoved(counts_of(given))]
     if second is None and isinstance(topology, MixedVolume):
