@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,8 @@ def smooth(
             options = {"slide": True, **options}
         if cad is not None and cad.curves and live.planar:  # else the mesh itself tells where they slide
             options["geometry"] = cad
+        if cad is not None and live.curved and not any(part.discrete for part in live.parts):
+            options.setdefault("surface_tolerance", math.inf)  # from facets: the geometry is trusted
         held = _held(gmsh, live, fixed, on_geometry)
         with Progress(options.get("max_sweeps", MOST_SWEEPS), bar=progress_bar) as progress:
             options["callback"] = progress.before(options.get("callback"))
