@@ -120,6 +120,13 @@ def test_a_surface_with_turned_triangles_is_seen_by_the_first_rank():
     assert "wound" in same(turned, slid(method="barrier", max_sweeps=3), cut(mesh, 2), 2).gathered
 
 
+def test_a_folded_plane_in_space_is_mended_by_the_first_rank():
+    mesh = wavy(12, 3, 0.9)
+    flat = np.column_stack([mesh.points[:, :2], mesh.points[:, :2].sum(axis=1)])
+    mesh = mesh.with_points(flat)
+    assert "folded" in same(mesh, slid(slide=None), cut(mesh, 2), 2).gathered
+
+
 def test_options_that_cannot_be_had_are_named_on_all_ranks():
     mesh = IN_PLANE["square"]
     with pytest.raises(InputError, match="nowhere"):

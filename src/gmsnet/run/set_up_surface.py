@@ -23,8 +23,9 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.preserve.protection import Protection
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
+from gmsnet.run.unfold import unfolded
 from gmsnet.topology.held import ON_BOUNDARY
-from gmsnet.topology.ordering import space_points
+from gmsnet.topology.ordering import space_points, taken
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 
@@ -39,16 +40,18 @@ def first_of_surface(
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     topology, start = Topology.and_points(given, asked, options.thread_count)
     torn = torn_apart(space_points(given)[:, :3], topology.held.get(ON_BOUNDARY))
-    facets, patches = patches_of_surface(
-        given, topology, names, options.feature_angle, asked | torn, options.free_needles
-    )
+    how = names, options.feature_angle, asked | torn, options.free_needles
+    facets, patches = patches_of_surface(given, topology, *how)
+    mended, notes = unfolded(given, facets, patches, asked) if options.untangle else (given, ())
+    if notes:
+        facets, patches = patches_of_surface(mended, topology, *how)
     slides = patches.slides | patches.curves.slides
     if (patches.curves.slides & ~_flagged(topology.free, len(slides))).any():
         topology, start = Topology.and_points(given, asked, options.thread_count, patches.curves.slides)
-    vertices = vertices_of(patches, space_points(given)[:, :3])
-    shell = Shell.made(topology, sides_of(given, topology, patches, vertices)).holding(~slides, FEATURE)
+    vertices = vertices_of(patches, space_points(mended)[:, :3])
+    shell = Shell.made(topology, sides_of(mended, topology, patches, vertices)).holding(~slides, FEATURE)
     sliding = SurfaceSliding.of(
-        given,
+        mended,
         facets,
         patches,
         shell.memory,
@@ -71,9 +74,11 @@ def first_of_surface(
     given = given.without_cells()
     before = measure(given, shell, start, executor.for_blocks(0))
     nothing = np.empty(0, dtype=np.float32)
+    points = taken(space_points(mended), shell.memory) if notes else start
     state = State(
-        given, restore, smoother, before, Protection(shell, []), start, start, nothing, remarks, sliding=sliding
-    )
+        given, restore, smoother, before, Protection(shell, []), start, points, nothing, remarks, sliding=sliding,
+        untangling=notes, untangled=points if notes else None,
+    )  # fmt: skip
     return state, shell
 
 

@@ -36,7 +36,7 @@ class StillInvertedCell(NamedTuple):
 def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Moves the free nodes so that fewer cells are inverted; those of second-order cells have a stage of their own."""
     if isinstance(state.topology, Shell) or (state.second_order is not None and not len(state.topology.free)):
-        return state  # of surfaces, sweeps bring back what shows the other side
+        return state  # of surfaces, plane parts are mended (run/unfold.py), and sweeps turn what shows the other side
     return _untangled(state, executor) if options.untangle and state.before.inverted else state
 
 
@@ -60,7 +60,7 @@ def protect_untangled(state: State, options: SmoothOptions, executor: Executor) 
         firm = bool(state.reasons)
         found = protected_volume(base, options.preserved, options.fix_layers, state.points, firm=firm)
         return replace(state, protection=found, untangled=state.points)
-    if not state.untangling:
+    if not state.untangling or isinstance(base, Shell):
         return state
     points = mesh.points.copy()
     points[base.memory[:, None], list(mesh.plane or ())] = np.ldexp(state.points, mesh.exponent)

@@ -1,0 +1,86 @@
+"""Plane parts of surfaces whose cells lie over one another: mended as a mesh in a plane is, or left as they are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.surface_meshes import box, surface_mesh, wavy
+
+import gmsnet
+from gmsnet.constraints.shell import FEATURE
+
+WAY = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+KINDS = ["quad", "triangle", "mixed"]
+
+
+def tangled(kind, amount=0.9):
+    """A square grid in the plane, its inner nodes thrown: (mesh in the plane, the same turned in space)."""
+    mesh = wavy(12, 3, amount, kind)
+    flat = np.column_stack([mesh.points[:, :2], np.zeros(len(mesh.points))])
+    return mesh.with_points(flat), mesh.with_points(flat @ WAY)
+
+
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_plane_mesh_that_is_turned_becomes_what_it_does_in_the_plane(kind, single):
+    flat, turned = tangled(kind)
+    assert gmsnet.quality(flat).inverted > 20
+    there = gmsnet.smooth(flat)
+    result = gmsnet.smooth(replace(turned, points=turned.points.astype(np.float32).astype(float), single=single))
+    assert (there.after.inverted, result.after.inverted) == (0, 0)
+    assert FEATURE not in result.held
+    assert result.after.shape.min() > there.after.shape.min() - 0.01
+    back = result.mesh.with_points(np.column_stack([(result.points @ WAY.T)[:, :2], np.zeros(len(result.points))]))
+    assert gmsnet.quality(back).inverted == 0
+    assert abs((result.points @ WAY.T)[:, 2]).max() < 1e-5
+    assert any(note.startswith("in a plane of the surface, untangling: all") for note in result.notes)
+
+
+def test_without_untangling_it_stays_folded():
+    result = gmsnet.smooth(tangled("quad")[1], untangle=False)
+    assert result.after.inverted
+    assert not any("untangling" in note for note in result.notes)
+
+
+def test_nodes_that_are_to_be_held_stay():
+    turned, fixed = tangled("quad")[1], [60, 61]
+    result = gmsnet.smooth(turned, fixed=fixed)
+    assert not result.moved[fixed].any()
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_one_side_of_a_box_is_mended_and_others_are_not_touched_by_it(turned):
+    mesh, inner = box(8)
+    points, rng = mesh.points.copy(), np.random.default_rng(1)
+    side = inner & (points[:, 2] == points[:, 2].max())
+    points[side, :2] += rng.uniform(-0.8, 0.8, (side.sum(), 2))
+    mesh = mesh.with_points(points @ WAY if turned else points)
+    result = gmsnet.smooth(mesh)
+    assert result.after.shape.min() > 0.8
+    assert set(np.flatnonzero(inner)) == set(np.setdiff1d(np.arange(len(points)), result.held[FEATURE]))
+    if not turned:
+        assert np.array_equal(result.points[side, 2], points[side, 2])
+
+
+def test_a_hem_that_lies_on_its_sheet_stays_folded():
+    flat = wavy(12, 3, 0.2)
+    x, y, fold = flat.points[:, 0].copy(), flat.points[:, 1], np.arange(len(flat.points)) // 13 == 9
+    x[fold] = 9.0
+    hem = np.column_stack([np.where(x > 9, 18 - x, x), y, np.zeros_like(x)]) @ WAY
+    result = gmsnet.smooth(flat.with_points(hem))
+    assert not any("untangling" in note for note in result.notes)
+    assert result.after.shape.min() > result.before.shape.min()
+    assert not result.moved[fold].any()
+
+
+def test_a_closed_flat_bag_has_no_side_that_is_up():
+    flat = wavy(8, 3, 0.0, "triangle")
+    rim = np.isin(flat.points[:, :2], (0, 8)).any(axis=1)
+    other = np.where(rim, np.arange(len(rim)), len(rim) + np.arange(len(rim)))
+    points = np.column_stack([flat.points[:, :2], np.zeros(len(rim))])
+    rows = flat.cells[0].nodes
+    bag = surface_mesh(np.concatenate([points, points]) @ WAY, {"triangle": np.vstack([rows, other[rows][:, ::-1]])})
+    result = gmsnet.smooth(bag)
+    assert not any("untangling" in note for note in result.notes)
