@@ -66,6 +66,21 @@ def test_every_format_in_space(run, tmp_path, suffix, regions):
         assert "interface between regions" in reasons
 
 
+@pytest.mark.parametrize("suffix", [".vtk", ".msh", ".inp"])
+def test_regions_that_mean_nothing_are_joined(run, tmp_path, suffix):
+    source, target = tmp_path / f"in{suffix}", tmp_path / f"out{suffix}"
+    gmsnet.write(some_mesh(True), source)
+    held = run("smooth", source, target)
+    assert "--join-regions" in held.out
+    done = run("smooth", source, target, "--join-regions")
+    assert done.code == 0
+    assert "between regions" not in done.out
+    between = Volume.of(gmsnet.read(source)).held["interface between regions"]
+    before, after = gmsnet.read(source), gmsnet.read(target)
+    assert (before.points != after.points).any(axis=1)[between].any()
+    assert [each.regions.tolist() for each in before.cells] == [each.regions.tolist() for each in after.cells]
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_from_every_format_into_every_other(run, tmp_path, suffix):
     source = tmp_path / "in.vtk"

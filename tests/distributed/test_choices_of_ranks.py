@@ -121,6 +121,7 @@ def test_sets_of_nodes_are_for_the_reader_of_the_whole(tmp_path: Path) -> None:
     ("grids", 3, [], {"slide": ["Zone0/cells", "Zone2"], "method": "barrier"}),
     ("surface of ugrid", 2, ["50,"], {"slide": ["all"], "method": "laplacian"}),
     ("split", 3, ["30,31"], {"method": "barrier"}),
+    ("grids", 2, [], {"join_regions": True, "method": "barrier"}),
 ])  # fmt: skip
 def test_the_bytes_of_a_serial_run(name: str, ranks: int, given: list[str], more, tmp_path: Path) -> None:
     path = FILES[name](tmp_path)

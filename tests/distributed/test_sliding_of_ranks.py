@@ -16,10 +16,11 @@ pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
 from support.blocks import block
 from support.ranks import parts_at_random, same, spread
-from support.surface_meshes import ball, wavy
+from support.surface_meshes import ball, halves, wavy
 
 from gmsnet.errors import InputError
 from gmsnet.run.options import SmoothOptions
+from gmsnet.topology.held import ON_INTERFACE
 
 IN_PLANE = {
     "square": gmsnet.random_mesh(900, seed=3),
@@ -125,6 +126,15 @@ def test_a_folded_plane_in_space_is_mended_by_the_first_rank():
     flat = np.column_stack([mesh.points[:, :2], mesh.points[:, :2].sum(axis=1)])
     mesh = mesh.with_points(flat)
     assert "folded" in same(mesh, slid(slide=None), cut(mesh, 2), 2).gathered
+
+
+@pytest.mark.parametrize("options", [{}, {"slide": None}, {"slide": None, "preserve": "shape"}])
+@pytest.mark.parametrize("kind", ["mixed", "cube", "hexahedra", "sheet of quads"])
+def test_regions_that_are_joined(kind, options):
+    mesh = halves(MESHES[kind])
+    told = same(mesh, slid(join_regions=True, max_sweeps=4, **options), cut(mesh), 3)
+    assert told.gathered == ""
+    assert ON_INTERFACE not in told.held
 
 
 def test_options_that_cannot_be_had_are_named_on_all_ranks():

@@ -47,7 +47,7 @@ def same(mesh, options, parts, ranks, fixed=None):
         variant=options.variant, objective=options.objective, threads=1, fixed=fixed,
         target_quality=options.target_quality, target_angle=options.target_angle,
         target_dihedral=options.target_dihedral, slide=options.slide, feature_angle=options.feature_angle,
-        surface_tolerance=options.surface_tolerance, hausdorff=options.hausdorff,
+        surface_tolerance=options.surface_tolerance, hausdorff=options.hausdorff, join_regions=options.join_regions,
     )  # fmt: skip
     points, results = spread(mesh, options, parts, ranks, fixed)
     assert points.tobytes() == serial.points.tobytes()

@@ -1,8 +1,9 @@
-"""Meshes of surfaces in space for tests: a sphere, a bent sheet and a box, their nodes thrown along them."""
+"""Meshes of surfaces in space for tests: a sphere, a bent sheet and a box, thrown along them; and meshes in halves."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -76,3 +77,15 @@ def box(side=6, seed=0, amount=0.25):
     p += amount * rng.uniform(-1, 1, p.shape) * ((p > 0) & (p < side)) * inner[:, None]
     rows = np.array(rows, dtype=np.int32)
     return surface_mesh(p, {"triangle": rows}), inner
+
+
+def halves(mesh):
+    """The same, its cells of the highest dimension in two regions, left and right."""
+    middle, highest = np.median(mesh.points[:, 0]), max(each.dimension for each in mesh.cells)
+    cells = tuple(
+        CellBlock(each.kind, each.nodes, 1 + (mesh.points[each.nodes, 0].mean(axis=1) > middle))
+        if each.dimension == highest
+        else each
+        for each in mesh.cells
+    )
+    return replace(mesh, cells=cells)

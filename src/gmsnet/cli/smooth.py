@@ -138,6 +138,12 @@ def smooth(
     update_normals: Annotated[
         bool, typer.Option(help="Of surfaces: compute normals that the file keeps anew where nodes have moved.")
     ] = False,
+    join_regions: Annotated[
+        bool,
+        typer.Option(
+            "--join-regions", help="Regions mean nothing: nodes of interfaces between them may move, but for markers."
+        ),
+    ] = False,
     threads: Annotated[
         int | None,
         typer.Option(min=1, help="Use at most so many processors (default: all). Same result for any number."),
@@ -229,7 +235,7 @@ def smooth(
         best_by=best_by,
         slide=slide or None, feature_angle=feature_angle,
         surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles,
-        update_normals=update_normals, device=device, **values_at_nodes(metric, size),
+        update_normals=update_normals, join_regions=join_regions, device=device, **values_at_nodes(metric, size),
     )  # fmt: skip
 
     held, whole_on_first = fix or [], any((plot, report, metric, size, update_normals))

@@ -13,7 +13,7 @@ from gmsnet.mesh.display import amount
 from gmsnet.mesh.known_cells import counts
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.run.account import Account
-from gmsnet.topology.held import ON_BOUNDARY
+from gmsnet.topology.held import ON_BOUNDARY, ON_INTERFACE
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +57,10 @@ class Outcome(Account):
             may_slide = not _has_second_order(self.mesh) and not any("slide:" in note for note in result.notes)
             if may_slide and len(result.held.get(ON_BOUNDARY, ())) > self.free:
                 console.print("most nodes are at the boundary and stay there: --slide all lets them move along it")
+            if ON_INTERFACE in result.held:
+                console.print(
+                    "nodes between regions stay there: --join-regions lets them move, if regions mean nothing"
+                )
         if self.written is None:
             console.print(f"left as it is: {self.input}")
         elif not aside:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import CELLS
 from gmsnet.errors import InputError
 from gmsnet.mesh.arrays import plain_array, whole_numbers
 from gmsnet.mesh.checks import finite_points
@@ -27,6 +28,10 @@ class Cells:
     nodes: Ids
     regions: Ids
     numbers: Ids
+
+    def in_one_region(self) -> Cells:
+        """The same cells, all of region 0."""
+        return Cells(self.kind, self.nodes, np.zeros_like(self.regions), self.numbers)
 
     def take(self, rows: NDArray[np.integer[Any]] | Flags) -> Cells:
         """Some of them."""
@@ -67,6 +72,13 @@ class Piece:
                 raise InputError(f"a {block.kind} cell names the global id {wrong[0]}, which no node of its piece has")
         object.__setattr__(self, "ids", ids)
         object.__setattr__(self, "points", points)
+
+    def with_one_region(self) -> Piece:
+        """As of the Mesh: the blocks are the same on all ranks, and so are those of the highest dimension."""
+        dimensions = [CELLS[block.kind].dimension if block.kind in CELLS else 0 for block in self.blocks]
+        each = zip(self.blocks, dimensions, strict=True)
+        joined = (block.in_one_region() if one == max(dimensions) else block for block, one in each)
+        return replace(self, blocks=tuple(joined))
 
 
 def pieces_of(mesh: Mesh, fixed: Flags, parts: Sequence[NDArray[np.int32]], ranks: int) -> list[Piece]:

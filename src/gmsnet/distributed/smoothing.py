@@ -61,17 +61,20 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
     began = time.perf_counter()
     lacking = options.update_normals and comm.rank == 0 and known is None
     raise_everywhere(comm, NO_NORMALS if lacking else "")
-    smoother = everywhere(comm, partial(_smoother, options))
+    smoother, given = everywhere(comm, partial(_smoother, options)), known
+    if options.join_regions:
+        piece = piece.with_one_region()
+        known = None if known is None else known._replace(mesh=known.mesh.with_one_region())
     around, counts = surrounded(piece, comm), _counts(piece, comm)
     why = _not_shared(counts, smoother, options)
     if why:
-        return smoothed_on_first(piece, options, comm, why, began, known)
+        return smoothed_on_first(piece, options, comm, why, began, given)
     mesh, found = framed(comm, around.mesh(piece.single)), None
     if options.slides or (mesh.plane is None and not mesh.has_volumes):
         known = gathered(piece, comm, known)
         found = found_on_first(known, smoother, options, comm)
         if found.why:
-            return smoothed_on_first(piece, options, comm, found.why, began, known)
+            return smoothed_on_first(piece, options, comm, found.why, began, given or known)
     part = Part.of(around, mesh, comm, None if found is None else found.along)
     try:
         everywhere(comm, lambda: check_target(part.mesh, options.target))
@@ -79,7 +82,7 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
         before = totals_of(part.points, part.simplices, Ranks(part))
         ready = _ready(piece, part, options, before, known)
         if ready.why:
-            return smoothed_on_first(piece, options, comm, ready.why, began, known)
+            return smoothed_on_first(piece, options, comm, ready.why, began, given or known)
         return _shared(piece, part, smoother, options, ready, before, began, found, counts)
     finally:
         part.halo.free()

@@ -65,6 +65,10 @@ class CellBlock:
         """For pickle, which knows nothing of arrays that are read-only: the block is made, and checked, anew."""
         return CellBlock, (self.kind, self.nodes, self.regions)
 
+    def in_one_region(self) -> CellBlock:
+        """The same cells, all of region 0."""
+        return CellBlock(self.kind, self.nodes, np.zeros(len(self.nodes), dtype=np.int64))
+
     @property
     def cell(self) -> CellKind:
         """What is known of each of the cells. InputError for a kind that is not known."""

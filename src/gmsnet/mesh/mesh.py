@@ -171,6 +171,14 @@ class Mesh:
         object.__setattr__(made, "points", finite_points(array))
         return made
 
+    def with_one_region(self) -> Mesh:
+        """The same mesh, its cells of the highest dimension in one region, 0: no interface lies between them."""
+        highest = max((block.dimension or 0 for block in self.cells), default=0)
+        cells = tuple(block.in_one_region() if block.dimension == highest else block for block in self.cells)
+        made = self._twin()
+        object.__setattr__(made, "cells", cells)
+        return made
+
     def without_cells(self) -> Mesh:
         """The points alone, in the same plane: all that is needed of a mesh once its connectivity is known."""
         made = self._twin()

@@ -19,13 +19,14 @@ from gmsnet.kernels.topology import columns as kernels
 from gmsnet.kernels.topology import connectivity
 from gmsnet.preserve.column_gaps import neighbours, with_gaps
 from gmsnet.preserve.layers import Layers
+from gmsnet.topology.held import ON_BOUNDARY, ON_INTERFACE
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.volume import Volume
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 
-WALLS = ("boundary", "interface between regions")  # why the nodes of walls are held
+WALLS = (ON_BOUNDARY, ON_INTERFACE)  # why the nodes of walls are held
 FLAT, STILL_FLAT = 2.5, 1.7  # how many times longer than thick cells are, in the mean around a node: at a wall, inside
 # How many times longer than thick flat cells are in the shorter of the two directions: else they are long one way
 # alone, as where a section was swept. The thirds of prisms lie askew, which evens that out.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex import survey as kernels
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.held import ON_BOUNDARY, ON_INTERFACE
 from gmsnet.topology.ordering import near_points
 from gmsnet.topology.stars import Ints
 from gmsnet.topology.topology import Topology
@@ -52,7 +53,7 @@ class Survey:
 def rim_of(topology: Topology | Volume) -> NDArray[np.uint8]:
     """(N,) by places in memory: BOUNDARY and INTERFACE of kernels.simplex.survey where a node is one of those."""
     nodes = np.zeros(len(topology.memory), dtype=np.uint8)
-    for reason, bit in (("boundary", kernels.BOUNDARY), ("interface between regions", kernels.INTERFACE)):
+    for reason, bit in ((ON_BOUNDARY, kernels.BOUNDARY), (ON_INTERFACE, kernels.INTERFACE)):
         for found in (topology.held, topology.sliding):
             nodes[found.get(reason, np.empty(0, dtype=np.int64))] = bit
     return np.take(nodes, topology.memory)

@@ -52,6 +52,7 @@ def smooth(
     hausdorff: float | None = None,
     free_needles: bool = False,
     update_normals: bool = False,
+    join_regions: bool = False,
     device: str = "cpu",
     metric: Any = None,
     size: Any = None,
@@ -90,6 +91,7 @@ def smooth(
     (default: no bound). free_needles: edges that look sharp only because a facet of a surface is thin are no features.
     update_normals: normals of faces and points, in the data of a surface and in the file that it was read from, are
     computed anew where nodes have moved (docs/surfaces.md).
+    join_regions: regions mean nothing, so nodes of interfaces between them may move; those of markers there stay.
     device: "cpu", or "cuda": a GPU of NVIDIA does what it can, sweeps in a plane, with the same bits (docs/cuda.md).
     metric: the tensors of which the cells are to be unit cells, by shape and size (docs/metric.md): an array (N, 3) of
     m11, m12, m22 at the nodes, or a function from points (n, 2) to such an array. size: the same for lengths h of
@@ -105,7 +107,7 @@ def smooth(
         preserve=preserve, fix_layers=fix_layers, untangle=untangle, guard=guard, seed=seed, callback=callback,
         weights=weights, best_by=best_by, slide=slide, feature_angle=feature_angle, geometry=geometry,
         surface_tolerance=surface_tolerance, hausdorff=hausdorff, free_needles=free_needles,
-        update_normals=update_normals, device=device, metric=metric, size=size,
+        update_normals=update_normals, join_regions=join_regions, device=device, metric=metric, size=size,
     )  # fmt: skip
     return smooth_with(mesh, options, fixed)
 

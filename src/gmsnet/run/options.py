@@ -59,6 +59,7 @@ class SmoothOptions:
     hausdorff: float | None = None
     free_needles: bool = False
     update_normals: bool = False
+    join_regions: bool = False
     device: str = CPU
     metric: Any = field(default=None, compare=False)
     size: Any = field(default=None, compare=False)
@@ -104,6 +105,7 @@ class SmoothOptions:
             )
         _check_flag("free_needles", self.free_needles)
         _check_flag("update_normals", self.update_normals)
+        _check_flag("join_regions", self.join_regions)
         _check_name("device", self.device, DEVICES)
         if self.device == CUDA:
             gpu_library()  # whether there is one is told before a file is read

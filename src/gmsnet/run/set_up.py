@@ -67,14 +67,18 @@ def first_state(
     check_options(given, options)
     remarks = []
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
-    asked = fixed_mask(given, fixed)
+    asked, matching = fixed_mask(given, fixed), images(given)
+    if options.update_normals:
+        restore = renewing(given, mesh)
+    if options.join_regions:
+        given = given.with_one_region()
     if given.has_volumes:
-        return _first_of_volume(given, restore, asked, fixed, smoother, options, executor, moved)
+        return _first_of_volume(given, restore, asked, matching, fixed, smoother, options, executor, moved)
     if given.plane is None:
-        if options.update_normals:
-            restore = renewing(given, mesh)
         state, shell = first_of_surface(given, restore, asked, smoother, options, executor)
-        return replace(state, remarks=(*state.remarks, *held_anyway(given, asked, shell, fixed, options.slides)))
+        return replace(
+            state, remarks=(*state.remarks, *held_anyway(given, asked, matching, shell, fixed, options.slides))
+        )
     threads = options.thread_count if len(given.points) >= MANY else 1
     still = asked if moved is None else asked | moved
     curves = curves_to_slide_on(given, options.slide, options.feature_angle, still)
@@ -83,7 +87,7 @@ def first_state(
     if curves is not None:
         sliding = Sliding.of(given, curves, topology.memory, topology.free, options.geometry)
     second = second_order_of(given, topology, options)
-    remarks += held_anyway(given, asked, topology, fixed, options.slides)
+    remarks += held_anyway(given, asked, matching, topology, fixed, options.slides)
     remarks += not_slid(options, second)
     if options.adapts and second is not None:
         raise InputError("a metric for second-order cells cannot be had so far: leave out metric, size and preserve")
@@ -143,13 +147,13 @@ def not_slid(options: SmoothOptions, second: SecondOrder | None = None) -> list[
 
 
 def held_anyway(
-    given: Mesh, asked: NDArray[np.bool_], topology: Topology | Volume, fixed: Any, slides: bool
-) -> list[str]:
+    given: Mesh, asked: NDArray[np.bool_], matching: NDArray[np.bool_], topology: Topology | Volume, fixed: Any,
+    slides: bool,
+) -> list[str]:  # fmt: skip
     """Says so where all nodes that are to be held are held for other reasons. slides: else some might slide.
 
-    And how many are held because they must match others, where they might move else.
+    And how many are held because they must match others, ``matching`` (N,) bool, where they might move else.
     """
-    matching = images(given)
     asked = asked & ~matching
     on_surface = given.plane is None and not given.has_volumes
     said = []
@@ -178,8 +182,8 @@ def repeating(counts: Mapping[str, int], known: int) -> str:
 
 
 def _first_of_volume(
-    given: Mesh, restore: Callable[[Floats], Any], asked: NDArray[np.bool_], fixed: Any, smoother: Smoother,
-    options: SmoothOptions, executor: Executor, moved: NDArray[np.bool_] | None,
+    given: Mesh, restore: Callable[[Floats], Any], asked: NDArray[np.bool_], matching: NDArray[np.bool_], fixed: Any,
+    smoother: Smoother, options: SmoothOptions, executor: Executor, moved: NDArray[np.bool_] | None,
 ) -> State:  # fmt: skip
     """The same of a mesh of volumes."""
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
@@ -191,7 +195,7 @@ def _first_of_volume(
     else:
         topology = volume_of(wound, surface[1].slides | surface[1].curves.slides)
         sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, options.distance, options.geometry)
-    remarks = held_anyway(given, asked, topology, fixed, options.slides)
+    remarks = held_anyway(given, asked, matching, topology, fixed, options.slides)
     remarks += doubled_note(given, topology)
     second = second_order_solids_of(given, topology, options)
     others = [unmoved(counts_of(given))]

@@ -16,7 +16,7 @@ from gmsnet.topology.polygons import Ints
 
 SMOOTHED = ("triangle", "quad")  # the cell types whose nodes may move
 SECOND_ORDER = ("triangle6", "quad8", "quad9")  # whose nodes move in a stage of their own (run/second_order.py)
-ON_BOUNDARY = "boundary"
+ON_BOUNDARY, ON_INTERFACE = "boundary", "interface between regions"
 OF_LINE, OF_FACE = "node of a line or vertex cell", "node of a face cell"  # of faces in a mesh of volumes
 OF_SECOND_ORDER = "node of a second-order cell"
 MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would no longer fit any cache
@@ -24,7 +24,7 @@ MOST_NEIGHBOURS = 4096  # a hub of more is held: a block of 64 such stars would 
 REASONS = {  # mark → text, in the order in which they count
     marks_of.UNUSED: "not used by any cell",
     marks_of.BOUNDARY: ON_BOUNDARY,
-    marks_of.INTERFACE: "interface between regions",
+    marks_of.INTERFACE: ON_INTERFACE,
     marks_of.LINE: OF_LINE,
     marks_of.FACE: OF_FACE,
     marks_of.UNSUPPORTED_CELL: "node of a cell that is not smoothed",
