@@ -7,7 +7,7 @@ import pytest
 from support.layer_meshes import grid, made
 
 import gmsnet
-from gmsnet.generate import disturb
+from gmsnet.generate import disturb, layered_mesh
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.preserve.protection import LAYER
@@ -130,3 +130,33 @@ def test_rows_are_layers_where_only_what_is_behind_them_is_disturbed(columns, as
     assert np.isin(inside, result.held[LAYER]).all()
     assert not result.moved[inside].any()
     assert result.moved[thrown].sum() > 0.2 * len(thrown)
+
+
+@pytest.mark.parametrize("cells", ["quad", "mixed"])
+@pytest.mark.parametrize("amount", [0.15, 0.3, 0.45])
+@pytest.mark.parametrize("aspect", [5, 20, 100])
+def test_rows_that_were_thrown_about_are_layers_still(aspect, amount, cells):
+    """Heights along a row are noise then, but rows still grow by one factor."""
+    mesh = layered_mesh(around=120, layers=20, aspect=aspect, cells=cells)
+    thrown = disturb(mesh, Topology.of(mesh).free, amount, seed=1, edge="shortest")
+    kept, wanted = (gmsnet.smooth(each, max_sweeps=0).held[LAYER] for each in (thrown, mesh))
+    assert np.isin(wanted, kept).mean() > 0.6
+    assert np.isin(kept, wanted).all()
+
+
+@pytest.mark.parametrize("amount", [0.0, 0.15, 0.3, 0.45])
+@pytest.mark.parametrize("factor", [2.0, 6.0])
+def test_grids_of_one_height_that_were_thrown_about_and_stretched_are_not(factor, amount):
+    mesh, _ = plate("quad", factor, 1.0, 40, 60)
+    thrown = disturb(mesh, Topology.of(mesh).free, amount, seed=2, edge="shortest") if amount else mesh
+    assert LAYER not in gmsnet.smooth(thrown, max_sweeps=0).held
+
+
+@pytest.mark.parametrize("power", [1.2, 1.3, 1.4])
+def test_grids_that_were_pressed_and_thrown_about_are_not(power):
+    """They grow from row to row, but by less and less."""
+    mesh, _ = plate("quad", 1.5, 1.0, 40, 40)
+    x, y = mesh.points[:, 0], mesh.points[:, 1] / mesh.points[:, 1].max()
+    pressed = mesh.with_points(np.column_stack([x, 0.7 * y ** (power - 0.4 + 0.8 * x)]))
+    thrown = disturb(pressed, Topology.of(pressed).free, 0.3, seed=2, edge="shortest")
+    assert LAYER not in gmsnet.smooth(thrown, max_sweeps=0).held

@@ -4,6 +4,9 @@ Where somebody has made layers in rows, each row has as many nodes as the first 
 the same factor all along the wall. Nobody's intent are rows that grow by more here and by less there (cells that were
 squeezed), or not at all (a mesh that was stretched). Rows go on where cells are as thick as long, as at a blunt nose or
 a sharp tail, and are one row there as well.
+
+Where nodes have been thrown about, growth along a row is noise. The medians of whole rows still tell the factor. Grids
+of one height that were thrown about have none.
 """
 
 from __future__ import annotations
@@ -34,6 +37,7 @@ STEADY = math.log(1.25)  # between most heights, or most ratios of length and he
 # Of one factor everywhere, from row to row as well: what nobody gets by chance, if heights differ along a wall by less
 # than UNSTEADY.
 CLOSELY, FACTOR, GROWN_BY_MUCH, UNSTEADY = 0.05, math.log(1.08), math.log(4.0), math.log(4.0)
+STILL_GROWN = math.log(2.5)  # of disturbed rows, the last over the first; of grids that were thrown about, at most 1.3
 CALM = 6  # rows that are CLOSELY alike, and others behind them disturbed: fewer are so by chance
 SHARE = 0.66  # of a row: where so much of it is in a layer, all of it is
 GAP, AS_HIGH = 0.5, math.log(2.0)  # of the nodes of a wall; between the height of a cell there and the median
@@ -134,7 +138,20 @@ def _layers_of(rows: list[Course]) -> int:
     calm = 1 + next((k for k, spread in enumerate(spreads) if spread > CLOSELY), last - 1)
     if _are_layers(rows, last, float(np.median(spreads))):
         return last
-    return calm if calm >= CALM and _are_layers(rows, last, float(np.median(spreads[: calm - 1]))) else 0
+    if calm >= CALM and _are_layers(rows, last, float(np.median(spreads[: calm - 1]))):
+        return calm
+    return last if _were_layers(rows, last) else 0
+
+
+def _were_layers(rows: list[Course], last: int) -> bool:
+    """The same of rows that have been disturbed: do their heights, in the median, still grow by one factor, and by
+    much?"""
+    if last < CALM or min(spread(rows[0].height), spread(rows[0].length - rows[0].height)) > UNSTEADY:
+        return False
+    heights, number = np.array([np.median(row.height) for row in rows[:last]]), np.arange(last)
+    factor, first = np.polyfit(number, heights, 1)
+    off = abs(heights - first - factor * number).max()
+    return bool(factor >= FACTOR and factor * (last - 1) >= STILL_GROWN and off <= ALIKE)
 
 
 def _are_layers(rows: list[Course], last: int, alike: float) -> bool:
