@@ -73,6 +73,20 @@ def test_the_same_file_as_without_ranks(folder, ranks):
         assert any("ranks: the first one" in note for note in report["notes"]) == (method == "getme")
 
 
+def test_what_is_said_of_untangling_and_layers(folder):
+    mesh = gmsnet.read(folder / "in.su2")
+    points, middle = mesh.points.copy(), np.argmin(abs(mesh.points - mesh.points.mean(axis=0)).sum(axis=1))
+    points[middle] += 0.1 * np.ptp(points)
+    gmsnet.write(mesh.with_points(points), folder / "tangled.su2")
+    runs = ("tangled.su2", "a.su2"), ("in.su2", "b.su2", "--fix-layers")
+    for report, run in zip(smooth_several(2, *runs, cwd=folder), runs, strict=True):
+        alone = gmsnet.smooth(gmsnet.read(folder / run[0]), fix_layers="--fix-layers" in run)
+        for begin in ("untangling:", "fix_layers:"):
+            said = [note for note in alone.notes if note.startswith(begin)]
+            assert [note for note in report["notes"] if note.startswith(begin)] == said
+        assert any(note.startswith(("untangling:", "fix_layers:")) for note in report["notes"])
+
+
 def test_errors_are_said_once(folder):
     done = smooth(2, "missing.su2", "out.su2", cwd=folder)
     assert done.returncode == 2

@@ -104,6 +104,14 @@ def test_nodes_beside_a_round_of_a_target_are_located_alike(count, seed):
     assert told.gathered == ""
 
 
+@pytest.mark.parametrize(("side", "seed"), [(12, 7), (10, 4), (14, 6)])
+def test_quads_whose_other_corners_are_held_are_among_the_worst(side, seed):
+    """A corner's row has no free node where only the fourth one of its quad is free: it counts as others do."""
+    mesh, options = wavy(side, seed, 0.4), slid(slide=None, method="worst-first")
+    fixed = np.random.default_rng(seed).random(len(mesh.points)) < 0.4
+    assert same(mesh, options, [np.arange(side * side, dtype=np.int32) % 2], 2, fixed).gathered == ""
+
+
 @pytest.mark.parametrize("kind", ["circle", "quads", "cube", "hexahedra", "sphere", "sheet of quads"])
 def test_inverted_cells(kind):
     mesh, rng = MESHES[kind], np.random.default_rng(7)

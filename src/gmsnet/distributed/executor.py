@@ -165,8 +165,11 @@ class Ranks:
         """See Executor."""
         free, active = field.topology.near_free, None
         if rows is not None:
-            active = np.zeros(len(free), dtype=bool)
-            active[field.topology.changeable.rows[rows]] = True
+            active, simplices = np.zeros(len(free), dtype=bool), field.topology.changeable
+            active[simplices.rows[rows]] = True
+            still = rows[~free[simplices.rows[rows]].any(axis=1)]  # on surfaces, of cells whose other corners may move
+            if len(still) and simplices.cells is not None:
+                active[simplices.rows[np.isin(simplices.cells, simplices.cells[still])]] = True
             active &= free
         self.loan = read_alike(self.part, field, active)
         return self.loan.field

@@ -102,5 +102,5 @@ def _as_a_state(mesh: Mesh, points: Floats, fixed: Any, options: SmoothOptions, 
     state = first_state(mesh, fixed, options.smoother(), options, serial)
     near = near_points(mesh.with_points(points), state.topology)
     interruption = KeyboardInterrupt() if found.interrupted else None
-    state = replace(state, points=near, totals=None, history=tuple(found.history))
+    state = replace(state, points=near, totals=None, history=tuple(found.history), untangling=found.untangling)
     return write_back(state.ended(found.stop_reason, interruption), options, serial)

@@ -23,8 +23,8 @@ class RankResult:
     cells of the mesh. sweeps, stop_reason, history, notes: as of a SmoothResult. held: reason → how many nodes of the
     mesh. nodes, cells: of the mesh. gathered: why the mesh was smoothed on the first rank, "" where it was shared out.
     seconds: for the whole call. messages, bytes: that this rank sent after colours. interrupted: this is the best mesh
-    so far. missed: how many cells miss the target, None without one. judged: as of a SmoothResult. whole: the
-    SmoothResult of the first rank, where that has one.
+    so far. missed: how many cells miss the target, None without one. judged: as of a SmoothResult. untangling: those of
+    the notes that are of it. whole: the SmoothResult of the first rank, where that has one.
     """
 
     points: NDArray[np.float64]
@@ -45,6 +45,7 @@ class RankResult:
     interrupted: bool = False
     missed: int | None = None
     judged: Judged = UNKNOWN
+    untangling: tuple[str, ...] = ()
     whole: SmoothResult | None = field(default=None, repr=False)
 
     def summary(self) -> dict[str, Any]:

@@ -37,7 +37,7 @@ from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.methods import Smoother
 from gmsnet.methods.banded import Kept
 from gmsnet.methods.base import CELLS
-from gmsnet.preserve.protection import LAYER, WALL
+from gmsnet.preserve.protection import LAYER, NO_LAYERS, WALL
 from gmsnet.run.options import CPU, SmoothOptions
 from gmsnet.run.outcome import factors_of, greatest_angle, large_angles, merit_of
 from gmsnet.run.set_up import check_options, check_target, not_slid
@@ -166,7 +166,7 @@ def _intent(
     """What is there on purpose. points: see Mended, where inverted cells were mended; None as they are."""
     wanted = options.preserved != "none" or options.fix_layers
     if not wanted or not may_be_meant(part, part.points if points is None else points):
-        return Intent()
+        return Intent(notes=(NO_LAYERS,) if options.fix_layers else ())
     now = None
     if points is not None:
         at = part.topology.places[np.searchsorted(part.around.nodes.ids, piece.ids)]
@@ -205,7 +205,8 @@ def _shared(
         before = found.before
     written = _written(piece, part, state, options, ready.inverted, before, found)
     points, moved, after, missed, greatest, judged = written
-    notes = [*intent.notes, *intent.of_walls[state.released :][:1], *([] if done is None else [done.note])]
+    untangling = () if done is None else (done.note,)
+    notes = [*intent.notes, *intent.of_walls[state.released :][:1], *untangling]
     if found is not None:
         where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
         notes += found.note(points[at], moved[at], where, options.hausdorff, piece, part.comm)
@@ -232,6 +233,7 @@ def _shared(
         interrupted=state.interruption is not None,
         missed=missed,
         judged=judged,
+        untangling=untangling,
     )
 
 

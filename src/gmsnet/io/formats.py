@@ -159,7 +159,7 @@ SIGNS = {
 }
 # Known by sight, but not read.
 STRANGERS = {
-    "an MFEM mesh of another kind (not v1.0)": rb"MFEM (NC |NURBS )?mesh v",
+    "an MFEM mesh of another kind (not v1.0)": rb"MFEM [\w -]*mesh v",
     "a VTK file of another kind (not an UnstructuredGrid or PolyData)": rb"(<\?xml[^>]*>\s*)?<VTKFile\b",
     "an HDF5 file": rb"\x89HDF\r\n",
     "a CGNS file of the old kind (ADF, which adf2hdf converts)": rb"@\(#\)ADF Database",

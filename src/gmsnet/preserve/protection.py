@@ -29,6 +29,7 @@ SIZE, METRIC, NONE = "size", "metric", "none"
 PRESERVE = (SHAPE, SIZE, METRIC, NONE)
 
 Flags = NDArray[np.bool_]
+NO_LAYERS = "fix_layers: no stretched layers were found, so none are held"
 Floats = NDArray[np.float64]
 
 LAYER, WALL = "stretched layer", "refined near a wall"
@@ -135,7 +136,7 @@ def _with_layers(
     elif found and preserve != METRIC:
         notes.append(f"{found.summary}; nothing is held for that (preserve={preserve!r})")
     if fix_layers and not found:
-        notes.append("fix_layers: no stretched layers were found, so none are held")
+        notes.append(NO_LAYERS)
     return protection
 
 
