@@ -210,6 +210,18 @@ def test_bad_files_are_refused_in_words(data: bytes, match: str) -> None:
     refused(gmsh, data, match)
 
 
+@pytest.mark.parametrize("version", [b"2", b"2.0", b"2.1"])
+def test_versions_before_and_words_behind_names(version: bytes) -> None:
+    other = OLD.replace(b"$MeshFormat\n2.2", b"$MeshFormat\n" + version)
+    assert other != OLD
+    found, plain = (gmsh.read({".msh": data}) for data in (other, OLD))
+    assert np.array_equal(found.points, plain.points)
+    assert found.region_names == plain.region_names
+    lines = [line + b" lower_dimensional_block" * (line.count(b'"') == 2) for line in OLD.split(b"\n")]
+    assert gmsh.read({".msh": b"\n".join(lines)}).region_names == plain.region_names
+    assert b"\n".join(lines) != OLD
+
+
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_binary_counts_that_lie_are_refused_without_memory(order: str) -> None:
     huge = (10**12).to_bytes(8, "little" if order == "<" else "big")

@@ -176,6 +176,18 @@ def test_a_file_without_vertices_is_refused() -> None:
         medit.read({".mesh": b"MeshVersionFormatted 2\nDimension 2\nEnd"})
 
 
+def test_sections_without_entries_are_read() -> None:
+    """TetGen and others write ``Edges 0``."""
+    sections = b"".join(b"%s\n0\n" % key.encode() for key in (*medit.KINDS, "RequiredVertices", "Normals", "Ridges")
+                        if key.encode() not in PLAIN)  # fmt: skip
+    parsed = medit.read({".mesh": PLAIN.replace(b"End", sections + b"End")})
+    plain = medit.read({".mesh": PLAIN})
+    assert [block.nodes.tolist() for block in parsed.cells if len(block.nodes)] == [
+        block.nodes.tolist() for block in plain.cells if len(block.nodes)
+    ]
+    assert {block.kind for block in parsed.cells} > {block.kind for block in plain.cells}
+
+
 def test_fortran_exponents_are_read_exactly() -> None:
     parsed = medit.read({".mesh": PLAIN.replace(b"-0.5 0.5 0", b"-0.1D-3 7.0d+01 0")})
     assert parsed.points[4].tolist() == [-0.1e-3, 70.0]

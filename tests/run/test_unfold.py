@@ -9,7 +9,10 @@ import pytest
 from support.surface_meshes import box, surface_mesh, wavy
 
 import gmsnet
+from gmsnet.constraints.facets import surface_itself
+from gmsnet.constraints.folded_planes import folded_planes
 from gmsnet.constraints.shell import FEATURE
+from gmsnet.topology.topology import Topology
 
 WAY = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
 KINDS = ["quad", "triangle", "mixed"]
@@ -84,3 +87,16 @@ def test_a_closed_flat_bag_has_no_side_that_is_up():
     bag = surface_mesh(np.concatenate([points, points]) @ WAY, {"triangle": np.vstack([rows, other[rows][:, ::-1]])})
     result = gmsnet.smooth(bag)
     assert not any("untangling" in note for note in result.notes)
+
+
+def test_folds_without_nodes_inside_are_not_looked_at():
+    """Pairs of triangles that lie over one another: all of their nodes are at the rim, however many there are."""
+    pair, many = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.2, 0.7, 0.1], [0.3, 0.9, 0.9 / 7]]), 40
+    points = np.concatenate([pair + np.array([2.0 * k, 0.0, 0.0]) for k in range(many)])
+    rows = np.concatenate([np.array([[0, 1, 2], [1, 0, 3]]) + 4 * k for k in range(many)])
+    mesh = surface_mesh(points, {"triangle": rows})
+    facets = surface_itself(mesh, Topology.of(mesh))
+    assert folded_planes(facets, mesh.points, np.ones(len(rows), dtype=bool)) == []
+    _, turned = tangled("triangle")
+    facets = surface_itself(turned, Topology.of(turned))
+    assert len(folded_planes(facets, turned.points, np.ones(len(facets.rows), dtype=bool))) == 1

@@ -19,6 +19,7 @@ from gmsnet.kernels.whole import facets as kernels
 Floats = NDArray[np.float64]
 LEVEL = 1e-6  # of the length of edges, and of the extent of the part: what is so near to a plane is in it
 
+FEWEST = 3  # facets around a node that is inside of its part
 OPPOSITE = -0.99  # the cosine between normals from which on they may be so in one plane
 
 
@@ -93,7 +94,19 @@ def _with_folds(facets: Facets, points: Floats, part: Longs, unit: Floats) -> li
     folded[part[dot(unit, unit[first[part]]) < 0.0]] = True
     begin, half = len(part) - facets.halves, facets.halves // 2
     folded[part[begin : begin + half][_crossed(facets, points)]] = True
-    return np.flatnonzero(folded).tolist()
+    return np.flatnonzero(folded & _with_inner_nodes(facets.rows, part, count)).tolist()
+
+
+def _with_inner_nodes(rows: Longs, part: Longs, count: int) -> Flags:
+    """(count,) which parts have nodes that none but their facets have, which alone may move: FEWEST facets at least."""
+    size = int(rows.max(initial=-1)) + 1
+    low, high = np.full(size, count, dtype=np.int64), np.full(size, -1, dtype=np.int64)
+    for column in rows.T:
+        np.minimum.at(low, column, part)
+        np.maximum.at(high, column, part)
+    found = np.zeros(count, dtype=bool)
+    found[low[(low == high) & (np.bincount(rows.ravel(), minlength=size) >= FEWEST)]] = True
+    return found
 
 
 def quads_of(facets: Facets) -> Longs:

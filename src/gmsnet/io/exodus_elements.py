@@ -67,6 +67,9 @@ def kind_of(called: str, nodes: int, dimension: int) -> str:
     raise FormatError(f"elements of type {called[:24]!r} are not known in a mesh of {dimension} dimensions")
 
 
+FACES_OF_SHELL = 2  # its first sides, which are the element itself and are not kept; its edges follow
+
+
 class Sides(NamedTuple):
     """One side of some elements of a block. block: its number, from 0. rows: (n,) the elements, by their places in it.
     corners: those of an element that the side has."""
@@ -95,10 +98,11 @@ def sides_of(
         here = np.flatnonzero((elements >= start) & (elements < end))
         if CELLS[whole].dimension != dimension or kind not in SIDES or not len(here):
             continue
-        if not 0 <= sides[here].min() <= sides[here].max() < len(SIDES[kind]):
-            # Faces of shells come before their edges: sides 1 and 2, which are the elements themselves.
+        of_shell = CELLS[whole].dimension == 2 and int(sides[here].max()) >= len(SIDES[kind])
+        first = FACES_OF_SHELL if of_shell else 0
+        if not 0 <= sides[here].min() <= sides[here].max() < first + len(SIDES[kind]):
             raise FormatError(f"a side set names a side that a {kind} does not have")
-        for side, corners in enumerate(SIDES[kind]):
+        for side, corners in enumerate(SIDES[kind], first):
             some = here[sides[here] == side]
             if len(some):
                 found.setdefault(_SIDE_KINDS[len(corners)], []).append(Sides(block, elements[some] - start, corners))

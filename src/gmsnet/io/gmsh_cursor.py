@@ -11,16 +11,17 @@ from gmsnet.io.text import Text, fail, quoted
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 
 _HEAD = re.compile(rb"\s*\$MeshFormat\s+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*(?:\r\n?|\n)")
+SECOND = ("2.2", "2", "2.0", "2.1")  # alike in what is read of them
 BEGIN = 4096  # bytes, in which a file begins
 
 
 def opened(data: Data) -> tuple[Cursor, bool]:
-    """The file behind its first section, and whether its version is 2.2."""
+    """The file behind its first section, and whether its version is 2.2, or one before that is alike."""
     head = _HEAD.match(data)
     if head is None and not data[:BEGIN].lstrip().startswith(b"$NOD"):
         raise FormatError("line 1: not a Gmsh file: it must start with $MeshFormat, the version, 0 or 1, and 8")
     version = head[1].decode("latin-1") if head else "1"
-    if head is None or version not in ("2.2", "4.1"):
+    if head is None or version not in (*SECOND, "4.1"):
         mend = "convert it with 'gmsh OLD.msh -save -format msh41 -o NEW.msh'"
         raise FormatError(f"Gmsh's format {version[:24]!r} is not supported, 2.2 and 4.1 are: {mend}")
     if head[2] not in (b"0", b"1") or head[3] != b"8":
@@ -35,7 +36,7 @@ def opened(data: Data) -> tuple[Cursor, bool]:
     here = source.at
     if source.word() != b"$EndMeshFormat":
         source.fail(here, "expected $EndMeshFormat")
-    return source, version == "2.2"
+    return source, version in SECOND
 
 
 class Cursor:

@@ -28,7 +28,7 @@ Ints = NDArray[np.int64]
 # What Gmsh calls the part of a physical group in a partition, or between several.
 PART = re.compile(r"_part\{(\d+(?:,\d+)*)\}_physical\{(\d{1,18})\}_dim\{[0-3]\}")
 MOST_TAG = 2**31
-_NAME = re.compile(rb'\s*([0-3])\s+(-?\d{1,18})\s+"([^"\r\n]*)"')
+_NAME = re.compile(rb'\s*([0-3])\s+(-?\d{1,18})\s+"([^"\r\n]*)"[^\r\n]*')  # libMesh has words behind
 _DIMENSIONS = np.array([CELLS[KINDS[code].name].dimension if code in KINDS else 3 for code in range(len(SIZES))])
 
 

@@ -77,7 +77,7 @@ class _Stream:
                 if end < len(words) and self._is_keyword(words[end]):  # at the end of the file it may be cut off
                     self.at = begin
                     return wider, self.take(end).reshape(count, -1)
-        return kind, rows.reshape(count, -1)
+        return kind, rows.reshape(count, nodes_of(kind) + 1)
 
     def _is_keyword(self, start: int) -> bool:
         return self.text.token(start)[:1].isalpha()
