@@ -18,12 +18,12 @@ def doubled(mesh: Mesh, among: Flags) -> tuple[Ints, Ints]:
     among: (N,) cells with other nodes are not looked at.
     """
     numbers = np.random.default_rng(0).integers(1 << 62, size=len(mesh.points))  # their sums tell cells apart
-    found: dict[str, list[tuple[Ints, Ints]]] = {}
+    found: dict[tuple[str, int], list[tuple[Ints, Ints]]] = {}
     before = 0
     for block in mesh.cells:
         if block.dimension == 3:
             rows = np.flatnonzero(among[block.nodes].all(axis=1))
-            found.setdefault(block.kind, []).append((before + rows, block.nodes[rows]))
+            found.setdefault((block.kind, block.nodes.shape[1]), []).append((before + rows, block.nodes[rows]))
         before += len(block.nodes)
     later, earlier = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for parts in found.values():
