@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import shortest_path
 
 import gmsnet
 import gmsnet.generate
@@ -19,6 +21,7 @@ from support.ranks import parts_at_random, same, spread
 from support.surface_meshes import ball, halves, wavy
 
 from gmsnet.errors import InputError
+from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.run.options import SmoothOptions
 from gmsnet.topology.held import ON_INTERFACE
 
@@ -110,6 +113,29 @@ def test_quads_whose_other_corners_are_held_are_among_the_worst(side, seed):
     mesh, options = wavy(side, seed, 0.4), slid(slide=None, method="worst-first")
     fixed = np.random.default_rng(seed).random(len(mesh.points)) < 0.4
     assert same(mesh, options, [np.arange(side * side, dtype=np.int32) % 2], 2, fixed).gathered == ""
+
+
+def with_a_marker_inside(mesh, seed):
+    """The same with a marker of lines, the shortest way between two nodes."""
+    ends = [np.stack([each.nodes, np.roll(each.nodes, -1, axis=1)], axis=-1).reshape(-1, 2) for each in mesh.cells]
+    count = len(mesh.points)
+    edges = coo_matrix((np.ones(sum(map(len, ends))), np.concatenate(ends).T), (count, count)).tocsr()
+    first, last = np.random.default_rng(seed).choice(count, 2, replace=False)
+    _, before = shortest_path(edges, directed=False, unweighted=True, indices=first, return_predecessors=True)
+    way = [last]
+    while way[-1] != first:
+        way.append(before[way[-1]])
+    rows = np.column_stack([way[:-1], way[1:]])
+    return replace(mesh, cells=(*mesh.cells, CellBlock("line", rows, np.full(len(rows), 7, dtype=np.int64))))
+
+
+@pytest.mark.parametrize("how", ["strips", "interleaved"])
+@pytest.mark.parametrize(("kind", "seed"), [("triangle", 0), ("triangle", 5), ("quad", 1), ("quad", 8)])
+def test_nodes_slide_along_a_marker_inside_of_a_region(kind, seed, how):
+    """Its lines are lent with the cells around, so that the first rank has the stars that one process has."""
+    make = gmsnet.random_mesh if kind == "triangle" else gmsnet.generate.random_quad_mesh
+    mesh = with_a_marker_inside(make(250, seed=seed), seed)
+    assert same(mesh, slid(), parts_at_random(mesh, 2, np.random.default_rng(seed), how), 2).gathered == ""
 
 
 @pytest.mark.parametrize("kind", ["circle", "quads", "cube", "hexahedra", "sphere", "sheet of quads"])

@@ -139,7 +139,7 @@ def gathered_field(part: Part, field: Field, active: Flags | None) -> Loan:
         moves[np.searchsorted(ids, each.ids[each.moves])] = True
     blocks, all_numbers = [], [ids[:0]]
     starts = np.cumsum([0, *part.around.sizes])
-    for kind, cells in zip(_faces(part), zip(*(each.cells for each in came), strict=True), strict=True):
+    for kind, cells in zip(_lent(part), zip(*(each.cells for each in came), strict=True), strict=True):
         nodes, numbers, regions = (np.concatenate(each) for each in zip(*cells, strict=True))
         _, once = np.unique(numbers, return_index=True)
         all_numbers.append(starts[kind[0]] + numbers[once])
@@ -179,10 +179,10 @@ def read_alike(part: Part, field: Field, active: Flags | None) -> Loan:
     return gathered_field(part, field, None)
 
 
-def _faces(part: Part) -> list[tuple[int, str]]:
-    """Which blocks have cells that move, and their kinds."""
+def _lent(part: Part) -> list[tuple[int, str]]:
+    """Which blocks have cells that move, or lines, on which nodes slide inside of a region; and their kinds."""
     kinds = enumerate(block.kind for block in part.around.blocks)
-    return [(k, kind) for k, kind in kinds if kind in (KINDS if part.mesh.has_volumes else PLANAR)]
+    return [(k, kind) for k, kind in kinds if kind in (KINDS if part.mesh.has_volumes else (*PLANAR, "line"))]
 
 
 def _parcel(part: Part, field: Field, active: Flags | None) -> Parcel:
@@ -191,7 +191,7 @@ def _parcel(part: Part, field: Field, active: Flags | None) -> Parcel:
     moves = np.zeros(len(ids), dtype=bool)
     moves[topology.memory] = topology.near_free if active is None else active
     used, cells = moves.copy(), []
-    for k, _ in _faces(part):
+    for k, _ in _lent(part):
         block, nodes = part.around.blocks[k], part.mesh.cells[k].nodes
         chosen = part.around.own[k] if active is None else moves[nodes].any(axis=1)
         used[nodes[chosen]] = True
