@@ -12,6 +12,7 @@ import gmsnet
 from gmsnet.constraints.facets import surface_itself
 from gmsnet.constraints.folded_planes import folded_planes
 from gmsnet.constraints.shell import FEATURE
+from gmsnet.run.unfold import _rim_turns_back
 from gmsnet.topology.topology import Topology
 
 WAY = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
@@ -100,3 +101,34 @@ def test_folds_without_nodes_inside_are_not_looked_at():
     _, turned = tangled("triangle")
     facets = surface_itself(turned, Topology.of(turned))
     assert len(folded_planes(facets, turned.points, np.ones(len(facets.rows), dtype=bool))) == 1
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_rims_that_go_back(angle):
+    """A slit ends in an angle of 360 degrees, a sheet that is folded on purpose in one of 0."""
+    x, y = (axis.ravel().astype(float) for axis in np.meshgrid(np.arange(7), np.arange(7), indexing="ij"))
+    k = (np.arange(6)[:, None] * 7 + np.arange(6)).ravel()
+    quads, none = np.column_stack([k, k + 7, k + 8, k + 1]), np.empty((0, 3), dtype=np.int64)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    flat = np.column_stack([x, y])
+    assert not _rim_turns_back(flat @ turn, (none, quads))
+    folded = np.column_stack([np.where(x > 4, 8 - x, x), y])
+    assert _rim_turns_back(folded @ turn, (none, quads))
+    lips = 7 * np.arange(3) + 3  # of a slit at y = 3, from x = 0 to 3; the quads above it have other nodes
+    above = (y[quads] >= 3).all(axis=1)[:, None] & np.isin(quads, lips)
+    slit = np.where(above, len(flat) + quads // 7, quads)
+    assert above.sum() == 5
+    assert not _rim_turns_back(np.concatenate([flat, flat[lips]]) @ turn, (none, slit))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_concave_quads_in_a_side_of_a_box(seed):
+    """Each is inverted, though its corners at the one or the other two opposite nodes are not."""
+    mesh, inner = box(6, amount=0.0, kind="quad")
+    points = mesh.points.copy()
+    rng = np.random.default_rng(seed)
+    side = np.flatnonzero(inner & (points[:, 2] == 0.0))
+    points[rng.choice(side, 3, replace=False), :2] += np.array([0.7, 0.6])
+    result = gmsnet.smooth(mesh.with_points(points))
+    assert result.before.inverted > 0
+    assert result.after.inverted == 0

@@ -52,8 +52,8 @@ def wavy(side=16, seed=0, amount=0.3, kind="quad"):
     return surface_mesh(points, cells)
 
 
-def box(side=6, seed=0, amount=0.25):
-    """The surface of a cube of triangles; the nodes inside of its sides are thrown within these."""
+def box(side=6, seed=0, amount=0.25, kind="triangle"):
+    """The surface of a cube of one kind of cell; the nodes inside of its sides are thrown within these."""
     points, rows = {}, []
 
     def node(*place):
@@ -70,13 +70,13 @@ def box(side=6, seed=0, amount=0.25):
                         return node(*place)
 
                     a, b, c, d = at(u, v), at(u + 1, v), at(u + 1, v + 1), at(u, v + 1)
-                    rows += [(a, b, c), (a, c, d)] if (level == side) != (axis == 1) else [(a, c, b), (a, d, c)]
+                    rows.append((a, b, c, d) if (level == side) != (axis == 1) else (a, d, c, b))
     p = np.array(list(points), dtype=float)
     rng = np.random.default_rng(seed)
     inner = ((p > 0) & (p < side)).sum(axis=1) == 2
     p += amount * rng.uniform(-1, 1, p.shape) * ((p > 0) & (p < side)) * inner[:, None]
     rows = np.array(rows, dtype=np.int32)
-    return surface_mesh(p, {"triangle": rows}), inner
+    return surface_mesh(p, {kind: rows if kind == "quad" else rows[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)}), inner
 
 
 def halves(mesh):

@@ -41,11 +41,8 @@ def folded_planes(facets: Facets, points: Floats, sharp: Flags) -> list[FoldedPl
     rows = facets.rows
     if not (_crossed(facets, points).any() or _turned_over(points, rows[sharp])):
         return []
-    normal, unit, area = np.empty((len(rows), 3)), np.empty((len(rows), 3)), np.empty(len(rows))
-    kernels.facet_normals(points, rows, normal, area, unit)
-    found, count, one, other = np.empty((4, rows.size), dtype=np.int64)
-    edges = kernels.list_edges(rows, len(points), found, count, one, other)
-    found, count, one, other = found[:edges], count[:edges], one[:edges], other[:edges]
+    normal, unit, area = _normals(points, rows)
+    found, count, one, other = _edges(points, rows)
     f, g = one // 3, other // 3
     joined = (count == 2) & (facets.label[f] == facets.label[g])
     joined &= ~np.isin(found, edge_keys(facets.lines[:, 0], facets.lines[:, 1], len(points)))
@@ -57,21 +54,35 @@ def folded_planes(facets: Facets, points: Floats, sharp: Flags) -> list[FoldedPl
     return [plane for plane in planes if plane is not None]
 
 
+def _normals(points: Floats, rows: Longs) -> tuple[Floats, Floats, Floats]:
+    """Of facets, see kernels.whole.facets: the products of two edges, unit normals, and the lengths of the products."""
+    normal, unit, area = np.empty((len(rows), 3)), np.empty((len(rows), 3)), np.empty(len(rows))
+    kernels.facet_normals(points, rows, normal, area, unit)
+    return normal, unit, area
+
+
+def _edges(points: Floats, rows: Longs) -> Longs:
+    """(4, E) the edges of facets, see kernels.whole.facets: their nodes, of how many sides, the first two of these."""
+    table = np.empty((4, rows.size), dtype=np.int64)
+    return table[:, : kernels.list_edges(rows, len(points), *table)]
+
+
 def _crossed(facets: Facets, points: Floats) -> Flags:
-    """(Q,) the quads that have corners on both sides."""
-    a, b, c, d = points[quads_of(facets)].transpose(1, 0, 2)
-    crossed: Flags = dot(np.cross(b - a, d - a), np.cross(d - c, b - c)) <= 0.0
+    """(Q,) the quads with a corner that is turned against the product of the diagonals: bow-ties and concave ones."""
+    places = points[quads_of(facets)].transpose(1, 0, 2)
+    product = np.cross(places[2] - places[0], places[3] - places[1])
+    crossed = np.zeros(len(product), dtype=bool)
+    for k in range(4):
+        here, ahead, behind = places[k], places[(k + 1) % 4], places[k - 1]
+        crossed |= dot(np.cross(ahead - here, behind - here), product) <= 0.0
     return crossed
 
 
 def _turned_over(points: Floats, rows: Longs) -> bool:
     """Do two of some facets (F, 3) with a common edge have normals that are opposite?"""
-    normal, unit, area = np.empty((len(rows), 3)), np.empty((len(rows), 3)), np.empty(len(rows))
-    kernels.facet_normals(points, rows, normal, area, unit)
-    found, count, one, other = np.empty((4, rows.size), dtype=np.int64)
-    edges = kernels.list_edges(rows, len(points), found, count, one, other)
-    cosine = dot(unit[one[:edges] // 3], unit[other[:edges] // 3])
-    return bool(((count[:edges] == 2) & (cosine < OPPOSITE)).any())
+    _, count, one, other = _edges(points, rows)
+    _, unit, _ = _normals(points, rows)
+    return bool(((count == 2) & (dot(unit[one // 3], unit[other // 3]) < OPPOSITE)).any())
 
 
 def _level(points: Floats, rows: Longs, unit: Floats, area: Floats, one: Longs, other: Longs) -> Flags:
@@ -86,7 +97,7 @@ def _level(points: Floats, rows: Longs, unit: Floats, area: Floats, one: Longs, 
 
 
 def _with_folds(facets: Facets, points: Floats, part: Longs, unit: Floats) -> list[int]:
-    """The parts with facets on both sides, or with a quad that has corners on both."""
+    """The parts with facets on both sides, or with a quad that has corners on both, and with nodes inside."""
     count = int(part.max(initial=-1)) + 1
     first = np.full(count, len(part), dtype=np.int64)
     np.minimum.at(first, part, np.arange(len(part)))
