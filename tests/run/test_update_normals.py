@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from support import normals as plain
 from support.surface_meshes import surface_mesh, wavy
+from support.volumes import cube, mesh_of
 from support.vtk_variants import grid_of, legacy_variants, polydata_of, vtu_variants
 
 import gmsnet
@@ -199,6 +200,28 @@ def test_normals_of_vtk(kind, tmp_path):
             assert (each.point_data["NormalStress"] == 1.0).all()
 
 
+@pytest.mark.parametrize("kind", ["vtu", "vtp"])
+def test_no_numbers_among_normals_of_vtk_stay(kind, tmp_path):
+    pytest.importorskip("vtk")
+    mesh, _, before = sheet()
+    before = before.copy()
+    before[::3] = np.nan
+    mesh = replace(mesh, point_data={"Normals": before})
+    if kind == "vtu":
+        variants = [data for _, data in vtu_variants(grid_of(mesh))][::5]
+    else:
+        variants = [vtp_of(polydata_of(mesh), mode) for mode in (0, 1, 2)]
+    for data in variants:
+        path = tmp_path / f"a.{kind}"
+        path.write_bytes(data)
+        result, new, _ = updated(path, tmp_path)
+        found = gmsnet.read(new).point_data["Normals"]
+        assert np.isnan(found[::3]).all()
+        kept, after = ~np.isnan(before[:, 0]), plain.normals_of_points(plain.faces_of(mesh), result.points)
+        moved = around(mesh, result.moved)[1]
+        check(found[kept], gmsnet.read(path).point_data["Normals"][kept], after[kept], moved[kept], 1e-6)
+
+
 def vtp_of(poly, mode):
     import vtk
 
@@ -243,15 +266,28 @@ def test_formats_whose_normals_are_not_found_say_so(tmp_path):
 def test_a_mesh_without_normals_is_told(tmp_path):
     mesh, _, _ = sheet()
     result = gmsnet.smooth(mesh, update_normals=True)
-    assert "update_normals: there are no normals in the mesh or its file that are known" in result.notes
+    said = "update_normals: the mesh and its file have no normals that are known, or all are 0"
+    assert said in result.notes
+    path = tmp_path / "a.stl"
+    path.write_bytes(plain.binary_stl(mesh, np.zeros_like(plain.normals_of_faces(plain.faces_of(mesh), mesh.points))))
+    result, new, old = updated(path, tmp_path)
+    assert said in result.notes
+    assert new.read_bytes() == old.read_bytes()
+
+
+@pytest.mark.parametrize("kind", ["plane", "volume"])
+def test_what_is_no_surface_is_told(kind):
+    """So that many files can be smoothed in one call, of which some are flat."""
+    mesh = random_mesh(50, seed=0) if kind == "plane" else mesh_of(*cube(30))
+    result, plain_one = gmsnet.smooth(mesh, update_normals=True), gmsnet.smooth(mesh)
+    assert "update_normals: this mesh is no surface in space, so normals stay" in result.notes
+    assert np.array_equal(result.points, plain_one.points)
 
 
 def test_what_cannot_be_is_refused(tmp_path):
     mesh, _, before = sheet()
     with pytest.raises(InputError, match="update_normals is of files and of meshes"):
         gmsnet.smooth((mesh.points, plain.faces_of(mesh)), update_normals=True)
-    with pytest.raises(InputError, match="update_normals is of surfaces in space"):
-        gmsnet.smooth(random_mesh(50, seed=0), update_normals=True)
     with pytest.raises(InputError, match="update_normals must be True or False"):
         gmsnet.smooth(mesh, update_normals=1)
     path = tmp_path / "a.obj"

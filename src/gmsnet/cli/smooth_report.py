@@ -59,7 +59,8 @@ class Outcome(Account):
                 console.print("most nodes are at the boundary and stay there: --slide all lets them move along it")
             if ON_INTERFACE in result.held:
                 console.print(
-                    "nodes between regions stay there: --join-regions lets them move, if regions mean nothing"
+                    "nodes between regions stay there: --join-regions lets those move that are of no marker, "
+                    "if regions mean nothing"
                 )
         if self.written is None:
             console.print(f"left as it is: {self.input}")

@@ -40,7 +40,7 @@ from gmsnet.methods.base import CELLS
 from gmsnet.preserve.protection import LAYER, NO_LAYERS, WALL
 from gmsnet.run.options import CPU, SmoothOptions
 from gmsnet.run.outcome import factors_of, greatest_angle, large_angles, merit_of
-from gmsnet.run.set_up import check_options, check_target, not_slid
+from gmsnet.run.set_up import check_options, check_target, without_effect
 from gmsnet.run.state import State
 from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.shell import Shell
@@ -211,7 +211,7 @@ def _shared(
         where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
         notes += found.note(points[at], moved[at], where, options.hausdorff, piece, part.comm)
     else:
-        notes += [*not_measured(part, counts), *not_slid(options)]
+        notes += [*not_measured(part, counts), *without_effect(options)]
     notes += judged.note(before, after, "η" if part.mesh.has_volumes else "1/q")
     notes += large_angles(greatest, missed, options)
     return RankResult(

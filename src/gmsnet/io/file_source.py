@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -68,13 +68,23 @@ class FileSource:
         """See Source."""
         return "of facets" if self.format == "stl" else next((each for each in self.unread if "normals" in each), "")
 
-    def renewing(self, point_data: PointData, cell_data: CellData) -> tuple[FileSource, list[str]]:
+    @cached_property
+    def _normals(self) -> dict[str, bool]:
+        """What normals are found in it → whether any is other than 0."""
+        return {each.what: bool((each.values != 0.0).any()) for each in self._found({self.main: self.data})}
+
+    @property
+    def renewable(self) -> tuple[str, ...]:
         """See Source."""
-        found = [each.what for each in self._found({self.main: self.data})]
-        stale = tuple(sorted({*fields_in(self.point_data, self.cell_data)} - {*found})) or (self.normals,) * bool(
-            self.normals and not found
-        )
-        return replace(self, point_data=point_data, cell_data=cell_data, renews=bool(found), stale=stale), found
+        return tuple(what for what, there in self._normals.items() if there)
+
+    def renewing(self, point_data: PointData, cell_data: CellData) -> FileSource:
+        """See Source."""
+        found = {*self._normals}
+        stale = tuple(sorted({*fields_in(self.point_data, self.cell_data)} - found))
+        if self.normals and not found:
+            stale = stale or (self.normals,)
+        return replace(self, point_data=point_data, cell_data=cell_data, renews=bool(found), stale=stale)
 
     def _found(self, files: Mapping[str, Data]) -> list[Normals]:
         if self.find is None or self.shares:

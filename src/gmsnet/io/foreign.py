@@ -41,10 +41,11 @@ class ForeignSource:
     title: str
     format: str = ""
     normals: str = ""
+    renewable: tuple[str, ...] = ()
 
-    def renewing(self, point_data: PointData, cell_data: CellData) -> tuple[ForeignSource, list[str]]:
+    def renewing(self, point_data: PointData, cell_data: CellData) -> ForeignSource:
         """See Source: it is only converted, and the data of the mesh are all that can be computed anew."""
-        return self, []
+        return self
 
     def images_in(self, mesh: Mesh) -> NDArray[np.int64]:
         """None: they are not read."""

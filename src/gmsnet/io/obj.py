@@ -72,7 +72,7 @@ def normals(files: Mapping[str, Data], cells: Sequence[CellBlock]) -> list[Norma
     row = np.where(named > 0, named - 1, np.where(named < 0, before + named, -1))
     if (bad := np.flatnonzero((row >= len(starts)) | ((named < 0) & (row < 0)))).size:
         text.fail(int(corners[bad[0]]), f"the normal {named[bad[0]]} is named, but there are {len(starts)}")
-    return [in_text(OTHERS[b"vn"], text, starts, row)]
+    return [in_text("vn", text, starts, row)]
 
 
 def _third(text: Text, starts: Starts) -> NDArray[np.int64]:

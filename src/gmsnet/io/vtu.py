@@ -19,7 +19,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io import convert, vtk_cells, vtk_ghosts, vtu_ranges
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
-from gmsnet.io.normals import Normals
+from gmsnet.io.normals import Normals, in_words
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.places import Lattice, Places
 from gmsnet.io.ranges import Plan
@@ -140,23 +140,32 @@ def normals_in(reader: Reader, cells: Sequence[CellBlock], count: int) -> list[N
         for array in reader.section(section):
             called, kind = array.attributes.get("Name", ""), array.attributes.get("type")
             if names_normals(called) and kind in ("Float32", "Float64") and reader.width(array) == 3:
-                values, slots = _points(reader, array, rows)
+                if array.attributes.get("format", "ascii") == "ascii":
+                    words = reader.words(array, 3 * rows)
+                    result.append(in_words(called, words, words.take(3 * rows, TYPES[kind]), TYPES[kind], row))
+                    continue
+                result.append(Normals(called, *_vectors(reader, array, rows), row))
                 reader.check_apart(array)
-                result.append(Normals(called, values, slots, row))
     return result
 
 
 def _points(reader: Reader, place: DataArray, count: int) -> tuple[NDArray[np.float64], Slots]:
-    """The points, or other vectors, and the places of their coordinates in whatever form they are stored."""
-    name = TYPES[place.attributes["type"]]
+    """The points, and the places of their coordinates in whatever form they are stored."""
     if place.attributes.get("format", "ascii") == "ascii":
+        name = TYPES[place.attributes["type"]]
         words = reader.words(place, 3 * count)
         return words.coordinates(words.take(3 * count, name), name)
-    found = reader.numbers(place, 3 * count)
-    if not np.isfinite(found.values).all():
+    points, slots = _vectors(reader, place, count)
+    if not np.isfinite(points).all():
         reader.fail(place, "a coordinate is not a finite number")
+    return points, slots
+
+
+def _vectors(reader: Reader, place: DataArray, count: int) -> tuple[NDArray[np.float64], Slots]:
+    """The vectors (count, 3) of an array that is encoded, and the places of their numbers."""
+    found = reader.numbers(place, 3 * count)
     points = found.values.astype(np.float64, copy=False).reshape(-1, 3)
-    kind, encoded = reader.order + name, found.encoded
+    kind, encoded = reader.order + TYPES[place.attributes["type"]], found.encoded
     if encoded is None:  # no points, nothing to write
         return points, BinarySlots(Places(), kind)
     encoding, size = encoded.encoding, np.dtype(kind).itemsize

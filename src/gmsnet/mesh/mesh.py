@@ -45,10 +45,13 @@ class Source(Protocol):
         """Normals of facets or points in it that no field of the mesh holds, in words; "" for none."""
         ...
 
-    def renewing(
-        self, point_data: dict[str, NDArray[Any]], cell_data: dict[str, tuple[NDArray[Any], ...]]
-    ) -> tuple[Source, list[str]]:
-        """The same with these data, whose ``splice`` computes normals anew, and which these are in it, in words."""
+    @property
+    def renewable(self) -> tuple[str, ...]:
+        """Normals in it that ``renewing`` is for, in words. FormatError where they are damaged."""
+        ...
+
+    def renewing(self, point_data: dict[str, NDArray[Any]], cell_data: dict[str, tuple[NDArray[Any], ...]]) -> Source:
+        """The same with these data, whose ``splice`` computes normals anew. Errors: see ``renewable``."""
         ...
 
     def images_in(self, mesh: Mesh) -> NDArray[np.int64]:

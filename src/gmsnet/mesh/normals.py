@@ -162,12 +162,12 @@ def renewed_mesh(mesh: Mesh, points: Floats) -> Mesh:
     """
     moved = mesh.with_points(points)
     point_data, cell_data = renewed_fields(mesh.point_data, mesh.cell_data, mesh.cells, mesh.points, moved.points)
-    source = None if mesh.source is None else mesh.source.renewing(point_data, cell_data)[0]
+    source = None if mesh.source is None else mesh.source.renewing(point_data, cell_data)
     return replace(moved, point_data=point_data, cell_data=cell_data, source=source)
 
 
 def normals_in(mesh: Mesh) -> list[str]:
     """The normals of a mesh and its file that ``renewed_mesh`` computes, in words. Errors: see there."""
     fields = fields_in(mesh.point_data, mesh.cell_data)
-    found = [] if mesh.source is None else mesh.source.renewing({}, {})[1]
+    found = () if mesh.source is None else mesh.source.renewable
     return list(dict.fromkeys([*fields, *found]))

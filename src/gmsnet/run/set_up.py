@@ -68,7 +68,7 @@ def first_state(
     remarks = []
     refuse_unless_free(BYTES_PER_NODE * len(given.points), f"smoothing {len(given.points):,} nodes")
     asked, matching = fixed_mask(given, fixed), images(given)
-    if options.update_normals:
+    if options.update_normals and given.plane is None and not given.has_volumes:
         restore = renewing(given, mesh)
     if options.join_regions:
         given = given.with_one_region()
@@ -88,7 +88,7 @@ def first_state(
         sliding = Sliding.of(given, curves, topology.memory, topology.free, options.geometry)
     second = second_order_of(given, topology, options)
     remarks += held_anyway(given, asked, matching, topology, fixed, options.slides)
-    remarks += not_slid(options, second)
+    remarks += without_effect(options, second)
     if options.adapts and second is not None:
         raise InputError("a metric for second-order cells cannot be had so far: leave out metric, size and preserve")
     values = check_given(options, len(given.points))
@@ -137,13 +137,14 @@ def first_state(
     )
 
 
-def not_slid(options: SmoothOptions, second: SecondOrder | None = None) -> list[str]:
-    """What of the options of sliding has no effect on a mesh in a plane, or of volumes."""
-    if options.slides:
-        return [] if second is None else ["slide: boundary nodes of second-order cells stay where they are"]
-    if options.feature_angle == FEATURE_ANGLE:
-        return []
-    return ["feature angle: it has no effect, as no node is to slide: ask for that by slide"]
+def without_effect(options: SmoothOptions, second: SecondOrder | None = None) -> list[str]:
+    """What of the options of sliding, and of surfaces, has no effect on a mesh in a plane, or of volumes."""
+    said = ["update_normals: this mesh is no surface in space, so normals stay"] if options.update_normals else []
+    if options.slides and second is not None:
+        said.append("slide: boundary nodes of second-order cells stay where they are")
+    if not options.slides and options.feature_angle != FEATURE_ANGLE:
+        said.append("feature angle: it has no effect, as no node is to slide: ask for that by slide")
+    return said
 
 
 def held_anyway(
@@ -206,7 +207,7 @@ def _first_of_volume(
     if isinstance(topology, MixedVolume) and (turned := topology.inside_out):
         remarks.append(f"read with their corners in the other order, for they are inside out: {turned}")
     start = taken(space_points(given), topology.memory)
-    remarks += not_slid(options, second)
+    remarks += without_effect(options, second)
     if second is None:
         before = measure(given.without_cells(), topology, start, executor.for_blocks(0))
     else:
@@ -234,8 +235,7 @@ def check_surface_options(mesh: Mesh, options: SmoothOptions) -> None:
     """InputError for options of surfaces where the mesh is none."""
     if mesh.plane is None and not mesh.has_volumes:
         return
-    for name, given in (("hausdorff", options.hausdorff is not None), ("free_needles", options.free_needles),
-                        ("update_normals", options.update_normals)):  # fmt: skip
+    for name, given in (("hausdorff", options.hausdorff is not None), ("free_needles", options.free_needles)):
         if given:
             raise InputError(f"{name} is of surfaces in space, and this mesh is none: leave it out")
 

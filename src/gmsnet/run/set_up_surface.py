@@ -87,7 +87,9 @@ def _of_normals(mesh: Mesh, update: bool) -> tuple[str, ...]:
     if update:
         found = normals_in(mesh)
         told = f"normals ({', '.join(found)}) are computed anew where nodes move"
-        return (told if found else "update_normals: there are no normals in the mesh or its file that are known",)
+        return (
+            told if found else "update_normals: the mesh and its file have no normals that are known, or all are 0",
+        )
     source = "" if mesh.source is None else mesh.source.normals
     if stale := ", ".join(filter(None, [*fields_in(mesh.point_data, mesh.cell_data), source])):
         return (
