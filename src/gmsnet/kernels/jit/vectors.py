@@ -1,19 +1,23 @@
 """Explicit SIMD: LLVM vectors of floats with operators, so that a formula is written once for numbers and for vectors.
 
 A loop over lanes is vectorised by LLVM where offsets are constants. Where each lane reads rows of its own, it is not:
-then an intrinsic made of these vectors takes a third of the time, and compiles in half of it.
+then an intrinsic made of these vectors takes a third of the time, and compiles in half of it. An intrinsic is written
+for any number of lanes (``lanewise``): of one lane, which an accelerator has, its vectors are plain numbers.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import wraps
+from inspect import signature
 from types import FunctionType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba.core import cgutils
+from numba.core import cgutils, types
+from numba.extending import intrinsic
 
 from gmsnet.kernels.jit.compile import Part
 
@@ -23,11 +27,80 @@ DOUBLE: Any
 NUMBER: Any
 INDEX: Any
 BYTE: Any
-REALS: Any
-NUMBERS: Any
-DOUBLES: Any
-REAL, DOUBLE, NUMBER, INDEX, BYTE = ir.FloatType(), ir.DoubleType(), ir.IntType(32), ir.IntType(64), ir.IntType(8)
-REALS, NUMBERS, DOUBLES = (ir.VectorType(kind, WIDTH) for kind in (REAL, NUMBER, DOUBLE))
+BIT: Any
+REAL, DOUBLE, NUMBER, INDEX, BYTE, BIT = (
+    ir.FloatType(), ir.DoubleType(), ir.IntType(32), ir.IntType(64), ir.IntType(8), ir.IntType(1)
+)  # fmt: skip
+
+
+class Lanes:
+    """So many lanes, and the types that Numba, or what stands for it there, has for what intrinsics are given.
+
+    reals, doubles, numbers: vectors of float32, float64 and int32.
+    """
+
+    def __init__(self, width: int, types: Any = types) -> None:
+        self.width, self.types = width, types
+        self.reals, self.doubles, self.numbers = self.of(REAL), self.of(DOUBLE), self.of(NUMBER)
+
+    def is_none(self, kind: Any) -> bool:
+        """Is that the type of None?"""
+        return isinstance(kind, self.types.NoneType)
+
+    def of(self, kind: Any) -> Any:
+        """A vector of numbers of a kind."""
+        return kind if self.width == 1 else ir.VectorType(kind, self.width)
+
+    def broadcast(self, builder: Any, number: Any) -> Vector:
+        """A number in all lanes."""
+        if self.width == 1:
+            return Vector(builder, number)
+        one = builder.insert_element(ir.Constant(self.of(number.type), ir.Undefined), number, ir.Constant(NUMBER, 0))
+        return Vector(builder, builder.shuffle_vector(one, one, mask_of(*[0] * self.width)))
+
+    def load(self, builder: Any, base: Any, row: int) -> Vector:
+        """A row of float32 of an array of such rows."""
+        return Vector(builder, load(builder, base, index(row * self.width), self.reals))
+
+    def load_double(self, builder: Any, base: Any) -> Vector:
+        """The first row of an array of float64."""
+        return Vector(builder, load(builder, base, index(0), self.doubles, 8))
+
+    def store_flags(self, builder: Any, base: Any, mask: Any) -> None:
+        """Writes a mask as the first row of an array of flags."""
+        store(builder, base, index(0), builder.zext(mask, self.of(BYTE)), 1)
+
+    def mask(self, builder: Any, bits: Any) -> Any:
+        """That of which whole numbers are the bits."""
+        bits = builder.trunc(bits, ir.IntType(self.width)) if bits.type.width > self.width else bits
+        return builder.bitcast(bits, self.of(BIT))
+
+    def count(self, builder: Any, mask: Any) -> Any:
+        """In how many lanes a mask is set."""
+        if self.width == 1:
+            return builder.zext(mask, INDEX)
+        return builder.zext(builder.ctpop(builder.bitcast(mask, ir.IntType(self.width))), INDEX)
+
+
+def lanewise(function: Callable[..., Any]) -> Any:
+    """An intrinsic of WIDTH lanes, of a function of lanes and of the types of its arguments.
+
+    It returns what the function of an intrinsic does: the signature, and what generates code.
+    """
+    made: Any = intrinsic(typed(function, Lanes(WIDTH)))
+    made.lanewise = function
+    return made
+
+
+def typed(function: Callable[..., Any], lanes: Lanes) -> Callable[..., Any]:
+    """What is to be made an intrinsic of some lanes."""
+
+    @wraps(function)
+    def of_types(_context: Any, *kinds: Any) -> Any:
+        return function(lanes, *kinds)
+
+    of_types.__signature__ = signature(function)  # type: ignore[attr-defined]
+    return of_types
 
 
 def index(value: int) -> ir.Constant:
@@ -35,13 +108,15 @@ def index(value: int) -> ir.Constant:
     return ir.Constant(INDEX, value)
 
 
-def constant(value: float, kind: Any = REALS) -> ir.Constant:
+def constant(value: float, kind: Any) -> ir.Constant:
     """The same number in all lanes."""
-    return ir.Constant(kind, [ir.Constant(kind.element, float(np.float32(value)) if kind == REALS else value)] * WIDTH)
+    if isinstance(kind, ir.VectorType):
+        return ir.Constant(kind, [constant(value, kind.element)] * kind.count)
+    return ir.Constant(kind, float(np.float32(value)) if kind == REAL else value)
 
 
 class Vector:
-    """WIDTH floats in a register, or float64 in two."""
+    """Floats in a register, or float64 in two."""
 
     builder: Any
     value: Any
@@ -75,7 +150,9 @@ class Vector:
 
     def widened(self) -> Vector:
         """In float64."""
-        return Vector(self.builder, self.builder.fpext(self.value, DOUBLES))
+        kind = self.value.type
+        wide = ir.VectorType(DOUBLE, kind.count) if isinstance(kind, ir.VectorType) else DOUBLE
+        return Vector(self.builder, self.builder.fpext(self.value, wide))
 
     def above(self, least: float) -> Vector:
         """This where it is at least so large, and elsewhere zero; what is not a number stays so."""
@@ -88,7 +165,7 @@ class Vector:
 
     def where(self, mask: Any, other: float) -> Vector:
         """This where the mask is set, and elsewhere a number."""
-        return Vector(self.builder, self.builder.select(mask, self.value, constant(other)))
+        return Vector(self.builder, self.builder.select(mask, self.value, self._of(other)))
 
 
 def smaller(one: Vector, other: Vector) -> Vector:
@@ -103,8 +180,9 @@ def larger(one: Vector, other: Vector) -> Vector:
 
 def root(x: Vector) -> Vector:
     """Square roots."""
-    form = ir.FunctionType(REALS, [REALS])
-    function = cgutils.get_or_insert_function(x.builder.module, form, f"llvm.sqrt.v{WIDTH}f32")
+    kind = x.value.type
+    name = f"llvm.sqrt.v{kind.count}f32" if isinstance(kind, ir.VectorType) else "llvm.sqrt.f32"
+    function = cgutils.get_or_insert_function(x.builder.module, ir.FunctionType(kind, [kind]), name)
     return Vector(x.builder, x.builder.call(function, [x.value]))
 
 
@@ -125,7 +203,7 @@ def data_of(context: Any, builder: Any, kind: Any, array: Any) -> Any:
     return context.make_array(kind)(context, builder, array).data
 
 
-def load(builder: Any, base: Any, offset: Any, kind: Any = REALS, align: int = 4) -> Any:
+def load(builder: Any, base: Any, offset: Any, kind: Any, align: int = 4) -> Any:
     """A vector that stands at an offset (in numbers of the array)."""
     value = builder.load(builder.bitcast(builder.gep(base, [offset]), kind.as_pointer()))
     value.align = align
@@ -138,27 +216,23 @@ def store(builder: Any, base: Any, offset: Any, value: Any, align: int = 4) -> N
     place.align = align
 
 
-def broadcast(builder: Any, number: Any) -> Vector:
-    """A number in all lanes."""
-    kind = ir.VectorType(number.type, WIDTH)
-    one = builder.insert_element(ir.Constant(kind, ir.Undefined), number, ir.Constant(NUMBER, 0))
-    return Vector(builder, builder.shuffle_vector(one, one, ir.Constant(NUMBERS, [ir.Constant(NUMBER, 0)] * WIDTH)))
-
-
 def mask_of(*lanes: int) -> ir.Constant:
     """Which lanes of two vectors a shuffle takes."""
     return ir.Constant(ir.VectorType(NUMBER, len(lanes)), [ir.Constant(NUMBER, lane) for lane in lanes])
 
 
 def transposed(builder: Any, rows: Sequence[Any]) -> list[Vector]:
-    """The components x, y and z of WIDTH vectors (x, y, z, ·) of four floats each.
+    """The components x, y and z of vectors (x, y, z, ·) of four floats, one of each lane.
 
     Every fourth one goes into one register first: so one shuffle does for all.
     """
+    if len(rows) == 1:
+        return [Vector(builder, builder.extract_element(rows[0], ir.Constant(NUMBER, k))) for k in range(3)]
     parts = [_joined(builder, rows[k::4]) for k in range(4)]
 
     def mixed(one: Any, other: Any, *lanes: int) -> Any:
-        places = (4 * part + lane + (WIDTH - 4) * (lane > 3) for part in range(WIDTH // 4) for lane in lanes)
+        width = len(rows)
+        places = (4 * part + lane + (width - 4) * (lane > 3) for part in range(width // 4) for lane in lanes)
         return builder.shuffle_vector(one, other, mask_of(*places))
 
     first, second = mixed(parts[0], parts[1], 0, 4, 1, 5), mixed(parts[2], parts[3], 0, 4, 1, 5)
@@ -181,9 +255,9 @@ class Sum:
 
     place: Any
 
-    def __init__(self, builder: Any, first: float) -> None:
-        self.place = cgutils.alloca_once(builder, REALS)
-        builder.store(constant(first), self.place)
+    def __init__(self, builder: Any, kind: Any, first: float) -> None:
+        self.place = cgutils.alloca_once(builder, kind)
+        builder.store(constant(first, kind), self.place)
 
     def get(self, builder: Any) -> Vector:
         """As it is now."""

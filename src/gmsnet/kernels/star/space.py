@@ -1,4 +1,4 @@
-"""Blocks of stars in space: LANES3 of one colour, and the SIMD parts that look at all their simplices.
+"""The SIMD parts that look at all simplices of a block of stars in space (kernels.star.space_blocks).
 
 A star is a free node with the corner simplices of its cells, three spokes each, which end in the nodes around it (its
 ring, in no order). Coordinates stand as [ring node][lane][x y z ·] in float32, over the size of the star and from its
@@ -12,13 +12,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from llvmlite import ir
-from numba.core import cgutils, types
-from numba.extending import intrinsic
+from numba.core import cgutils
 
 from gmsnet.kernels.jit import vectors
-from gmsnet.kernels.jit.vectors import INDEX, NUMBER, REAL, Sum, Vector, as_written, broadcast, index
+from gmsnet.kernels.jit.vectors import INDEX, NUMBER, REAL, Lanes, Sum, Vector, as_written, index, lanewise
 from gmsnet.kernels.simplex import mean_ratio3
-from gmsnet.kernels.star.space_blocks import LANES3
 
 KEPT = 8  # rows of each simplex: w, D, s, S
 # Rows of sums. The Hessian without its part along I, its diagonal halved; ISO: the sum of f/S. LEAST: the minimum D.
@@ -31,20 +29,21 @@ FAR_ABOVE = 1e30  # for simplices that a lane does not have
 SCALE, ROOT_OF_SCALE, TWO_P, M, MIXED, SQUARED = range(6)
 
 
-@intrinsic
-def relate(_context: Any, points: Any, ring: Any, offset: Any, rows: Any, star: Any, inverse: Any, local: Any) -> Any:
+@lanewise
+def relate(lanes: Lanes, points: Any, ring: Any, offset: Any, rows: Any, star: Any, inverse: Any, local: Any) -> Any:
     """Writes local[row][lane] = (point of the ring − centre)·inverse in float32.
 
-    points: (N, 4) float64. ring: from ``offset`` on. star: (LANES3·4,) the centres. inverse: (LANES3,) float32.
+    points: (N, 4) float64. ring: from ``offset`` on. star: (L·4,) the centres of L lanes. inverse: (L,) float32.
     """
+    types = lanes.types
     signature = types.void(points, ring, types.int64, types.int64, star, inverse, local)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         at = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 1, 4, 5, 6)}
         four, double = ir.VectorType(REAL, 4), ir.VectorType(vectors.DOUBLE, 4)
         with cgutils.for_range(builder, arguments[3]) as loop:
-            first = builder.mul(loop.index, index(LANES3))
-            for lane in range(LANES3):
+            first = builder.mul(loop.index, index(lanes.width))
+            for lane in range(lanes.width):
                 here = builder.add(first, index(lane))
                 node = builder.zext(builder.load(builder.gep(at[1], [builder.add(arguments[2], here)])), INDEX)
                 place = vectors.load(builder, at[0], builder.shl(node, index(2)), double, 8)
@@ -59,11 +58,13 @@ def relate(_context: Any, points: Any, ring: Any, offset: Any, rows: Any, star: 
     return signature, generate
 
 
-def value_of(builder: Any, lengths: Vector, inverse: Vector, power: Any, constants: Any) -> tuple[Vector, Vector]:
+def value_of(
+    builder: Any, lengths: Vector, inverse: Vector, power: Any, constants: Sequence[Vector]
+) -> tuple[Vector, Vector]:
     """f of simplices, and S^(3/2). inverse: 1/D. power: k."""
     high = lengths * vectors.root(lengths)
     ratio = high * inverse
-    place = cgutils.alloca_once(builder, vectors.REALS)
+    place = cgutils.alloca_once(builder, lengths.value.type)
     plain = builder.icmp_signed("<", power, index(0))
     with builder.if_else(plain) as (then, other):
         with then:
@@ -81,22 +82,23 @@ def value_of(builder: Any, lengths: Vector, inverse: Vector, power: Any, constan
 class _Wall:
     """The objective of ``mean_ratio3.walled``: its constants, those of a Power3, and how often it is squared."""
 
-    def __init__(self, context: Any, builder: Any, kind: Any, constants: Any, squarings: Any) -> None:
-        base = vectors.data_of(context, builder, kind, constants)
+    def __init__(self, builder: Any, constants: Sequence[Vector], squarings: Any) -> None:
         self.builder, self.squarings = builder, squarings
-        self.root, self.scale, self.steep, self.weight = (
-            broadcast(builder, builder.load(builder.gep(base, [index(k)]))) for k in range(4)
-        )
+        self.root, self.scale, self.steep, self.weight = constants
 
     @classmethod
-    def of(cls, context: Any, builder: Any, kind: Any, constants: Any, squarings: Any) -> _Wall | None:
-        return None if isinstance(kind, types.NoneType) else cls(context, builder, kind, constants, squarings)
+    def of(cls, lanes: Lanes, context: Any, builder: Any, kind: Any, constants: Any, squarings: Any) -> _Wall | None:
+        if lanes.is_none(kind):
+            return None
+        return cls(
+            builder, _constants(lanes, builder, vectors.data_of(context, builder, kind, constants), 4), squarings
+        )
 
     def around(self, lengths: Vector, inverse: Vector, on: Any) -> tuple[Sequence[Vector], Vector]:
         """What ``walled`` returns, and S^(3/2). inverse: 1/D."""
         builder, high = self.builder, lengths * vectors.root(lengths)
         ratio = (high * inverse * self.root).where(on, 1.0)
-        place = cgutils.alloca_once(builder, vectors.REALS)
+        place = cgutils.alloca_once(builder, lengths.value.type)
         builder.store(((ratio * ratio) * self.scale).value, place)
         with cgutils.for_range(builder, self.squarings):
             g = Vector(builder, builder.load(place)).above(LEAST_ROOT)
@@ -105,11 +107,11 @@ class _Wall:
         return as_written(mean_ratio3.walled)(ratio, wall, self.steep), high
 
 
-def _softness(context: Any, builder: Any, kind: Any, soft: Any) -> Vector | None:
+def _softness(lanes: Lanes, context: Any, builder: Any, kind: Any, soft: Any) -> Vector | None:
     """ε² of all lanes."""
-    if isinstance(kind, types.NoneType):
+    if lanes.is_none(kind):
         return None
-    softness = Vector(builder, vectors.load(builder, vectors.data_of(context, builder, kind, soft), index(0)))
+    softness = lanes.load(builder, vectors.data_of(context, builder, kind, soft), 0)
     return softness * softness
 
 
@@ -121,41 +123,36 @@ def _inverses(double: Vector, softness: Vector | None) -> tuple[Vector, Vector]:
     wide = vectors.root(softness + double * double)
     # For D < 0 the sum would lose its digits: χ = ½ε²/(√ − D).
     plain, small = (double + wide) * 0.5, softness * 0.5 * (1.0 / (wide - double))
-    positive = small.builder.fcmp_ordered(">", double.value, vectors.constant(0.0))
+    positive = small.builder.fcmp_ordered(">", double.value, vectors.constant(0.0, double.value.type))
     chi = Vector(double.builder, double.builder.select(positive, plain.value, small.value))
     return 1.0 / chi, 1.0 / wide
 
 
-def _constants(builder: Any, base: Any) -> list[Vector]:
-    return [broadcast(builder, builder.load(builder.gep(base, [index(k)]))) for k in range(SQUARED + 1)]
-
-
-def _present(builder: Any, counts: Any, row: Any) -> Any:
-    """A mask of the lanes that have a simplex of this number."""
-    number = builder.trunc(row, NUMBER)
-    one = builder.insert_element(ir.Constant(vectors.NUMBERS, ir.Undefined), number, ir.Constant(NUMBER, 0))
-    each = builder.shuffle_vector(one, one, ir.Constant(vectors.NUMBERS, [ir.Constant(NUMBER, 0)] * LANES3))
-    return builder.icmp_signed("<", each, counts)
+def _constants(lanes: Lanes, builder: Any, base: Any, count: int) -> list[Vector]:
+    return [lanes.broadcast(builder, builder.load(builder.gep(base, [index(k)]))) for k in range(count)]
 
 
 class _Rows:
     """Which lanes have a simplex in a row, and its weights: of tetrahedra, or of a mixture in the last arguments."""
 
-    def __init__(self, context: Any, builder: Any, kinds: Any, arguments: Any, counts: Any, at: Any) -> None:
-        self.builder, self.mixed, self.counts = builder, not isinstance(kinds[0], types.NoneType), counts
+    def __init__(
+        self, lanes: Lanes, context: Any, builder: Any, kinds: Any, arguments: Any, counts: Any, at: Any
+    ) -> None:
+        self.of, self.builder, self.mixed, self.counts = lanes, builder, not lanes.is_none(kinds[0]), counts
         if self.mixed:
             self.role, self.present, self.weights = (
                 vectors.data_of(context, builder, kind, argument)
                 for kind, argument in zip(kinds, arguments, strict=True)
             )
-            self.first = builder.udiv(at, index(3 * LANES3))
+            self.first = builder.udiv(at, index(3 * lanes.width))
 
     def lanes(self, row: Any) -> Any:
         """A mask."""
+        builder = self.builder
         if not self.mixed:
-            return _present(self.builder, self.counts, row)
-        bits = self.builder.load(self.builder.gep(self.present, [self.builder.add(self.first, row)]))
-        return self.builder.bitcast(bits, ir.VectorType(ir.IntType(1), LANES3))
+            number = self.of.broadcast(builder, builder.trunc(row, NUMBER)).value
+            return builder.icmp_signed("<", number, self.counts)
+        return self.of.mask(builder, builder.load(builder.gep(self.present, [builder.add(self.first, row)])))
 
     def weight(self, row: Any, first: int, last: int) -> list[Vector]:
         """Those of a mixture, by their places."""
@@ -163,25 +160,26 @@ class _Rows:
         role = builder.load(builder.gep(self.role, [builder.add(self.first, row)]))
         place = builder.shl(builder.zext(role, INDEX), index(3))
         return [
-            broadcast(builder, builder.load(builder.gep(self.weights, [builder.add(place, index(k))])))
+            self.of.broadcast(builder, builder.load(builder.gep(self.weights, [builder.add(place, index(k))])))
             for k in range(first, last)
         ]
 
 
-@intrinsic
+@lanewise
 def derive(
-    _context: Any, local: Any, spoke: Any, at: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any,
+    lanes: Lanes, local: Any, spoke: Any, at: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any,
     soft: Any, wall: Any, squarings: Any, kept: Any, sums: Any, role: Any, present: Any, weights: Any,
 ) -> Any:  # fmt: skip
     """Writes what is kept of each simplex, and the sums VALUE to LEAST over them.
 
-    local: as ``relate`` leaves it. spoke: from ``at`` on, so many rows; count: those of each lane, from block·LANES3
-    on. power: k, constants: (SQUARED + 1,) float32, those named above. soft: (LANES3,) ε of each lane, over the cube of
+    local: as ``relate`` leaves it. spoke: from ``at`` on, so many rows; count: those of each lane, from block·L on,
+    L lanes. power: k, constants: (SQUARED + 1,) float32, those named above. soft: (L,) ε of each lane, over the cube of
     its size, or None: in f, D is then χ(D) = (D + √(ε² + D²))/2, which is positive for any D (Garanzha et al.:
     Foldover-free maps in 50 lines of code, 2021), and the Hessian is that without the term of χ''. wall, squarings:
     those of a Power3; with a wall the objective is that of ``mean_ratio3.walled``. role, present, weights: those of a
     Mixture, or None.
     """
+    types = lanes.types
     signature = types.void(
         local, spoke, types.int64, types.int64, count, types.int64, types.int64, constants, soft, wall, types.int64,
         kept, sums, role, present, weights,
@@ -191,22 +189,22 @@ def derive(
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 1, 4, 7, 11, 12)}
-        barrier = _Wall.of(context, builder, signature.args[9], *arguments[9:11])
-        softness = _softness(context, builder, signature.args[8], arguments[8])
-        constants = _constants(builder, data[7])
-        first = builder.mul(arguments[5], index(LANES3))
-        counts = vectors.load(builder, data[4], first, vectors.NUMBERS)
-        lay = _Rows(context, builder, signature.args[13:], arguments[13:], counts, arguments[2])
+        barrier = _Wall.of(lanes, context, builder, signature.args[9], *arguments[9:11])
+        softness = _softness(lanes, context, builder, signature.args[8], arguments[8])
+        constants = _constants(lanes, builder, data[7], SQUARED + 1)
+        first = builder.mul(arguments[5], index(lanes.width))
+        counts = vectors.load(builder, data[4], first, lanes.numbers)
+        lay = _Rows(lanes, context, builder, signature.args[13:], arguments[13:], counts, arguments[2])
         four = ir.VectorType(REAL, 4)
-        found = [Sum(builder, FAR_ABOVE if k == LEAST else 0.0) for k in range(LEAST + 1)]
+        found = [Sum(builder, lanes.reals, FAR_ABOVE if k == LEAST else 0.0) for k in range(LEAST + 1)]
         with cgutils.for_range(builder, arguments[3]) as loop:
-            begin = builder.add(arguments[2], builder.mul(loop.index, index(3 * LANES3)))
+            begin = builder.add(arguments[2], builder.mul(loop.index, index(3 * lanes.width)))
             spokes = list[Vector]()
             for k in range(3):
                 ends = []
-                for lane in range(LANES3):
-                    row = builder.load(builder.gep(data[1], [builder.add(begin, index(k * LANES3 + lane))]))
-                    there = builder.add(builder.mul(builder.zext(row, INDEX), index(LANES3)), index(lane))
+                for lane in range(lanes.width):
+                    row = builder.load(builder.gep(data[1], [builder.add(begin, index(k * lanes.width + lane))]))
+                    there = builder.add(builder.mul(builder.zext(row, INDEX), index(lanes.width)), index(lane))
                     ends.append(vectors.load(builder, data[0], builder.shl(there, index(2)), four))
                 spokes += vectors.transposed(builder, ends)
             on = lay.lanes(loop.index)
@@ -217,9 +215,9 @@ def derive(
                 double, lengths, wx, wy, wz, sx, sy, sz = measured(*spokes)
             double = double.where(on, FAR_ABOVE)
             wx, wy, wz = wx.where(on, 0.0), wy.where(on, 0.0), wz.where(on, 0.0)
-            to = builder.mul(loop.index, index(KEPT * LANES3))
+            to = builder.mul(loop.index, index(KEPT * lanes.width))
             for k, row in enumerate((wx, wy, wz, double, sx, sy, sz, lengths)):
-                vectors.store(builder, data[11], builder.add(to, index(k * LANES3)), row.value)
+                vectors.store(builder, data[11], builder.add(to, index(k * lanes.width)), row.value)
             inverse, of_d = _inverses(double, softness)
             of_s = 1.0 / lengths
             if barrier is None:
@@ -235,21 +233,22 @@ def derive(
                 found[k].add(term)
             found[LEAST].lower(double)
         for k, total in enumerate(found):
-            vectors.store(builder, data[12], index(k * LANES3), total.get(builder).value)
+            vectors.store(builder, data[12], index(k * lanes.width), total.get(builder).value)
         return context.get_dummy_value()
 
     return signature, generate
 
 
-@intrinsic
+@lanewise
 def judge(
-    _context: Any, kept: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any, soft: Any, step: Any,
+    lanes: Lanes, kept: Any, rows: Any, count: Any, block: Any, power: Any, constants: Any, soft: Any, step: Any,
     floor: Any, sums: Any, at: Any, wall: Any, squarings: Any, role: Any, present: Any, weights: Any,
 ) -> Any:  # fmt: skip
-    """Writes the sums AFTER and MARGIN after a step (3·LANES3,), [axis][lane].
+    """Writes the sums AFTER and MARGIN after a step (3·L,), [axis][lane].
 
     floor: c, of D/S^(3/2). soft, at, wall, squarings, role, present, weights: as in ``derive``.
     """
+    types = lanes.types
     signature = types.void(
         kept, types.int64, count, types.int64, types.int64, constants, soft, step, types.float32, sums, types.int64,
         wall, types.int64, role, present, weights,
@@ -258,19 +257,18 @@ def judge(
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = {k: vectors.data_of(context, builder, signature.args[k], arguments[k]) for k in (0, 2, 5, 7, 9)}
-        softness = _softness(context, builder, signature.args[6], arguments[6])
-        constants = _constants(builder, data[5])
-        counts = vectors.load(builder, data[2], builder.mul(arguments[3], index(LANES3)), vectors.NUMBERS)
-        lay = _Rows(context, builder, signature.args[13:], arguments[13:], counts, arguments[10])
-        barrier = _Wall.of(context, builder, signature.args[11], *arguments[11:13])
-        way = [Vector(builder, vectors.load(builder, data[7], index(k * LANES3))) for k in range(3)]
-        floor = broadcast(builder, arguments[8])
-        after, margin = Sum(builder, 0.0), Sum(builder, FAR_ABOVE)
+        softness = _softness(lanes, context, builder, signature.args[6], arguments[6])
+        constants = _constants(lanes, builder, data[5], SQUARED + 1)
+        counts = vectors.load(builder, data[2], builder.mul(arguments[3], index(lanes.width)), lanes.numbers)
+        lay = _Rows(lanes, context, builder, signature.args[13:], arguments[13:], counts, arguments[10])
+        barrier = _Wall.of(lanes, context, builder, signature.args[11], *arguments[11:13])
+        way = [lanes.load(builder, data[7], k) for k in range(3)]
+        floor = lanes.broadcast(builder, arguments[8])
+        after, margin = Sum(builder, lanes.reals, 0.0), Sum(builder, lanes.reals, FAR_ABOVE)
         with cgutils.for_range(builder, arguments[1]) as loop:
-            at = builder.mul(loop.index, index(KEPT * LANES3))
-            w = [
-                Vector(builder, vectors.load(builder, data[0], builder.add(at, index(k * LANES3)))) for k in range(KEPT)
-            ]
+            at = builder.mul(loop.index, index(KEPT * lanes.width))
+            rows = [builder.add(at, index(k * lanes.width)) for k in range(KEPT)]
+            w = [Vector(builder, vectors.load(builder, data[0], row, lanes.reals)) for row in rows]
             if lay.mixed:
                 double, lengths = moved_by(w[3], w[7], *w[:3], *w[4:7], *way, *lay.weight(loop.index, 6, 7))
             else:
@@ -283,8 +281,8 @@ def judge(
                 (f, *_), high = barrier.around(lengths, inverse, on)
             after.add(f.where(on, 0.0))
             margin.lower((double - high * floor).where(on, FAR_ABOVE))
-        vectors.store(builder, data[9], index(AFTER * LANES3), after.get(builder).value)
-        vectors.store(builder, data[9], index(MARGIN * LANES3), margin.get(builder).value)
+        vectors.store(builder, data[9], index(AFTER * lanes.width), after.get(builder).value)
+        vectors.store(builder, data[9], index(MARGIN * lanes.width), margin.get(builder).value)
         return context.get_dummy_value()
 
     return signature, generate
