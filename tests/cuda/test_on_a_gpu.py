@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from support.blocks import block
 from support.optional import library
 from support.other_machine import Processor
 
@@ -13,13 +14,15 @@ import gmsnet
 from gmsnet.cuda import executor, launch
 from gmsnet.cuda.library import FUSED, as_written, at_work, checked
 from gmsnet.errors import GmsnetError, InputError, MissingExtraError
-from gmsnet.generate import random_mesh, random_quad_mesh
+from gmsnet.generate import random_mesh, random_quad_mesh, random_volume
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.run import api
 
-MESHES = {"triangle": random_mesh(1500, seed=1), "quad": random_quad_mesh(800, seed=2)}
-
-
+SOLIDS = block(6, 6, 6, wedges=np.ndindex(2, 5), pyramids=np.ndindex(2, 3, 5), jitter=0.15, seed=2)
+MESHES = {
+    "triangle": random_mesh(1500, seed=1), "quad": random_quad_mesh(800, seed=2),
+    "tetra": random_volume(300, seed=1), "solids": SOLIDS,
+}  # fmt: skip
 WAYS = [*itertools.product(MESHES, ("auto", "barrier", "laplacian")), ("triangle", "gmsnet"), ("triangle", "cvt")]
 
 
@@ -91,11 +94,14 @@ def machine(monkeypatch):
         ("triangle", {"method": "gmsnet"}),
         ("triangle", {"method": "angle"}),
         ("triangle", {"method": "cvt"}),
+        ("tetra", {"method": "barrier"}),
+        ("tetra", {"method": "laplacian", "guard": "star", "slide": "all"}),
+        ("solids", {"method": "barrier", "slide": "all"}),
     ],
 )
 def test_what_is_compiled_rounds_as_it_is_written(machine, kind, options):
     gmsnet.smooth(MESHES[kind], device="cuda", max_sweeps=1, **options)
-    assert len(machine.texts) == 2  # a sweep and a look
+    assert len(machine.texts) == 1 + (not MESHES[kind].has_volumes)  # a sweep and, in a plane, a look
     for text in machine.texts.values():
         assert "mul.rn.f" in text
         assert FUSED not in text

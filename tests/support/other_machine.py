@@ -8,8 +8,13 @@ from types import ModuleType
 
 import numba
 import numpy as np
+from numba.core import types
+from numba.extending import intrinsic
 
+from gmsnet.cuda.parts import FEWEST
 from gmsnet.kernels.jit.retarget import Retarget
+from gmsnet.kernels.simplex.jacobian3 import SIZE, solid_workspace
+from gmsnet.kernels.star.stars3 import aligned, aligned_of_star
 
 MODE = {"error_model": "numpy"}
 
@@ -33,7 +38,14 @@ def parts_for(room):
     module = ModuleType("numpy")
     vars(module).update({name: getattr(np, name) for name in dir(np) if not name.startswith("_")})
     module.empty, module.zeros = (numba.njit(**MODE)(each) for each in (empty, zeros))
-    return Retarget(numba.njit(**MODE), {"LANES": 1, "np": module}, {})
+    parts = {}
+    if room > FEWEST:
+        parts = {
+            aligned: parts_for(FEWEST).names["np"].empty,
+            aligned_of_star: module.empty,
+            solid_workspace: numba.njit(**MODE)(lambda: np.zeros(SIZE)),
+        }
+    return Retarget(numba.njit(**MODE), {"LANES": 1, "LANES3": 1, "np": module}, parts, intrinsic, types)
 
 
 class Processor:

@@ -1,4 +1,4 @@
-"""Sweeps over stars in a plane on a GPU, and all else on threads.
+"""Sweeps over stars in a plane and in volumes on a GPU, and all else on threads.
 
 Points go to the GPU before a sweep and come back after it. Stars go once; a thread of the GPU visits one, by the
 kernels of the processor compiled anew (kernels.jit.retarget). Stars of one colour share no cell, so that each finds the
@@ -20,11 +20,14 @@ from gmsnet.cuda.parts import room_for
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.simplex.summary import Summary
 from gmsnet.kernels.star.block import Blocks, Visit
+from gmsnet.kernels.star.space import KEPT
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
+from gmsnet.kernels.star.surface import Surface
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import Threads, serial
 
 METHODS = ("auto", "barrier", "laplacian", "gmsnet", "angle", "cvt", "cpt")  # that have such sweeps
-LONGEST = 256  # numbers in an array of one star: each thread of the GPU has memory for some of them
+LONGEST, LONGEST_IN_SPACE = 256, 1024  # numbers in an array of one star: each thread of the GPU has memory for some
 FEWEST = 64  # blocks of LANES stars: of a smaller mesh the processor has done a sweep before the GPU has begun
 
 
@@ -63,9 +66,9 @@ class Machine(Protocol):
 
 
 class OnMachine(NamedTuple):
-    """Stars in the memory of a machine. first: where those of each colour begin, most: how many one has at most."""
+    """Stars in the memory of a machine, as ``singles`` makes them. most: how many of one colour there are at most."""
 
-    blocks: Blocks
+    blocks: Any
     first: Any
     most: int
 
@@ -85,19 +88,32 @@ class Gpu(Threads):
 
     def swept(self, visit: Visit, stars: Any, points: NDArray[np.float64], guard: Any) -> NDArray[np.int64] | None:
         """See Executor."""
-        room = LONGEST + 1 if visit.room is None else room_for(stars.blocks.most, visit.room)
-        if room > LONGEST:
+        room = self._room(visit, stars.blocks)
+        if not room:
             return None
         machine, on, near = self.machine, self._on_machine(stars), self._sent(points)
-        tally = np.zeros(3, dtype=np.int64)
+        tally, blocks = np.zeros(3, dtype=np.int64), on.blocks
         counts, guarded, own = machine.there(tally), self._copied(guard), self._copied(visit.arguments)
-        machine.start(visit.kernel, room, on.most, (near, on.blocks, on.first, guarded, own, counts))
-        machine.fetch(near, points)
-        machine.fetch(counts, tally)
-        if guard.constraint is not None:  # nodes have gone on along their curves
-            machine.fetch(guarded.constraint.parameter, guard.constraint.parameter)
+        back = [(near, points), (counts, tally)]
+        if (mixture := getattr(stars.blocks, "mixture", None)) is not None:  # what is known of cells changes, too
+            slack, gone = machine.there(mixture.slack), machine.there(mixture.gone)
+            back += [(slack, mixture.slack), (gone, mixture.gone)]
+            blocks = blocks._replace(mixture=blocks.mixture._replace(slack=slack, gone=gone))
+        if guard.constraint is not None:  # nodes go on along their curves, or facets
+            name = "place" if isinstance(guard.constraint, Surface) else "parameter"
+            back.append((getattr(guarded.constraint, name), getattr(guard.constraint, name)))
+        machine.start(visit.kernel, room, on.most, (near, blocks, on.first, guarded, own, counts))
+        for there, values in back:
+            machine.fetch(there, values)
         self.sweeps += 1
         return tally
+
+    def _room(self, visit: Visit, blocks: Blocks | SpaceBlocks) -> int:
+        """How long arrays are; 0 where the machine does no such sweep."""
+        if visit.room is None:
+            return 0
+        longest, room = LONGEST_IN_SPACE if isinstance(blocks, SpaceBlocks) else LONGEST, room_for(blocks, visit.room)
+        return room if room <= longest else 0
 
     def figures(
         self, summary: Summary, points: NDArray[np.float64], cells: tuple[Any, ...], rest: tuple[Any, ...]
@@ -120,8 +136,9 @@ class Gpu(Threads):
         if self.sweeps:
             return (f"{self.machine.name} did {self.sweeps:,} sweep{'' if self.sweeps == 1 else 's'}",)
         return (
-            f"{self.machine.name} did no sweep: it does those of the methods {', '.join(METHODS)} in a plane, over "
-            f"{FEWEST * LANES:,} free nodes or more with at most 127 neighbours each",
+            f"{self.machine.name} did no sweep: it does those of the methods {', '.join(METHODS)} in a plane and in "
+            f"volumes, over {FEWEST * LANES:,} free nodes or more with at most 127 neighbours each, in volumes with at "
+            f"most {LONGEST_IN_SPACE // KEPT} cell corners",
         )
 
     def close(self) -> None:
@@ -142,7 +159,7 @@ class Gpu(Threads):
     def _on_machine(self, stars: Any) -> OnMachine:
         if stars not in self._stars:
             blocks, first = singles(stars.blocks, stars.first)
-            if blocks.patterns is not None:  # its tables are read as they lie in memory
+            if isinstance(blocks, Blocks) and blocks.patterns is not None:  # its tables are read as they lie in memory
                 flat: Any = (each.ravel() for each in blocks.patterns)
                 blocks = blocks._replace(patterns=type(blocks.patterns)(*flat))
             most = int(np.diff(first).max(initial=0))

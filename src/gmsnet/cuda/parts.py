@@ -17,12 +17,16 @@ from llvmlite import ir
 from gmsnet.cuda.library import cuda, inside
 from gmsnet.kernels.jit.load import address
 from gmsnet.kernels.jit.retarget import Retarget
-from gmsnet.kernels.star.block import CORNERS, FLOORS, ask_ahead, ring_row, workspace_for
+from gmsnet.kernels.simplex.jacobian3 import SIZE, solid_workspace
+from gmsnet.kernels.star.block import CORNERS, FLOORS, Blocks, ask_ahead, ring_row, workspace_for
+from gmsnet.kernels.star.space import KEPT
+from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.kernels.star.stars import centre_of
+from gmsnet.kernels.star.stars3 import aligned, aligned_of_star, workspace3_for
 
 FEWEST = 32  # numbers in an array: as many as the counters of a workspace
-OF_ARRAYS: tuple[Any, ...] = (ring_row, centre_of, workspace_for)  # parts that return some
-SAME = ("float32", "float64", "int32", "int64", "uint32", "uint64", "inf", "nan")  # of NumPy
+OF_ARRAYS: tuple[Any, ...] = (ring_row, centre_of, workspace_for, workspace3_for)  # parts that return some
+SAME = ("bool_", "float32", "float64", "int32", "int64", "uint16", "uint32", "uint64", "inf", "nan")  # of NumPy
 
 
 def larger(one, other, third=None):
@@ -60,21 +64,31 @@ def entry_of(kind, table, index):
     return table[index]
 
 
-def room_for(most: int, besides: int) -> int:
-    """How long arrays are for stars of up to so many nodes, of a kernel that needs ``besides`` for itself.
+def room_for(blocks: Blocks | SpaceBlocks, besides: int) -> int:
+    """How long arrays are for the stars of some blocks, of a kernel that needs ``besides`` for itself.
 
     A power of two, so that few kernels are compiled.
     """
-    return 1 << (max(2 * (1 + most), FLOORS + most + CORNERS, besides, FEWEST) - 1).bit_length()
+    most, sizes = blocks.most, [besides, FEWEST]
+    if isinstance(blocks, SpaceBlocks):
+        sizes += [4 * most, KEPT * blocks.most_simplices]
+    else:
+        sizes += [2 * (1 + most), FLOORS + most + CORNERS]
+    return 1 << (max(sizes) - 1).bit_length()
 
 
 @cache
 def parts_for(room: int) -> Retarget:
     """What compiles kernels whose longest array has so many numbers."""
     names = {
-        "LANES": 1, "np": _numpy(room), "max": compiled(larger), "min": compiled(smaller), "load": compiled(entry_of),
+        "LANES": 1, "LANES3": 1, "np": _numpy(room), "max": compiled(larger), "min": compiled(smaller),
+        "load": compiled(entry_of),
     }  # fmt: skip
-    return Retarget(compiled, names, {ask_ahead: compiled(nothing), address: compiled(same)})
+    parts = {
+        ask_ahead: compiled(nothing), address: compiled(same), aligned: _empty(FEWEST), aligned_of_star: _empty(room),
+        solid_workspace: _solid_workspace(),
+    }  # fmt: skip
+    return Retarget(compiled, names, parts, inside("extending").intrinsic, inside("types"))
 
 
 @cache
@@ -94,6 +108,17 @@ def _numpy(room: int) -> ModuleType:
     return module
 
 
+@cache
+def _solid_workspace() -> Any:
+    """See kernels.simplex.jacobian3: far larger than what all other kernels need."""
+    zeros = _empty(SIZE, zero=True)
+
+    def workspace():
+        return zeros(SIZE)
+
+    return cuda().jit(workspace, device=True, inline="always")
+
+
 def _empty(room: int, zero: bool = False) -> Any:
     """np.empty(size, dtype=np.float64), with room for so many numbers whatever the size. zero: of zeros."""
     types, cgutils = inside("types"), inside("cgutils")
@@ -108,9 +133,11 @@ def _empty(room: int, zero: bool = False) -> Any:
             row = ir.ArrayType(context.get_data_type(number), room)
             data = cgutils.alloca_once(builder, row)
             if zero:
-                builder.store(ir.Constant(row, None), data)
+                with cgutils.for_range(builder, context.get_constant(types.intp, room)) as loop:
+                    place = cgutils.gep_inbounds(builder, data, 0, loop.index)
+                    builder.store(ir.Constant(place.type.pointee, None), place)
             array = context.make_array(kind)(context, builder)
-            bytes_each = context.get_constant(types.intp, number.bitwidth // 8)
+            bytes_each = context.get_constant(types.intp, 1 if number == types.boolean else number.bitwidth // 8)
             context.populate_array(
                 array, data=builder.bitcast(data, array.data.type), shape=[length], strides=[bytes_each],
                 itemsize=bytes_each, meminfo=None,

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
-from gmsnet.kernels.star.block import Blocks
+from gmsnet.kernels.star.block import Blocks, Visit
 from gmsnet.kernels.star.guard import WORST, Guard
-from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import Field, StarSmoother, Tally
 from gmsnet.methods.gains import low_shape, mean_shape
 from gmsnet.parallel.executor import Executor
@@ -51,12 +50,9 @@ class Above(StarSmoother):
         """See StarSmoother."""
         raise NotImplementedError
 
-    def visit_in_space(
-        self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    def in_space(self, guard: Guard) -> Visit:
         """See StarSmoother."""
-        power = self._above(guard.floor if self.floor is None else self.floor)
-        sweep3(points, blocks, first, last, guard, power, self.relaxation, tally)
+        return Visit(sweep3, (self._above(guard.floor if self.floor is None else self.floor), self.relaxation))
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""

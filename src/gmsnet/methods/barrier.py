@@ -28,7 +28,6 @@ from gmsnet.kernels.methods.shell_lanes import sweep_lanes
 from gmsnet.kernels.star.block import Visit
 from gmsnet.kernels.star.guard import Guard
 from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
-from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, Field, Method, StarSmoother, Tally
 from gmsnet.parallel.executor import Executor
 
@@ -67,12 +66,10 @@ class Barrier(StarSmoother):
         """See StarSmoother."""
         return Visit(kernels.sweep, (self.power, *self._pace))
 
-    def visit_in_space(
-        self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    def in_space(self, guard: Guard) -> Visit:
         """See StarSmoother."""
         relaxation = min(self.relaxation, IN_SPACE_MOST) if self.sweeps < self.relaxed else 1.0
-        sweep3(points, blocks, first, last, guard, self.power3, relaxation, tally)
+        return Visit(sweep3, (self.power3, relaxation))
 
     def visit_on_surface(
         self, points: NDArray[np.float64], stars: ShellStars, first: int, last: int, guard: Guard, tally: Tally

@@ -136,11 +136,17 @@ class StarSmoother(Smoother):
         kernel, arguments, _ = self.in_plane
         kernel(points, blocks, first, last, guard, *arguments, tally)
 
+    def in_space(self, guard: Guard) -> Visit | None:
+        """What visits stars in space in this sweep, of methods that have "tetra" among their cells."""
+        return None
+
     def visit_in_space(
         self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
     ) -> None:
-        """The same of stars in space, of methods that have "tetra" among their cells."""
-        raise NotImplementedError
+        """As ``visit``, of stars in space."""
+        if (visit := self.in_space(guard)) is None:
+            raise NotImplementedError
+        visit.kernel(points, blocks, first, last, guard, *visit.arguments, tally)
 
     def visit_on_surface(
         self, points: NDArray[np.float64], stars: ShellStars, first: int, last: int, guard: Guard, tally: Tally
@@ -176,9 +182,9 @@ class StarSmoother(Smoother):
                 self.visit(field.points, blocks, first, last, guard, counts)
             return counts
 
-        tally = None
-        if isinstance(blocks, Blocks) and self.in_plane is not None:
-            tally = executor.swept(self.in_plane, stars, field.points, guard)
+        own = self.in_space(guard) if isinstance(blocks, SpaceBlocks) else None
+        own = self.in_plane if isinstance(blocks, Blocks) else own
+        tally = None if own is None else executor.swept(own, stars, field.points, guard)
         if tally is None:
             tally = by_colour(executor, visit, stars, field.points)
         field.floor.swept(tally)

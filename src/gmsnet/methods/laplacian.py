@@ -27,7 +27,6 @@ from gmsnet.kernels.methods.laplacian3 import sweep3
 from gmsnet.kernels.star.block import Visit
 from gmsnet.kernels.star.guard import Guard
 from gmsnet.kernels.star.shell import ShellStars
-from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, CELLS, Method, StarSmoother, Tally
 
 VARIANTS: dict[str, int | None] = {  # None: the plain form, which has a kernel of its own
@@ -52,11 +51,9 @@ class Laplacian(StarSmoother):
         """See StarSmoother."""
         return Visit(laplacian_plain.sweep) if self.variant is None else Visit(kernels.sweep, (self.variant,))
 
-    def visit_in_space(
-        self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    def in_space(self, guard: Guard) -> Visit:
         """See StarSmoother."""
-        sweep3(points, blocks, first, last, guard, IN_SPACE, self.variant is not None, tally)
+        return Visit(sweep3, (IN_SPACE, self.variant is not None))
 
     def visit_on_surface(
         self, points: NDArray[np.float64], stars: ShellStars, first: int, last: int, guard: Guard, tally: Tally

@@ -23,7 +23,6 @@ from gmsnet.kernels.simplex import objectives
 from gmsnet.kernels.simplex.objectives3 import Aim3
 from gmsnet.kernels.star.block import Blocks, Visit
 from gmsnet.kernels.star.guard import LARGEST, Guard
-from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.methods.base import ALL_CELLS, TRIANGLES, Method, MethodOptions, StarSmoother, Tally
 
 
@@ -42,11 +41,9 @@ class Adam(StarSmoother):
         """See StarSmoother."""
         return Visit(adam.sweep, (self.objective, self.sizes), None)
 
-    def visit_in_space(
-        self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    def in_space(self, guard: Guard) -> Visit:
         """See StarSmoother."""
-        descent3.sweep3(points, blocks, first, last, guard, Aim3(self.objective), 0, self.sizes, tally)
+        return Visit(descent3.sweep3, (Aim3(self.objective), 0, self.sizes), None)
 
 
 class Newton(StarSmoother):
@@ -72,11 +69,9 @@ class Newton(StarSmoother):
             guard = guard._replace(floor=max(self.MARGIN * guard.floor, self.floor * LARGEST))
         newton.sweep(points, blocks, first, last, guard, self.objective, tally)
 
-    def visit_in_space(
-        self, points: NDArray[np.float64], blocks: SpaceBlocks, first: int, last: int, guard: Guard, tally: Tally
-    ) -> None:
+    def in_space(self, guard: Guard) -> Visit:
         """See StarSmoother."""
-        descent3.sweep3(points, blocks, first, last, guard, Aim3(self.objective), newton.STEPS, np.empty(0), tally)
+        return Visit(descent3.sweep3, (Aim3(self.objective), newton.STEPS, np.empty(0)), None)
 
 
 def step_sizes() -> NDArray[np.float64]:

@@ -52,15 +52,22 @@ def aligned(count, kind):
     return whole[first : first + count]
 
 
+@inlined
+def aligned_of_star(count, kind):
+    """The same of as many numbers as a star has nodes, or simplices, times some."""
+    return aligned(count, kind)
+
+
 @part
 def workspace3_for(most, most_simplices):
     """For stars of up to so many nodes around and simplices."""
     return Workspace3(
-        np.empty(4 * LANES3), aligned(LANES3, np.float64), aligned(LANES3, np.float64), aligned(LANES3, np.float32),
-        aligned(4 * most * LANES3, np.float32), aligned(KEPT * most_simplices * LANES3, np.float32),
-        aligned(SUMS * LANES3, np.float32), aligned(3 * LANES3, np.float32), aligned(4 * LANES3, np.float32),
-        aligned(LANES3, np.float32), np.empty(LANES3, dtype=np.bool_), np.empty(LANES3, dtype=np.int32),
-        np.empty(4 * LANES3), np.empty(LANES3, dtype=np.int64),
+        aligned(4 * LANES3, np.float64), aligned(LANES3, np.float64), aligned(LANES3, np.float64),
+        aligned(LANES3, np.float32), aligned_of_star(4 * most * LANES3, np.float32),
+        aligned_of_star(KEPT * most_simplices * LANES3, np.float32), aligned(SUMS * LANES3, np.float32),
+        aligned(3 * LANES3, np.float32), aligned(4 * LANES3, np.float32), aligned(LANES3, np.float32),
+        aligned(LANES3, np.bool_), aligned(LANES3, np.int32), aligned(4 * LANES3, np.float64),
+        aligned(LANES3, np.int64),
     )  # fmt: skip
 
 

@@ -220,20 +220,3 @@ def fill_blocks(free, start, ring, kind, sizes, block, to, centre, rings, offset
             centre[b * LANES + lane] = centre[b * LANES + last]
             for row in range(offset[b], offset[b] + LANES * degree[b], LANES):
                 rings[row + lane] = rings[row + last]
-
-
-@kernel
-def one_by_one(centre, rings, offset, degree, filled, centres, ring, offsets, degrees):
-    """Writes the stars of blocks (see ``fill_blocks``) one after the other, the nodes around each together.
-
-    centres, offsets, degrees: of each star; ring: the nodes around it from its offset on.
-    """
-    star = at = 0
-    for b in range(len(degree)):
-        n = np.int64(degree[b])
-        for lane in range(filled[b]):
-            centres[star], offsets[star], degrees[star] = centre[b * LANES + lane], at, n
-            for j in range(n):
-                ring[at + j] = rings[offset[b] + j * LANES + lane]
-            star += 1
-            at += n
