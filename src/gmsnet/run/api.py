@@ -92,7 +92,7 @@ def smooth(
     update_normals: normals of faces and points, in the data of a surface and in the file that it was read from, are
     computed anew where nodes have moved (docs/surfaces.md).
     join_regions: regions mean nothing, so nodes of interfaces between them may move; those of markers there stay.
-    device: "cpu", or "cuda": a GPU of NVIDIA does what it can, sweeps in a plane, with the same bits (docs/cuda.md).
+    device: "cpu", or "cuda": a GPU of NVIDIA does the sweeps that it can, with the same bits (docs/cuda.md).
     metric: the tensors of which the cells are to be unit cells, by shape and size (docs/metric.md): an array (N, 3) of
     m11, m12, m22 at the nodes, or a function from points (n, 2) to such an array. size: the same for lengths h of
     edges: an array (N,), or a function from points (n, 2) to one (n,); its metric is h⁻²·I.
