@@ -45,12 +45,16 @@ class Messages:
     def exchange(self, values: Floats) -> None:
         """values: (n, ``columns`` or more); of more, the first are exchanged."""
         np.take(values[:, : self.columns], self.out, axis=0, out=self.sent)
+        self.go()
+        values[self.into, : self.columns] = self.got
+
+    def go(self) -> None:
+        """Sends what stands in ``sent``; what comes stands in ``got``."""
         if self.request is None:
             self.graph.Neighbor_alltoallv(*self.buffers)
         else:
             self.request.Start()
             self.request.Wait()
-        values[self.into, : self.columns] = self.got
 
     def free(self) -> None:
         """Gives the request back."""
@@ -120,9 +124,16 @@ class Halo:
 
     def spread(self, values: NDArray[Any]) -> NDArray[Any]:
         """Values (n,) at nodes with those of their owners; of numbers that a float64 can hold."""
-        wide = values.astype(np.float64).reshape(-1, 1)
-        self.whole.exchange(wide)
-        return wide[:, 0].astype(values.dtype)
+        found = values.copy()
+        self.renew(found)
+        return found
+
+    def renew(self, values: NDArray[Any]) -> None:
+        """The same in place."""
+        whole = self.whole
+        whole.sent[:, 0] = values[whole.out]
+        whole.go()
+        values[whole.into] = whole.got[:, 0].astype(values.dtype)
 
     def free(self) -> None:
         """Gives back what MPI keeps."""

@@ -25,7 +25,7 @@ from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.kernels.topology.layout import morton_codes
-from gmsnet.kernels.topology.ready import colour_ready
+from gmsnet.kernels.topology.ready import colour_ready, waits_for_others
 from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import planar_points, space_points, taken
@@ -200,12 +200,19 @@ def _coloured(comm: Any, topology: Topology | Volume, halo: Halo) -> Topology | 
     """The same with the colours of the whole mesh, as many as there are of them."""
     places, free = topology.colouring.places, halo.spread(topology.near_free)
     colours = np.full(len(free), -1, dtype=np.int32)
-    start, ring = topology.colouring.start, topology.colouring.ring
+    start, ring, own = topology.colouring.start, topology.colouring.ring, np.zeros(len(free), dtype=bool)
+    own[places] = True
+    given, waits = (start, ring, topology.memory, free), np.empty(len(places), dtype=bool)
+    waits_for_others(places, own, *given, waits)
+    taken = np.full(int(np.diff(start)[places].max(initial=0)) + 1, -1, dtype=np.int64)
+    waiting, found, left = places, np.empty_like(places), len(places)
     while True:
-        colour_ready(places, start, ring, topology.memory, free, colours)
-        colours = halo.spread(colours)
-        if not comm.allreduce(int(np.count_nonzero(colours[places] < 0))):
+        left -= colour_ready(waiting, own, *given, colours, taken, found)
+        halo.renew(colours)
+        if not comm.allreduce(left):
             break
+        waiting = places[waits] if waiting is places else waiting
+        waiting = waiting[colours[waiting] < 0]
     count = int(comm.allreduce(int(colours.max(initial=-1)) + 1, mpi().MAX))
     axes = 2 if isinstance(topology, Topology) and topology.plane is not None else 3
     halo.coloured(colours, count, axes)
