@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import gmsnet
+from gmsnet.distributed.first import follow, release, smooth_from_first
 from gmsnet.distributed.piece import pieces_of
 from gmsnet.distributed.smoothing import smoothed
 from support.comm import together
@@ -39,6 +40,19 @@ def spread(mesh, options, parts, ranks, fixed=None):
     for result in results:
         assert _figures(result) == _figures(results[0])
     return points, results
+
+
+def from_first(mesh, options, ranks):
+    """The SmoothResult of a first rank that has the mesh, while the others follow it."""
+
+    def work(comm):
+        if comm.rank > 0:
+            return follow(comm)
+        found = smooth_from_first(mesh, options, comm=comm)
+        release(comm)
+        return found
+
+    return together(ranks, work)[0]
 
 
 def same(mesh, options, parts, ranks, fixed=None):

@@ -88,4 +88,4 @@ def _piece(mesh: Mesh, ids: Any, fixed: Any, numbered: Numbered) -> Piece:
         if places.shape != (len(nodes),):
             raise InputError(f"{len(nodes):,} {kind} cells need one number each, got shape {places.shape}")
         blocks.append(Cells(kind, nodes, regions, places))
-    return Piece(ids, mesh.points, fixed, tuple(blocks), mesh.single)
+    return Piece(ids, mesh.points, fixed, tuple(blocks), mesh.single, rounding=mesh.rounding)

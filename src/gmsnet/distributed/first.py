@@ -100,7 +100,10 @@ def smooth_file_from_first(task: FileTask, comm: Any = None) -> RankResult:
 def _as_a_state(mesh: Mesh, points: Floats, fixed: Any, options: SmoothOptions, found: RankResult) -> State:
     """The end of a serial run that came to the same points (N, dim)."""
     state = first_state(mesh, fixed, options.smoother(), options, serial)
-    near = near_points(mesh.with_points(points), state.topology)
+    near = near_points(mesh.with_points(points).in_frame_of(mesh), state.topology)
     interruption = KeyboardInterrupt() if found.interrupted else None
-    state = replace(state, points=near, totals=None, history=tuple(found.history), untangling=found.untangling)
+    state = replace(
+        state, points=near, totals=None, history=tuple(found.history), untangling=found.untangling,
+        released=found.released,
+    )  # fmt: skip
     return write_back(state.ended(found.stop_reason, interruption), options, serial)

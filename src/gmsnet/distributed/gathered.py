@@ -43,7 +43,8 @@ def gathered(piece: Piece, comm: Any, known: Whole | None = None) -> Whole | Non
         nodes = np.concatenate([block.nodes for block in cells])[order]
         regions = np.concatenate([block.regions for block in cells])[order]
         blocks.append(CellBlock(cells[0].kind, np.searchsorted(ids, nodes), regions))
-    return Whole(Mesh(points, tuple(blocks), piece.names, single=piece.single), ids, fixed)
+    whole = Mesh(points, tuple(blocks), piece.names, single=piece.single, rounding=piece.rounding)
+    return Whole(whole, ids, fixed)
 
 
 def brought(whole: Whole | None, values: NDArray[Any], piece: Piece, comm: Any) -> NDArray[Any] | None:

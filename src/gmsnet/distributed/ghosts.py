@@ -58,11 +58,11 @@ class Surrounded:
         numbers = [low + block.numbers for low, block in zip(first, self.blocks, strict=True)]
         return np.concatenate([*numbers, np.empty(0, dtype=np.int64)])
 
-    def mesh(self, single: bool) -> Mesh:
-        """All of it, nodes by ascending ids."""
+    def mesh(self, piece: Piece) -> Mesh:
+        """All of it, nodes by ascending ids; a part of the mesh that a piece is of."""
         ids = self.nodes.ids
         cells = [CellBlock(block.kind, np.searchsorted(ids, block.nodes), block.regions) for block in self.blocks]
-        return Mesh(self.nodes.points, tuple(cells), single=single)
+        return Mesh(self.nodes.points, tuple(cells), single=piece.single, rounding=piece.rounding)
 
     def halo(self, comm: Any, places: NDArray[Any]) -> Halo:
         """Of all nodes that are here and elsewhere. places: (n,) of each in memory."""

@@ -14,6 +14,7 @@ from gmsnet.errors import InputError
 from gmsnet.mesh.arrays import plain_array, whole_numbers
 from gmsnet.mesh.checks import finite_points
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.rounding import Rounding
 
 Ids = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -43,7 +44,7 @@ class Piece:
     """Some cells of a mesh and their nodes.
 
     ids: (n,) the global id of each node, each once. points: (n, dim). fixed: (n,) bool, to be held. blocks: the same on
-    all ranks, though some may be empty. single, names: as of the Mesh, the same on all ranks.
+    all ranks, though some may be empty. single, names, rounding: as of the Mesh, the same on all ranks.
 
     Raises InputError for ids that are negative or come twice, points that are not finite, and cells of other nodes.
     """
@@ -54,6 +55,7 @@ class Piece:
     blocks: tuple[Cells, ...]
     single: bool = False
     names: Mapping[tuple[int, int], str] = field(default_factory=dict)
+    rounding: Rounding | None = None
 
     def __post_init__(self) -> None:
         ids = whole_numbers(self.ids, "the global ids of nodes")
@@ -98,5 +100,5 @@ def pieces_of(mesh: Mesh, fixed: Flags, parts: Sequence[NDArray[np.int32]], rank
             blocks.append(Cells(block.kind, block.nodes[rows], block.regions[rows], rows))
             inside[block.nodes[rows]] = True
         ids = np.flatnonzero(inside)
-        found.append(Piece(ids, mesh.points[ids], fixed[ids], tuple(blocks), mesh.single))
+        found.append(Piece(ids, mesh.points[ids], fixed[ids], tuple(blocks), mesh.single, rounding=mesh.rounding))
     return found

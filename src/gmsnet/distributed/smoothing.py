@@ -69,7 +69,7 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
     why = _not_shared(counts, smoother, options)
     if why:
         return smoothed_on_first(piece, options, comm, why, began, given)
-    mesh, found = framed(comm, around.mesh(piece.single)), None
+    mesh, found = framed(comm, around.mesh(piece)), None
     if options.slides or (mesh.plane is None and not mesh.has_volumes):
         known = gathered(piece, comm, known)
         found = found_on_first(known, smoother, options, comm)
@@ -234,6 +234,7 @@ def _shared(
         missed=missed,
         judged=judged,
         untangling=untangling,
+        released=state.released,
     )
 
 
@@ -266,7 +267,7 @@ def _written(
         best = points if better else mesh.points
         return _Written(best, moved & better, *figures)
     assert mesh.box is not None
-    written = replace(mesh, points=points).as_part(mesh.plane, mesh.kinds_there, mesh.exponent, mesh.box)
+    written = replace(mesh, points=points).in_frame_of(mesh)
     near = taken(planar_points(written) if mesh.plane else space_points(written), topology.memory)
     ranks, scored = Ranks(part), state.topology.scored
     after = totals_of(near, part.simplices, ranks)

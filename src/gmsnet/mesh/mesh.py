@@ -228,6 +228,13 @@ class Mesh:
         made.__dict__["has_volumes"], made.__dict__["has_quads"], made.__dict__["has_solids"] = kinds
         return made
 
+    def in_frame_of(self, other: Mesh) -> Mesh:
+        """The same in the plane and by the exponent of a mesh of the same cells, whose nodes were elsewhere."""
+        made = self._twin()
+        for name in ("plane", "exponent", "box", "has_volumes", "has_quads", "has_solids"):
+            made.__dict__[name] = getattr(other, name)
+        return made
+
     @property
     def kinds_there(self) -> tuple[bool, bool, bool]:
         """Whether it has_volumes, has_quads and has_solids."""
