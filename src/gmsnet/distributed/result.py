@@ -24,7 +24,8 @@ class RankResult:
     mesh. nodes, cells: of the mesh. gathered: why the mesh was smoothed on the first rank, "" where it was shared out.
     seconds: for the whole call. messages, bytes: that this rank sent after colours. interrupted: this is the best mesh
     so far. missed: how many cells miss the target, None without one. judged: as of a SmoothResult. untangling: those of
-    the notes that are of it. released: nodes near walls were let go at the end. whole: the SmoothResult of the first rank, where that has one.
+    the notes that are of it. released: nodes near walls were let go at the end. whole: the SmoothResult of the first
+    rank, where that has one.
     """
 
     points: NDArray[np.float64]
