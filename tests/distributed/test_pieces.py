@@ -101,9 +101,14 @@ def not_finite(rank, points, triangles, ids):
     return np.where(rank, np.nan, points), triangles, ids
 
 
+def in_space(rank, points, triangles, ids):
+    return np.pad(points, ((0, 0), (0, rank))), triangles, ids
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
+        (in_space, "how many coordinates a node has must be the same on all ranks: rank 0 has 2, rank 1 3"),
         (doubled, "the global id 0 is given to two nodes of one piece: give each node once"),
         (negative, "global ids count from 0, got -1"),
         (elsewhere, "is at .* on rank 0 and at .* on rank 1"),

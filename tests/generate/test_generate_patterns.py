@@ -61,6 +61,7 @@ def run(*arguments):
         ("--pattern structured --cells tetra --nodes 35", lambda: lattice_volume(3)),
         ("--pattern structured --cells tetra --columns 2", lambda: lattice_volume(2)),
         ("--pattern part --columns 9", lambda: part_volume(9)),
+        ("--pattern part", lambda: part_volume(9)),
         ("--pattern layered --columns 4 --layers 3 --aspect 10", lambda: layered_volume(4, 3, first=0.1)),
         ("--pattern structured --cells tetra --columns 3 --jitter 2 --tangled",
          lambda: disturb(m := lattice_volume(3), inner_nodes(m), 2.0, keep_valid=False)),

@@ -136,11 +136,13 @@ def _side_of(given: Given) -> int:
 def _lattice(name: str) -> Callable[[Given, float, int], Mesh]:
     def make(given: Given, size: float, seed: int) -> Mesh:
         from gmsnet import generate
+        from gmsnet.generate.volumes import LEAST_PART
 
+        least = LEAST_PART if name == "part_volume" else 1
         nodes = given.get("nodes", NODES)
         if nodes < 1:
             raise InputError(f"a mesh needs at least 1 node inside, got --nodes {nodes}")
-        return getattr(generate, name)(given.get("columns", _cells_of(nodes)), size=size)  # type: ignore[no-any-return]
+        return getattr(generate, name)(given.get("columns", max(_cells_of(nodes), least)), size=size)  # type: ignore[no-any-return]
 
     return make
 

@@ -77,8 +77,10 @@ class Surrounded:
 def surrounded(piece: Piece, comm: Any) -> Surrounded:
     """With what other ranks know of its nodes.
 
-    Raises InputError, on all ranks, where pieces disagree on where a node is, on a cell, or on the kinds of cells.
+    Raises InputError, on all ranks, where pieces disagree on where a node is, on a cell, on the kinds of cells, or on
+    how many coordinates a node has.
     """
+    agreed(comm, piece.points.shape[1], "how many coordinates a node has")
     kinds = agreed(comm, tuple(block.kind for block in piece.blocks), "the kinds of cells, block by block")
     mine = _owned(piece, comm)
     came = comm.alltoall(_parcels(piece, mine, comm))
