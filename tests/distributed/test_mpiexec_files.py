@@ -88,6 +88,8 @@ def test_a_target(folder, quality, code):
     assert (report["missed"], report["target_met"], report["gathered"]) == (missed, code == 0, "")
     assert done.returncode == code, done.stderr
     assert ("target not met" in done.stderr) == (code == 1)
+    worst = int(serial.after.cell[np.argmin(serial.after.shape)])
+    assert (f"\n  cell {worst} at " in done.stderr) == (code == 1)
 
 
 @pytest.mark.parametrize("target", ["a.pvtu", "b.pvtu"])

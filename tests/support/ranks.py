@@ -8,6 +8,7 @@ import gmsnet
 from gmsnet.distributed.first import follow, release, smooth_from_first
 from gmsnet.distributed.piece import pieces_of
 from gmsnet.distributed.smoothing import smoothed
+from gmsnet.measure.worst import places_of, unmet
 from support.comm import together
 
 
@@ -71,6 +72,7 @@ def same(mesh, options, parts, ranks, fixed=None):
     assert repr(told.judged) == repr(serial.judged)
     assert told.stop_reason == serial.stop_reason
     assert [sweep.moved for sweep in told.history] == [sweep.moved for sweep in serial.history]
+    assert told.worst == places_of(serial.after, unmet(serial.after, options.target))
     if options.target:
         assert told.missed == len(options.target.missed_in(serial.after))
     assert told.held == {reason: len(ids) for reason, ids in serial.held.items()}

@@ -61,4 +61,6 @@ def smooth_in_pieces(work: FileWork, options: SmoothOptions, format: str, fix: S
     if found.missed:
         missed = f"target not met: {amount(found.missed, 'cell')} {miss_it(found.missed)}"
         typer.echo(f"gmsnet: {work.number}{missed}", err=True)
+    for line in found.named():
+        typer.echo(f"  {line}", err=True)
     return 1 if inverted or found.missed else 0

@@ -25,6 +25,7 @@ from gmsnet.kernels.star.surface import Surface
 from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import measure
 from gmsnet.measure.totals import Totals, totals_of
+from gmsnet.measure.worst import Place, places_of, unmet
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.parallel.threads import serial
@@ -43,8 +44,9 @@ Flags = NDArray[np.bool_]
 Rail = Constraint | Surface
 
 
-# The totals of a mesh, how many cells miss the target, the greatest angle where that has one, by what it was compared.
-Figures = tuple[Totals | None, int | None, float, Judged]
+# The totals of a mesh, how many cells miss the target, the greatest angle where that has one, by what it was compared,
+# and the worst cells of a RankResult.
+Figures = tuple[Totals | None, int | None, float, Judged, tuple[Place, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +169,8 @@ class Found:
             final = after if better else before
             judged = Judged(first, last if better else first)
             missed = len(target.missed_in(final)) if target else None
-            told = better, (final.totals, missed, greatest_angle(final, options), judged)
+            worst = places_of(final, unmet(final, target))
+            told = better, (final.totals, missed, greatest_angle(final, options), judged, worst)
         found: tuple[bool, Figures] = comm.bcast(told)
         return found
 

@@ -17,6 +17,7 @@ from gmsnet.distributed.part import connected
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.result import RankResult
 from gmsnet.errors import GmsnetError
+from gmsnet.measure.worst import places_of, unmet
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.banded import Kept
@@ -136,6 +137,7 @@ def _figures(whole: Whole, result: SmoothResult, options: SmoothOptions) -> dict
         "nodes": len(whole.ids),
         "cells": sum(len(block.nodes) for block in whole.mesh.cells),
         "missed": len(options.target.missed_in(result.after)) if options.target else None,
+        "worst": places_of(result.after, unmet(result.after, options.target)),
         "interruption": result.stop_reason == INTERRUPTED,
     }
 

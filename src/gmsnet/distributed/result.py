@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gmsnet.measure.judged import UNKNOWN, Judged
 from gmsnet.measure.totals import Totals
+from gmsnet.measure.worst import Place, named_places
 from gmsnet.mesh.display import amount, miss_it, plain
 from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.sweep import Sweep
@@ -24,8 +25,9 @@ class RankResult:
     mesh. nodes, cells: of the mesh. gathered: why the mesh was smoothed on the first rank, "" where it was shared out.
     seconds: for the whole call. messages, bytes: that this rank sent after colours. interrupted: this is the best mesh
     so far. missed: how many cells miss the target, None without one. judged: as of a SmoothResult. untangling: those of
-    the notes that are of it. released: nodes near walls were let go at the end. whole: the SmoothResult of the first
-    rank, where that has one.
+    the notes that are of it. released: nodes near walls were let go at the end. worst: of the cells that are inverted
+    or miss the target the worst ones, by their numbers in the mesh. whole: the SmoothResult of the first rank, where
+    that has one.
     """
 
     points: NDArray[np.float64]
@@ -48,6 +50,7 @@ class RankResult:
     judged: Judged = UNKNOWN
     untangling: tuple[str, ...] = ()
     released: bool = False
+    worst: tuple[Place, ...] = ()
     whole: SmoothResult | None = field(default=None, repr=False)
 
     def summary(self) -> dict[str, Any]:
@@ -65,6 +68,10 @@ class RankResult:
         if self.missed:
             lines.append(f"target not met: {amount(self.missed, 'cell')} {miss_it(self.missed)}")
         return "\n".join([f"RankResult: {first}", *lines, *self.notes])
+
+    def named(self) -> list[str]:
+        """The cells in ``worst``, a line for each."""
+        return named_places(self.worst, "shape")
 
     def lines(self) -> list[str]:
         """What was done, and what has become of each figure."""

@@ -27,13 +27,14 @@ from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.stages import Meant, swept
-from gmsnet.distributed.told import held, missing, not_measured
+from gmsnet.distributed.told import held, missing, not_measured, worst_of
 from gmsnet.distributed.winding import Winding
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.measure.totals import Totals, totals_of
+from gmsnet.measure.worst import Place
 from gmsnet.methods import Smoother
 from gmsnet.methods.banded import Kept
 from gmsnet.methods.base import CELLS
@@ -204,7 +205,7 @@ def _shared(
     if found is not None and isinstance(part.topology, Shell):
         before = found.before
     written = _written(piece, part, state, options, ready.inverted, before, found)
-    points, moved, after, missed, greatest, judged = written
+    points, moved, after, missed, greatest, judged, worst = written
     untangling = () if done is None else (done.note,)
     notes = [*intent.notes, *intent.of_walls[state.released :][:1], *untangling]
     if found is not None:
@@ -235,13 +236,14 @@ def _shared(
         judged=judged,
         untangling=untangling,
         released=state.released,
+        worst=worst,
     )
 
 
 class _Written(NamedTuple):
     """The best mesh by global ids, that of the input if it is the better one as it is written. after: its figures;
     missed: how many cells miss the target, None without one; greatest: angle, where angles have a target; judged: by
-    what it was compared with the input.
+    what it was compared with the input; worst: see RankResult.
     """
 
     points: Floats
@@ -250,6 +252,7 @@ class _Written(NamedTuple):
     missed: int | None
     greatest: float
     judged: Judged
+    worst: tuple[Place, ...] = ()
 
 
 def _written(
@@ -273,6 +276,7 @@ def _written(
     after = totals_of(near, part.simplices, ranks)
     of_free = Judged(*(totals_of(places, scored, ranks) for places in (part.points, near)))
     inverted, missed, missed_before, greatest = 0 if after is None else after.inverted, None, None, [0.0, 0.0]
+    first = last = None
     if target:
         first = state.before if isinstance(state.before, QualityReport) else measure(mesh, topology, part.points)
         last = measure(written, topology, near)
@@ -285,7 +289,11 @@ def _written(
         merits = (merit_of(totals, options.best_by) for totals in (of_free.after, of_free.before))
         now, then = ((count, *merit) for count, merit in zip((inverted, inverted_before), merits, strict=True))
         better = now <= then
+    if not target and (inverted if better else inverted_before):
+        last, first = measure(written, topology, near), measure(mesh, topology, part.points)
+    final = last if better else first
+    worst = () if final is None else worst_of(part, final, options)
     if better:
-        return _Written(points, moved, after, missed, greatest[1], of_free)
+        return _Written(points, moved, after, missed, greatest[1], of_free, worst)
     judged = of_free._replace(after=of_free.before)
-    return _Written(mesh.points, np.zeros_like(moved), before, missed_before, greatest[0], judged)
+    return _Written(mesh.points, np.zeros_like(moved), before, missed_before, greatest[0], judged, worst)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import chain
 
 import numpy as np
 
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Part
 from gmsnet.measure.report import QualityReport
+from gmsnet.measure.worst import NAMED, Place, places_of, unmet
 from gmsnet.mesh.known_cells import unmoved
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.set_up import NOT_MEASURED, repeating
@@ -38,6 +40,14 @@ def not_measured(part: Part, counts: Mapping[str, int]) -> list[str]:
         others.append(repeating(counts, known))
     left_out = ", ".join(filter(None, others))
     return [NOT_MEASURED + left_out] if left_out else []
+
+
+def worst_of(part: Part, report: QualityReport, options: SmoothOptions) -> tuple[Place, ...]:
+    """Of the cells of all ranks that are inverted or miss the target the worst ones. report: of the part."""
+    rows = unmet(report, options.target)
+    places = places_of(report, rows[part.own_cells[report.cell[rows]]])
+    own = [each._replace(cell=int(part.around.numbers[each.cell])) for each in places]
+    return tuple(sorted(chain(*part.comm.allgather(own)))[:NAMED])
 
 
 def missing(part: Part, report: QualityReport, options: SmoothOptions) -> tuple[int, float]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.measure.report import QualityReport
 from gmsnet.measure.solids import MeasuredSolids
+from gmsnet.measure.target import Target
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 
@@ -76,6 +77,37 @@ def corners_of(mesh: Mesh, cell: int) -> NDArray[np.int64]:
             return block.nodes[cell, : block.corners]
         cell -= len(block.nodes)
     raise IndexError(cell)
+
+
+class Place(NamedTuple):
+    """A cell by its number, its 1/q or η, and its middle."""
+
+    shape: float
+    cell: int
+    centre: tuple[float, ...]
+
+
+def unmet(report: QualityReport, target: Target | None) -> NDArray[np.int64]:
+    """(k,) the rows of the cells that are inverted or miss a target, the worst first."""
+    rows = np.flatnonzero(~report.valid)
+    if target:
+        rows = np.union1d(rows, target.missed_in(report))
+    return rows[np.argsort(report.shape[rows], kind="stable")]
+
+
+def places_of(report: QualityReport, rows: NDArray[np.int64]) -> tuple[Place, ...]:
+    """The first NAMED of some rows."""
+    rows = rows[:NAMED]
+    found = zip(report.shape[rows].tolist(), report.cell[rows].tolist(), report.centre[rows].tolist(), strict=True)
+    return tuple(Place(shape, cell, tuple(centre)) for shape, cell, centre in found)
+
+
+def named_places(places: Sequence[Place], symbol: str) -> list[str]:
+    """A line for each."""
+    return [
+        f"cell {each.cell} at {' '.join(f'{value:.6g}' for value in each.centre)}: {symbol} {each.shape:.4g}"
+        for each in places
+    ]
 
 
 def named_cells(report: QualityReport, rows: NDArray[np.int64], what: str) -> str:
