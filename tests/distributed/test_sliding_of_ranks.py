@@ -110,7 +110,7 @@ def test_nodes_beside_a_round_of_a_target_are_located_alike(count, seed):
 @pytest.mark.parametrize(("side", "seed"), [(12, 7), (10, 4), (14, 6)])
 def test_quads_whose_other_corners_are_held_are_among_the_worst(side, seed):
     """A corner's row has no free node where only the fourth one of its quad is free: it counts as others do."""
-    mesh, options = wavy(side, seed, 0.4), slid(slide=None, method="worst-first")
+    mesh, options = wavy(side, seed, 0.4), slid(slide=None, method="worst-first", untangle=False)
     fixed = np.random.default_rng(seed).random(len(mesh.points)) < 0.4
     assert same(mesh, options, [np.arange(side * side, dtype=np.int32) % 2], 2, fixed).gathered == ""
 
@@ -160,6 +160,14 @@ def test_a_folded_plane_in_space_is_mended_by_the_first_rank():
     flat = np.column_stack([mesh.points[:, :2], mesh.points[:, :2].sum(axis=1)])
     mesh = mesh.with_points(flat)
     assert "folded" in same(mesh, slid(slide=None), cut(mesh, 2), 2).gathered
+
+
+@pytest.mark.parametrize("kind", ["triangle", "quad"])
+def test_folds_of_a_curved_surface_are_mended_by_the_first_rank(kind):
+    mesh = wavy(16, 3, 0.7, kind)
+    told = same(mesh, slid(slide=None), cut(mesh, 2), 2)
+    assert "folded" in told.gathered
+    assert told.after.inverted == 0
 
 
 @pytest.mark.parametrize("options", [{}, {"slide": None}, {"slide": None, "preserve": "shape"}])

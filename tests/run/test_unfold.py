@@ -54,6 +54,17 @@ def test_nodes_that_are_to_be_held_stay():
     assert not result.moved[fixed].any()
 
 
+def test_the_rest_keeps_its_place_where_the_outermost_node_moves():
+    """Coordinates are over a power of two, which follows from the largest one."""
+    turned = tangled("quad", 0.2)[1]
+    points = turned.points.copy()
+    points[84] = 100.0 * WAY[0]
+    result = gmsnet.smooth(turned.with_points(points))
+    assert (result.before.inverted, result.after.inverted) == (3, 0)
+    assert abs(result.points).max() < 20.0
+    assert np.array_equal(result.points[[0, 12, 156, 168]], points[[0, 12, 156, 168]])
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_one_side_of_a_box_is_mended_and_others_are_not_touched_by_it(turned):
     mesh, inner = box(8)
@@ -97,10 +108,10 @@ def test_folds_without_nodes_inside_are_not_looked_at():
     rows = np.concatenate([np.array([[0, 1, 2], [1, 0, 3]]) + 4 * k for k in range(many)])
     mesh = surface_mesh(points, {"triangle": rows})
     facets = surface_itself(mesh, Topology.of(mesh))
-    assert folded_planes(facets, mesh.points, np.ones(len(rows), dtype=bool)) == []
+    assert folded_planes(facets, mesh.points) == []
     _, turned = tangled("triangle")
     facets = surface_itself(turned, Topology.of(turned))
-    assert len(folded_planes(facets, turned.points, np.ones(len(facets.rows), dtype=bool))) == 1
+    assert len(folded_planes(facets, turned.points)) == 1
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7])

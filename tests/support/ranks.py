@@ -63,6 +63,7 @@ def same(mesh, options, parts, ranks, fixed=None):
         target_quality=options.target_quality, target_angle=options.target_angle,
         target_dihedral=options.target_dihedral, slide=options.slide, feature_angle=options.feature_angle,
         surface_tolerance=options.surface_tolerance, hausdorff=options.hausdorff, join_regions=options.join_regions,
+        untangle=options.untangle,
     )  # fmt: skip
     points, results = spread(mesh, options, parts, ranks, fixed)
     assert points.tobytes() == serial.points.tobytes()

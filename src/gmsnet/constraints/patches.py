@@ -40,11 +40,12 @@ class Patches:
 
 
 def patches_of(
-    facets: Facets, points: Floats, feature_angle: float, single: bool, may: Flags, free_needles: bool = False
+    facets: Facets, points: Floats, feature_angle: float, single: bool, may: Flags, free_needles: Flags | bool = False
 ) -> Patches:
     """The patches of a surface. points: (N, 3). feature_angle: degrees. may: (N,) bool, which nodes may slide.
 
-    free_needles: edges are not sharp that are so only because a facet there is thin (constraints/needles.py).
+    free_needles: edges are not sharp that are so only because a facet there is thin (constraints/needles.py). (F,)
+    bool: those between two of these facets.
 
     An edge is sharp where its two facets turn by the feature angle or more, differ in their region or marks, or have
     no area, where it belongs to one facet or more than two, and where there is a line cell.
@@ -62,9 +63,10 @@ def patches_of(
     smooth = two & (size[f] > 0.0) & (size[g] > 0.0) & (facets.label[f] == facets.label[g])
     least = math.cos(math.radians(feature_angle)) + SLACK
     gentle = smooth & (cosine >= least)
-    if free_needles:
-        triangles = len(rows) - facets.halves
-        alike = two & (facets.label[f] == facets.label[g]) & (np.maximum(f, g) < triangles)
+    if np.any(free_needles):
+        triangles, chosen = len(rows) - facets.halves, np.broadcast_to(free_needles, len(rows))
+        alike = two & chosen[f] & chosen[g]
+        alike &= (facets.label[f] == facets.label[g]) & (np.maximum(f, g) < triangles)
         freed, unit = free_edges(points[rows], unit, area, one, other, gentle, alike, least)
         gentle |= freed
     smooth = gentle

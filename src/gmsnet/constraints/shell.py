@@ -29,7 +29,7 @@ SAME = 2e-6  # of the largest coordinate: so far apart may be what would be one 
 
 def patches_of_surface(
     mesh: Mesh, topology: Topology, names: Sequence[str] | None, feature_angle: float, held: Flags,
-    free_needles: bool = False,
+    free_needles: Flags | bool = False,
 ) -> tuple[Facets, Patches]:  # fmt: skip
     """The facets of a mesh in no plane and its patches; which of its nodes slide: (N,) by id.
 

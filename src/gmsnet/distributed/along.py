@@ -208,7 +208,7 @@ def found_on_first(whole: Whole | None, smoother: Smoother, options: SmoothOptio
         if isinstance(topology, Shell) and not Winding.of(topology).reads(forth=True):
             why = "cells are wound in both directions"
         elif isinstance(topology, Shell) and state.untangling:
-            why = "planes of the surface are folded, and mended as a whole"
+            why = "the surface is folded over, and mended as a whole"
         told = Along.of(state, whole.ids), state.before.totals, state.remarks, why
     along, before, remarks, why = comm.bcast(told)
     return Found(along, before, remarks, why, whole, state)

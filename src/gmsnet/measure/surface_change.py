@@ -64,32 +64,33 @@ class Compared(NamedTuple):
 
 
 class Grid:
-    """Facets (T, 3, 3), in boxes, so that the nearest ones are found. sums: see ``measure_triangles``."""
+    """Facets, in boxes, so that the nearest ones are found. triangles: (T, 3, 3). sums: see ``measure_triangles``."""
 
+    triangles: Floats
     sums: Any
 
     def __init__(self, triangles: Floats) -> None:
-        self._triangles = np.ascontiguousarray(triangles)
+        self.triangles = np.ascontiguousarray(triangles)
         self._low, high, count = np.empty(3), np.empty(3), len(triangles)
-        self.sums = extent_kernels.measure_triangles(self._triangles, self._low, high)
+        self.sums = extent_kernels.measure_triangles(self.triangles, self._low, high)
         extent = high - self._low
         self._width = max(float(self.sums[extent_kernels.SPAN]) / count, float(extent.max()) * 1e-6) or 1.0
         while True:
             self._shape = np.maximum(np.ceil(extent / self._width), 1.0).astype(np.int64)
             if np.prod(self._shape.astype(float)) <= BOXES * count + 64:
-                entries = kernels.count_entries(self._triangles, self._low, self._width, self._shape)
+                entries = kernels.count_entries(self.triangles, self._low, self._width, self._shape)
                 if entries <= ENTRIES * count + 64:
                     break
             self._width *= 1.25
         self._start = np.zeros(int(np.prod(self._shape)) + 2, dtype=np.int64)
         self._entries = np.empty(entries, dtype=np.int32)
-        kernels.fill(self._triangles, self._low, self._width, self._shape, self._start, self._entries)
+        kernels.fill(self.triangles, self._low, self._width, self._shape, self._start, self._entries)
 
     def nearest(self, points: Floats) -> tuple[Floats, Ints]:
         """The distances of points (P, 3) from the nearest facets, and which these are."""
         far, which = np.empty(len(points)), np.empty(len(points), dtype=np.int64)
         grid = self._low, self._width, self._shape, self._start, self._entries
-        kernels.nearest(self._triangles, *grid, np.ascontiguousarray(points), far, which)
+        kernels.nearest(self.triangles, *grid, np.ascontiguousarray(points), far, which)
         return far, which
 
 
@@ -110,8 +111,8 @@ def surface_change(compared: Compared) -> SurfaceChange | None:
     far, _ = first.nearest(_thinned(after))
     back, _ = second.nearest(_thinned(before))
     places = _thinned(np.arange(len(rows)), len(PLACES))
-    there, _ = first.nearest(_places(now[places]))
-    here, _ = second.nearest(_places(was[places]))
+    there, _ = first.nearest(places_on(now[places]))
+    here, _ = second.nearest(places_on(was[places]))
     middles = _thinned(np.arange(len(rows)))
     centre, which = first.nearest(now[middles].mean(axis=1))
     hausdorff = max(float(each.max()) for each in (far, back, there, here, centre))
@@ -133,7 +134,8 @@ def _thinned(values: NDArray[Any], each: int = 1) -> NDArray[Any]:
     return values[:: max(1, len(values) * each // SAMPLES)]
 
 
-def _places(triangles: Floats) -> Floats:
+def places_on(triangles: Floats) -> Floats:
+    """(7T, 3) on each of triangles (T, 3, 3): PLACES."""
     places: Floats = np.einsum("pk,tkx->tpx", PLACES, triangles).reshape(-1, 3)
     return places
 

@@ -40,11 +40,11 @@ def first_of_surface(
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     topology, start = Topology.and_points(given, asked, options.thread_count)
     torn = torn_apart(space_points(given)[:, :3], topology.held.get(ON_BOUNDARY))
-    how = names, options.feature_angle, asked | torn, options.free_needles
-    facets, patches = patches_of_surface(given, topology, *how)
-    mended, notes = unfolded(given, facets, patches, asked) if options.untangle else (given, ())
+    how = names, options.feature_angle, asked | torn
+    facets, patches = patches_of_surface(given, topology, *how, options.free_needles)
+    mended, notes, laid = unfolded(given, facets, patches, asked, options)
     if notes:
-        facets, patches = patches_of_surface(mended, topology, *how)
+        facets, patches = patches_of_surface(mended, topology, *how, laid | options.free_needles)
     slides = patches.slides | patches.curves.slides
     if (patches.curves.slides & ~_flagged(topology.free, len(slides))).any():
         topology, start = Topology.and_points(given, asked, options.thread_count, patches.curves.slides)

@@ -1,83 +1,77 @@
-"""Plane parts of a surface that are folded: they are untangled as meshes in a plane are, before all else."""
+"""Parts of a surface that are folded over: laid flat and untangled as meshes in a plane are, before all else."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.charts import Chart, folded
 from gmsnet.constraints.facets import Facets
-from gmsnet.constraints.folded_planes import OPPOSITE, FoldedPlane, folded_planes, quads_of
+from gmsnet.constraints.folded_planes import folded_planes
+from gmsnet.constraints.folds import FOLD
 from gmsnet.constraints.patches import NOTHING, Patches
-from gmsnet.measure.signs import exact_signs
-from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.kernels.star.guard import Precision
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.run.flat_part import ROUNDING, FlatPart
+from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import precision_of
+from gmsnet.run.unfold_curved import CurvedParts
 from gmsnet.run.untangle_stage import note_of
-from gmsnet.topology.ordering import planar_points, space_points
-from gmsnet.topology.topology import Topology
+from gmsnet.topology.ordering import space_points
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-ROUNDING = 4.0  # times that of a coordinate in space: what one in the plane may be off
+OPPOSITE = -0.99  # the cosine between two edges of a rim from which on it goes back
 
 
-def unfolded(mesh: Mesh, facets: Facets, patches: Patches, asked: Flags) -> tuple[Mesh, tuple[str, ...]]:
-    """A surface with its plane parts untangled, where some are folded, and what was done about each.
+class Unfolded(NamedTuple):
+    """mesh: with the parts that were mended. notes: what was done about each; () where nothing was. laid: (F,) bool,
+    the facets of curved parts: sharp edges there, where facets are thin, are none of the surface."""
 
-    facets, patches: of the surface. asked: (N,) bool, nodes to hold; those at the rim of a part stay, too. A part that
-    cannot be mended in full may be folded on purpose, as the hem of a sheet is: it stays as it is.
+    mesh: Mesh
+    notes: tuple[str, ...]
+    laid: Flags
+
+
+def unfolded(mesh: Mesh, facets: Facets, patches: Patches, asked: Flags, options: SmoothOptions) -> Unfolded:
+    """A surface with its folded parts untangled. facets, patches: of the surface. asked: (N,) bool, nodes to hold.
+
+    Nodes at the rim of a part stay, too. A plane part that cannot be mended in full, or a fold of another one, may be
+    there on purpose, as the hem of a sheet is: it stays as it is.
     """
-    notes, moved, points = list[str](), np.zeros(len(mesh.points), dtype=bool), space_points(mesh)[:, :3].copy()
-    sharp = (patches.beside == NOTHING).any(axis=1)
-    for plane in folded_planes(facets, points, sharp):
-        found = _untangled(mesh, facets, plane, points, asked)
-        if found is not None:
-            nodes, places, note = found
-            points[nodes], moved[nodes] = places, True
-            notes.append(note)
-    if not notes:
-        return mesh, ()
-    full = mesh.points.copy()
-    full[moved] = np.ldexp(points[moved], mesh.exponent)
-    return mesh.with_points(full), tuple(notes)
-
-
-def _untangled(
-    mesh: Mesh, facets: Facets, plane: FoldedPlane, points: Floats, asked: Flags
-) -> tuple[NDArray[np.int64], Floats, str] | None:
-    """The nodes of a part that move, where to (n, 3), and what to say."""
-    chosen, half = plane.facets, facets.halves // 2
-    begin = len(facets.rows) - facets.halves
-    whole = chosen[begin : begin + half] & chosen[begin + half :]
-    kept = np.concatenate([chosen[:begin], whole, whole])
-    triangles, quads = facets.rows[:begin][chosen[:begin]], quads_of(facets)[whole]
+    laid, points = np.zeros(len(facets.rows), dtype=bool), space_points(mesh)[:, :3].copy()
+    if not options.untangle or not folded(facets, points, (patches.beside == NOTHING).any(axis=1), FOLD):
+        return Unfolded(mesh, (), laid)
     held = asked | facets.still
     held[facets.lines] = True
-    held[facets.rows[~kept]] = True
-    nodes, corner = np.unique(np.concatenate([triangles.ravel(), quads.ravel()]), return_inverse=True)
-    flat = (points[nodes] - plane.origin) @ plane.axes.T
-    tables = corner[: triangles.size].reshape(-1, 3), corner[triangles.size :].reshape(-1, 4)
-    if _rim_turns_back(flat, tables):
-        return None
-    kinds = zip(("triangle", "quad"), tables, strict=True)
-    part = Mesh(flat, tuple(CellBlock(kind, table, np.zeros(len(table), dtype=np.int64)) for kind, table in kinds))
-    connected = Topology.of(part, held[nodes])
-    start = planar_points(part)[connected.memory]
-    if not (exact_signs(start, connected.near, connected.near_orientation) <= 0).any():
-        return None
-    from gmsnet.untangle import untangle  # what it needs of SciPy takes 0.15 s more to import
+    precision = precision_of(mesh)
+    precision = precision._replace(grain=precision.grain + ROUNDING * precision.unit * float(abs(points).max()))
+    notes, start, uses = list[str](), points.copy(), np.bincount(facets.rows.ravel(), minlength=len(points))
+    for plane in folded_planes(facets, points):
+        part = FlatPart.of(facets, plane, points, held, uses)
+        notes += _mended_plane(part, plane, points, precision)
+    notes += CurvedParts.of(mesh, facets, start, held, uses, precision, options).mend(points, laid)
+    moved = (points != start).any(axis=1)
+    if not moved.any():
+        return Unfolded(mesh, (), laid)
+    full = mesh.points.copy()
+    full[moved] = np.ldexp(points[moved], mesh.exponent)
+    return Unfolded(mesh.with_points(full, rescaled=False), tuple(notes), laid)
 
-    known = precision_of(mesh)
-    grain = known.grain + ROUNDING * known.unit * float(abs(points).max())
-    done = untangle(start, connected, known._replace(grain=np.ldexp(grain, -part.exponent), single=False))
-    if done.after:
-        return None
-    moved = np.flatnonzero((done.points != start).any(axis=1))
-    own = connected.memory[moved]
-    step = np.ldexp(done.points[moved] - start[moved], part.exponent) @ plane.axes
-    return nodes[own], points[nodes[own]] + step, f"in a plane of the surface, {note_of(done)}"
+
+def _mended_plane(part: FlatPart, plane: Chart, points: Floats, precision: Precision) -> list[str]:
+    """Untangles a plane part of the points (N, 3), in place, if it is mended in full; what to say."""
+    if _rim_turns_back(part.flat, (part.triangles, part.quads)):
+        return []
+    found = part.untangled(part.held, precision)
+    if found is None or found[0].after:
+        return []
+    done, own, step = found
+    points[part.nodes[own]] += step @ plane.axes
+    return [f"in a plane of the surface, {note_of(done)}"]
 
 
 def _rim_turns_back(flat: Floats, tables: tuple[NDArray[np.int64], NDArray[np.int64]]) -> bool:

@@ -36,7 +36,7 @@ class StillInvertedCell(NamedTuple):
 def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Moves the free nodes so that fewer cells are inverted; those of second-order cells have a stage of their own."""
     if isinstance(state.topology, Shell) or (state.second_order is not None and not len(state.topology.free)):
-        return state  # of surfaces, plane parts are mended (run/unfold.py), and sweeps turn what shows the other side
+        return state  # of surfaces, folded parts are mended (run/unfold.py), and sweeps turn what shows the other side
     return _untangled(state, executor) if options.untangle and state.before.inverted else state
 
 
