@@ -162,8 +162,8 @@ class Mesh:
         made.__dict__.update(self.__dict__)
         return made
 
-    def with_points(self, points: NDArray[np.float64], *, rescaled: bool = True) -> Mesh:
-        """The same mesh with other coordinates (same shape as ``points``). rescaled: its ``exponent`` follows them."""
+    def with_points(self, points: NDArray[np.float64]) -> Mesh:
+        """The same mesh with other coordinates (same shape as ``points``)."""
         array = plain_array(points, "points")
         if array.shape != self.points.shape:
             raise InputError(f"new points must have the shape {self.points.shape}, got {array.shape}")
@@ -171,8 +171,6 @@ class Mesh:
         if self.cells:  # without any (``without_cells``), it is the plane of those that there were
             made.__dict__.pop("plane", None)
         made.__dict__.pop("exponent", None)
-        if not rescaled:
-            made.__dict__["exponent"] = self.exponent
         object.__setattr__(made, "points", finite_points(array))
         return made
 

@@ -59,7 +59,7 @@ def unfolded(mesh: Mesh, facets: Facets, patches: Patches, asked: Flags, options
         return Unfolded(mesh, (), laid)
     full = mesh.points.copy()
     full[moved] = np.ldexp(points[moved], mesh.exponent)
-    return Unfolded(mesh.with_points(full, rescaled=False), tuple(notes), laid)
+    return Unfolded(mesh.with_points(full).in_frame_of(mesh), tuple(notes), laid)
 
 
 def _mended_plane(part: FlatPart, plane: Chart, points: Floats, precision: Precision) -> list[str]:
