@@ -35,10 +35,6 @@ class PartLibrary(JITCodeLibrary):
         """See ``codegen``."""
 
 
-# What Numba itself compiles for such parts: others would not count in it, and would hold arrays for ever.
-_OF_NO_COUNTING: dict[Any, Any] = {}
-
-
 @register_pass(mutates_CFG=False, analysis_only=True)
 class NoCounting(AnalysisPass):
     """Lets parts that only look at arrays of their caller not count who uses them.
@@ -56,7 +52,7 @@ class NoCounting(AnalysisPass):
         """See AnalysisPass."""
         if makes_arrays(state):
             return False
-        state.targetctx = state.targetctx.subtarget(enable_nrt=False, cached_internal_func=_OF_NO_COUNTING)
+        state.targetctx = state.targetctx.subtarget(enable_nrt=False)
         vars(state.targetctx).pop("nrt", None)  # what the context with counting has made of it
         return True
 
