@@ -16,6 +16,7 @@ pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 from support.layer_meshes import blunt
 from support.ranks import parts_at_random, same
 
+from gmsnet.distributed.on_first import LOOKED_AT
 from gmsnet.methods.banded import PLAN
 from gmsnet.preserve.protection import LAYER
 from gmsnet.run.options import SmoothOptions
@@ -43,6 +44,7 @@ def test_the_stage_near_walls_is_shared_out(amount, how):
     assert told.gathered == ""
     assert PHASE in [sweep.stage for sweep in told.history]
     assert WALL not in told.held
+    assert LOOKED_AT in told.notes
 
 
 @pytest.mark.parametrize("how", ["interleaved", "strips"])

@@ -32,6 +32,9 @@ from gmsnet.topology.volume import Volume
 Floats = NDArray[np.float64]
 
 
+LOOKED_AT = "rank 0 has looked for layers and refined walls in the whole mesh, and needed memory for it: see preserve"
+
+
 class Intent(NamedTuple):
     """What of the mesh is there on purpose. layers: (n,) of the piece, held. walls: of the piece, as of Protection.
 
@@ -67,7 +70,7 @@ def intent_of(
             found = protected(mesh, topology, options.preserved, options.fix_layers, near, firm=sure)
         layers = np.zeros(len(whole.ids), dtype=bool) if found.layers is None else found.layers
         kept = None if found.walls is None else np.column_stack(found.walls)
-        told = _of_walls(found), found.notes
+        told = _of_walls(found), [*found.notes, *[LOOKED_AT] * (known is None)]
     of_walls, notes = comm.bcast(told)
     layers = scattered(whole, layers, piece, comm)
     if not of_walls:
