@@ -276,7 +276,7 @@ def _written(
     after = totals_of(near, part.simplices, ranks)
     of_free = Judged(*(totals_of(places, scored, ranks) for places in (part.points, near)))
     inverted, missed, missed_before, greatest = 0 if after is None else after.inverted, None, None, [0.0, 0.0]
-    first = last = None
+    final = None
     if target:
         first = state.before if isinstance(state.before, QualityReport) else measure(mesh, topology, part.points)
         last = measure(written, topology, near)
@@ -285,13 +285,13 @@ def _written(
         better = (inverted, missed, -least) <= (inverted_before, missed_before, -least_before)
         angles = [greatest_angle(report, options) for report in (first, last)]
         greatest = [float(part.comm.allreduce(angle, mpi().MAX)) for angle in angles]
+        final = last if better else first
     else:
         merits = (merit_of(totals, options.best_by) for totals in (of_free.after, of_free.before))
         now, then = ((count, *merit) for count, merit in zip((inverted, inverted_before), merits, strict=True))
         better = now <= then
-    if not target and (inverted if better else inverted_before):
-        last, first = measure(written, topology, near), measure(mesh, topology, part.points)
-    final = last if better else first
+        if inverted if better else inverted_before:
+            final = measure(written, topology, near) if better else measure(mesh, topology, part.points)
     worst = () if final is None else worst_of(part, final, options)
     if better:
         return _Written(points, moved, after, missed, greatest[1], of_free, worst)

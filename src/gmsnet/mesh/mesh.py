@@ -215,13 +215,14 @@ class Mesh:
         return None
 
     def as_part(
-        self, plane: tuple[int, int] | None, kinds: tuple[bool, bool, bool], exponent: int, box: NDArray[np.float64]
-    ) -> Mesh:
+        self, plane: tuple[int, int] | None, kinds: tuple[bool, bool, bool], exponent: int,
+        box: NDArray[np.float64] | None,
+    ) -> Mesh:  # fmt: skip
         """The same as a part of a mesh with this plane and exponent, and of whose nodes these are.
 
         kinds: see ``kinds_there``. box: (2, D) the least and the greatest coordinates of all its nodes, in the plane if
-        there is one, over 2 to the power of the exponent. They are numbered in memory as in the whole mesh: nodes that
-        come first come first.
+        there is one, over 2 to the power of the exponent; None of a whole mesh. They are numbered in memory as in the
+        whole mesh: nodes that come first come first.
         """
         made = self._twin()
         made.__dict__.update(plane=plane, exponent=exponent, box=box)
@@ -230,10 +231,7 @@ class Mesh:
 
     def in_frame_of(self, other: Mesh) -> Mesh:
         """The same in the plane and by the exponent of a mesh of the same cells, whose nodes were elsewhere."""
-        made = self._twin()
-        for name in ("plane", "exponent", "box", "has_volumes", "has_quads", "has_solids"):
-            made.__dict__[name] = getattr(other, name)
-        return made
+        return self.as_part(other.plane, other.kinds_there, other.exponent, other.box)
 
     @property
     def kinds_there(self) -> tuple[bool, bool, bool]:
