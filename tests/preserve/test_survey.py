@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 from support.layer_meshes import grid, heights, shaken
 
 import gmsnet
-from gmsnet.kernels.simplex import stretch
 from gmsnet.kernels.simplex.survey import BOUNDARY
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.preserve.layers import _coherent
-from gmsnet.preserve.survey import MOST, Survey
+from gmsnet.preserve.layers import coherent
+from gmsnet.preserve.survey import Survey
 from gmsnet.topology.topology import Topology
 
 
@@ -22,9 +21,11 @@ def look(mesh):
     """Which nodes the quick look suspects, and which ones a full search finds."""
     topology = Topology.of(mesh)
     survey = Survey.of(mesh, topology)
-    cells = np.empty((len(topology.near), stretch.COLUMNS))
-    stretch.per_cell(survey.points, topology.near, topology.near_orientation, MOST, cells)
-    return survey.suspects, _coherent(topology.near, cells, survey.rim > 0)
+    every = np.ones(len(survey.rim), dtype=bool)
+    _, nodes, strong = coherent(survey.points, topology, survey.rim, every)
+    found = np.zeros_like(every)
+    found[nodes[strong]] = True
+    return survey.suspects, found
 
 
 @settings(max_examples=150, deadline=None)

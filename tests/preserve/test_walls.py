@@ -17,7 +17,8 @@ from gmsnet.paper.cases import CASES
 from gmsnet.preserve.layers import stretched_layers
 from gmsnet.preserve.protection import WALL, wall_note
 from gmsnet.preserve.survey import Survey
-from gmsnet.preserve.walls import NEAR, WIDEST, _walls, near_walls
+from gmsnet.preserve.wall_edges import Beside
+from gmsnet.preserve.walls import NEAR, WIDEST, near_walls
 from gmsnet.topology.topology import Topology
 
 
@@ -239,7 +240,7 @@ def test_walls_of_quads_are_pieces_of_the_boundary(cells):
     mesh = random_quad_mesh(800, cells=cells, seed=3)
     topology = Topology.of(mesh)
     survey = Survey.of(mesh, topology)
-    walls = _walls(topology.simplices, survey.rim > 0, survey.beside)
+    walls = Beside.of(topology.simplices, survey.beside, survey.rim).walls()
     assert len(walls) == 1  # the square
     edges = {tuple(sorted(edge)) for edge in topology.memory[walls[0][0]].tolist()}
     count = Counter(

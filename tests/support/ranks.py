@@ -103,11 +103,14 @@ TOLD = (
     "feature angle",
     "hausdorff:",
     "not measured",
+    "cells that have one height",
+    "the mesh looks anisotropic",
+    "fix_layers:",
 )
 
 
 def _of_stages(notes):
-    """What is said of inverted cells, of walls, of nodes that slide and of cells that are left out."""
+    """What is said of inverted cells, layers and walls, of nodes that slide and of cells that are left out."""
     return [note for note in notes if note.startswith(TOLD)]
 
 

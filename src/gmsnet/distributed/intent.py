@@ -1,53 +1,125 @@
-"""Whether anything in a mesh may be there on purpose: what a rank can tell of its own part.
+"""Whether anything in a mesh may be there on purpose: what ranks can tell of their own parts.
 
-No is certain. Where it may be, layers and refined walls have to be looked for in the whole mesh.
+No is certain: no layer starts, and no wall is refined. Else both have to be looked for in the whole mesh.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Part
+from gmsnet.distributed.wall_cells import WallCells
 from gmsnet.kernels.simplex import survey as kernels
-from gmsnet.preserve.columns import FEWEST, feet
+from gmsnet.kernels.topology.connectivity import touching
+from gmsnet.preserve import columns
+from gmsnet.preserve.layers import coherent, fewest_in
 from gmsnet.preserve.survey import FEW, MOST, SEED, SLACK, rim_of
-from gmsnet.preserve.walls import refined
+from gmsnet.preserve.wall_edges import doubled
+from gmsnet.preserve.walls import refined_walls
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
+Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Ids = NDArray[np.int64]
 
 SURE = 1.0 + 1e-9  # sums over ranks have other roundings
 
 
-def may_be_meant(part: Part, points: Floats) -> bool:
-    """May there be stretched layers, or cells near a wall that the mesh is refined towards? The same on all ranks.
+class Look(NamedTuple):
+    """What ranks have seen of their parts, alike on all of them.
 
-    points: as ``Part.points``.
+    layers, walls: may there be stretched layers, and walls that the mesh is refined towards? beside: the cells at the
+    walls of a mesh in a plane.
     """
-    topology = part.topology
-    if isinstance(topology, Volume):
+
+    layers: bool
+    walls: bool = False
+    beside: WallCells | None = None
+
+    @classmethod
+    def at(cls, part: Part, points: Floats) -> Look:
+        """points: as ``Part.points``."""
+        topology = part.topology
         rim = part.halo.spread(rim_of(topology))
-        found = feet(points, topology, rim > 0)
-        return int(part.comm.allreduce(int(np.count_nonzero(part.moves[found])))) >= FEWEST
-    rim = part.halo.spread(rim_of(topology))
-    ring = np.zeros((len(rim), 4), dtype=np.float32)
-    beside, _ = kernels.first_ring(points, topology.near, rim, MOST, ring)
-    for column in range(3):
-        ring[:, column] = part.halo.spread(ring[:, column])
-    suspects = kernels.suspects(topology.near, rim, MOST, FEW, SEED - SLACK, ring) & part.moves
-    total = part.comm.allreduce(_doubled_area(part, topology, points))
-    cells = part.comm.allreduce(len(part.own_rows))
-    walls = refined(points, topology.near.take(beside, axis=0), SURE * total / max(cells, 1))
-    return bool(part.comm.allreduce(bool(suspects.any()) or walls, mpi().LOR))
+        if isinstance(topology, Volume):
+            return cls(_layers_of_volume(part, topology, points, rim > 0))
+        ring = np.zeros((len(rim), 4), dtype=np.float32)
+        rows, _ = kernels.first_ring(points, topology.near, rim, MOST, ring)
+        for column in range(3):
+            ring[:, column] = part.halo.spread(ring[:, column])
+        suspects = kernels.suspects(topology.near, rim, MOST, FEW, SEED - SLACK, ring) & part.moves
+        beside = WallCells.of(part, topology, rows, rim)
+        return cls(_layers(part, topology, points, rim, suspects), _walls(part, topology, points, beside), beside)
 
 
-def _doubled_area(part: Part, topology: Topology, points: Floats) -> float:
-    """Twice the area of all simplices of the rank's own cells."""
-    a, b, c = (points[topology.near[part.own_rows, k]] for k in range(3))
-    (px, py), (qx, qy) = (b - a).T, (c - a).T
-    return math.fsum(np.abs(px * qy - py * qx))
+def _layers_of_volume(part: Part, topology: Volume, points: Floats, wall: Flags) -> bool:
+    """Do as many nodes hang together from which columns may start as a layer has?"""
+    foot = np.zeros(len(wall), dtype=bool)
+    foot[columns.feet(points, topology, wall)] = True
+    foot &= part.moves
+    return _most_together(part, foot, columns.linked(topology.near, foot, wall)) >= columns.FEWEST
+
+
+def _layers(part: Part, topology: Topology, points: Floats, rim: NDArray[np.uint8], suspects: Flags) -> bool:
+    """Do as many nodes hang together as a layer has from which it may extend?"""
+    if not part.comm.allreduce(bool(suspects.any()), mpi().LOR):
+        return False
+
+    def shared(nodes: Ints, means: Floats) -> Floats:
+        whole, found = np.zeros(len(rim)), means.copy()
+        for column in range(means.shape[1]):
+            whole[nodes] = means[:, column]
+            part.halo.renew(whole)
+            found[:, column] = whole[nodes]
+        return found
+
+    corners, nodes, strong = coherent(points, topology, rim, part.halo.spread(suspects), shared)
+    seed = np.zeros(len(rim), dtype=bool)
+    seed[nodes[strong]] = True
+    seed = part.halo.spread(seed)
+    cells = nodes[corners[touching(corners, (seed & part.moves)[nodes])]]
+    pairs = cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    quads = bool(part.comm.allreduce(topology.near_shapes is not None, mpi().LOR))
+    return _most_together(part, seed & part.moves, pairs[seed[pairs].all(axis=1)]) >= fewest_in(quads=quads)
+
+
+def _most_together(part: Part, chosen: Flags, pairs: Ints) -> int:
+    """The largest number of chosen nodes that hang together over pairs of nodes.
+
+    chosen: (n,) by places in memory, of the nodes that this rank moves. pairs: (p, 2) places, all with a chosen node.
+    """
+    ids = part.around.nodes.ids[part.topology.memory]
+    came = part.comm.gather((ids[chosen], np.unique(ids[pairs], axis=0)))
+    return int(
+        part.comm.bcast(None if came is None else _largest(*(np.concatenate(x) for x in zip(*came, strict=True))))
+    )
+
+
+def _largest(chosen: Ids, pairs: Ids) -> int:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components  # loads what few runs need
+
+    if not len(chosen):
+        return 0
+    names, number = np.unique(np.concatenate([chosen, pairs.ravel()]), return_inverse=True)
+    one, two = number[len(chosen) :].reshape(-1, 2).T
+    graph = coo_array((np.ones(len(one), dtype=np.int8), (one, two)), shape=(len(names), len(names)))
+    piece: NDArray[Any] = connected_components(graph, directed=False)[1]
+    return int(np.bincount(piece[number[: len(chosen)]]).max())
+
+
+def _walls(part: Part, topology: Topology, points: Floats, beside: WallCells) -> bool:
+    """Are most of the cells at one of the walls small?"""
+    comm = part.comm
+    total = comm.allreduce(math.fsum(doubled(points, topology.near[part.own_rows])))
+    mean = SURE * total / max(comm.allreduce(len(part.own_rows)), 1)
+    near = beside.at(points)
+    found = False if near is None or beside.beside is None else refined_walls(near, beside.beside, mean)
+    return bool(comm.bcast(found))

@@ -16,6 +16,7 @@ from gmsnet.distributed.gathered import Whole, brought, gathered, scattered
 from gmsnet.distributed.part import connected
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.result import RankResult
+from gmsnet.distributed.wall_cells import WallCells
 from gmsnet.errors import GmsnetError
 from gmsnet.measure.worst import places_of, unmet
 from gmsnet.mesh.display import amount
@@ -38,13 +39,15 @@ LOOKED_AT = "rank 0 has looked for layers and refined walls in the whole mesh, a
 class Intent(NamedTuple):
     """What of the mesh is there on purpose. layers: (n,) of the piece, held. walls: of the piece, as of Protection.
 
-    of_walls: what to say of the nodes near these, where they are held and where they move.
+    of_walls: what to say of the nodes near these, where they are held and where they move. beside: the cells at walls,
+    where heights over these are to be compared.
     """
 
     layers: NDArray[np.bool_] | None = None
     walls: Kept | None = None
     of_walls: tuple[str, ...] = ()
     notes: Sequence[str] = ()
+    beside: WallCells | None = None
 
 
 def intent_of(

@@ -145,7 +145,7 @@ class Part:
         cell = chosen if simplices.cells is None else simplices.cells[chosen]
         _, begin, size = np.unique(cell, return_index=True, return_counts=True)  # rows of a cell stand together
         begin, size = begin.astype(np.int64), size.astype(np.int64)
-        lowest = _lowest(simplices)[chosen[begin]] if len(chosen) else np.empty(0, dtype=np.int64)
+        lowest = lowest_of(simplices)[chosen[begin]] if len(chosen) else np.empty(0, dtype=np.int64)
         own = np.flatnonzero(self.moves)
         counts = np.bincount(lowest, size, minlength=len(self.codes)).astype(np.int64)
         first = np.zeros(len(self.codes), dtype=np.int64)
@@ -237,7 +237,7 @@ def _of_whole_cells(simplices: Rows, chosen: Flags) -> Flags:
     return np.asarray(cells[simplices.cells])
 
 
-def _lowest(simplices: Rows) -> Ids:
+def lowest_of(simplices: Rows) -> Ids:
     """(S,) the lowest place in memory among the nodes of the cell of each row."""
     if isinstance(simplices, Tetrahedra) and simplices.solids is not None:
         found: Ids = simplices.solids.nodes.min(axis=1).astype(np.int64)[simplices.cells]

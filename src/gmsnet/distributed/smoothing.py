@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.constraints.sliding import REASON
 from gmsnet.distributed.agreement import everywhere, raise_everywhere
 from gmsnet.distributed.along import Found, found_on_first, where_on
 from gmsnet.distributed.answered import Answered
@@ -19,16 +18,14 @@ from gmsnet.distributed.executor import Ranks
 from gmsnet.distributed.frame import framed
 from gmsnet.distributed.gathered import Whole, gathered
 from gmsnet.distributed.ghosts import surrounded
-from gmsnet.distributed.intent import may_be_meant
 from gmsnet.distributed.library import mpi
-from gmsnet.distributed.mending import Mended, inverted_in, mended
-from gmsnet.distributed.on_first import Intent, intent_of, smoothed_on_first
+from gmsnet.distributed.on_first import smoothed_on_first
 from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
+from gmsnet.distributed.readied import Ready, meant, readied
 from gmsnet.distributed.result import RankResult
-from gmsnet.distributed.stages import Meant, swept
+from gmsnet.distributed.stages import swept
 from gmsnet.distributed.told import held, missing, not_measured, worst_of
-from gmsnet.distributed.winding import Winding
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.judged import Judged
@@ -36,9 +33,7 @@ from gmsnet.measure.report import QualityReport, measure
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.measure.worst import Place
 from gmsnet.methods import Smoother
-from gmsnet.methods.banded import Kept
 from gmsnet.methods.base import CELLS
-from gmsnet.preserve.protection import LAYER, NO_LAYERS, WALL
 from gmsnet.run.options import CPU, SmoothOptions
 from gmsnet.run.outcome import factors_of, greatest_angle, large_angles, merit_of
 from gmsnet.run.set_up import check_options, check_target, without_effect
@@ -81,7 +76,7 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
         everywhere(comm, lambda: check_target(part.mesh, options.target))
         everywhere(comm, lambda: check_options(part.mesh, options, counts))
         before = totals_of(part.points, part.simplices, Ranks(part))
-        ready = _ready(piece, part, options, before, known)
+        ready = readied(piece, part, options, before, known)
         if ready.why:
             return smoothed_on_first(piece, options, comm, ready.why, began, given or known)
         return _shared(piece, part, smoother, options, ready, before, began, found, counts)
@@ -114,94 +109,15 @@ def _not_shared(counts: Mapping[str, int], smoother: Smoother, options: SmoothOp
     return f"cells of the kind {', '.join(others)} are not shared out" if others else ""
 
 
-def _not_plain(part: Part, before: Totals | None) -> str:
-    """Why the mesh cannot be shared out as it is; "" if it can."""
-    topology, comm = part.topology, part.comm
-    if before is None:
-        return "no cell can be smoothed"
-    winding = Winding(*comm.allreduce(np.array(Winding.of(topology))).tolist())
-    if winding.unread:
-        return "parts of the mesh, or facets that do not match, have to be seen whole"
-    return "" if winding.alike else "cells are wound in both directions"
-
-
-class _Ready(NamedTuple):
-    """What comes before the sweeps. why: they cannot be shared out, "" if they can. inverted: how many cells are;
-    mended: what they have become, where they are mended first.
-    """
-
-    why: str
-    intent: Intent = Intent()
-    inverted: int = 0
-    mended: Mended | None = None
-
-
-def _ready(
-    piece: Piece, part: Part, options: SmoothOptions, before: Totals | None, known: Whole | None
-) -> _Ready:  # fmt: skip
-    why = _not_plain(part, before)
-    if why or before is None:
-        return _Ready(why)
-    inverted = inverted_in(part) if before.uncertain else 0
-    if isinstance(part.topology, Shell):  # sweeps bring back what shows the other side
-        if inverted and options.target:
-            return _Ready("which cells miss the target is seen whole where some are inverted")
-        return _Ready("", inverted=inverted)
-    intent = _intent(piece, part, options, known, None, firm=inverted > 0)
-    if not inverted:
-        return _Ready("", intent)
-    if not options.untangle:
-        return _Ready("inverted cells are to stay as they are")
-    topology = _meant(intent, piece, part).held
-    if part.along is not None:
-        topology = topology.holding(part.along.slides_at(part.around.nodes.ids), REASON)
-    done = mended(part, topology, inverted)
-    if done is None:
-        return _Ready("inverted cells could not be mended with what lies around them")
-    return _Ready("", _intent(piece, part, options, known, done.points, firm=False), inverted, done)
-
-
-def _intent(
-    piece: Piece, part: Part, options: SmoothOptions, known: Whole | None, points: Floats | None, *, firm: bool
-) -> Intent:  # fmt: skip
-    """What is there on purpose. points: see Mended, where inverted cells were mended; None as they are."""
-    wanted = options.preserved != "none" or options.fix_layers
-    if not wanted or not may_be_meant(part, part.points if points is None else points):
-        return Intent(notes=(NO_LAYERS,) if options.fix_layers else ())
-    now = None
-    if points is not None:
-        at = part.topology.places[np.searchsorted(part.around.nodes.ids, piece.ids)]
-        now = points[at]
-    return intent_of(piece, options, part.comm, known, now, part.along, firm=firm)
-
-
-def _meant(intent: Intent, piece: Piece, part: Part) -> Meant:
-    """The connectivity of a part with the nodes held that are there on purpose."""
-    topology, ids = part.topology, part.around.nodes.ids
-
-    def on_part(values: NDArray[Any]) -> Floats:
-        """(n,) by id of the part, of those at the nodes of the piece."""
-        found = np.zeros(len(ids))
-        found[np.searchsorted(ids, piece.ids)] = values
-        return np.asarray(part.halo.spread(found[topology.memory])[topology.places])
-
-    if intent.layers is not None:
-        topology = topology.holding(on_part(intent.layers) > 0.0, LAYER)
-    if intent.walls is None:
-        return Meant(topology, topology)
-    walls = Kept.of_columns([on_part(values) for values in intent.walls])
-    return Meant(topology, topology.holding(walls.nodes, WALL), walls)
-
-
 def _shared(
-    piece: Piece, part: Part, smoother: Smoother, options: SmoothOptions, ready: _Ready, before: Totals | None,
+    piece: Piece, part: Part, smoother: Smoother, options: SmoothOptions, ready: Ready, before: Totals | None,
     began: float, found: Found | None, counts: Mapping[str, int],
 ) -> RankResult:  # fmt: skip
     at = np.searchsorted(part.around.nodes.ids, piece.ids)
     intent, done = ready.intent, ready.mended
     asked = part.comm.bcast(options.callback is not None)
     options = replace(options, callback=Answered(part.comm, options.callback) if asked else None)
-    state = swept(part, _meant(intent, piece, part), smoother, options, done, ready.inverted)
+    state = swept(part, meant(intent, piece, part), smoother, options, done, ready.inverted)
     if found is not None and isinstance(part.topology, Shell):
         before = found.before
     written = _written(piece, part, state, options, ready.inverted, before, found)
@@ -213,6 +129,8 @@ def _shared(
         notes += found.note(points[at], moved[at], where, options.hausdorff, piece, part.comm)
     else:
         notes += [*not_measured(part, counts), *without_effect(options)]
+    if intent.beside is not None and part.comm.allreduce(bool(moved.any()), mpi().LOR):
+        notes += intent.beside.note(part.points, state.points)
     notes += judged.note(before, after, "η" if part.mesh.has_volumes else "1/q")
     notes += large_angles(greatest, missed, options)
     return RankResult(

@@ -199,9 +199,7 @@ def _accepted(
     number[columns[long, 0]] = np.flatnonzero(long)
     others = np.flatnonzero(wall & (number < 0))  # they link columns as well, those of a face with those around an edge
     number[others] = len(columns) + np.arange(len(others))
-    beside = number[rows[connectivity.touching(rows, (number >= 0) & (number < len(columns)))]]
-    pairs = np.concatenate([beside[:, [a, b]] for a, b in kernels.EDGES])
-    pairs = pairs[(pairs >= 0).all(axis=1) & (pairs < len(columns)).any(axis=1)]
+    pairs = number[linked(rows, (number >= 0) & (number < len(columns)), wall)]
     count = len(columns) + len(others)
     graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     piece = connected_components(graph, directed=False)[1]
@@ -221,6 +219,13 @@ def _accepted(
         even = np.median(differ[piece[pairs[:, 0]] == name], axis=None) <= EVEN
         accepted[own] = grown or (even and np.median(higher[own]) >= least)
     return accepted
+
+
+def linked(rows: Ints, foot: Flags, wall: Flags) -> Ints:
+    """The edges (E, 2) of cells between nodes of walls (N,), one of them or both a foot; once for each simplex."""
+    corners = rows[connectivity.touching(rows, foot)]
+    pairs = np.concatenate([corners[:, [a, b]] for a, b in kernels.EDGES])
+    return np.asarray(pairs[wall[pairs].all(axis=1) & foot[pairs].any(axis=1)])
 
 
 def _tensors(moments: Floats) -> Floats:

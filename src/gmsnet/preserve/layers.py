@@ -15,6 +15,7 @@ rows of cells.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,7 @@ from gmsnet.topology.topology import Topology
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
+Shared = Callable[[NDArray[np.int32], Floats], Floats]
 
 REACH = math.log(2.5)  # the mean stretch of a star to which a layer extends; right triangles with legs 1 and 2 have it
 ALIKE = math.log(1.8)  # the same of the mean of v, if in little: the halves of squares have 1.73
@@ -126,31 +128,45 @@ def stretched_layers(mesh: Mesh, topology: Topology, survey: Survey | None = Non
 
 
 def _seeds(survey: Survey, topology: Topology) -> Flags:
-    """(N,) by places in memory: nodes that hang together, FEWEST or more, of which the mean over two rings is SEED.
-
-    The mean of v, or more; cells with a node of the boundary or of an interface do not count.
+    """(N,) by places in memory: nodes that hang together, as many as a layer has, of which the mean over two rings is
+    SEED or more.
     """
     seeds = np.zeros(len(survey.rim), dtype=bool)
     if not survey.suspects.any():
         return seeds
-    rows, corners, nodes = surroundings(topology.near, survey.suspects)
-    cells = np.empty((len(rows), stretch.COLUMNS))
-    stretch.per_cell(survey.points[nodes], corners, topology.near_orientation[rows], MOST, cells)
-    strong = _coherent(corners, cells, survey.rim[nodes] > 0) & survey.suspects[nodes]
+    corners, nodes, strong = coherent(survey.points, topology, survey.rim, survey.suspects)
     piece = pieces(corners, strong)
-    fewest = FEWEST if topology.near_shapes is None else FEWEST_OF_QUADS
+    fewest = fewest_in(quads=topology.near_shapes is not None)
     seeds[nodes[strong & (np.bincount(piece[strong], minlength=len(nodes)) >= fewest)[piece]]] = True
     return seeds
 
 
-def _coherent(triangles: NDArray[np.int32], cells: Floats, rim: Flags) -> Flags:
-    """(N,) where the mean of v over two rings is SEED or longer; cells with a node of the rim do not count."""
-    nodes, around, number = np.empty((len(rim), 2)), np.empty((len(triangles), 2)), np.empty(len(rim), dtype=np.int32)
-    stretch.to_nodes(triangles, rim, FEW, cells, nodes, number)
+def fewest_in(*, quads: bool) -> int:
+    """Nodes that hang together, of which the mean over two rings is SEED or more: fewer are no layer."""
+    return FEWEST_OF_QUADS if quads else FEWEST
+
+
+def coherent(
+    points: Floats, topology: Topology, rim: NDArray[np.uint8], suspects: Flags, shared: Shared | None = None
+) -> tuple[NDArray[np.int32], NDArray[np.int32], Flags]:
+    """The suspects where the mean of v over two rings is SEED or longer; cells with a node of the rim do not count.
+
+    points, rim, suspects: as of a survey. shared: takes the means over the first ring at these nodes, and gives those
+    of the whole mesh where only a part of it is here. Returns the corners (T, 3) of the cells within two rings of the
+    suspects in a numbering of their own, the places (n,) of these nodes, and (n,) which of them are such suspects.
+    """
+    rows, corners, nodes = surroundings(topology.near, suspects)
+    cells = np.empty((len(rows), stretch.COLUMNS))
+    stretch.per_cell(points[nodes], corners, topology.near_orientation[rows], MOST, cells)
+    apart, number = rim[nodes] > 0, np.empty(len(nodes), dtype=np.int32)
+    means, around = np.empty((len(nodes), 2)), np.empty((len(corners), 2))
+    stretch.to_nodes(corners, apart, FEW, cells, means, number)
+    if shared is not None:
+        means = shared(nodes, means)
     # A corner of a cell that counts has a cell that counts, so no mean is formed with the zeros of nodes without one.
-    stretch.to_cells(triangles, nodes, around)
-    stretch.to_nodes(triangles, rim, FEW, around, nodes, number)
-    return np.asarray((nodes**2).sum(axis=1) >= SEED**2)
+    stretch.to_cells(corners, means, around)
+    stretch.to_nodes(corners, apart, FEW, around, means, number)
+    return corners, nodes, ((means**2).sum(axis=1) >= SEED**2) & suspects[nodes]
 
 
 def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:

@@ -20,8 +20,8 @@ from gmsnet.preserve.anchored import split
 from gmsnet.preserve.columns import layers_of_volume
 from gmsnet.preserve.layers import Layers, stretched_layers
 from gmsnet.preserve.survey import Survey
-from gmsnet.preserve.walls import HIGHER, NEAR, heights_now, near_walls
-from gmsnet.topology.stars import Ints
+from gmsnet.preserve.wall_edges import Beside
+from gmsnet.preserve.walls import NEAR, near_walls
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 
@@ -41,15 +41,15 @@ class Protection:
 
     base: the topology without any. layers: (N,) bool by id, the nodes that are held on account of stretched layers.
     walls: by id, the nodes next to walls that the mesh is refined towards, which move in a stage of their own
-    (wall_stage.py), and how exactly their cells keep their areas. None where there are none. beside: as of a survey,
-    where heights over walls are to be compared.
+    (wall_stage.py), and how exactly their cells keep their areas. None where there are none. beside: the cells beside
+    walls, where heights over these are to be compared.
     """
 
     base: Topology | Volume
     notes: list[str]
     layers: Flags | None = None
     walls: Kept | None = None
-    beside: Ints | None = None
+    beside: Beside | None = None
 
     @property
     def near_walls(self) -> Flags | None:
@@ -110,7 +110,7 @@ def protected(
     notes.extend(_coarse(coarse))
     walled = Protection(topology, notes, layers, walls)
     last = walled if walls.nodes.any() and WALL in walled.topology.held else protection
-    return replace(last, beside=survey.beside)
+    return replace(last, beside=Beside.of(topology.simplices, survey.beside, survey.rim))
 
 
 def protected_volume(topology: Volume, preserve: str, fix_layers: bool, near: Floats, *, firm: bool) -> Protection:
@@ -199,20 +199,6 @@ def _coarse(walls: int) -> list[str]:
     which = "a wall" if walls == 1 else f"{walls} walls"
     so = f"cells on it are larger than {NEAR:.0%} of its diameter, and smoothed like others"
     return [f"the mesh is refined towards {which}, but {so}: preserve={SIZE!r} changes their heights less"]
-
-
-def height_note(protection: Protection, before: Floats, now: Floats) -> list[str]:
-    """Says so where cells of one height along a wall have another now. before, now: (N, 2) points, by places."""
-    if protection.beside is None or not isinstance(protection.base, Topology):
-        return []
-    times = heights_now(protection.base, protection.beside, before, now)
-    changed = times[np.abs(np.log(times)) > HIGHER]
-    if not len(changed):
-        return []
-    most = changed[np.argmax(np.abs(np.log(changed)))]
-    which = "a wall" if len(changed) == 1 else f"{len(changed)} walls"
-    mend = f"if they are meant, preserve={SIZE!r} changes them less, and nodes that fix names stay"
-    return [f"cells that have one height over {which} are {most:.2g} times as high now, in the median: {mend}"]
 
 
 def carried_note(nodes: int) -> str:

@@ -13,21 +13,18 @@ with that around single cells that are damaged. So a mesh that is a little worse
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex import measures as quality
-from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL, Simplices
-from gmsnet.kernels.simplex.survey import BOUNDARY
-from gmsnet.kernels.topology.components import pieces
+from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL
 from gmsnet.measure.signs import exact_signs
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.banded import Kept
-from gmsnet.preserve.courses import spread
-from gmsnet.preserve.survey import Survey, rim_of
+from gmsnet.preserve.survey import Survey
+from gmsnet.preserve.wall_edges import Beside, doubled, edge_of
 from gmsnet.topology.stars import Ints
 from gmsnet.topology.topology import Topology
 
@@ -48,10 +45,6 @@ NOISE = np.array([[0.08, 0.1, 0.2, 0.4], [0.12, 0.145, 0.17, 0.25]])  # of trian
 WIDEST = 4.0
 ROUGH, BROKEN = 0.4, 0.5  # the same for single cells, whose band reaches to the mean from the second on
 SOUND, POOR = 0.5, 0.3  # the same by their 1/q
-FEWEST = 12  # edges of a wall of which it is told how high cells are now
-HIGHER = math.log(1.3)  # than before, in the median of the cells on a wall: less is not told
-ONE_HEIGHT = math.log(1.25)  # between most heights along a wall: nobody gets them by chance
-TINY = 1e-300
 CANDIDATES = 8  # edges of the wall, by their middles, among which the nearest is looked for
 
 
@@ -81,19 +74,20 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
         return NearWalls(kept, 0)
     survey = survey or Survey.of(mesh, topology)
     points = survey.points
-    largest = REFINED * float(_edge(survey.double))
-    if not refined(points, triangles.take(survey.beside, axis=0), survey.double):
+    largest = REFINED * float(edge_of(survey.double))
+    beside = Beside.of(topology.simplices, survey.beside, survey.rim)
+    if not _some_small(points, beside, largest):
         return NearWalls(kept, 0)  # so it is with most meshes
     rough: Floats | None = None
-    for wall, cells in _walls(topology.simplices, _on_boundary(survey.rim), survey.beside):
-        size = _edge(_double(points, triangles[cells]))
-        if (size <= largest).mean() < MOST:
+    for wall, cells in beside.walls():
+        size = edge_of(doubled(points, beside.simplices.rows[cells]))
+        if not _mostly_small(size, largest):
             continue
         diameter = _diameter(points[np.unique(wall)])
         close = NEAR * diameter
         most = min(largest, close)
         rows = _rows_near(points, triangles, points[wall], close)
-        inside = _edge(_double(points, triangles[rows]))
+        inside = edge_of(doubled(points, triangles[rows]))
         if not (most > 0.0 and all(len(some) and (some <= most).mean() >= MOST for some in (size, inside))):
             coarse += bool(close < np.median(size) <= COARSE * diameter)
             continue
@@ -106,9 +100,23 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
     return NearWalls(kept, coarse)
 
 
-def refined(points: Floats, beside: Ints, double: float) -> bool:
-    """Are some of the cells (B, 3) beside a boundary small? double: the mean of twice the area over the mesh."""
-    return bool((_edge(_double(points, beside)) <= REFINED * float(_edge(double))).any())
+def refined_walls(points: Floats, beside: Beside, double: float) -> bool:
+    """Are most of the cells beside one of the walls small? Else no cell is kept.
+
+    double: the mean of twice the area over the mesh.
+    """
+    largest, rows = REFINED * float(edge_of(double)), beside.simplices.rows
+    if not _some_small(points, beside, largest):
+        return False
+    return any(_mostly_small(edge_of(doubled(points, rows[cells])), largest) for _, cells in beside.walls())
+
+
+def _some_small(points: Floats, beside: Beside, largest: float) -> bool:
+    return bool((edge_of(doubled(points, beside.simplices.rows)) <= largest).any())
+
+
+def _mostly_small(size: Floats, largest: float) -> bool:
+    return bool((size <= largest).mean() >= MOST)
 
 
 def _levels(topology: Topology, rows: NDArray[np.int64]) -> Floats:
@@ -157,7 +165,7 @@ def _roughness(topology: Topology, points: Floats) -> Floats:
     """
     rows, shapes = topology.near, topology.near_shapes
     cells = np.arange(len(rows)) if topology.near_cells is None else topology.near_cells
-    double, number = np.bincount(cells, _double(points, rows)), np.bincount(cells)
+    double, number = np.bincount(cells, doubled(points, rows)), np.bincount(cells)
     size = np.log(np.maximum(double / np.maximum(number, 1), np.finfo(float).tiny))
     # Of a corner of a quad the corner itself, and the edge to the next one: so each of a cell counts once.
     once = np.ones(rows.size, dtype=bool)
@@ -177,75 +185,6 @@ def _roughness(topology: Topology, points: Floats) -> Floats:
     each = np.maximum(np.bincount(corners, minlength=len(points)), 1)
     around = np.bincount(corners, off[owner], minlength=len(points)) / each
     return np.asarray((np.bincount(owner, around[corners]) / np.maximum(np.bincount(owner), 1))[cells])
-
-
-def _double(points: Floats, triangles: Ints) -> Floats:
-    """(T,) twice the area."""
-    (ax, bx, cx), (ay, by, cy) = (points[:, axis][triangles].T for axis in range(2))
-    return np.asarray(np.abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)))
-
-
-def _edge(double: Floats | float) -> Floats:
-    """The edges of equilateral triangles of such areas."""
-    return np.asarray(np.sqrt(double * (2.0 / np.sqrt(3.0))))
-
-
-def heights_now(topology: Topology, beside: Ints, before: Floats, now: Floats) -> Floats:
-    """How many times as high as before cells are over the edges of a wall, in the median, for each wall along which
-    they had one height, or one ratio of height and length, and that has FEWEST edges or more.
-
-    beside: as of a survey. before, now: (N, 2) points by places in memory. No wall is looked at where the areas of few
-    cells have changed by more than HIGHER, or where those of three quarters are uneven.
-    """
-    found, rows = list[float](), topology.near[beside]
-    first, last = (np.log(_double(each, rows) + TINY) for each in (before, now))
-    if np.count_nonzero(np.abs(last - first) > HIGHER) < FEWEST // 2:  # so it is with most meshes
-        return np.array(found)
-    steps = np.sort(np.abs(np.diff(first)))  # cells that lie near one another stand so in memory
-    if steps[len(steps) // 4] > ONE_HEIGHT:  # so it is with random ones
-        return np.array(found)
-    for edges, cells in _walls(topology.simplices, _on_boundary(rim_of(topology)), beside):
-        if len(edges) < FEWEST:
-            continue
-        first, length = _log_heights(before, topology.near[cells], edges)
-        if min(spread(first), spread(first - length)) <= ONE_HEIGHT:
-            last, _ = _log_heights(now, topology.near[cells], edges)
-            found.append(float(np.exp(np.median(last - first))))
-    return np.array(found)
-
-
-def _log_heights(points: Floats, triangles: Ints, edges: Ints) -> tuple[Floats, Floats]:
-    """Logarithms of the heights of cells over edges, and of their lengths."""
-    way = points[edges[:, 1]] - points[edges[:, 0]]
-    length = np.log(np.hypot(way[:, 0], way[:, 1]) + TINY)
-    return np.log(_double(points, triangles) + TINY) - length, length
-
-
-def _on_boundary(rim: NDArray[np.uint8]) -> Flags:
-    return np.asarray((rim & BOUNDARY) > 0)
-
-
-def _walls(simplices: Simplices, boundary: Flags, beside: Ints) -> list[tuple[Ints, Ints]]:
-    """The boundary edges (k, 2) of each piece of the boundary that hangs together, and a row of the cell at each.
-
-    boundary: (N,) by places. beside: rows with two nodes of it or more.
-    """
-    shapes = simplices.shapes
-    edges = simplices.rows[beside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    at_rim = boundary[edges].all(axis=1)
-    if shapes is not None:  # of a corner of a quad, the edge to the next one: so each edge of a cell counts once
-        at_rim &= np.repeat(shapes[beside] == EQUILATERAL, 3) | (np.arange(len(edges)) % 3 == 0)
-    outer = np.flatnonzero(at_rim)
-    ends = np.sort(edges[outer], axis=1)
-    key = ends[:, 0].astype(np.int64) * len(boundary) + ends[:, 1]
-    # An edge between two of these nodes that is not on the boundary has both of its cells among these rows.
-    _, place, count = np.unique(key, return_index=True, return_counts=True)
-    once = place[count == 1]
-    ends, cells = ends[once], beside[outer[once] // 3]
-    piece = pieces(ends, boundary)[ends[:, 0]]
-    order = np.argsort(piece, kind="stable")
-    parts = np.split(order, np.flatnonzero(np.diff(piece[order])) + 1)
-    return [(ends[part], cells[part]) for part in parts if len(part)]
 
 
 def _rows_near(points: Floats, triangles: Ints, wall: Floats, near: float) -> NDArray[np.int64]:

@@ -22,7 +22,8 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.metric.conformity import Conformity, ConformityChange
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
-from gmsnet.preserve.protection import LAYER, WALL, Protection, carried_note, height_note, wall_note
+from gmsnet.preserve.protection import LAYER, WALL, Protection, carried_note, wall_note
+from gmsnet.preserve.wall_heights import height_note
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.state import Final, State, with_corners
@@ -57,8 +58,9 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
     claimed = state.second_order is not None and state.stop_reason == TARGET_REACHED  # by stages for their own cells
     if claimed and len(options.target.missed_in(final.after)):
         state = state.ended(NO_PROGRESS if state.history else NOTHING_TO_MOVE)
-    if final.moved.any() and not state.before.inverted and state.motion is None:
-        heights = height_note(state.protection, state.start, state.points)
+    beside = state.protection.beside
+    if beside is not None and final.moved.any() and not state.before.inverted and state.motion is None:
+        heights = height_note(beside, state.start, state.points)
         state = replace(state, remarks=(*state.remarks, *heights))
     nothing = np.empty((0, 2))
     shapes = np.empty(0, dtype=np.float32)
