@@ -13,6 +13,7 @@ from gmsnet.constraints.facets import Facets
 from gmsnet.constraints.features import dot
 from gmsnet.constraints.outline import Flags, Longs
 from gmsnet.constraints.patches import linked
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 
 Floats = NDArray[np.float64]
 LEVEL = 1e-6  # of the length of edges, and of the extent of the part: what is so near to a plane is in it
@@ -61,7 +62,7 @@ def _with_inner_nodes(rows: Longs, part: Longs, count: int) -> Flags:
 
 def _plane(chosen: Longs, points: Floats, rows: Longs, normal: Floats) -> Chart | None:
     """The plane of a part; None where it is none, or has no boundary, and so no side that is up."""
-    nodes = np.unique(rows[chosen])
+    nodes = sorted_unique(rows[chosen])
     at = points[nodes]
     upward, size = normal[chosen].sum(axis=0), np.ptp(at, axis=0)
     extent = float(size.max())

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.topology import chains, winding
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.polygons import Faces, Ints, Offsets, offset_type
 
@@ -42,7 +43,7 @@ def outline_of(mesh: Mesh) -> Outline:
     side_keys = edge_keys(faces.corner[halves], head[halves], nodes)
     lines, marks, still = line_cells(mesh)
     line_keys = edge_keys(lines[:, 0], lines[:, 1], nodes)
-    on_lines = _half_edges_on(np.unique(line_keys), faces, head, nodes)
+    on_lines = _half_edges_on(sorted_unique(line_keys), faces, head, nodes)
     still |= _still(mesh, faces, twin, np.union1d(halves, on_lines))
     still[lines[~np.isin(line_keys, edge_keys(faces.corner[on_lines], head[on_lines], nodes))]] = True
 

@@ -18,6 +18,7 @@ from gmsnet.distributed.loan import SHARE, Loan, around, read_alike
 from gmsnet.distributed.numbering import NO_NUMBERS, Numbers
 from gmsnet.distributed.part import Part
 from gmsnet.kernels.star.constraint import Constraint
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.methods.base import Field
 from gmsnet.parallel.executor import Executor, Figure, Figures, Result
 from gmsnet.parallel.threads import serial
@@ -229,7 +230,7 @@ class Ranks:
 
     def blocks_with(self, rows: NDArray[np.int32], size: int) -> NDArray[np.int32]:
         """See Executor."""
-        found = np.unique(np.concatenate(self.comm.allgather(np.unique(self.numbers[rows // size]))))
+        found = sorted_unique(np.concatenate(self.comm.allgather(sorted_unique(self.numbers[rows // size]))))
         return np.flatnonzero(np.isin(self.numbers, found)).astype(np.int32)
 
     def minimum(self, value: Figure) -> Figure:

@@ -35,6 +35,7 @@ from gmsnet.io.ranges import Column, Plan, put
 from gmsnet.io.rows import AT_ONCE, Ranges, Rows
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.vtk_ghosts import GHOST_CELLS
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 
 Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
@@ -239,7 +240,7 @@ def _renumbered(
 
 
 def _ids_of(nodes: Sequence[Ids]) -> Ids:
-    found: Ids = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *(each.ravel() for each in nodes)]))
+    found: Ids = sorted_unique(np.concatenate([np.empty(0, dtype=np.int64), *(each.ravel() for each in nodes)]))
     return found
 
 

@@ -19,6 +19,7 @@ from gmsnet.io.cells import distinct
 from gmsnet.io.face_ranges import FaceLists, SomeFaces
 from gmsnet.io.foam_cells import SHAPES, Sides, walls
 from gmsnet.io.rows import Ranges, share
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 
 Ids = NDArray[np.int64]
@@ -116,7 +117,7 @@ def _held(comm: Any, lists: FaceLists, mine: SomeFaces, first: int, nodes: int, 
     everywhere(comm, lambda: said(lambda: _within(points, nodes, "points")))
     lists_of = by_rank(homes(cuts(lists.count, comm.size), faces), comm.size)
     here = np.concatenate(comm.alltoall([faces[rows] for rows in lists_of]))
-    return np.concatenate([mine.take(np.unique(here - first)).nodes, points])
+    return np.concatenate([mine.take(sorted_unique(here - first)).nodes, points])
 
 
 def _within(ids: Ids, most: int, what: str) -> None:

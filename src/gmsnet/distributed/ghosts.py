@@ -17,6 +17,7 @@ from gmsnet.distributed.agreement import agreed, raise_everywhere
 from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.piece import Cells, Ids, Piece
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -109,7 +110,7 @@ def _parcels(piece: Piece, nodes: Nodes, comm: Any) -> list[tuple[Nodes, tuple[C
             chosen[rank].append(block.take(rows))
     found = []
     for blocks in chosen:
-        ids = np.unique(np.concatenate([nodes.ids[:0], *(block.nodes.ravel() for block in blocks)]))
+        ids = sorted_unique(np.concatenate([nodes.ids[:0], *(block.nodes.ravel() for block in blocks)]))
         found.append((nodes.of(ids), tuple(blocks) if len(ids) else ()))
     return found
 

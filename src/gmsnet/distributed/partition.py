@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from gmsnet.distributed.frame import box_of
 from gmsnet.distributed.library import metis
 from gmsnet.kernels.topology.layout import morton_codes
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.mesh import Mesh
 
 Ranks = NDArray[np.int32]
@@ -79,7 +80,7 @@ def _by_metis(library: object, mesh: Mesh, ranks: int) -> Ranks:
     nodes = len(mesh.points)
     pairs = np.concatenate([*ends, np.empty((0, 2), dtype=np.int64)])
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    keys = np.unique(np.concatenate([pairs[:, 0] * nodes + pairs[:, 1], pairs[:, 1] * nodes + pairs[:, 0]]))
+    keys = sorted_unique(np.concatenate([pairs[:, 0] * nodes + pairs[:, 1], pairs[:, 1] * nodes + pairs[:, 0]]))
     start = np.zeros(nodes + 1, dtype=np.int64)
     np.cumsum(np.bincount(keys // nodes, minlength=nodes), out=start[1:])
     graph = library.CSRAdjacency(start, keys % nodes)  # type: ignore[attr-defined]

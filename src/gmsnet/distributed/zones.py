@@ -14,6 +14,7 @@ from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.joining import joined_points
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.piece import Cells
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 
 Ids = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -39,7 +40,7 @@ class Shared(NamedTuple):
 def named_here(comm: Any, rows: Ids, nodes: Ids) -> Ids:
     """All ranks call it: those of the nodes that this rank keeps that any rank names, ascending. rows: see Shared."""
     lists = by_rank(homes(rows, nodes), comm.size)
-    return np.unique(np.concatenate(comm.alltoall([nodes[some] for some in lists])))
+    return sorted_unique(np.concatenate(comm.alltoall([nodes[some] for some in lists])))
 
 
 def with_vertices(

@@ -14,6 +14,7 @@ from scipy.spatial import Delaunay, QhullError
 from gmsnet.errors import InputError
 from gmsnet.generate.marked import marked
 from gmsnet.generate.outline import inside
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -70,7 +71,7 @@ def labelled(mesh: Triangulation, markers: Sequence[str], *, scale: float = 1.0)
 def unique_edges(triangles: Ints) -> Ints:
     """(E × 2) each edge once, the smaller number first, in the order of the numbers."""
     nodes = int(triangles.max(initial=0)) + 1
-    return np.column_stack(np.divmod(np.unique(_keys(_edges(triangles), nodes)), nodes))
+    return np.column_stack(np.divmod(sorted_unique(_keys(_edges(triangles), nodes)), nodes))
 
 
 def _edges(triangles: Ints) -> Ints:
@@ -125,5 +126,5 @@ def _check(points: Floats, segments: Ints, triangles: Ints) -> None:
     (x0, y0), (x1, y1) = ((points[segments[:, k]] - points[0]).T for k in range(2))
     enclosed = float(np.sum(x0 * y1 - x1 * y0))
     filled = abs(float(area.sum()) - enclosed) <= 1e-9 * enclosed and bool((area > 0).all())
-    if not (boundary and filled and len(np.unique(triangles)) == len(points)):
+    if not (boundary and filled and len(sorted_unique(triangles)) == len(points)):
         raise InputError("rounding spoils the triangulation of these nodes; take another seed or rings less flat")

@@ -12,6 +12,7 @@ from gmsnet.generate.arguments import one_of
 from gmsnet.generate.random import generator
 from gmsnet.kernels.simplex import orientation3
 from gmsnet.kernels.simplex.predicates import signs
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -89,10 +90,10 @@ def _landed(old: Floats, shift: Floats, *, single: bool) -> Floats:
 def keep_orientation(old: Floats, shift: Floats, corners: Ints, *, single: bool) -> None:
     """Halves shifts (N × D, in place) until every corner simplex (T × (D + 1)) has its old orientation."""
     sign = orientations(old, corners)
-    shift[np.unique(corners[sign == 0])] = 0.0
+    shift[sorted_unique(corners[sign == 0])] = 0.0
     halvings = 0
     while (broken := orientations(_landed(old, shift, single=single), corners) != sign).any():
-        shift[np.unique(corners[broken])] *= 0.5 if halvings < 60 else 0.0
+        shift[sorted_unique(corners[broken])] *= 0.5 if halvings < 60 else 0.0
         halvings += 1
 
 

@@ -14,6 +14,7 @@ from gmsnet.generate.curves import Curve
 from gmsnet.generate.good import good_mesh
 from gmsnet.generate.shaped import Shaped, faced
 from gmsnet.generate.surfaces import UP, in_faces
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -102,7 +103,7 @@ def _extruded(flat: Mesh, sides: Mapping[str, Shape], height: float, cells: str,
     names = [flat.region_names[1, k] for k in flat.cells[1].regions.tolist()]
     points, at = flat.points.copy(), np.array(names)
     for name, shape in sides.items():
-        ends = np.unique(segments[at == name])
+        ends = sorted_unique(segments[at == name])
         inner = np.setdiff1d(ends, segments[at != name])
         points[inner, :2] = shape.project(np.column_stack([points[inner, :2], np.zeros(len(inner))]))[:, :2]
     edge = np.linalg.norm(np.diff(points[segments], axis=1), axis=-1).mean()

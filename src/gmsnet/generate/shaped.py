@@ -13,6 +13,7 @@ from gmsnet.errors import InputError
 from gmsnet.generate.arguments import one_of, positive
 from gmsnet.generate.disturb import EDGES, corner_triangles, edge_lengths, edges_of, orientations, random_directions
 from gmsnet.generate.random import generator
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -117,5 +118,5 @@ def _broken(points: Floats, triangles: Ints, of: Ints, faces: list[Shape], cells
         along[rows] = (normal[rows] * face.normal(face.project(centre[rows]))).sum(axis=1)
     bad = [triangles[along <= 0.0].ravel()]
     bad += [nodes[orientations(points, nodes) <= 0].ravel() for nodes in cells]
-    found: Ints = np.unique(np.concatenate(bad))
+    found: Ints = sorted_unique(np.concatenate(bad))
     return found

@@ -9,6 +9,7 @@ from scipy.spatial import ConvexHull
 from gmsnet.generate.arguments import positive, whole_number
 from gmsnet.generate.marked_volume import SIDES, marked_volume, on_sides, outer_faces
 from gmsnet.generate.random import generator
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.mesh import Mesh
 
 Floats = NDArray[np.float64]
@@ -78,8 +79,8 @@ def part_volume(cells: int, *, size: float = 1.0) -> Mesh:
     faces = outer_faces({"tetra": rows})["triangle"]
     of = _on_part(points, faces)
     holes = [
-        (np.unique(faces[of == len(SIDES)]), _from_cylinder),
-        (np.unique(faces[of == len(SIDES) + 1]), _from_sphere),
+        (sorted_unique(faces[of == len(SIDES)]), _from_cylinder),
+        (sorted_unique(faces[of == len(SIDES) + 1]), _from_sphere),
     ]
     least = KEPT * determinants(points, rows)
     for _ in range(ROUNDS):
@@ -170,5 +171,5 @@ def _halved(points: Floats, shift: Floats, rows: Ints, least: Floats) -> Floats:
         bad = determinants(points + shift, rows) < least
         if not bad.any():
             return shift
-        shift[np.unique(rows[bad])] *= 0.5
+        shift[sorted_unique(rows[bad])] *= 0.5
     return np.zeros_like(shift)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.io.gmsh_sections import KINDS
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -130,7 +131,7 @@ def _groups(gmsh: Any, tags: Ints, taken: Mapping[tuple[int, int], str]) -> dict
         if name and name not in taken.values():
             nodes, _ = gmsh.model.mesh.getNodesForPhysicalGroup(dimension, tag)
             found.setdefault(name, []).append(_rows(tags, np.asarray(nodes).astype(np.int64)))
-    return {name: np.unique(np.concatenate(rows)) for name, rows in found.items()}
+    return {name: sorted_unique(np.concatenate(rows)) for name, rows in found.items()}
 
 
 def _rows(tags: Ints, wanted: Ints) -> Ints:

@@ -21,6 +21,7 @@ from gmsnet.io.cell_table import table_blocks
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed
 from gmsnet.io.fields import of_abaqus
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 
 __all__ = ["name", "read", "suffixes", "write"]
@@ -54,7 +55,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
     }
     sets = node_sets.by_name()
     for told, members in element_sets.by_name({*sets, *names.values()}).items():
-        sets[told] = np.unique(cells.nodes_of(members))
+        sets[told] = sorted_unique(cells.nodes_of(members))
     for number, (key, nodes) in enumerate(held.items(), len(names) + 1):
         blocks.append(CellBlock("vertex", nodes[:, None], np.full(len(nodes), number)))
         region_names[0, number] = key

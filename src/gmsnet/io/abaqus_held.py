@@ -8,6 +8,7 @@ from gmsnet.io.abaqus_deck import Deck, Section
 from gmsnet.io.abaqus_scopes import Scope, Scopes
 from gmsnet.io.abaqus_sets import Ints, Sets, numeric
 from gmsnet.io.text import Starts
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 
 KEYWORDS = ("BOUNDARY", "CLOAD", "CFLUX", "EQUATION", "MPC")
 
@@ -31,9 +32,9 @@ def named_nodes(deck: Deck, scopes: Scopes, scope: Scope, section: Section, sets
             parts.append(sets.numbers.places(deck, scopes.named(instance), np.array([start]), one))
         elif (members := sets.named(scopes, scope, word)) is None:
             deck.text.fail(start, f"no set of nodes is called {deck.text.word(start)} before here")
-        elif len(np.unique(members)) < sets.numbers.count:
+        elif len(sorted_unique(members)) < sets.numbers.count:
             parts.append(members)
-    return np.unique(np.concatenate(parts))
+    return sorted_unique(np.concatenate(parts))
 
 
 def _words(deck: Deck, section: Section) -> Starts:

@@ -11,6 +11,7 @@ from gmsnet.io.abaqus_deck import Deck, Section
 from gmsnet.io.abaqus_scopes import TOP, Scope, Scopes
 from gmsnet.io.cells import counted, first_repeated, joined, places_of
 from gmsnet.io.text import Starts, Text
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 
 Ints = NDArray[np.int64]
 MOST_IN_STEPS = 50  # members of ranges with a step, for each that there is: the ranges must not be each other
@@ -114,7 +115,7 @@ class Sets:
         """Puts members into a set, which may be there already."""
         key = scope, name.upper()
         if len(members) > self.numbers.count:  # sets of sets may name each of them again and again
-            members = np.unique(members)
+            members = sorted_unique(members)
         self.found.setdefault(key, []).append(members)
         self.shown.setdefault(key, name)
 
@@ -165,4 +166,4 @@ class Sets:
             members = self.get(*key)
             if name not in others and members is not None and len(members):
                 out.setdefault(name, []).append(members)
-        return {name: np.unique(np.concatenate(parts)) for name, parts in out.items()}
+        return {name: sorted_unique(np.concatenate(parts)) for name, parts in out.items()}

@@ -30,6 +30,7 @@ from gmsnet.io.splice import Share
 from gmsnet.io.stored import Part as Axis
 from gmsnet.io.stored import coordinates, shared
 from gmsnet.io.vtk_ghosts import with_vertices
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -60,7 +61,7 @@ def _one(parts: list[Parsed]) -> Parsed:
         raise FormatError("no zone has cells: there is nothing to smooth")
     whole = merged([Part(part) for part in parts])
     slots = shared([Share(part.slots, node) for part, node in zip(parts, whole.nodes, strict=True)])
-    sets = {name: np.unique(node[nodes]) for part, node in zip(parts, whole.nodes, strict=True)
+    sets = {name: sorted_unique(node[nodes]) for part, node in zip(parts, whole.nodes, strict=True)
             for name, nodes in part.node_sets.items()}  # fmt: skip
     unread = [f"the division into {len(parts)} zones", *dict.fromkeys(whole.parsed.unread)]
     parsed = replace(whole.parsed, slots=slots, node_sets=sets, unread=unread)
@@ -143,7 +144,7 @@ def _conditions(zone: Node, count: int) -> Iterator[tuple[str, Ints]]:
                 continue
             nodes = listed.integers().reshape(-1) - 1
             if len(nodes) and 0 <= nodes.min() <= nodes.max() < count:
-                yield title(condition), np.unique(nodes)
+                yield title(condition), sorted_unique(nodes)
 
 
 def plan(file: Ranges) -> Plan | None:

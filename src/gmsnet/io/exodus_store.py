@@ -23,6 +23,7 @@ from gmsnet.io.hdf5_rows import rows_of
 from gmsnet.io.rows import Listed, Rows
 from gmsnet.io.splice import Points, Slots
 from gmsnet.io.stored import Column, ColumnSlots, Part, coordinates
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 
 
 class Store(Protocol):
@@ -246,7 +247,7 @@ def node_sets(store: Store, count: int) -> dict[str, NDArray[np.int64]]:
         nodes = store.integers(f"node_ns{k + 1}").reshape(-1) - 1
         check_range(nodes, count, blame(f"node_ns{k + 1}"))
         title = titles[k] if titles[k] and titles[k] not in found else f"node set {ids[k]}"
-        found[title] = np.unique(nodes)
+        found[title] = sorted_unique(nodes)
     return found
 
 

@@ -23,6 +23,7 @@ from gmsnet.io.foam_cells import Sides, volumes, walls
 from gmsnet.io.places import Lattice, Places
 from gmsnet.io.splice import BinarySlots, Points, TextSlots
 from gmsnet.io.text import Text, fail
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.mesh import Mesh
 
 name = "Fluent"
@@ -73,7 +74,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
 def _images(found: list[Section], zones: Ints, sizes: Ints, nodes: Ints) -> Ints:
     """The nodes of periodic boundaries."""
     periodic = [k.zone for k in found if k.key in FACES and k.body and len(k.head) > 3 and k.head[3] in PERIODIC]
-    return np.unique(nodes[np.repeat(np.isin(zones, periodic), sizes)])
+    return sorted_unique(nodes[np.repeat(np.isin(zones, periodic), sizes)])
 
 
 def _points(data: Data, found: list[Section], dimension: int) -> tuple[Points, TextSlots | BinarySlots]:

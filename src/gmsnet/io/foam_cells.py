@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gmsnet.cells.table import face_name
 from gmsnet.io.places import ranges
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 
 Ints = NDArray[np.int64]
@@ -34,7 +35,7 @@ class Faces(NamedTuple):
 
     def points_of(self, chosen: Ints) -> Ints:
         """(n,) the points of some faces, each once."""
-        found: Ints = np.unique(self.points[ranges(self.starts[chosen], self.sizes[chosen])])
+        found: Ints = sorted_unique(self.points[ranges(self.starts[chosen], self.sizes[chosen])])
         return found
 
     def corners(self, chosen: Ints, size: int) -> Ints:

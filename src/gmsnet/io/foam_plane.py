@@ -15,6 +15,7 @@ from gmsnet.cells.table import face_name
 from gmsnet.io.foam_cells import Faces, Ints
 from gmsnet.io.foam_patches import Patch
 from gmsnet.io.places import ranges
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 
 NEAR = 1e-6  # of the extent: so near are two points of which one is behind the other
@@ -60,7 +61,7 @@ def _paired(points: NDArray[np.float64], axes: tuple[int, int], back: NDArray[np
         mate[orders[1]] = orders[0]
     else:
         distance, mate = cKDTree(one).query(other)
-        if distance.max() > near or len(np.unique(mate)) != len(front):
+        if distance.max() > near or len(sorted_unique(mate)) != len(front):
             return None
     node = np.empty(len(points), dtype=np.int64)
     node[front], node[behind] = np.arange(len(front)), mate

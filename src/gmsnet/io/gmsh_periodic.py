@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from gmsnet.io import gmsh_sections as sections
 from gmsnet.io.cells import joined, places_of, sealed
 from gmsnet.io.words import TextWords, Words
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 
 _AFFINE = 17  # tokens of a transformation of version 2.2: a word and 16 numbers
 
@@ -33,4 +34,4 @@ def _is_word(words: Words, word: bytes) -> bool:
 def nodes_of_images(images: NDArray[np.int64], tags: NDArray[np.int64]) -> NDArray[np.int64]:
     """(n,) the nodes on either side, counted from 0, without those that are not in the file. tags: of all nodes."""
     known = images[np.isin(images, tags).all(axis=1)]
-    return sealed(np.unique(places_of(tags, known.reshape(-1))[0]) if len(known) else np.empty(0, dtype=np.int64))
+    return sealed(sorted_unique(places_of(tags, known.reshape(-1))[0]) if len(known) else np.empty(0, dtype=np.int64))

@@ -20,6 +20,7 @@ from gmsnet.io.medit_sections import HELD, KINDS, SKIPPED, SKIPPED_VALUES, SKIPP
 from gmsnet.io.normals import Normals, in_text
 from gmsnet.io.pieces import Piece, Pieces
 from gmsnet.io.text import Starts, Text
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.normals import FaceCorners
@@ -91,7 +92,7 @@ def _cells(
             else:
                 of = faces.get(key.removeprefix("Required"), np.empty((0, 1), dtype=np.int64))
                 _check_faces(text, key, starts, nodes, len(of))
-                nodes = np.unique(of[nodes.ravel()]).reshape(-1, 1)
+                nodes = sorted_unique(of[nodes.ravel()]).reshape(-1, 1)
             cells.append(CellBlock("vertex", nodes, np.full(len(nodes), HELD[key])))
             names[0, HELD[key]] = key
     return cells, names

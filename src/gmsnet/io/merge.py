@@ -13,6 +13,7 @@ from gmsnet.errors import FormatError
 from gmsnet.io.document import Parsed
 from gmsnet.io.splice import Share, Untouched
 from gmsnet.io.vtk_ghosts import LEVELS, TYPES, ghosts, with_vertices
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 
 Ints = NDArray[np.int64]
@@ -62,9 +63,9 @@ def merged(parts: Sequence[Part]) -> Merged:
     names = {key: name for part in parts for key, name in part.parsed.region_names.items()}
     unread = [text for part in parts for text in part.parsed.unread] + [f"the point data {name!r}" for name in lost]
     single = any(part.parsed.single for part in parts)
-    images = np.unique(np.concatenate([node[part.parsed.images] for part, node in zip(parts, nodes, strict=True)]))
+    images = sorted_unique(np.concatenate([node[part.parsed.images] for part, node in zip(parts, nodes, strict=True)]))
     parsed = Parsed(points, cells, Untouched(), names, point_data, cell_data, single, unread, images=images)
-    return Merged(parsed, nodes, np.unique(np.concatenate([node.reshape(-1)[unsure], orphans])))
+    return Merged(parsed, nodes, sorted_unique(np.concatenate([node.reshape(-1)[unsure], orphans])))
 
 
 def one_mesh(parts: Mapping[str, Part], files: int) -> Parsed:

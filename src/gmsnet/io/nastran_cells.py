@@ -12,6 +12,7 @@ from gmsnet.io.cells import places_of
 from gmsnet.io.nastran_lines import LARGE, Bulk, Cards, Ints
 from gmsnet.io.nastran_numbers import lenient, whole
 from gmsnet.io.text import fail
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 
 _TRIANGLE, _QUAD = {3: Kind("triangle")}, {4: Kind("quad")}
@@ -146,7 +147,7 @@ def _of_spc1(bulk: Bulk, cards: Cards, ids: Ints) -> Ints:
     rest = cards.some(~thru)
     most = min(8 * int(rest.count.max(initial=0)), MOST_FIELDS)
     parts += [_known(lenient(bulk, *bulk.field(rest, field)), ids) for field in range(3, most + 1)]
-    return np.unique(np.concatenate(parts))
+    return sorted_unique(np.concatenate(parts))
 
 
 MOST_RANGES = 1000
@@ -156,5 +157,5 @@ def _known(numbers: Ints, ids: Ints) -> Ints:
     """The places of those numbers that are nodes."""
     order = np.argsort(ids, kind="stable")
     at = np.searchsorted(ids, numbers, sorter=order).clip(max=len(ids) - 1)
-    found: NDArray[np.int64] = np.unique(order[at[ids[order[at]] == numbers]])
+    found: NDArray[np.int64] = sorted_unique(order[at[ids[order[at]] == numbers]])
     return found

@@ -16,6 +16,7 @@ from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
 from gmsnet.io.splice import TextSlots
 from gmsnet.io.text import Rows, Text
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -88,7 +89,7 @@ def read(files: Mapping[str, Data]) -> Parsed:
     starts = np.ascontiguousarray(points.columns(0, 3))
     coordinates, ends = text.spans(starts)
     cells = [block for key, rows in elements for block in _blocks(text, key, rows, len(coordinates))]
-    matching = np.unique(np.concatenate([np.empty(0, dtype=np.int64),
+    matching = sorted_unique(np.concatenate([np.empty(0, dtype=np.int64),
                                          *(_identified(text, rows, len(points)) for rows in images)]))  # fmt: skip
     slots = TextSlots(starts, ends)
     return Parsed(coordinates, cells, slots, names, unread=list(dict.fromkeys(unread)), images=matching)

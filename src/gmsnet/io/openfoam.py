@@ -23,6 +23,7 @@ from gmsnet.io.foam_plane import Plane, cells_in, plane_of
 from gmsnet.io.foam_ranges import plan as plan
 from gmsnet.io.places import Places
 from gmsnet.io.splice import BinarySlots, Slots, TextSlots
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -64,8 +65,8 @@ def facts(files: Mapping[str, Data], whole: bool = True) -> Facts:
         blocks = cells_in(plane, found, known, back, regions)
         slots = _in_plane(slots, plane)
         rows = plane.points
-        points, held = sealed(points[plane.points][:, plane.axes]), np.unique(plane.node[held])
-        images = np.unique(plane.node[images])
+        points, held = sealed(points[plane.points][:, plane.axes]), sorted_unique(plane.node[held])
+        images = sorted_unique(plane.node[images])
     else:
         blocks = volumes(found, Sides.of(found, 0, cells), regions) + _walls(found, known)
     dimension = 2 if plane is not None else 3
@@ -123,7 +124,7 @@ def _of_zones(files: Mapping[str, Data], found: Faces, points: int) -> Ints:
             parts.append(found.points_of(members))
     if "pointZones" in files:
         parts += [members for _, members in zones(files["pointZones"], "pointZones", points)]
-    return np.unique(np.concatenate(parts))
+    return sorted_unique(np.concatenate(parts))
 
 
 def _walls(found: Faces, known: list[Patch]) -> list[CellBlock]:

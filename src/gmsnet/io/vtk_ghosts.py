@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.io.document import Parsed
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 
 TYPES, LEVELS = "vtkGhostType", "vtkGhostLevels"  # the latter until VTK 7
@@ -39,7 +40,7 @@ def marked(values: NDArray[Any], bits: int) -> NDArray[np.bool_]:
 def held(parsed: Parsed) -> Parsed:
     """The same file with the nodes of its ghost cells held: a piece by itself must not move what others move, too."""
     nodes = [block.nodes[marks].ravel() for block, marks in zip(parsed.cells, ghosts(parsed), strict=True)]
-    return with_vertices(parsed, np.unique(np.concatenate(nodes)), GHOST_CELLS)
+    return with_vertices(parsed, sorted_unique(np.concatenate(nodes)), GHOST_CELLS)
 
 
 def with_vertices(parsed: Parsed, nodes: NDArray[np.int64], name: str) -> Parsed:

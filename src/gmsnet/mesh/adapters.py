@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gmsnet.errors import InputError
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.array_forms import (
     Restore,
     dimension_of,
@@ -218,7 +219,7 @@ def _mesh(
     for name, ids in (cell_sets or {}).items():
         parts = np.split(np.isin(np.arange(len(region)), ids), breaks)
         nodes = [nodes[part].ravel() for (_, nodes), part in zip(blocks, parts, strict=True)]
-        node_sets[name] = np.unique(np.concatenate([node_sets.get(name, np.zeros(0, dtype=np.int64)), *nodes]))
+        node_sets[name] = sorted_unique(np.concatenate([node_sets.get(name, np.zeros(0, dtype=np.int64)), *nodes]))
     cells = tuple(
         CellBlock(kind, nodes, part)
         for (kind, nodes), part in zip(blocks, np.split(region, breaks), strict=bool(blocks))

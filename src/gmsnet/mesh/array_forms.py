@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gmsnet.cells.table import CELLS, face_name
 from gmsnet.errors import InputError
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.arrays import coordinates, plain_array, whole_numbers
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.checks import items_of
@@ -65,7 +66,7 @@ def mesh_from_arrays(
             region_names[1, lowest] = name
             lowest += 1
         elif nodes.ndim == 1:
-            node_sets[name] = np.unique(members(nodes, len(array), f"marker {name!r}", "nodes"))
+            node_sets[name] = sorted_unique(members(nodes, len(array), f"marker {name!r}", "nodes"))
         else:
             raise InputError(
                 f"marker {name!r} must be pairs of nodes (E, 2), node ids or a mask, got the shape {nodes.shape}"

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.arrays import plain_array
 from gmsnet.mesh.cell_block import CellBlock, cells_in_words
 from gmsnet.mesh.checks import (
@@ -270,4 +271,4 @@ class Mesh:
             for region in np.unique(block.regions).tolist():
                 for name in marker_names(self.region_names, block.dimension, region):
                     nodes.setdefault(name, []).append(block.nodes[block.regions == region].ravel())
-        return {name: np.unique(np.concatenate(ids)) for name, ids in nodes.items()}
+        return {name: sorted_unique(np.concatenate(ids)) for name, ids in nodes.items()}

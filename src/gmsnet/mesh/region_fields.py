@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
+
 WORDS = (  # FreeFEM writes Label, deal.II MaterialID, MFEM attribute, Gmsh CellEntityIds, Elmer GeometryIds
     *("mat", "material", "region", "zone", "domain", "subdomain", "physical", "attribute"),
     *("entity", "ref", "tag", "part", "block", "group", "label", "marker", "geometry", "family"),
@@ -77,7 +79,7 @@ def names_of_rows(rows: Iterable[Any]) -> dict[tuple[int, int], str]:
 def _numbers_cells(values: NDArray[Any]) -> bool:
     """Whether each of many cells has a value of its own."""
     count = len(values)  # that the first of them differ is seldom, and quickly told
-    return count >= NUMBERED and all(len(np.unique(part)) == len(part) for part in (values[:NUMBERED], values))
+    return count >= NUMBERED and all(len(sorted_unique(part)) == len(part) for part in (values[:NUMBERED], values))
 
 
 def _whole(values: NDArray[Any]) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.arrays import plain_array
 from gmsnet.mesh.checks import in_words
 from gmsnet.mesh.mesh import Mesh
@@ -45,7 +46,7 @@ def chosen_nodes(mesh: Mesh, chosen: Any, what: str) -> NDArray[np.int64]:
     values, forms, count = _values(chosen, what), f"{what} {FORMS}", len(mesh.points)
     if values.dtype.kind == "U":
         named = [_nodes_of(mesh, name) for name in values.ravel().tolist()]
-        return named[0] if len(named) == 1 else np.unique(np.concatenate(named))
+        return named[0] if len(named) == 1 else sorted_unique(np.concatenate(named))
     if values.dtype == bool:
         if values.shape != (count,):
             raise InputError(f"a mask of {what} nodes needs one value per node, {(count,)}, got shape {values.shape}")

@@ -9,6 +9,7 @@ import numpy as np
 
 from gmsnet.cells.table import CELLS
 from gmsnet.errors import InputError
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.array_forms import Restore, from_pair, in_precision_of, mesh_from_arrays
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.region_fields import combined
@@ -41,7 +42,7 @@ def from_skfem(thing: Any) -> tuple[Mesh, Restore]:
     facets = np.asarray(thing.facets).T if thing.boundaries else np.zeros((0, 2), dtype=np.int64)
     markers = {name: facets[np.asarray(ids)] for name, ids in (thing.boundaries or {}).items()}
     if CELLS[kind].dimension == 3:
-        markers = {name: np.unique(nodes) for name, nodes in markers.items()}
+        markers = {name: sorted_unique(nodes) for name, nodes in markers.items()}
     mesh, back = mesh_from_arrays(points, {kind: cells}, regions, markers), in_precision_of(points)
     return mesh, lambda new: dataclasses.replace(thing, doflocs=np.ascontiguousarray(back(new).T))
 

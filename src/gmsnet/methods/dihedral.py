@@ -20,6 +20,7 @@ from gmsnet.kernels.methods.descent3 import sweep3
 from gmsnet.kernels.simplex.objectives3 import DIHEDRAL, Aim3
 from gmsnet.kernels.star.guard import STAR, Guard, MeshGuard
 from gmsnet.kernels.star.space_blocks import SpaceBlocks
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.measure.dihedral import WIDE, ratios_of, renew, worst
 from gmsnet.methods.again import over_changing
 from gmsnet.methods.base import Field, Smoother, Tally
@@ -83,7 +84,7 @@ class Dihedral(Smoother):
             chosen = ranked.rows[ranked.measure < self.goal]
             if not ranked.least < self.goal:
                 return tally
-            nodes = np.unique(cells.rows[chosen])
+            nodes = sorted_unique(cells.rows[chosen])
             nodes = nodes[topology.near_free[nodes]]
             enough = min(ranked.most, self.goal)
             aim = Aim3(DIHEDRAL, cycle.doublings, self.wide, math.radians(enough), max(guard.floor, 0.0))

@@ -14,6 +14,7 @@ from gmsnet.kernels.curved.raise3 import raise_nodes3
 from gmsnet.kernels.curved.stars3 import NO_FOLLOWER, CurvedSolids, put_all
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import Guard, MeshGuard, Precision
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.measure.solid import exact_signs_of
 from gmsnet.methods.floor import floor_of
 from gmsnet.topology.curved_solids import CURVED
@@ -173,5 +174,5 @@ class SolidCells(NamedTuple):
     def _corners(self, cells: Ints) -> Ints:
         """The corners of some cells."""
         nodes, kinds = self.mesh.cells[cells, :8], self.mesh.kinds[cells]
-        found: Ints = np.unique(nodes[np.arange(8) < self.mesh.corners[kinds][:, None]]).astype(np.int64)
+        found: Ints = sorted_unique(nodes[np.arange(8) < self.mesh.corners[kinds][:, None]]).astype(np.int64)
         return found

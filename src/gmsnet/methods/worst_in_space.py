@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.methods.barrier3 import K3, Power3, sweep3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.space_blocks import SpaceBlocks
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.measure.dihedral import ratios_of, renew
 from gmsnet.methods.base import Field, Smoother, Tally, over_stars
 from gmsnet.parallel.executor import Executor
@@ -50,7 +51,7 @@ class WorstInSpace(Smoother):
         before = after = _most(ratios, executor)
         every = executor.counted(np.ones(len(ratios), dtype=bool))
         for share, number, sweeps in CYCLES:
-            nodes = np.unique(cells.rows[executor.lowest_rows(-ratios, how_many(self.times * share, every))])
+            nodes = sorted_unique(cells.rows[executor.lowest_rows(-ratios, how_many(self.times * share, every))])
             nodes = nodes[topology.near_free[nodes]]
             stars = topology.stars_of(nodes.astype(np.int64))
             power = Power3.of(number, min(after / K3, 1e30))

@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
 
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.motion.prescribed import Prescribed
 from gmsnet.motion.rotations import Rotations, rotations_in
 from gmsnet.topology.outline import held_edges
@@ -113,7 +114,7 @@ def outline(topology: Topology | Volume, moved: Flags) -> Ints:
 def _parts(edges: Ints, count: int) -> list[Nodes]:
     """The nodes of each connected part of a graph, without nodes that have no edge."""
     number = scipy.sparse.csgraph.connected_components(_graph(edges, count), directed=False)[1]
-    nodes = np.unique(edges)
+    nodes = sorted_unique(edges)
     order = np.argsort(number[nodes], kind="stable")
     nodes, number = nodes[order], number[nodes[order]]
     return np.split(nodes, np.flatnonzero(np.diff(number)) + 1) if len(nodes) else []

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.arrays import plain_array
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.plane import in_plane
@@ -97,7 +98,7 @@ class Prescribed:
 
     def rotate(self, ids: NDArray[np.int64], degrees: float, centre: Sequence[float], axis: Sequence[float]) -> None:
         """Turns some nodes about a centre, counter-clockwise; in space about an axis (3,) that points at the viewer."""
-        ids = np.unique(ids)
+        ids = sorted_unique(ids)
         with np.errstate(over="ignore", invalid="ignore"):
             self.places[ids] = (self.places[ids] - centre) @ _matrix(degrees, axis).T + centre
         turn = math.radians(degrees) * np.array(axis)

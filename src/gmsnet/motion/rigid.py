@@ -24,6 +24,7 @@ import scipy.sparse
 import scipy.spatial
 from numpy.typing import NDArray
 
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.kernels.whole import multigrid
 from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.multigrid import Multigrid, approach
@@ -65,7 +66,7 @@ class Follower:
         corners = rows.shape[1]
         edges = np.concatenate([rows[:, [i, j]] for i in range(corners) for j in range(i + 1, corners)])
         edges = np.sort(edges[free[edges].any(axis=1)], axis=1)
-        key = np.unique(edges[:, 0].astype(np.int64) * len(free) + edges[:, 1])
+        key = sorted_unique(edges[:, 0].astype(np.int64) * len(free) + edges[:, 1])
         edges = np.column_stack(np.divmod(key, len(free))).astype(np.int32)
         layers = (kept | ~free)[edges].all(axis=1) & kept[edges].any(axis=1)
         bodies = points[moving if moving.any() else ~free]

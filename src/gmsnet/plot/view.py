@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import InputError
 from gmsnet.kernels.simplex.bernstein import NAMES
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.measure.palette import AFTER, BAD_TO_GOOD, INVERTED, OTHER_CELLS
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.mesh.cell_block import CellBlock
@@ -104,7 +105,7 @@ class View:
     def box(self) -> NDArray[np.float64]:
         """(2 × 2) least and greatest coordinates of the nodes that are drawn."""
         nodes = [self.corners.ravel(), self.middles[self.middles >= 0], *(each.ravel() for each in self.others)]
-        used = self.points[np.unique(np.concatenate(nodes))]
+        used = self.points[sorted_unique(np.concatenate(nodes))]
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
     @property

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS
 from gmsnet.errors import InputError
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.measure.palette import AFTER, BEFORE, INVERTED
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.mesh.mesh import Mesh
@@ -103,7 +104,7 @@ def _draw(axes: Any, view: Space, worst: NDArray[np.int64], faces: Sequence[NDAr
     for nodes, owner in _facets(view.mesh, numbers):
         of_cells = [colour_of[number] for number in owner.tolist()]
         axes.add_collection3d(Poly3DCollection(points[nodes], facecolors=of_cells, edgecolors=EDGE, linewidths=0.2))
-    used = points[np.unique(np.concatenate([nodes.ravel() for nodes, _ in _facets(view.mesh)]))]
+    used = points[sorted_unique(np.concatenate([nodes.ravel() for nodes, _ in _facets(view.mesh)]))]
     low, span = used.min(axis=0), np.ptp(used, axis=0)
     for axis, start, extent in zip("xyz", low, span, strict=True):
         getattr(axes, f"set_{axis}lim")(start, start + extent)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.simplex import stretch
 from gmsnet.kernels.topology import connectivity
 from gmsnet.kernels.topology.components import pieces, surroundings
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.display import plain
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
@@ -202,7 +203,7 @@ def _layers(mesh: Mesh, topology: Topology, layer: Flags) -> Layers | None:
         nodes[triangles[damaged]] &= 2 * still[triangles[damaged]] >= every[triangles[damaged]]
     lengths = np.exp(cells[chosen, stretch.LENGTH])
     first = np.ones(len(chosen), dtype=bool) if of_cell is None else np.append(True, np.diff(of_cell) != 0)
-    broken = damaged.sum() if of_cell is None else len(np.unique(of_cell[damaged]))
+    broken = damaged.sum() if of_cell is None else len(sorted_unique(of_cell[damaged]))
     return Layers(nodes, chosen[first], float(np.median(lengths)), float(lengths.max()), int(broken))
 
 

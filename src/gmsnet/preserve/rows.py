@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.topology import winding
 from gmsnet.kernels.topology.components import pieces
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.topology.polygons import Offsets, offset_type
 
 Flags = NDArray[np.bool_]
@@ -71,7 +72,7 @@ def followed(quads: NDArray[np.int32], points: Floats, inside: Flags) -> Flags:
             waiting = waiting[~inside[waiting]]
             begun = waiting[_many_beside(waiting, next_along[waiting].astype(np.int64), twin)]
         inside[begun], along[begun], across[begun] = True, next_along[begun], next_across[begun]
-        rows = np.unique(np.concatenate([two[taken], begun]))
+        rows = sorted_unique(np.concatenate([two[taken], begun]))
     return inside
 
 

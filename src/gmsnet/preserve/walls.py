@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex import measures as quality
 from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.measure.signs import exact_signs
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.banded import Kept
@@ -83,7 +84,7 @@ def near_walls(mesh: Mesh, topology: Topology, survey: Survey | None = None) -> 
         size = edge_of(doubled(points, beside.simplices.rows[cells]))
         if not _mostly_small(size, largest):
             continue
-        diameter = _diameter(points[np.unique(wall)])
+        diameter = _diameter(points[sorted_unique(wall)])
         close = NEAR * diameter
         most = min(largest, close)
         rows = _rows_near(points, triangles, points[wall], close)

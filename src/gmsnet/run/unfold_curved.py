@@ -18,6 +18,7 @@ from gmsnet.constraints.options import TOLERANCE
 from gmsnet.constraints.patches import NOTHING, linked
 from gmsnet.kernels.star.chords import CLOSER
 from gmsnet.kernels.star.guard import Precision
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.measure.surface_change import Grid, places_on
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.run.flat_part import FlatPart
@@ -108,7 +109,7 @@ class CurvedParts:
         part = FlatPart.of(self.facets, chart, points, self.held | folds.torn, self.uses)
         rows, held = part.rows, part.held.copy()
         was = _inverted(part, part.flat)
-        if not was.any() or self._rough(chart, part, np.unique(rows[was])):
+        if not was.any() or self._rough(chart, part, sorted_unique(rows[was])):
             return None
         beside = _beside(rows)
         cluster = np.where(was, linked(beside, (beside != NOTHING) & was[:, None] & was[beside]), NOTHING)
@@ -162,7 +163,7 @@ class CurvedParts:
         moved = np.zeros(len(flat), dtype=bool)
         moved[own] = True
         touched = moved[rows].any(axis=1)
-        at = np.unique(rows[touched])
+        at = sorted_unique(rows[touched])
         old = self.given[part.nodes] - chart.origin
         surface = heights_at(flat[at], old @ chart.axes.T, old @ chart.normal)
         side = np.zeros((len(flat), 3))

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 from gmsnet.topology.topology import Topology
@@ -123,7 +124,7 @@ def _guarded(curved: Cells) -> int:
     mesh, may = curved.mesh, curved.inner | curved.corner
     bad = np.flatnonzero(curved.signs(_all(curved)) != 1)
     for _ in range(ROUNDS):
-        before, nodes = len(bad), np.unique(mesh.cells[_around(mesh, bad)])
+        before, nodes = len(bad), sorted_unique(mesh.cells[_around(mesh, bad)])
         nodes = nodes[nodes >= 0]
         nodes = nodes[may[nodes]]
         for threshold in TAUS:
@@ -138,8 +139,8 @@ def _guarded(curved: Cells) -> int:
 
 def _around(mesh: Any, cells: Ints) -> Ints:
     """The cells that share a node with some, these included."""
-    nodes = np.unique(mesh.cells[cells])
-    return np.unique(rows_of(mesh.cell_start, mesh.cell_of, nodes[nodes >= 0]))
+    nodes = sorted_unique(mesh.cells[cells])
+    return sorted_unique(rows_of(mesh.cell_start, mesh.cell_of, nodes[nodes >= 0]))
 
 
 def _patches(mesh: Any, bad: Ints, rings: int) -> list[Ints]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.methods.barrier3 import Power3
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.kernels.star.space_blocks import SpaceBlocks
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.kernels.untangle.space import find_bad, find_bad_inside, soften
 from gmsnet.measure.volumes import exact_signs3
 from gmsnet.parallel.executor import Executor
@@ -272,5 +273,5 @@ def _inverted(attempt: Attempt, bad: NDArray[np.int64]) -> int:
     """How many cells are, of those with these rows that are not certainly valid."""
     topology, cells = attempt.topology, attempt.topology.simplices.cells
     if cells is not None:  # exact signs of their corners do not tell
-        return len(np.unique(cells[bad]))
+        return len(sorted_unique(cells[bad]))
     return int((exact_signs3(attempt.points, topology.near[bad], topology.near_orientation[bad]) <= 0).sum())

@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import inlined
 from gmsnet.kernels.simplex.cube_root import cube_root
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 
 TINY = 1e-300  # stands in for a length of zero: the quotient is then zero, not a division by zero
 REGULAR = 6.0 * 2.0 ** (1.0 / 3.0)  # K
@@ -80,7 +81,7 @@ class Tetrahedra(NamedTuple):
     @property
     def cell_count(self) -> int:
         """How many cells they belong to."""
-        return len(self.rows) if self.cells is None else len(np.unique(self.cells))
+        return len(self.rows) if self.cells is None else len(sorted_unique(self.cells))
 
     def take(self, rows: NDArray[np.int32]) -> Tetrahedra:
         """Some of them."""
