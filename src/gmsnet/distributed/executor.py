@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
@@ -135,6 +136,11 @@ class Ranks:
         last = self._bound(numbers[equal & counted], room)
         return np.flatnonzero(less | (equal & (numbers <= last))).astype(np.int32)
 
+    def nth(self, values: Floats, number: int) -> float:
+        """See Executor."""
+        count = self.comm.allreduce(len(values))
+        return _value(self._bound(_keys(values), min(number, count))) if count else math.inf
+
     def counted(self, flags: NDArray[np.bool_]) -> int:
         """See Executor."""
         return int(self.comm.allreduce(int(np.count_nonzero(flags & self.rows.counted))))
@@ -162,17 +168,20 @@ class Ranks:
         found: Floats = np.concatenate([each for _, each in came])[order]
         return found
 
-    def gathered(self, field: Field, rows: NDArray[np.int32] | None) -> Field | None:
+    def gathered(self, field: Field) -> Field | None:
         """See Executor."""
-        free, active = field.topology.near_free, None
-        if rows is not None:
-            active, simplices = np.zeros(len(free), dtype=bool), field.topology.changeable
-            active[simplices.rows[rows]] = True
-            still = rows[~free[simplices.rows[rows]].any(axis=1)]  # on surfaces, of cells whose other corners may move
-            if len(still) and simplices.cells is not None:
-                active[simplices.rows[np.isin(simplices.cells, simplices.cells[still])]] = True
-            active &= free
-        self.loan = read_alike(self.part, field, active)
+        self.loan = read_alike(self.part, field, None)
+        return self.loan.field
+
+    def dealt(self, field: Field, rows: NDArray[np.int32]) -> Field | None:
+        """See Executor. Nodes that hang together are on one rank."""
+        free, simplices = field.topology.near_free, field.topology.changeable
+        active = np.zeros(len(free), dtype=bool)
+        active[simplices.rows[rows]] = True
+        still = rows[~free[simplices.rows[rows]].any(axis=1)]  # on surfaces, of cells whose other corners may move
+        if len(still) and simplices.cells is not None:
+            active[simplices.rows[np.isin(simplices.cells, simplices.cells[still])]] = True
+        self.loan = read_alike(self.part, field, active & free, dealt=True)
         return self.loan.field
 
     def gathered_around(
@@ -258,3 +267,9 @@ def _keys(values: Floats) -> NDArray[np.int64]:
     """Whole numbers in the order of the values."""
     bits = (values + 0.0).view(np.int64)  # 0.0 and -0.0 are one
     return np.where(bits < 0, bits ^ np.int64(2**63 - 1), bits)
+
+
+def _value(key: int) -> float:
+    """The value that has this key."""
+    bits = np.int64(key)
+    return float((bits if key >= 0 else bits ^ np.int64(2**63 - 1)).view(np.float64))

@@ -1,4 +1,4 @@
-"""What the first rank smooths for all: cells of all ranks around some nodes, or all cells, and where the nodes go then.
+"""What ranks smooth for others: cells around some nodes, or all cells on the first rank, and where the nodes go then.
 
 What follows one another, as the visits to the worst cells do, goes by global ids. So it comes to the same wherever the
 cells are, if the stars are whole.
@@ -6,16 +6,20 @@ cells are, if the stars are whole.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.along import Rail, put_on, where_on
+from gmsnet.distributed.homes import homes
+from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Known, Part, connected
 from gmsnet.distributed.piece import Ids
 from gmsnet.distributed.winding import Winding
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.base import Field
@@ -48,21 +52,20 @@ class Parcel(NamedTuple):
 
 
 class Loan(NamedTuple):
-    """ids: (n,) those that this rank has sent. field: what was gathered, on the first rank; all: the ids of its nodes.
-
-    sent: on the first rank, the ids of each rank.
+    """ids: of each rank those that this rank has sent it. field: what came here, None where nothing did; all: the ids
+    of its nodes. sent: those of each rank.
     """
 
-    ids: Ids
+    ids: list[Ids]
     field: Field | None = None
     all: Ids | None = None
     sent: list[Ids] | None = None
 
     def at_nodes(self, part: Part, values: Floats) -> Floats:
-        """Values (n,) of a rank, in memory order, in that of the gathered field; none but on the first rank."""
-        came = part.comm.gather(values[self._places(part)])
+        """Values (n,) of a rank, in memory order, in that of the field here; none where there is none."""
+        came = part.comm.alltoall([values[places] for places in self._places(part)])
         found = np.empty(0 if self.all is None else len(self.all))
-        if came is None or self.field is None or self.all is None or self.sent is None:
+        if self.field is None or self.all is None or self.sent is None:
             return found
         for ids, some in zip(self.sent, came, strict=True):
             found[np.searchsorted(self.all, ids)] = some
@@ -92,18 +95,24 @@ class Loan(NamedTuple):
         found: NDArray[np.int32] = part.topology.places[np.searchsorted(known, here)]
         return found
 
-    def _places(self, part: Part) -> NDArray[np.int32]:
-        """In memory, of the nodes that were sent."""
-        return part.topology.places[np.searchsorted(part.around.nodes.ids, self.ids)]
+    def _places(self, part: Part) -> list[NDArray[np.int32]]:
+        """In memory, of the nodes that were sent to each rank."""
+        return [part.topology.places[np.searchsorted(part.around.nodes.ids, ids)] for ids in self.ids]
+
+    def _back(self, part: Part, values: Floats | None) -> list[Floats]:
+        """Values of the nodes of the field, by id, to the ranks that have sent them: what comes from each rank."""
+        parcels: list[Any] = [()] * part.comm.size
+        if values is not None and self.all is not None and self.sent is not None:
+            parcels = [values[np.searchsorted(self.all, ids)] for ids in self.sent]
+        came: list[Floats] = part.comm.alltoall(parcels)
+        return came
 
     def give_back(self, part: Part, points: Floats) -> None:
-        """The points of the gathered field go to the ranks. points: (n, …) of a rank, in memory order."""
-        parcels: list[Floats] | None = None
-        if self.field is not None and self.all is not None and self.sent is not None:
-            found = np.empty_like(self.field.points)
-            found[self.field.topology.memory] = self.field.points
-            parcels = [found[np.searchsorted(self.all, ids)] for ids in self.sent]
-        points[self._places(part)] = part.comm.scatter(parcels)
+        """The points of what came to each rank go back. points: (n, …) of a rank, in memory order."""
+        found = None if self.field is None else self.field.points[self.field.topology.places]
+        for places, came in zip(self._places(part), self._back(part, found), strict=True):
+            if len(places):
+                points[places] = came
         for axis in range(points.shape[1]):  # to those, too, that have sent no cell of a node
             points[:, axis] = part.halo.spread(points[:, axis])
         if part.rail is not None:
@@ -111,27 +120,41 @@ class Loan(NamedTuple):
 
     def _slid_back(self, part: Part, rail: Rail) -> None:
         """So do the places on the rail, of the nodes that were free to move: of others only their rank knows them."""
-        parcels: list[Floats] | None = None
-        if self.field is not None and self.all is not None and self.sent is not None:
+        found = None
+        if self.field is not None:
             assert self.field.constraint is not None
-            found = np.where(self.field.topology.near_free, where_on(self.field.constraint), np.nan)
-            found = found[self.field.topology.places]
-            parcels = [found[np.searchsorted(self.all, ids)] for ids in self.sent]
-        came, now, places = part.comm.scatter(parcels), where_on(rail), self._places(part)
-        known = ~np.isnan(came)
-        now[places[known]] = came[known]
+            topology = self.field.topology
+            found = np.where(topology.near_free, where_on(self.field.constraint), np.nan)[topology.places]
+        now = where_on(rail)
+        for places, came in zip(self._places(part), self._back(part, found), strict=True):
+            known = ~np.isnan(np.asarray(came, dtype=np.float64))
+            now[places[known]] = np.asarray(came)[known]
         put_on(rail, part.halo.spread(now))
 
 
 def gathered_field(part: Part, field: Field, active: Flags | None) -> Loan:
-    """What is smoothed, with all cells at the active nodes of all ranks, which alone are free. All ranks call it.
+    """What is smoothed, with all cells at the active nodes of all ranks, which alone are free, on the first rank.
 
-    active: (N,) by places in memory, of the nodes that are free here; None for the whole mesh.
+    All ranks call it. active: (N,) by places in memory, of the nodes that are free here; None for the whole mesh.
     """
-    parcel = _parcel(part, field, active)
-    came = part.comm.gather(parcel)
-    if came is None:
-        return Loan(parcel.ids)
+    return _exchanged(part, field, {0: active})
+
+
+def dealt_field(part: Part, field: Field, active: Flags) -> Loan:
+    """The same, dealt out: nodes that hang together go to one rank, with all cells at them."""
+    ranks = homes(part, field.topology, active)
+    return _exchanged(part, field, {rank: ranks == rank for rank in sorted_unique(ranks[active]).tolist()})
+
+
+def _exchanged(part: Part, field: Field, active: Mapping[int, Flags | None]) -> Loan:
+    """active: rank → the nodes that this rank sends it, with all cells at them; None for the whole mesh."""
+    starred = part.halo.spread(field.topology.near_ringed)
+    parcels = [_parcel(part, field, active[k], starred) if k in active else None for k in range(part.comm.size)]
+    sent = [part.around.nodes.ids[:0] if parcel is None else parcel.ids for parcel in parcels]
+    found = part.comm.alltoall(parcels)
+    came = [parcel for parcel in found if parcel is not None]
+    if not came:
+        return Loan(sent)
     ids, first = np.unique(np.concatenate([each.ids for each in came]), return_index=True)
     places, points = (np.concatenate([each[k] for each in came])[first] for k in (1, 2))
     moves = np.zeros(len(ids), dtype=bool)
@@ -164,19 +187,20 @@ def gathered_field(part: Part, field: Field, active: Flags | None) -> Loan:
             where[np.searchsorted(ids, each.ids[each.moves])] = each.where[each.moves]
         put_on(rail, where[topology.memory])
     lent = Field(points, topology, field.precision, field.level, constraint=rail)
-    return Loan(parcel.ids, lent, ids, [each.ids for each in came])
+    return Loan(sent, lent, ids, [ids[:0] if parcel is None else parcel.ids for parcel in found])
 
 
-def read_alike(part: Part, field: Field, active: Flags | None) -> Loan:
-    """The same, with all cells read as in the whole mesh.
+def read_alike(part: Part, field: Field, active: Flags | None, *, dealt: bool = False) -> Loan:
+    """The same, gathered or dealt out, with all cells read as in the whole mesh.
 
     Where cells of the input are inverted, some that are cut off from others may be read the other way round: then the
     whole mesh is gathered.
     """
-    loan = gathered_field(part, field, active)
-    if active is None or part.comm.bcast(loan.field is None or Winding.of(loan.field.topology).reads(forth=part.forth)):
-        return loan
-    return gathered_field(part, field, None)
+    if active is None:
+        return gathered_field(part, field, None)
+    loan = dealt_field(part, field, active) if dealt else gathered_field(part, field, active)
+    otherwise = loan.field is not None and not Winding.of(loan.field.topology).reads(forth=part.forth)
+    return gathered_field(part, field, None) if part.comm.allreduce(bool(otherwise), mpi().LOR) else loan
 
 
 def _lent(part: Part) -> list[tuple[int, str]]:
@@ -185,8 +209,8 @@ def _lent(part: Part) -> list[tuple[int, str]]:
     return [(k, kind) for k, kind in kinds if kind in (KINDS if part.mesh.has_volumes else (*PLANAR, "line"))]
 
 
-def _parcel(part: Part, field: Field, active: Flags | None) -> Parcel:
-    """What this rank brings: all cells at the active nodes; of the whole mesh, its own."""
+def _parcel(part: Part, field: Field, active: Flags | None, starred: Flags) -> Parcel:
+    """What this rank brings: all cells at the active nodes; of the whole mesh, its own. starred: (n,), as of Parcel."""
     topology, ids = field.topology, part.around.nodes.ids
     moves = np.zeros(len(ids), dtype=bool)
     moves[topology.memory] = topology.near_free if active is None else active
@@ -197,9 +221,11 @@ def _parcel(part: Part, field: Field, active: Flags | None) -> Parcel:
         used[nodes[chosen]] = True
         cells.append((block.nodes[chosen], block.numbers[chosen], block.regions[chosen]))
     near = topology.places[np.flatnonzero(used)]
-    starred, colours = part.halo.spread(topology.near_ringed)[near], topology.colouring.colours[near]
+    colours = topology.colouring.colours[near]
     where = np.zeros(len(near)) if part.rail is None else where_on(part.rail)[near]
-    return Parcel(ids[used], part.mesh.points[used], field.points[near], moves[used], starred, colours, where, cells)
+    return Parcel(
+        ids[used], part.mesh.points[used], field.points[near], moves[used], starred[near], colours, where, cells
+    )
 
 
 def around(part: Part, topology: Topology | Volume, chosen: Flags, rings: int) -> Flags:

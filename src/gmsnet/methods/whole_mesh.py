@@ -195,7 +195,7 @@ class WholeMesh(Smoother):
         tally = np.zeros(3, dtype=np.int64)
         for doublings in self.doublings:
             before, floor = field.points.copy(), max(field.guard(executor).floor, 0.0)
-            whole = executor.gathered(field, None)  # on one process
+            whole = executor.gathered(field)  # on one process
             inner = executor if whole is field else serial
             can, taken = executor.returned(
                 field, whole, (False, False) if whole is None else self._taken(whole, doublings, floor, inner)
@@ -231,7 +231,7 @@ class WholeMesh(Smoother):
         if field.constraint is None:
             return
         floor = max(field.guard(executor).floor, 0.0)
-        whole = executor.gathered(field, None)  # on one process
+        whole = executor.gathered(field)  # on one process
         inner = executor if whole is field else serial
         taken = whole is not None and self._slid(whole, doublings, floor, inner)
         if executor.returned(field, whole, taken):

@@ -1,7 +1,8 @@
 """The worst cells first: Newton's method on high powers of q, at the free nodes of the worst cells alone.
 
 A cycle ranks the cells, takes a share of them, and visits their free nodes a number of times
-(kernels/methods/worst_first.py), in the order of their ids. Cells are ranked among the candidates, which are the
+(kernels/methods/worst_first.py), in the order of their ids. Where processes share a mesh, nodes that hang together are
+visited by one of them. Cells are ranked among the candidates, which are the
 worst of all when the list of cycles begins: a cell next to a mended one can become the worst, and is one of them.
 
 A sweep is one cycle of CYCLES; after the last of them LAST goes on, with new candidates each time, until the worst cell
@@ -18,15 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES
-from gmsnet.kernels.methods import ranking
-from gmsnet.kernels.methods import worst_first_cycles as kernels
+from gmsnet.kernels.methods import ranking, shell
+from gmsnet.kernels.methods.worst_first_cycles import visit_all
 from gmsnet.kernels.simplex.mean_ratio2 import Simplices
-from gmsnet.kernels.simplex.shell_measures import shell_shapes
+from gmsnet.kernels.simplex.shell_measures import shell_shapes, shell_shapes_of
 from gmsnet.kernels.star.guard import Guard, StarGuard
 from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.methods.base import ALL_CELLS, Field, Method, MethodOptions, Smoother, Tally
 from gmsnet.methods.worst_in_space import WorstInSpace
-from gmsnet.methods.worst_on_surface import cycles_on_surface
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 from gmsnet.topology.shell import Shell
@@ -58,6 +58,7 @@ CYCLES = (
 LAST = (Cycle(0.0003, 7, 16), Cycle(0.0003, 8, 16))
 HALVINGS = 24  # of the interval in which a limit is looked for: single precision has no more
 GAIN = 1e-4  # in the minimum 1/q: less is none
+LEAST = 1e-6  # of 1/q, where cells are inverted: the scale of q is taken from there
 
 
 class WorstFirst(Smoother):
@@ -75,7 +76,7 @@ class WorstFirst(Smoother):
     converged: bool
     next: int
     limit: np.float32
-    gathered: NDArray[np.int32]
+    dealt: NDArray[np.int32]
 
     least = gained = -math.inf
     shared_out = True
@@ -104,44 +105,98 @@ class WorstFirst(Smoother):
         count = executor.cell_count(simplices)
         plan = [(max(FEWEST, math.ceil(cycle.share * count)), cycle.power, cycle.sweeps) for cycle in chosen]
         guard = field.guard(executor)
-        part = executor.gathered(field, self.cells)  # on one process
+        part = executor.dealt(field, self.cells)
         if isinstance(guard, StarGuard):
             guard = guard._replace(floors=executor.lent(guard.floors))
-        found = (0.0, 0.0, 0.0, tally) if part is None else self._cycles(part, field, guard, plan)
-        before, late, after, tally = executor.returned(field, part, found)
+        patches = None if part is None else self._patches(part, field, guard)
+        before, late, after, tally = executor.returned(field, part, _cycles(patches, plan, executor))
         self.next += len(chosen)
         self.converged = goes_on and after < before + GAIN
         self.least, self.gained = after, after - late
         return tally
 
-    def _cycles(
-        self, part: Field, field: Field, guard: Guard, plan: list[tuple[int, int, int]]
-    ) -> tuple[float, float, float, Tally]:  # fmt: skip
-        """What ``cycles`` returns, and the tally. part: the field, or the cells around the candidates of all processes.
+    def _patches(self, part: Field, field: Field, guard: Guard) -> Patches:
+        """part: the field, or the cells around some candidates of all processes.
 
         The candidates of these are the same cells, for they are all that were up to a limit.
         """
-        topology, tally, cells = part.topology, np.zeros(3, dtype=np.int64), self.cells
-        assert isinstance(topology, Topology)
-        assert cells is not None
+        cells = self.cells
         if part is not field:
             guard = guard._replace(constraint=part.constraint)
             if self.next == 0 or self.next >= len(self.cycles):
-                self.gathered = up_to(self.limit, shapes_in(part, serial))
-            cells = self.gathered
-        if isinstance(topology, Shell):
-            return *cycles_on_surface(part, topology, cells, guard, plan, tally), tally
-        figures = kernels.cycles(
-            part.points, topology.changeable, cells, topology.near_free, topology.memory, topology.links, guard,
-            np.array(plan), tally,
-        )  # fmt: skip
-        return *figures, tally
+                self.dealt = up_to(self.limit, shapes_in(part, serial))
+            cells = self.dealt
+        assert cells is not None
+        return Patches(part, cells, guard)
 
     def _in_space(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         inner = WorstInSpace(self.share)
         tally = inner.sweep(field, executor, test)
         self.least, self.gained, self.converged = inner.least, inner.gained, inner.gained < GAIN
         return tally
+
+
+class Patches:
+    """The stars of the free nodes of some cells, which the cycles visit. cells: rows of ``changeable``.
+
+    shape: their 1/q.
+    """
+
+    shape: NDArray[np.float64]
+
+    def __init__(self, field: Field, cells: NDArray[np.int32], guard: Guard) -> None:
+        self.field, self.cells, self.guard = field, cells, guard
+        self.mark = np.zeros(len(field.points), dtype=np.bool_)
+        self.shape = np.empty(len(cells))
+        self.rank()
+
+    def rank(self) -> None:
+        """How good the cells are now."""
+        simplices = self.field.topology.changeable
+        shapes = shell_shapes_of if isinstance(simplices, ShellSimplices) else ranking.shapes_of
+        shapes(self.field.points, simplices, self.cells, self.shape)
+
+    def visit(self, limit: float, doublings: int, sweeps: int, scale: float, tally: Tally) -> None:
+        """Visits the free nodes of those up to a limit, so many times. tally: (3,), added to."""
+        field, topology = self.field, self.field.topology
+        assert isinstance(topology, Topology)
+        nodes = ranking.free_nodes(
+            topology.changeable.rows, self.cells, self.shape, limit, topology.near_free, topology.memory, self.mark
+        )
+        if isinstance(topology, Shell):
+            stars = topology.stars_of(nodes)
+            shell.visit(field.points, stars, nodes, self.guard, doublings, sweeps, scale, self.mark, tally)
+        else:
+            visit_all(
+                field.points, nodes, topology.links, self.guard, doublings, sweeps, scale, self.mark, tally
+            )  # fmt: skip
+        self.rank()
+
+
+def _cycles(
+    patches: Patches | None, plan: list[tuple[int, int, int]], executor: Executor
+) -> tuple[float, float, float, Tally]:
+    """Makes the cycles of a plan; the minimum 1/q of all candidates before it, before its last cycle, and after it.
+
+    And the tally of all processes. plan: of cells to take, log₂ of the power p, and visits to their free nodes.
+    patches: of this process, None where it has none.
+    """
+    tally, none = np.zeros(3, dtype=np.int64), np.empty(0)
+
+    def shape() -> NDArray[np.float64]:
+        return none if patches is None else patches.shape
+
+    def least() -> float:
+        return executor.minimum(float(shape().min(initial=math.inf)))
+
+    before = late = after = least()
+    for wanted, doublings, sweeps in plan:
+        late = after
+        limit = executor.nth(shape(), wanted)
+        if patches is not None:
+            patches.visit(limit, doublings, sweeps, max(late, LEAST) / math.sqrt(3.0), tally)
+        after = least()
+    return before, late, after, executor.total(tally)
 
 
 def candidates(field: Field, executor: Executor) -> tuple[NDArray[np.int32], float, np.float32]:

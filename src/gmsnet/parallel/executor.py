@@ -101,16 +101,27 @@ class Executor(Protocol):
         """Values (K, …) of all processes in the order of their numbers, which are ascending here."""
         ...
 
-    def gathered(self, field: Any, rows: NDArray[np.int32] | None) -> Any:
+    def nth(self, values: NDArray[np.float64], number: int) -> float:
+        """The value at this place, from 1 on, of those of all processes in their order; ∞ where there is none.
+
+        If they are fewer, the last one.
+        """
+        ...
+
+    def gathered(self, field: Any) -> Any:
+        """The whole mesh that is smoothed: a Field on one process, None on the others."""
+        ...
+
+    def dealt(self, field: Any, rows: NDArray[np.int32]) -> Any:
         """What is smoothed, with all cells at the free nodes of some rows of ``changeable``, of all processes.
 
-        Those nodes alone are free. rows: None for the whole mesh. Returns a Field on one process, None on the others. A
-        single process has ``field`` itself, where more nodes may be free.
+        Those nodes alone are free. Each process has a Field of some of them, or None, and no cell with such nodes is
+        on two. A single process has ``field`` itself, where more nodes may be free.
         """
         ...
 
     def gathered_around(self, field: Any, corners: NDArray[np.int32], rings: int) -> tuple[Any, NDArray[np.int32]]:
-        """The same of the free nodes within so many rings of some cells of all processes, and these cells there.
+        """The free nodes within so many rings of some cells of all processes on one of them, and these cells there.
 
         corners: (K, 3 or 4) of the cells; of all processes each comes once.
         """
@@ -137,11 +148,11 @@ class Executor(Protocol):
         ...
 
     def lent(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values (N,) at nodes, in memory order, for what was gathered last: in its order, where it is."""
+        """Values (N,) at nodes, in memory order, for what was gathered or dealt last: in its order, where it is."""
         ...
 
     def returned(self, field: Any, part: Any, result: Result) -> Result:
-        """The points of what was gathered go back into ``field``; returns the result of the process that had it."""
+        """The points of what was gathered or dealt go back into ``field``; returns the result of the first process."""
         ...
 
     def blocks_with(self, rows: NDArray[np.int32], size: int) -> NDArray[np.int32]:

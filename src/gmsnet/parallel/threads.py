@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -97,7 +98,18 @@ class Process:
         """See Executor."""
         return values
 
-    def gathered(self, field: Any, rows: NDArray[np.int32] | None) -> Any:
+    def nth(self, values: NDArray[np.float64], number: int) -> float:
+        """See Executor."""
+        if not len(values):
+            return math.inf
+        place = min(number, len(values)) - 1
+        return float(np.partition(values, place)[place])
+
+    def gathered(self, field: Any) -> Any:
+        """See Executor."""
+        return field
+
+    def dealt(self, field: Any, rows: NDArray[np.int32]) -> Any:
         """See Executor."""
         return field
 

@@ -53,46 +53,6 @@ def shapes_of(points, simplices, cells, shape):
         shape[k] = orientation[t] * shape_of(px, py, qx, qy, weights_at_first(simplices.shapes, t, True))
 
 
-@part
-def least(values):
-    """The minimum of them; NumPy's takes a third of a second to compile."""
-    found = np.inf
-    for k in range(len(values)):
-        found = min(found, values[k])
-    return found
-
-
-@part
-def smallest(values, rank):
-    """The value that would stand at the place ``rank`` if the values were sorted (Hoare's selection).
-
-    NumPy's partition does the same, but takes three seconds to compile.
-    """
-    some = np.empty(len(values))
-    for k in range(len(values)):
-        some[k] = values[k]
-    low, high = 0, len(some) - 1
-    while low < high:
-        pivot = some[(low + high) // 2]
-        i, j = low, high
-        while i <= j:
-            while some[i] < pivot:
-                i += 1
-            while some[j] > pivot:
-                j -= 1
-            if i <= j:
-                some[i], some[j] = some[j], some[i]
-                i += 1
-                j -= 1
-        if rank <= j:
-            high = j
-        elif rank >= i:
-            low = i
-        else:
-            break
-    return some[rank]
-
-
 @kernel
 def free_nodes(rows, cells, shape, limit, free, memory, seen):
     """The free nodes (int32) of those of the cells whose shape is at most the limit, in the order of their ids.

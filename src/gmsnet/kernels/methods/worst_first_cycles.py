@@ -1,14 +1,11 @@
-"""Cycles of ranking the worst cells and visiting their free nodes: see methods/worst_first.py."""
+"""Visits to the free nodes of the worst cells: see methods/worst_first.py."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from gmsnet.kernels.jit.compile import kernel, part
 from gmsnet.kernels.methods.missing import any_missing
-from gmsnet.kernels.methods.ranking import free_nodes, least, shapes_of, smallest
 from gmsnet.kernels.methods.worst_first import descend, gather, way_there
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
 from gmsnet.kernels.star.constraint import follow
@@ -16,31 +13,12 @@ from gmsnet.kernels.star.pattern import count_of, pattern_at
 from gmsnet.kernels.star.truncation import HALVINGS
 
 STILL = 1e-8  # of a spoke's square: a move of less leaves a star be
-LEAST = 1e-6  # of 1/q, where cells are inverted: the scale of q is taken from there
 
 
 @kernel
-def cycles(points, simplices, cells, free, memory, stars, guard, plan, tally):
-    """Makes the cycles of a plan among the cells; returns the minimum 1/q of these before it, before its last cycle,
-    and after it.
-
-    cells: indices of corner simplices. free: (N,) bool. memory: (N,) ids. stars: of all nodes (kernels.star.pattern).
-    plan: (C, 3) of cells to take, log₂ of the power p, and visits to their free nodes. tally: (3,), added to.
-    """
-    shape, mark = np.empty(len(cells)), np.empty(len(points), dtype=np.bool_)
-    for i in range(len(points)):
-        mark[i] = False
-    shapes_of(points, simplices, cells, shape)
-    before = late = least(shape)
-    for c in range(len(plan)):
-        late = least(shape)
-        wanted = min(plan[c, 0], len(cells))
-        limit = smallest(shape, wanted - 1)
-        scale = max(late, LEAST) / math.sqrt(3.0)
-        nodes = free_nodes(simplices.rows, cells, shape, limit, free, memory, mark)
-        visit(points, nodes, stars, guard, plan[c, 1], plan[c, 2], scale, None, mark, None, tally)
-        shapes_of(points, simplices, cells, shape)
-    return before, late, least(shape)
+def visit_all(points, nodes, stars, guard, doublings, sweeps, scale, awake, tally):
+    """``visit`` without a target."""
+    visit(points, nodes, stars, guard, doublings, sweeps, scale, None, awake, None, tally)
 
 
 @part
