@@ -22,6 +22,7 @@ from gmsnet.distributed.winding import Winding
 from gmsnet.errors import GmsnetError
 from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.surface import Surface
+from gmsnet.kernels.topology.places import places_in
 from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import measure
 from gmsnet.measure.totals import Totals, totals_of
@@ -114,7 +115,7 @@ class Along:
         if rail is None:
             return None
         order = np.argsort(self.ids)
-        place = np.minimum(np.searchsorted(self.ids[order], ids), len(order) - 1)
+        place = np.minimum(places_in(self.ids[order], ids), len(order) - 1)
         row = np.where(self.ids[order][place] == ids, order[place], -1).astype(np.int32)[topology.memory]
         if isinstance(rail, Constraint):
             return rail._replace(row=row, parameter=rail.parameter.copy())
@@ -124,7 +125,7 @@ class Along:
         chosen = np.repeat(here, count)
         start = np.zeros_like(rail.start)
         np.cumsum(np.where(here, count, 0), out=start[1:])
-        ring = topology.places[np.searchsorted(ids, self.ring[chosen])].astype(np.int32)
+        ring = topology.places[places_in(ids, self.ring[chosen])].astype(np.int32)
         return rail._replace(row=row, place=rail.place.copy(), start=start, ring=ring, own=rail.own[chosen])
 
 

@@ -23,6 +23,7 @@ from gmsnet.io.pieces import Pieces
 from gmsnet.io.rows import share
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.vtk_ghosts import ghosts
+from gmsnet.kernels.topology.places import places_in
 from gmsnet.mesh.selection import held_by_data
 
 Ids = NDArray[np.int64]
@@ -67,7 +68,7 @@ class FilePieces:
         """Key → each file of this rank with new points (n, dim) of the piece. moved: whether any rank moved a node."""
         files = {key: _as_it_is(data) for key, (_, data, _) in self.opened.items()}
         cuts = np.cumsum([len(part.parsed.points) for part in self.parts.values()])[:-1]
-        at = np.searchsorted(self.piece.ids, self.joined.node)
+        at = places_in(self.piece.ids, self.joined.node)
         for (key, part), rows in zip(self.parts.items(), np.split(at, cuts), strict=True) if self.parts else ():
             if moved:
                 files[key] = _replaced(part, self.opened[key][1], self.piece.points[rows], points[rows])

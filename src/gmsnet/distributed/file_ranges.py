@@ -35,6 +35,7 @@ from gmsnet.io.ranges import Column, Plan, put
 from gmsnet.io.rows import AT_ONCE, Ranges, Rows
 from gmsnet.io.stamps import Stamps
 from gmsnet.io.vtk_ghosts import GHOST_CELLS
+from gmsnet.kernels.topology.places import places_in
 from gmsnet.kernels.topology.sorted_unique import sorted_unique
 
 Floats = NDArray[np.float64]
@@ -162,7 +163,7 @@ def read_ranges(name: str, format: str, comm: Any) -> FileRanges:
         named = _ids_of([block.nodes for block in read])
         zones, nodes, stay = in_zones(comm, plan.zones, nodes, named)
         node = zones.of_points(comm, named)
-        read = [replace(block, nodes=node[np.searchsorted(named, block.nodes)]) for block in read]
+        read = [replace(block, nodes=node[places_in(named, block.nodes)]) for block in read]
         called = "coincident points"
     read, names = with_vertices(comm, read, names, named_here(comm, nodes.rows, stay), called)
     ids = _ids_of([block.nodes[:, 0] for block in read])
@@ -227,7 +228,7 @@ def _renumbered(
             node = int(twice.min())
             tag = int(plan.tags_of(file, node, node + 1)[0])
             raise FormatError(f"{plan.where_tag(node)}: the node {tag} is given twice")
-        found = [replace(block, nodes=nodes[np.searchsorted(named, block.nodes)]) for block in read]
+        found = [replace(block, nodes=nodes[places_in(named, block.nodes)]) for block in read]
         for number, (block, old) in enumerate(zip(found, read, strict=True)):
             if (block.nodes < 0).any():
                 row, column = np.argwhere(block.nodes < 0)[0].tolist()
@@ -235,7 +236,7 @@ def _renumbered(
                                   f"{old.nodes[row, column]}, which the file has not")  # fmt: skip
         return found
 
-    pairs = nodes[np.searchsorted(named, images)]
+    pairs = nodes[places_in(named, images)]
     return everywhere(comm, lambda: said(file, checked)), pairs[(pairs >= 0).all(axis=1)].ravel()
 
 
@@ -249,7 +250,7 @@ def _shared_out(comm: Any, blocks: Sequence[Cells], ids: Ids, points: Floats) ->
 
     ids, points: the first node of each cell. So it does not matter in which order a file has its cells.
     """
-    first = [np.searchsorted(ids, block.nodes[:, 0]) for block in blocks]
+    first = [places_in(ids, block.nodes[:, 0]) for block in blocks]
     ranks = along_curve(comm, points[np.concatenate([np.empty(0, dtype=np.int64), *first])])
     found, cuts = [], np.cumsum([len(each) for each in first])[:-1]
     for block, chosen in zip(blocks, np.split(ranks, cuts), strict=True):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.piece import Ids, Piece
+from gmsnet.kernels.topology.places import places_in
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -36,13 +37,13 @@ def gathered(piece: Piece, comm: Any, known: Whole | None = None) -> Whole | Non
     points = np.concatenate([part.points for part in parts])[first]
     fixed = np.zeros(len(ids), dtype=bool)
     for part in parts:
-        fixed[np.searchsorted(ids, part.ids[part.fixed])] = True
+        fixed[places_in(ids, part.ids[part.fixed])] = True
     blocks = []
     for cells in zip(*(part.blocks for part in parts), strict=True):
         order = np.argsort(np.concatenate([block.numbers for block in cells]))
         nodes = np.concatenate([block.nodes for block in cells])[order]
         regions = np.concatenate([block.regions for block in cells])[order]
-        blocks.append(CellBlock(cells[0].kind, np.searchsorted(ids, nodes), regions))
+        blocks.append(CellBlock(cells[0].kind, places_in(ids, nodes), regions))
     whole = Mesh(points, tuple(blocks), piece.names, single=piece.single, rounding=piece.rounding)
     return Whole(whole, ids, fixed)
 
@@ -54,7 +55,7 @@ def brought(whole: Whole | None, values: NDArray[Any], piece: Piece, comm: Any) 
         return None
     found = np.empty((len(whole.ids), *values.shape[1:]), dtype=values.dtype)
     for ids, some in came:
-        found[np.searchsorted(whole.ids, ids)] = some
+        found[places_in(whole.ids, ids)] = some
     return found
 
 
@@ -63,6 +64,6 @@ def scattered(whole: Whole | None, values: NDArray[Any] | None, piece: Piece, co
     wanted = comm.gather(piece.ids)
     parcels = None
     if whole is not None and values is not None:
-        parcels = [values[np.searchsorted(whole.ids, ids)] for ids in wanted]
+        parcels = [values[places_in(whole.ids, ids)] for ids in wanted]
     found: NDArray[Any] = comm.scatter(parcels)
     return found

@@ -17,6 +17,7 @@ from gmsnet.distributed.agreement import agreed, raise_everywhere
 from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.piece import Cells, Ids, Piece
+from gmsnet.kernels.topology.places import places_in
 from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -35,7 +36,7 @@ class Nodes(NamedTuple):
 
     def of(self, ids: Ids) -> Nodes:
         """Those with some ids."""
-        at = np.searchsorted(self.ids, ids)
+        at = places_in(self.ids, ids)
         return Nodes(ids, self.points[at], self.owner[at], self.fixed[at])
 
 
@@ -62,7 +63,7 @@ class Surrounded:
     def mesh(self, piece: Piece) -> Mesh:
         """All of it, nodes by ascending ids; a part of the mesh that a piece is of."""
         ids = self.nodes.ids
-        cells = [CellBlock(block.kind, np.searchsorted(ids, block.nodes), block.regions) for block in self.blocks]
+        cells = [CellBlock(block.kind, places_in(ids, block.nodes), block.regions) for block in self.blocks]
         return Mesh(self.nodes.points, tuple(cells), single=piece.single, rounding=piece.rounding)
 
     def halo(self, comm: Any, places: NDArray[Any]) -> Halo:
@@ -71,7 +72,7 @@ class Surrounded:
         wanted = by_rank(owner, comm.size)
         wanted[comm.rank] = wanted[comm.rank][:0]
         asked = comm.alltoall([ids[places] for places in wanted])
-        own = {rank: places[np.searchsorted(ids, found)] for rank, found in enumerate(asked) if len(found)}
+        own = {rank: places[places_in(ids, found)] for rank, found in enumerate(asked) if len(found)}
         return Halo(comm, own, {rank: places[found] for rank, found in enumerate(wanted) if len(found)})
 
 
@@ -105,7 +106,7 @@ def _parcels(piece: Piece, nodes: Nodes, comm: Any) -> list[tuple[Nodes, tuple[C
     """For each rank the cells that have a node which it moves, and their nodes; none for this rank."""
     chosen: list[list[Cells]] = [[] for _ in range(comm.size)]
     for block in piece.blocks:
-        owner = nodes.owner[np.searchsorted(nodes.ids, block.nodes)].reshape(block.nodes.shape)
+        owner = nodes.owner[places_in(nodes.ids, block.nodes)].reshape(block.nodes.shape)
         for rank, rows in enumerate(owners_beside(owner, comm)):
             chosen[rank].append(block.take(rows))
     found = []

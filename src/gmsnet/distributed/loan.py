@@ -19,6 +19,7 @@ from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Known, Part, connected
 from gmsnet.distributed.piece import Ids
 from gmsnet.distributed.winding import Winding
+from gmsnet.kernels.topology.places import places_in
 from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
@@ -68,7 +69,7 @@ class Loan(NamedTuple):
         if self.field is None or self.all is None or self.sent is None:
             return found
         for ids, some in zip(self.sent, came, strict=True):
-            found[np.searchsorted(self.all, ids)] = some
+            found[places_in(self.all, ids)] = some
         in_memory: Floats = found[self.field.topology.memory]
         return in_memory
 
@@ -82,7 +83,7 @@ class Loan(NamedTuple):
             return corners[:0]
         ids = np.concatenate(came)
         _, once = np.unique(np.sort(ids, axis=1), axis=0, return_index=True)
-        found: NDArray[np.int32] = self.field.topology.places[np.searchsorted(self.all, ids[once])]
+        found: NDArray[np.int32] = self.field.topology.places[places_in(self.all, ids[once])]
         return found
 
     def cells_back(self, part: Part, corners: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -92,18 +93,18 @@ class Loan(NamedTuple):
             ids = self.all[self.field.topology.memory[corners]]
         ids, known = part.comm.bcast(ids), part.around.nodes.ids
         here = ids[np.isin(ids, known).all(axis=1)]
-        found: NDArray[np.int32] = part.topology.places[np.searchsorted(known, here)]
+        found: NDArray[np.int32] = part.topology.places[places_in(known, here)]
         return found
 
     def _places(self, part: Part) -> list[NDArray[np.int32]]:
         """In memory, of the nodes that were sent to each rank."""
-        return [part.topology.places[np.searchsorted(part.around.nodes.ids, ids)] for ids in self.ids]
+        return [part.topology.places[places_in(part.around.nodes.ids, ids)] for ids in self.ids]
 
     def _back(self, part: Part, values: Floats | None) -> list[Floats]:
         """Values of the nodes of the field, by id, to the ranks that have sent them: what comes from each rank."""
         parcels: list[Any] = [()] * part.comm.size
         if values is not None and self.all is not None and self.sent is not None:
-            parcels = [values[np.searchsorted(self.all, ids)] for ids in self.sent]
+            parcels = [values[places_in(self.all, ids)] for ids in self.sent]
         came: list[Floats] = part.comm.alltoall(parcels)
         return came
 
@@ -159,14 +160,14 @@ def _exchanged(part: Part, field: Field, active: Mapping[int, Flags | None]) -> 
     places, points = (np.concatenate([each[k] for each in came])[first] for k in (1, 2))
     moves = np.zeros(len(ids), dtype=bool)
     for each in came:
-        moves[np.searchsorted(ids, each.ids[each.moves])] = True
+        moves[places_in(ids, each.ids[each.moves])] = True
     blocks, all_numbers = [], [ids[:0]]
     starts = np.cumsum([0, *part.around.sizes])
     for kind, cells in zip(_lent(part), zip(*(each.cells for each in came), strict=True), strict=True):
         nodes, numbers, regions = (np.concatenate(each) for each in zip(*cells, strict=True))
         _, once = np.unique(numbers, return_index=True)
         all_numbers.append(starts[kind[0]] + numbers[once])
-        nodes = np.searchsorted(ids, nodes[once])
+        nodes = places_in(ids, nodes[once])
         blocks.append(CellBlock(kind[1], nodes, regions[once]))
     whole = part.mesh
     assert whole.box is not None
@@ -184,7 +185,7 @@ def _exchanged(part: Part, field: Field, active: Mapping[int, Flags | None]) -> 
     if rail is not None:
         where = np.concatenate([each.where for each in came])[first]
         for each in came:  # who moves a node knows where it is
-            where[np.searchsorted(ids, each.ids[each.moves])] = each.where[each.moves]
+            where[places_in(ids, each.ids[each.moves])] = each.where[each.moves]
         put_on(rail, where[topology.memory])
     lent = Field(points, topology, field.precision, field.level, constraint=rail)
     return Loan(sent, lent, ids, [ids[:0] if parcel is None else parcel.ids for parcel in found])

@@ -42,7 +42,7 @@ def before(comm: Any, codes: Ids, ids: Ids, counts: Ids) -> Ids:
     codes: (n,) places on the curve, by which nodes come, those of one place by their ids (n,). counts: (n,). Each node
     is given by one rank.
     """
-    size, order = comm.size, np.lexsort((ids, codes))
+    size, order = comm.size, _in_order(codes, ids)
     sample = codes[order[np.linspace(0, len(order) - 1, SAMPLES).astype(np.int64)]] if len(order) else codes[:0]
     every = np.sort(np.concatenate(comm.allgather(sample)))
     ends = every[np.arange(1, size) * len(every) // size] if len(every) else np.zeros(size - 1, dtype=np.int64)
@@ -50,7 +50,7 @@ def before(comm: Any, codes: Ids, ids: Ids, counts: Ids) -> Ids:
     lists = by_rank(to, size)
     came = comm.alltoall([(codes[rows], ids[rows], counts[rows]) for rows in lists])
     code, number, count = (np.concatenate(each) for each in zip(*came, strict=True))
-    sequence = np.lexsort((number, code))
+    sequence = _in_order(code, number)
     sums = np.concatenate([[0], np.cumsum(count[sequence])])
     first = comm.exscan(int(sums[-1])) or 0
     found = np.empty(len(code), dtype=np.int64)
@@ -60,3 +60,14 @@ def before(comm: Any, codes: Ids, ids: Ids, counts: Ids) -> Ids:
     for rows, values in zip(lists, back, strict=True):
         out[rows] = values
     return out
+
+
+def _in_order(codes: Ids, ids: Ids) -> NDArray[np.intp]:
+    """As ``np.lexsort((ids, codes))``, in less time where most stand in order and few codes are equal."""
+    order = np.argsort(codes, kind="stable")
+    ordered = codes[order]
+    equal = ordered[1:] == ordered[:-1]
+    tied = np.flatnonzero(np.append(False, equal) | np.append(equal, False))
+    among = order[tied]
+    order[tied] = among[np.lexsort((ids[among], codes[among]))]
+    return order

@@ -25,6 +25,7 @@ from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.shell_simplices import ShellSimplices
 from gmsnet.kernels.topology.layout import morton_codes
+from gmsnet.kernels.topology.places import places_in
 from gmsnet.kernels.topology.ready import colour_ready, waits_for_others
 from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.mesh import Mesh
@@ -185,7 +186,7 @@ class Part:
         told, where = (np.concatenate(each) for each in zip(*came, strict=True))
         if len(told):
             order = np.argsort(told)
-            at = np.minimum(np.searchsorted(told[order], number), len(told) - 1)
+            at = np.minimum(places_in(told[order], number), len(told) - 1)
             found = told[order][at] == number
             place, known = np.where(found, where[order][at], place), known | found
         return place, known

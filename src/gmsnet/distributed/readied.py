@@ -16,6 +16,7 @@ from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.stages import Meant
 from gmsnet.distributed.winding import Winding
+from gmsnet.kernels.topology.places import places_in
 from gmsnet.measure.report import SHAPE
 from gmsnet.measure.totals import Totals
 from gmsnet.methods.banded import Kept
@@ -86,7 +87,7 @@ def _intent(
         return Intent(notes=(NO_LAYERS,) if options.fix_layers else (), beside=beside)
     now = None
     if points is not None:
-        at = part.topology.places[np.searchsorted(part.around.nodes.ids, piece.ids)]
+        at = part.topology.places[places_in(part.around.nodes.ids, piece.ids)]
         now = points[at]
     return intent_of(piece, options, part.comm, known, now, part.along, firm=firm)._replace(beside=beside)
 
@@ -98,7 +99,7 @@ def meant(intent: Intent, piece: Piece, part: Part) -> Meant:
     def on_part(values: NDArray[Any]) -> Floats:
         """(n,) by id of the part, of those at the nodes of the piece."""
         found = np.zeros(len(ids))
-        found[np.searchsorted(ids, piece.ids)] = values
+        found[places_in(ids, piece.ids)] = values
         return np.asarray(part.halo.spread(found[topology.memory])[topology.places])
 
     if intent.layers is not None:

@@ -27,6 +27,7 @@ from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.stages import swept
 from gmsnet.distributed.told import held, missing, not_measured, worst_of
 from gmsnet.errors import InputError
+from gmsnet.kernels.topology.places import places_in
 from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import QualityReport, measure
@@ -113,7 +114,7 @@ def _shared(
     piece: Piece, part: Part, smoother: Smoother, options: SmoothOptions, ready: Ready, before: Totals | None,
     began: float, found: Found | None, counts: Mapping[str, int],
 ) -> RankResult:  # fmt: skip
-    at = np.searchsorted(part.around.nodes.ids, piece.ids)
+    at = places_in(part.around.nodes.ids, piece.ids)
     intent, done = ready.intent, ready.mended
     asked = part.comm.bcast(options.callback is not None)
     options = replace(options, callback=Answered(part.comm, options.callback) if asked else None)
@@ -183,7 +184,7 @@ def _written(
     plane = mesh.plane or (0, 1, 2)
     put_back(state.points, part.points, topology.memory, plane, *factors_of(mesh.exponent), points, moved)
     if found is not None and isinstance(topology, Shell):  # whose figures are added up in the order of the cells
-        at = np.searchsorted(part.around.nodes.ids, piece.ids)
+        at = places_in(part.around.nodes.ids, piece.ids)
         better, figures = found.judged(points[at], piece, options, part.comm)
         best = points if better else mesh.points
         return _Written(best, moved & better, *figures)
