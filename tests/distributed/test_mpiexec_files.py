@@ -234,3 +234,22 @@ def test_several_files_that_ranks_share_go_into_a_folder(tmp_path, dry):
     assert [each["output"] for each in told] == ([None, None] if dry else ["out/a.cgns", "out/b.lb8.ugrid"])
     written = {} if dry else {f"out/{name}": before[f"serial/{name}"] for name in ("a.cgns", "b.lb8.ugrid")}
     assert saved(tmp_path) == {**before, **written}
+
+
+@pytest.mark.parametrize("code", [0, 1])
+def test_pieces_are_measured(folder, code):
+    more = () if code == 0 else ("--threshold", "0.9")
+    command = ("-m", "gmsnet", "quality", "a.pvtu", "--json", *more)
+    shared, alone = mpiexec(3, *command, cwd=folder), mpiexec(1, *command, cwd=folder)
+    assert (shared.returncode, alone.returncode) == (code, code), shared.stderr
+    assert shared.stdout == alone.stdout  # of one rank
+    assert shared.stderr == alone.stderr
+    assert json.loads(shared.stdout)["triangles"] > 1_000
+
+
+def test_pieces_that_are_damaged_are_told_once(folder):
+    (folder / "a" / "a_1.vtu").write_bytes((folder / "a" / "a_1.vtu").read_bytes()[:900])
+    done = mpiexec(3, "-m", "gmsnet", "quality", "a.pvtu", cwd=folder)
+    assert done.returncode == 2
+    assert done.stderr.count("gmsnet: error:") == 1
+    assert "a_1.vtu" in done.stderr

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gmsnet.errors import InputError
+
+if TYPE_CHECKING:
+    from gmsnet.measure.report import QualityReport
+    from gmsnet.mesh.mesh import Mesh
 
 
 def quality(
@@ -31,7 +35,8 @@ def quality(
 
     Two meshes are measured side by side; how far nodes have moved is told as well where both have the same cells.
     """
-    from gmsnet.cli.destination import check_drawable, check_picture, check_report, shown
+    from gmsnet.cli.destination import check_picture, check_report, shown
+    from gmsnet.mesh.display import amount
 
     if threshold is not None and not -1.0 <= threshold <= 1.0:
         raise InputError(f"--threshold is a value of 1/q and must lie between -1 and 1, got {threshold:g}")
@@ -48,64 +53,74 @@ def quality(
 
         raise typer.Exit(compare((input, other), threshold, format, json=json))
 
-    from gmsnet import io
     from gmsnet.cli import output
     from gmsnet.cli import report as tables
-    from gmsnet.measure.worst import named_cells, worst_cells
-    from gmsnet.mesh.known_cells import counts, unmeasured
+    from gmsnet.cli.rank_files import measured_in_pieces
+    from gmsnet.measure.overview import Overview
+
+    found = None if plot or report else measured_in_pieces(input, format, threshold)
+    mesh = None
+    if found is None:
+        mesh, measures = _measured(input, format, plot)
+        found = Overview.of(mesh, measures, threshold)
+    wanted = "volumes that can be measured" if found.volumes else "triangles and quads"
+    if threshold is not None and found.others and not found.cells:
+        raise InputError(
+            f"{shown(input)}: a threshold is asked of {wanted}, and this mesh has none: "
+            f"{found.others} cannot be measured so far"
+        )
+    if plot is not None and mesh is not None:
+        from gmsnet.plot import plot_quality
+
+        plot_quality(mesh, plot)
+    few = found.below[0]
+    document = {"input": input, "nodes": found.nodes, "planar": found.planar, **found.summary()}
+    if threshold is not None:
+        document |= {"threshold": threshold, "below_threshold": few}
+    document |= {"worst": found.worst, "plot": plot, "report": report}
+    if report is not None and mesh is not None:
+        from gmsnet.cli.command import command_of
+        from gmsnet.cli.quality_page import write_quality_page
+
+        write_quality_page(report, input, mesh, measures, document, command_of(context))
+    if json:
+        output.print_json(document)
+    else:
+        console = output.console()
+        console.print(f"{shown(input)}: {found.told}")
+        if found.cells:
+            console.print()
+            console.print(tables.figures({"now": found}))
+            console.print("\nworst cells (numbers from 0)")
+            console.print(tables.worst_table(found.worst))
+        else:
+            console.print(f"there are no {wanted if found.volumes else 'triangles or quads to measure'}")
+        if found.others:
+            console.print(f"not measured: {found.others}")
+        for remark in found.remarks:
+            console.print(remark)
+        if not (found.planar or found.volumes):
+            console.print("the mesh is a surface in space: its cells have no sign, none counts as inverted")
+        if found.gathered:
+            console.print(f"ranks: the first one measured all {amount(found.nodes, 'node')}, for {found.gathered}")
+        if plot is not None:
+            console.print(f"picture: {plot}")
+        if report is not None:
+            console.print(f"report: {report}")
+    if threshold is not None and few:
+        typer.echo(f"gmsnet: below the threshold {threshold:g}: {found.below_in_words()}", err=True)
+        raise typer.Exit(1)
+
+
+def _measured(input: str, format: str | None, plot: str | None) -> tuple[Mesh, QualityReport]:
+    from gmsnet import io
+    from gmsnet.cli.destination import check_drawable, shown
     from gmsnet.run.api import quality as measure
 
     mesh = io.read(input, format)
     if plot is not None:
         check_drawable(mesh, input)
     try:
-        found, others = measure(mesh), unmeasured(mesh)
+        return mesh, measure(mesh)
     except InputError as error:
         raise InputError(f"{shown(input)}: {error}") from error
-    wanted = "volumes that can be measured" if mesh.has_volumes else "triangles and quads"
-    if threshold is not None and others and not len(found.cell):
-        raise InputError(
-            f"{shown(input)}: a threshold is asked of {wanted}, and this mesh has none: "
-            f"{others} cannot be measured so far"
-        )
-    worst = worst_cells(mesh, found)
-    if plot is not None:
-        from gmsnet.plot import plot_quality
-
-        plot_quality(mesh, plot)
-    few = 0 if threshold is None else int((found.shape < threshold).sum())
-    document = {"input": input, "nodes": len(mesh.points), "planar": mesh.plane is not None, **found.summary()}
-    if threshold is not None:
-        document |= {"threshold": threshold, "below_threshold": few}
-    document |= {"worst": worst, "plot": plot, "report": report}
-    if report is not None:
-        from gmsnet.cli.command import command_of
-        from gmsnet.cli.quality_page import write_quality_page
-
-        write_quality_page(report, input, mesh, found, document, command_of(context))
-    if json:
-        output.print_json(document)
-    else:
-        console = output.console()
-        console.print(f"{shown(input)}: {counts(mesh)}")
-        if len(found.cell):
-            console.print()
-            console.print(tables.figures({"now": found}))
-            console.print("\nworst cells (numbers from 0)")
-            console.print(tables.worst_table(worst))
-        else:
-            console.print(f"there are no {wanted if mesh.has_volumes else 'triangles or quads to measure'}")
-        if others:
-            console.print(f"not measured: {others}")
-        for remark in found.remarks:
-            console.print(remark)
-        if mesh.plane is None and not mesh.has_volumes:
-            console.print("the mesh is a surface in space: its cells have no sign, none counts as inverted")
-        if plot is not None:
-            console.print(f"picture: {plot}")
-        if report is not None:
-            console.print(f"report: {report}")
-    if threshold is not None and few:
-        cells = named_cells(found, found.worst(few), "below it")
-        typer.echo(f"gmsnet: below the threshold {threshold:g}: {cells}", err=True)
-        raise typer.Exit(1)

@@ -1,4 +1,4 @@
-"""Under mpiexec: a file in pieces, of which each rank reads and writes its own."""
+"""Under mpiexec: a file in pieces, of which each rank reads its own, and writes them."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from gmsnet.mesh.display import amount, miss_it, visible
 from gmsnet.parallel.interrupts import interruptible
 
 if TYPE_CHECKING:
+    from gmsnet.measure.overview import Overview
     from gmsnet.run.options import SmoothOptions
 
 
@@ -33,6 +34,17 @@ def shared_format(
 
     named = names_markers(fix) or not {*slide} <= {ALL}
     return layouts.shared_format(source, target, read_as, write_as, named=named)
+
+
+def measured_in_pieces(source: str, read_as: str | None, threshold: float | None) -> Overview | None:
+    """What all ranks know of a file that they read part by part; None where one process measures it."""
+    format = shared_format(source, source, read_as, read_as, (), ())
+    if not format:
+        return None
+    from gmsnet.distributed.file_run import QualityTask
+    from gmsnet.distributed.first import measure_file_from_first
+
+    return measure_file_from_first(QualityTask(source, format, threshold))
 
 
 def smooth_in_pieces(work: FileWork, options: SmoothOptions, format: str, fix: Sequence[str]) -> int:

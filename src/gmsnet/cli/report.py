@@ -12,11 +12,12 @@ from gmsnet.measure.figures import figures_of
 from gmsnet.measure.worst import worst_rows
 
 if TYPE_CHECKING:
+    from gmsnet.measure.overview import Overview
     from gmsnet.measure.report import QualityReport
     from gmsnet.metric.conformity import ConformityChange
 
 
-def figures(reports: Mapping[str, QualityReport]) -> Table:
+def figures(reports: Mapping[str, QualityReport | Overview]) -> Table:
     """One row for each figure of quality, one column for each report."""
     rows = figures_of([report.summary() for report in reports.values()])
     return table(["", *reports], [[row.label, *row.texts] for row in rows])

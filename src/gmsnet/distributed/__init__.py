@@ -1,6 +1,7 @@
 """Meshes that are spread over the ranks of a cluster (docs/distributed.md)."""
 
-from gmsnet.distributed.api import smooth
+from gmsnet.distributed.api import quality, smooth
 from gmsnet.distributed.result import RankResult
+from gmsnet.measure.overview import Overview
 
-__all__ = ["RankResult", "smooth"]
+__all__ = ["Overview", "RankResult", "quality", "smooth"]

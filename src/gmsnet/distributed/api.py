@@ -1,4 +1,4 @@
-"""smooth() over ranks: what codes call whose mesh is spread over a cluster."""
+"""smooth() and quality() over ranks: what codes call whose mesh is spread over a cluster."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 from gmsnet.distributed.agreement import agreed, everywhere
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.piece import Cells, Piece
+from gmsnet.distributed.quality import measured
 from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.smoothing import smoothed
 from gmsnet.errors import InputError
+from gmsnet.measure.overview import Overview
 from gmsnet.mesh.adapters import to_mesh
 from gmsnet.mesh.arrays import whole_numbers
 from gmsnet.mesh.mesh import Mesh
@@ -45,6 +47,21 @@ def smooth(
     numbered = _numbered(comm, given[0], numbers)
     piece = everywhere(comm, lambda: _piece(*given, numbered))
     return smoothed(piece, asked, comm)
+
+
+def quality(mesh: Any, ids: Any, *, numbers: Any = None, threshold: float | None = None, comm: Any = None) -> Overview:
+    """How good the cells of a mesh are that is spread over the ranks of a communicator; all ranks call it.
+
+    mesh, ids, numbers, comm: as of ``smooth``. threshold: of 1/q, or η; cells below it are counted, and the worst of
+    them named. Figures, and the numbers of the worst cells, are those of ``gmsnet.quality`` of the whole mesh; means of
+    η of hexahedra, wedges and pyramids may differ in the last digit. What is not shared out the first rank measures,
+    and ``gathered`` says why. Raises as ``smooth``.
+    """
+    comm = mpi().COMM_WORLD if comm is None else comm
+    agreed(comm, threshold, "the threshold")
+    given = everywhere(comm, lambda: _given(mesh, ids, None))
+    numbered = _numbered(comm, given[0], numbers)
+    return measured(everywhere(comm, lambda: _piece(*given, numbered)), comm, threshold)
 
 
 def _given(mesh: Any, ids: Any, fixed: Any) -> tuple[Mesh, Any, Any]:

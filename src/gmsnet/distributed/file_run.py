@@ -1,4 +1,4 @@
-"""A mesh in files, smoothed where it is: each rank reads and writes its own part, and none has the whole mesh."""
+"""A mesh in files, smoothed or measured where it is: each rank reads and writes its part, and none has the whole."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from gmsnet.distributed.chosen import Chosen, holding
 from gmsnet.distributed.file_pieces import read_pieces
 from gmsnet.distributed.file_ranges import read_ranges
 from gmsnet.distributed.planned import PLANNED
+from gmsnet.distributed.quality import measured
 from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.smoothing import smoothed
+from gmsnet.measure.overview import Overview
 from gmsnet.run.options import SmoothOptions
 
 
@@ -27,11 +29,29 @@ class FileTask:
     chosen: Chosen | None = None
 
 
+@dataclass(frozen=True)
+class QualityTask:
+    """A mesh in files that all ranks measure. source: a path, of this format. threshold: see ``measured``."""
+
+    source: str
+    format: str
+    threshold: float | None = None
+
+
+def measure_file(task: QualityTask, comm: Any) -> Overview:
+    """All ranks call it. Raises InputError, on all ranks alike."""
+    return measured(_read(task, comm).piece, comm, task.threshold)
+
+
+def _read(task: FileTask | QualityTask, comm: Any) -> Any:
+    read = read_ranges if task.format in PLANNED else read_pieces
+    return read(task.source, task.format, comm)
+
+
 def smooth_file(task: FileTask, comm: Any) -> RankResult:
     """All ranks call it. The files have the bytes that a serial run writes. Raises InputError, on all ranks alike;
     then nothing is written."""
-    read = read_ranges if task.format in PLANNED else read_pieces
-    given = read(task.source, task.format, comm)
+    given = _read(task, comm)
     found = smoothed(holding(given.piece, task.chosen, comm), task.options, comm)
     if task.target is not None:
         moved = bool(comm.allreduce(int((found.points != given.piece.points).any())))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.distributed.file_run import FileTask, smooth_file
+from gmsnet.distributed.file_run import FileTask, QualityTask, measure_file, smooth_file
 from gmsnet.distributed.gathered import Whole
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.partition import partition
@@ -20,6 +20,7 @@ from gmsnet.distributed.piece import pieces_of
 from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.smoothing import smoothed
 from gmsnet.errors import GmsnetError
+from gmsnet.measure.overview import Overview
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.selection import fixed_mask
 from gmsnet.parallel.threads import serial
@@ -41,6 +42,10 @@ def follow(comm: Any = None) -> None:
         if isinstance(options, FileTask):
             with contextlib.suppress(GmsnetError):
                 smooth_file(options, comm)
+            continue
+        if isinstance(options, QualityTask):
+            with contextlib.suppress(GmsnetError):
+                measure_file(options, comm)
             continue
         piece = comm.scatter(None)
         with contextlib.suppress(GmsnetError):  # the first rank raises it, too, and says it
@@ -95,6 +100,14 @@ def smooth_file_from_first(task: FileTask, comm: Any = None) -> RankResult:
     with _TOGETHER:
         comm.bcast(replace(task, options=replace(task.options, callback=None), chosen=None))
         return smooth_file(task, comm)
+
+
+def measure_file_from_first(task: QualityTask, comm: Any = None) -> Overview:
+    """``measure_file`` while the others ``follow``. Errors: see there."""
+    comm = mpi().COMM_WORLD if comm is None else comm
+    with _TOGETHER:
+        comm.bcast(task)
+        return measure_file(task, comm)
 
 
 def _as_a_state(mesh: Mesh, points: Floats, fixed: Any, options: SmoothOptions, found: RankResult) -> State:

@@ -27,7 +27,7 @@ from gmsnet.topology.shell import Shell
 Floats = NDArray[np.float64]
 
 
-def _not_plain(part: Part, before: Totals | None) -> str:
+def not_plain(part: Part, before: Totals | None) -> str:
     """Why the mesh cannot be shared out as it is; "" if it can."""
     topology, comm = part.topology, part.comm
     if before is None:
@@ -53,7 +53,7 @@ def readied(
     piece: Piece, part: Part, options: SmoothOptions, before: Totals | None, known: Whole | None
 ) -> Ready:  # fmt: skip
     """What comes before the sweeps; called by all ranks alike. before: of the input. known: see ``gathered``."""
-    why = _not_plain(part, before)
+    why = not_plain(part, before)
     if why or before is None:
         return Ready(why)
     inverted = inverted_in(part) if before.uncertain else 0

@@ -25,7 +25,7 @@ from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.readied import Ready, meant, readied
 from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.stages import swept
-from gmsnet.distributed.told import held, missing, not_measured, worst_of
+from gmsnet.distributed.told import counts_of, held, missing, not_measured, worst_of
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology.places import places_in
 from gmsnet.kernels.topology.write_back import put_back
@@ -62,7 +62,7 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
     if options.join_regions:
         piece = piece.with_one_region()
         known = None if known is None else known._replace(mesh=known.mesh.with_one_region())
-    around, counts = surrounded(piece, comm), _counts(piece, comm)
+    around, counts = surrounded(piece, comm), counts_of(piece, comm)
     why = _not_shared(counts, smoother, options)
     if why:
         return smoothed_on_first(piece, options, comm, why, began, given)
@@ -89,14 +89,6 @@ def _smoother(options: SmoothOptions) -> Smoother:
     if options.device != CPU:
         raise InputError("device='cuda' is for one process: with several ranks, leave device out")
     return options.smoother()
-
-
-def _counts(piece: Piece, comm: Any) -> dict[str, int]:
-    """Kind → how many cells the mesh has, of kinds with any."""
-    found: dict[str, int] = {}
-    for block in piece.blocks:
-        found[block.kind] = found.get(block.kind, 0) + int(comm.allreduce(len(block.nodes)))
-    return {kind: count for kind, count in found.items() if count}
 
 
 def _not_shared(counts: Mapping[str, int], smoother: Smoother, options: SmoothOptions) -> str:

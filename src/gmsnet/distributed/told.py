@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import chain
+from typing import Any
 
 import numpy as np
 
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Part
+from gmsnet.distributed.piece import Piece
 from gmsnet.measure.report import QualityReport
 from gmsnet.measure.worst import NAMED, Place, places_of, unmet
 from gmsnet.mesh.known_cells import unmoved
@@ -17,6 +19,14 @@ from gmsnet.run.set_up import NOT_MEASURED, repeating
 from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
+
+
+def counts_of(piece: Piece, comm: Any) -> dict[str, int]:
+    """Kind → how many cells the mesh has, of kinds with any."""
+    found: dict[str, int] = {}
+    for block in piece.blocks:
+        found[block.kind] = found.get(block.kind, 0) + int(comm.allreduce(len(block.nodes)))
+    return {kind: count for kind, count in found.items() if count}
 
 
 def held(part: Part, topology: Topology | Volume) -> dict[str, int]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,9 +46,16 @@ def remarks_on(cells: MeasuredSolids) -> list[str]:
         f"{amount(len(numbers), f'{kind} cell')} inside out in the file: read in the other order of their nodes"
         for kind, numbers in cells.turned.items()
     ]
-    for what, rows in defects_of(cells).items():
-        named = ", ".join(map(str, rows[:NAMED].tolist())) + (", …" if len(rows) > NAMED else "")
-        said.append(f"{amount(len(rows), 'cell')} {what.removeprefix('cells ')} (numbers from 0: {named})")
+    found = {what: (len(rows), rows[:NAMED].tolist()) for what, rows in defects_of(cells).items()}
+    return [*said, *in_words(found)]
+
+
+def in_words(defects: Mapping[str, tuple[int, list[int]]]) -> list[str]:
+    """What is wrong, a sentence each. defects: how many cells, and the first of their numbers."""
+    said = []
+    for what, (count, numbers) in defects.items():
+        named = ", ".join(map(str, numbers)) + (", …" if count > len(numbers) else "")
+        said.append(f"{amount(count, 'cell')} {what.removeprefix('cells ')} (numbers from 0: {named})")
     return said
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,8 @@ from gmsnet.measure.defects import defects_of
 from gmsnet.measure.solids import MeasuredSolids
 from gmsnet.measure.totals import Totals
 from gmsnet.measure.volumes import MeasuredTetrahedra
+from gmsnet.parallel.executor import Executor
+from gmsnet.parallel.threads import serial
 
 Floats = NDArray[np.float64]
 
@@ -23,6 +25,7 @@ THRESHOLDS: dict[str, tuple[float, ...]] = {
 }  # fmt: skip
 BEST_IS_LOW = ("max_angle", "max_dihedral")
 NAMED = 10  # cells with a defect are named
+HALF = 26  # bits of the halves of a sum: those of 2³⁶ cells do not overflow
 
 
 def summary_of(
@@ -33,49 +36,86 @@ def summary_of(
     document: dict[str, Any] = {**cells.counts, "inverted": inverted}
     if totals is None:
         return document
-    planar = isinstance(cells, MeasuredCells) and cells.order is None
+    triangles = isinstance(cells, MeasuredCells) and cells.order is None
+    document |= measures_of(cells.names, totals, column, triangles=triangles)
+    if isinstance(cells, MeasuredSolids):
+        defects = {what: (len(rows), rows[:NAMED].tolist()) for what, rows in defects_of(cells).items()}
+        turned = {kind: len(numbers) for kind, numbers in cells.turned.items()}
+        document |= of_solids(cells.undecided, len(cells.invalid_inside), turned, defects)
+        bounds = cells.curved_bounds()
+        if len(bounds):
+            document["curved"] = {"min": float(bounds.min()), "mean": float(bounds.mean())}
+    return {**document, **qhats(totals)} if triangles else document
+
+
+def measures_of(
+    names: Sequence[str], totals: Totals, column: Callable[[str], Floats], *, triangles: bool, over: Executor = serial
+) -> dict[str, dict[str, Any]]:
+    """What there is to say of each measure. names: of all that the cells have. triangles: all of them are.
+
+    column: the values of a process; over: forms the figures of all.
+    """
+    document: dict[str, dict[str, Any]] = {}
     known = {"shape": totals.shape_mean}
-    if planar:
-        known |= {"min_angle": totals.low_mean, "max_angle": totals.high_mean}
-        known["aspect"] = totals.aspect_mean
-    names = [name for name in cells.names if planar or name != "aspect"]
-    names += [] if planar or "scaled_jacobian" in names else ["scaled_jacobian"]
+    if triangles:
+        known |= {"min_angle": totals.low_mean, "max_angle": totals.high_mean, "aspect": totals.aspect_mean}
+    names = [name for name in names if triangles or name != "aspect"]
+    names += [] if triangles or "scaled_jacobian" in names else ["scaled_jacobian"]
     for name in names:
         values, mean = column(name), known.get(name, math.nan)
         best_is_low = name in BEST_IS_LOW
         document[name] = {
-            "min": float(values.min()),
-            "mean": float(values.mean()) if math.isnan(mean) else mean,
-            "max": float(values.max()),
-            "p1": percentile(values, 99 if best_is_low else 1),
+            "min": over.minimum(float(values.min(initial=math.inf))),
+            "mean": mean_of(values, over) if math.isnan(mean) else mean,
+            "max": -over.minimum(-float(values.max(initial=-math.inf))),
+            "p1": percentile(values, 99 if best_is_low else 1, over),
         }
         for limit in THRESHOLDS.get(name, ()):
-            beyond = values > limit if best_is_low else values < limit
-            document[name][f"{'above' if best_is_low else 'below'}_{limit:g}"] = int(np.count_nonzero(beyond))
-    if isinstance(cells, MeasuredSolids):
-        document |= _of_solids(cells)
-    return {**document, "qhat": totals.qhat, "qhat_aspect": totals.qhat_aspect} if planar else document
-
-
-def _of_solids(cells: MeasuredSolids) -> dict[str, Any]:
-    """What else there is to say of volumes of any kinds, as plain numbers."""
-    defects = defects_of(cells).items()
-    document: dict[str, Any] = {
-        "undecided": cells.undecided,
-        "invalid_inside": len(cells.invalid_inside),
-        "read_inside_out": {kind: len(numbers) for kind, numbers in cells.turned.items()},
-        "defects": {what: {"count": len(rows), "cells": rows[:NAMED].tolist()} for what, rows in defects},
-    }
-    bounds = cells.curved_bounds()
-    if len(bounds):
-        document["curved"] = {"min": float(bounds.min()), "mean": float(bounds.mean())}
+            beyond = np.count_nonzero(values > limit if best_is_low else values < limit)
+            document[name][f"{'above' if best_is_low else 'below'}_{limit:g}"] = int(over.total(np.array([beyond]))[0])
     return document
 
 
-def percentile(values: Floats, percent: int) -> float:
-    """What ``np.percentile`` says, in an eighth of its time: NumPy is quick to find one value in order, not two."""
-    place = percent / 100 * (len(values) - 1)
+def qhats(totals: Totals) -> dict[str, float]:
+    """Of triangles, q̂ with both kinds of 1/q."""
+    return {"qhat": totals.qhat, "qhat_aspect": totals.qhat_aspect}
+
+
+def of_solids(
+    undecided: int, invalid_inside: int, turned: Mapping[str, int], defects: Mapping[str, tuple[int, list[int]]]
+) -> dict[str, Any]:
+    """What else there is to say of volumes of any kinds, as plain numbers.
+
+    turned: kind → how many cells are read inside out. defects: what is wrong → how many cells, and the first of them.
+    """
+    return {
+        "undecided": undecided,
+        "invalid_inside": invalid_inside,
+        "read_inside_out": dict(turned),
+        "defects": {what: {"count": count, "cells": numbers} for what, (count, numbers) in defects.items()},
+    }
+
+
+def mean_of(values: Floats, over: Executor = serial) -> float:
+    """The mean of the values of all processes, the same in any order; nan where there are none, or one is not finite.
+
+    Each is rounded to 2⁻⁵² of the largest one, and they are added up as whole numbers, of two halves.
+    """
+    top, bad = float(np.abs(values).max(initial=0.0)), not bool(np.isfinite(values).all())
+    top, count = -over.minimum(-top), int(over.total(np.array([len(values)]))[0])
+    if int(over.total(np.array([int(bad)]))[0]) or not count:
+        return math.nan
+    scale = math.frexp(top)[1]
+    scaled = np.ldexp(values, -scale)  # up to 1
+    high = np.rint(scaled * 2.0**HALF)
+    low = np.rint((scaled - high * 2.0**-HALF) * 2.0 ** (2 * HALF))
+    sums = over.total(np.array([high.astype(np.int64).sum(), low.astype(np.int64).sum()]))
+    return math.ldexp((int(sums[0]) * 2**HALF + int(sums[1])) / (count * 2 ** (2 * HALF)), scale)
+
+
+def percentile(values: Floats, percent: int, over: Executor = serial) -> float:
+    """What ``np.percentile`` says of the values of all processes."""
+    place = percent / 100 * (int(over.total(np.array([len(values)]))[0]) - 1)
     below = int(place)
-    parted = np.partition(values, below)
-    low = float(parted[below])
-    return low if place == below else low + (float(parted[below + 1 :].min()) - low) * (place - below)
+    low = over.nth(values, below + 1)
+    return low if place == below else low + (over.nth(values, below + 2) - low) * (place - below)

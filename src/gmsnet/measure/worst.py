@@ -22,8 +22,15 @@ def worst_cells(
     mesh: Mesh, report: QualityReport, held: NDArray[np.bool_] | None = None, count: int = WORST
 ) -> list[dict[str, Any]]:
     """The cells of minimum 1/q, the worst first: number from 0, measures, place, and how many corners are held."""
-    rows = []
-    for row in report.worst(count).tolist():
+    return described(mesh, report, report.worst(count), held)
+
+
+def described(
+    mesh: Mesh, report: QualityReport, rows: NDArray[np.int64], held: NDArray[np.bool_] | None = None
+) -> list[dict[str, Any]]:
+    """The same of the cells in some rows of a report."""
+    cells = []
+    for row in rows.tolist():
         cell = int(report.cell[row])
         found: dict[str, Any] = {
             "cell": cell,
@@ -38,8 +45,8 @@ def worst_cells(
         if held is not None:
             found["held_corners"] = int(held[corners_of(mesh, cell)].sum())
             found["corners"] = len(corners_of(mesh, cell))
-        rows.append(found)
-    return rows
+        cells.append(found)
+    return cells
 
 
 def invalid_place(report: QualityReport, row: int) -> list[float] | None:
@@ -112,6 +119,11 @@ def named_places(places: Sequence[Place], symbol: str) -> list[str]:
 
 def named_cells(report: QualityReport, rows: NDArray[np.int64], what: str) -> str:
     """The cells of these rows, the worst first, in words: how many are what, and the first of them by number."""
-    named = ", ".join(str(cell) for cell in report.cell[rows[:NAMED]].tolist())
-    more = ", …" if len(rows) > NAMED else ""
-    return f"{amount(len(rows), 'cell')} {what} (numbers from 0, worst first: {named}{more})"
+    return named_numbers(report.cell[rows[:NAMED]].tolist(), len(rows), what)
+
+
+def named_numbers(numbers: Sequence[int], count: int, what: str) -> str:
+    """The same of so many cells. numbers: of the first of them."""
+    named = ", ".join(map(str, numbers))
+    more = ", …" if count > len(numbers) else ""
+    return f"{amount(count, 'cell')} {what} (numbers from 0, worst first: {named}{more})"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,11 @@ def cells_in_words(cells: Iterable[CellBlock]) -> list[str]:
     counts: dict[str, int] = {}
     for block in cells:
         counts[block.kind] = counts.get(block.kind, 0) + len(block.nodes)
+    return counted_in_words(counts)
+
+
+def counted_in_words(counts: Mapping[str, int]) -> list[str]:
+    """The same. counts: kind → cells."""
     return [amount(count, f"{kind} cell") for kind, count in counts.items()]
 
 
