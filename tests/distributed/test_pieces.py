@@ -54,6 +54,22 @@ def test_arrays_of_two_ranks():
         assert f"{len(MESH.points)} nodes" in repr(result)
 
 
+def test_two_ranks_measure_their_arrays():
+    cells = np.concatenate([TRIANGLES[rank == HALF] for rank in (0, 1)])
+    expected = gmsnet.quality((MESH.points, cells))
+
+    def work(comm):
+        points, triangles, ids = own(comm.rank)
+        return gmsnet.distributed.quality((points, triangles), ids, threshold=0.5, comm=comm)
+
+    for found in together(2, work):
+        assert found.gathered == ""
+        assert found.summary() == expected.summary()
+        assert found.below[0] == int((expected.shape < 0.5).sum()) > 0
+        assert [cell["cell"] for cell in found.worst] == expected.worst(5).tolist()
+        assert "1/q, least" in repr(found)
+
+
 def test_cells_with_numbers_of_their_own_stand_as_in_the_whole_mesh():
     expected = gmsnet.smooth((MESH.points, TRIANGLES), method="barrier", preserve="none", threads=1)
 
@@ -105,9 +121,14 @@ def in_space(rank, points, triangles, ids):
     return np.pad(points, ((0, 0), (0, rank))), triangles, ids
 
 
+def whole(rank, points, triangles, ids):
+    return MESH.points, TRIANGLES, np.arange(len(MESH.points))
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
+        (whole, "all ranks have given the same cells: each cell of the mesh belongs to one rank"),
         (in_space, "how many coordinates a node has must be the same on all ranks: rank 0 has 2, rank 1 3"),
         (doubled, "the global id 0 is given to two nodes of one piece: give each node once"),
         (negative, "global ids count from 0, got -1"),

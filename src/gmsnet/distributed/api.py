@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet.distributed.agreement import agreed, everywhere
 from gmsnet.distributed.library import mpi
@@ -20,6 +21,8 @@ from gmsnet.mesh.arrays import whole_numbers
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.selection import fixed_mask
 from gmsnet.run.options import SmoothOptions
+
+SAME = "all ranks have given the same cells: each cell of the mesh belongs to one rank, so give each its own part"
 
 
 def smooth(
@@ -45,8 +48,7 @@ def smooth(
     agreed(comm, asked.asked, "the options")
     given = everywhere(comm, lambda: _given(mesh, ids, fixed))
     numbered = _numbered(comm, given[0], numbers)
-    piece = everywhere(comm, lambda: _piece(*given, numbered))
-    return smoothed(piece, asked, comm)
+    return smoothed(_checked(everywhere(comm, lambda: _piece(*given, numbered)), comm), asked, comm)
 
 
 def quality(mesh: Any, ids: Any, *, numbers: Any = None, threshold: float | None = None, comm: Any = None) -> Overview:
@@ -61,7 +63,7 @@ def quality(mesh: Any, ids: Any, *, numbers: Any = None, threshold: float | None
     agreed(comm, threshold, "the threshold")
     given = everywhere(comm, lambda: _given(mesh, ids, None))
     numbered = _numbered(comm, given[0], numbers)
-    return measured(everywhere(comm, lambda: _piece(*given, numbered)), comm, threshold)
+    return measured(_checked(everywhere(comm, lambda: _piece(*given, numbered)), comm), comm, threshold)
 
 
 def _given(mesh: Any, ids: Any, fixed: Any) -> tuple[Mesh, Any, Any]:
@@ -106,3 +108,21 @@ def _piece(mesh: Mesh, ids: Any, fixed: Any, numbered: Numbered) -> Piece:
             raise InputError(f"{len(nodes):,} {kind} cells need one number each, got shape {places.shape}")
         blocks.append(Cells(kind, nodes, regions, places))
     return Piece(ids, mesh.points, fixed, tuple(blocks), mesh.single, rounding=mesh.rounding)
+
+
+def _checked(piece: Piece, comm: Any) -> Piece:
+    """Raises InputError on all ranks where all have given the same cells, as of a mesh that is not spread."""
+    told = [(len(block.nodes), _mark(block.nodes)) for block in piece.blocks]
+    every = comm.allgather(told)
+    if comm.size > 1 and all(each == every[0] for each in every) and any(len(block.nodes) for block in piece.blocks):
+        raise InputError(SAME)
+    return piece
+
+
+def _mark(nodes: NDArray[np.int64]) -> int:
+    """A number that cells (C, k) share with others by chance alone, in whatever order these stand."""
+    marks = np.zeros(len(nodes), dtype=np.uint64)
+    for column in nodes.T:
+        marks = (marks ^ column.astype(np.uint64)) * np.uint64(0x9E3779B97F4A7C15)
+        marks ^= marks >> np.uint64(29)
+    return int(marks.sum())
