@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from gmsnet.errors import InputError
-from gmsnet.kernels.topology.sorted_unique import sorted_unique
 
 if TYPE_CHECKING:
     import numpy as np
@@ -79,7 +78,7 @@ def prescribed(mesh: Mesh, moves: Moves, displacement: str | None) -> Prescribed
     made = Prescribed.still(mesh)
     for option in ("--rotate", "--move"):
         for marker, numbers in moves.get(option, ()):
-            ids, wanted = sorted_unique(chosen_nodes(mesh, marker, option)), VALUES[option][made.dimension - 2]
+            ids, wanted = np.unique(chosen_nodes(mesh, marker, option)), VALUES[option][made.dimension - 2]
             if len(numbers) != len(wanted.split()) - 1:
                 what = "a volume" if made.dimension == 3 else "a mesh in a plane"
                 raise InputError(f"{option} takes {wanted} for {what}, got {len(numbers)} numbers after {marker!r}")

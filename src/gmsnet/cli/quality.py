@@ -101,7 +101,7 @@ def quality(
             console.print(remark)
         if not (found.planar or found.volumes):
             console.print("the mesh is a surface in space: its cells have no sign, none counts as inverted")
-        if found.gathered:
+        if found.gathered and found.cells:
             console.print(f"ranks: the first one measured all {amount(found.nodes, 'node')}, for {found.gathered}")
         if plot is not None:
             console.print(f"picture: {plot}")

@@ -1,4 +1,4 @@
-"""Under mpiexec: a file in pieces, of which each rank reads its own, and writes them."""
+"""Under mpiexec: a file in pieces, of which each rank reads its own, and writes it, or measures it."""
 
 from __future__ import annotations
 

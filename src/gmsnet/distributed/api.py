@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -55,12 +56,11 @@ def quality(mesh: Any, ids: Any, *, numbers: Any = None, threshold: float | None
     """How good the cells of a mesh are that is spread over the ranks of a communicator; all ranks call it.
 
     mesh, ids, numbers, comm: as of ``smooth``. threshold: of 1/q, or η; cells below it are counted, and the worst of
-    them named. Figures, and the numbers of the worst cells, are those of ``gmsnet.quality`` of the whole mesh; means of
-    η of hexahedra, wedges and pyramids may differ in the last digit. What is not shared out the first rank measures,
-    and ``gathered`` says why. Raises as ``smooth``.
+    them named. Figures, and the numbers of the worst cells, are those of ``gmsnet.quality`` of the whole mesh. What is
+    not shared out the first rank measures, and ``gathered`` says why. Raises as ``smooth``.
     """
     comm = mpi().COMM_WORLD if comm is None else comm
-    agreed(comm, threshold, "the threshold")
+    threshold = agreed(comm, everywhere(comm, lambda: _threshold(threshold)), "the threshold")
     given = everywhere(comm, lambda: _given(mesh, ids, None))
     numbered = _numbered(comm, given[0], numbers)
     return measured(_checked(everywhere(comm, lambda: _piece(*given, numbered)), comm), comm, threshold)
@@ -108,6 +108,15 @@ def _piece(mesh: Mesh, ids: Any, fixed: Any, numbered: Numbered) -> Piece:
             raise InputError(f"{len(nodes):,} {kind} cells need one number each, got shape {places.shape}")
         blocks.append(Cells(kind, nodes, regions, places))
     return Piece(ids, mesh.points, fixed, tuple(blocks), mesh.single, rounding=mesh.rounding)
+
+
+def _threshold(given: Any) -> float | None:
+    """Raises InputError for what is none."""
+    if given is None:
+        return None
+    if type(given) is bool or not (isinstance(given, Real) and -1.0 <= float(given) <= 1.0):
+        raise InputError(f"threshold is a value of 1/q and must lie between -1 and 1, got {given!r}")
+    return float(given)
 
 
 def _checked(piece: Piece, comm: Any) -> Piece:

@@ -13,6 +13,7 @@ from gmsnet.distributed.planned import PLANNED
 from gmsnet.distributed.quality import measured
 from gmsnet.distributed.result import RankResult
 from gmsnet.distributed.smoothing import smoothed
+from gmsnet.errors import InputError
 from gmsnet.measure.overview import Overview
 from gmsnet.run.options import SmoothOptions
 
@@ -40,7 +41,11 @@ class QualityTask:
 
 def measure_file(task: QualityTask, comm: Any) -> Overview:
     """All ranks call it. Raises InputError, on all ranks alike."""
-    return measured(_read(task, comm).piece, comm, task.threshold)
+    given = _read(task, comm)
+    try:
+        return measured(given.piece, comm, task.threshold)
+    except InputError as error:
+        raise InputError(f"{task.source}: {error}") from error
 
 
 def _read(task: FileTask | QualityTask, comm: Any) -> Any:

@@ -1,4 +1,4 @@
-"""A mesh that the first rank has, smoothed by all: what the command line does under mpiexec."""
+"""What the command line does under mpiexec: meshes that the first rank has, or files, smoothed or measured by all."""
 
 from __future__ import annotations
 

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.distributed.along import Rail, put_on, where_on
-from gmsnet.distributed.homes import homes
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Known, Part, connected
+from gmsnet.distributed.patch_ranks import patch_ranks
 from gmsnet.distributed.piece import Ids
 from gmsnet.distributed.winding import Winding
 from gmsnet.kernels.topology.places import places_in
@@ -143,7 +143,7 @@ def gathered_field(part: Part, field: Field, active: Flags | None) -> Loan:
 
 def dealt_field(part: Part, field: Field, active: Flags) -> Loan:
     """The same, dealt out: nodes that hang together go to one rank, with all cells at them."""
-    ranks = homes(part, field.topology, active)
+    ranks = patch_ranks(part, field.topology, active)
     return _exchanged(part, field, {rank: ranks == rank for rank in sorted_unique(ranks[active]).tolist()})
 
 

@@ -14,6 +14,7 @@ from gmsnet.distributed.executor import Ranks
 from gmsnet.distributed.frame import framed
 from gmsnet.distributed.gathered import Whole, gathered
 from gmsnet.distributed.ghosts import surrounded
+from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.readied import not_plain
@@ -23,9 +24,9 @@ from gmsnet.measure.defects import UNMATCHED, defects_of, in_words
 from gmsnet.measure.overview import Overview
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.measure.solids import PLURAL, MeasuredSolids
-from gmsnet.measure.summary import NAMED, measures_of, of_solids, qhats
+from gmsnet.measure.summary import measures_of, of_solids, qhats
 from gmsnet.measure.totals import Totals, totals_of
-from gmsnet.measure.worst import WORST, described
+from gmsnet.measure.worst import NAMED, WORST, described
 from gmsnet.mesh.cell_block import counted_in_words
 from gmsnet.mesh.display import amount
 from gmsnet.methods.base import CELLS
@@ -34,6 +35,9 @@ from gmsnet.topology.solids import KINDS
 Floats = NDArray[np.float64]
 
 SURFACE = "surfaces are measured whole"
+NOTHING = "there are no cells to measure"
+REPEATED = "cells that name a node twice are measured whole"
+TURNED = "cells are inside out in the file"
 
 
 def measured(piece: Piece, comm: Any, threshold: float | None = None) -> Overview:
@@ -51,10 +55,11 @@ def measured(piece: Piece, comm: Any, threshold: float | None = None) -> Overvie
     part = Part.of(around, mesh, comm, None)
     try:
         before = totals_of(part.points, part.simplices, Ranks(part))
-        why = not_plain(part, before)
-        if why or before is None:
-            return _on_first(piece, comm, threshold, why)
-        return _of_parts(part, counts, before, threshold)
+        if before is None:
+            return _on_first(piece, comm, threshold, NOTHING)
+        own, kinds = _Own(part, before), KINDS if mesh.has_volumes else CELLS
+        why = not_plain(part, before) or own.not_plain(sum(counts[kind] for kind in counts if kind in kinds))
+        return _on_first(piece, comm, threshold, why) if why else _of_parts(own, counts, before, threshold)
     finally:
         part.halo.free()
 
@@ -78,10 +83,18 @@ def _of_whole(whole: Whole, threshold: float | None, why: str) -> Overview:
 class _Own:
     """The measures of a rank's own cells."""
 
-    def __init__(self, part: Part) -> None:
+    def __init__(self, part: Part, totals: Totals) -> None:
         self.part, self.comm = part, part.comm
-        self.report: QualityReport = measure(part.mesh, part.topology, part.points)
+        self.report: QualityReport = measure(part.mesh, part.topology, part.points, totals=totals)
         self.rows = np.flatnonzero(part.own_cells[self.report.cell])
+
+    def not_plain(self, cells: int) -> str:
+        """Why the cells cannot be measured part by part, "" if they can. cells: how many there are of the mesh."""
+        if self.comm.allreduce(len(self.rows)) != cells:
+            return REPEATED
+        found = self.report.cells
+        turned = isinstance(found, MeasuredSolids) and bool(found.turned)
+        return TURNED if self.comm.allreduce(turned, mpi().LOR) else ""
 
     def column(self, name: str) -> Floats:
         """(C,) by its name."""
@@ -108,9 +121,9 @@ class _Own:
         return sum(count for count, _ in came), sorted(chain(*(numbers for _, numbers in came)))[:NAMED]
 
 
-def _of_parts(part: Part, counts: dict[str, int], totals: Totals, threshold: float | None) -> Overview:
+def _of_parts(own: _Own, counts: dict[str, int], totals: Totals, threshold: float | None) -> Overview:
     """counts: kind → how many cells the mesh has."""
-    own, comm = _Own(part), part.comm
+    part, comm = own.part, own.comm
     cells, shape = own.report.cells, own.column("shape")
     measured = [kind for kind in counts if kind in (KINDS if part.mesh.has_volumes else CELLS)]
     triangles = not part.mesh.has_volumes and "quad" not in measured
@@ -118,9 +131,10 @@ def _of_parts(part: Part, counts: dict[str, int], totals: Totals, threshold: flo
     for kind in measured:
         figures[f"{kind}s" if kind in CELLS else PLURAL[TABLE[kind].corners or 0]] = counts[kind]
     figures["inverted"] = own.number(~own.report.valid[own.rows])
-    figures |= measures_of(cells.names, totals, own.column, triangles=triangles, over=Ranks(part))
-    remarks: list[str] = []
-    if set(measured) - {"tetra", *CELLS}:
+    remarks, solids = list[str](), bool(set(measured) - {"tetra", *CELLS})
+    known = None if solids else totals
+    figures |= measures_of(cells.names, known, own.column, triangles=triangles, over=Ranks(part))
+    if solids:
         of_all = _of_solids(own)
         figures |= of_all
         remarks = in_words({what: (found["count"], found["cells"]) for what, found in of_all["defects"].items()})

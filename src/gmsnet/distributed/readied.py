@@ -79,7 +79,8 @@ def _intent(
     piece: Piece, part: Part, options: SmoothOptions, known: Whole | None, points: Floats | None, *, firm: bool
 ) -> Intent:  # fmt: skip
     """What is there on purpose. points: see Mended, where inverted cells were mended; None as they are."""
-    if options.preserved == NONE and not options.fix_layers:
+    wanted = options.preserved != NONE or options.fix_layers
+    if not wanted or not part.comm.allreduce(len(part.topology.free)):
         return Intent()
     look = Look.at(part, part.points if points is None else points)
     beside = look.beside if options.preserved == SHAPE and points is None and not firm else None

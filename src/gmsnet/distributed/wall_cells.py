@@ -22,7 +22,8 @@ class WallCells:
     """Of a mesh in a plane. part: of this rank; places: of its nodes that are corners of such cells.
 
     beside: the cells, in memory order of the whole mesh, with numbers of their nodes alone, on the first rank; None
-    elsewhere. number: the numbers of the nodes that come from the ranks, one after the other.
+    elsewhere. How they are wound is left out. number: the numbers of the nodes that come from the ranks, one after the
+    other.
     """
 
     part: Part
@@ -41,23 +42,21 @@ class WallCells:
         found = Beside.of(simplices, rows, rim)
         places, corners = np.unique(found.simplices.rows, return_inverse=True)
         parcel = (
-            part.codes[lowest], ids[lowest], corners.reshape(-1, 3), found.simplices.orientation,
+            part.codes[lowest], ids[lowest], corners.reshape(-1, 3),
             _shapes(found.simplices), ids[places], found.boundary[places],
         )  # fmt: skip
         came = comm.gather(parcel)
         if came is None:
             return cls(part, places, None, np.empty(0, dtype=np.intp))
-        codes, first, cells, orientation, shapes, nodes, boundary = zip(*came, strict=True)
+        codes, first, cells, shapes, nodes, boundary = zip(*came, strict=True)
         _, number = np.unique(np.concatenate(nodes), return_inverse=True)
         begin = np.cumsum([0, *map(len, nodes)])
         order = np.lexsort((np.concatenate(first), np.concatenate(codes)))  # stable
         numbered = [number[start:][each] for start, each in zip(begin, cells, strict=False)]
         on_boundary = np.zeros(int(number.max(initial=-1)) + 1, dtype=bool)
         on_boundary[number] = np.concatenate(boundary)
-        whole = Simplices(
-            np.concatenate(numbered)[order].astype(np.int32), np.concatenate(orientation)[order],
-            np.concatenate(shapes)[order],
-        )  # fmt: skip
+        rows, forth = np.concatenate(numbered)[order].astype(np.int32), np.ones(len(order), dtype=np.int8)
+        whole = Simplices(rows, forth, np.concatenate(shapes)[order])
         return cls(part, places, Beside(whole, on_boundary), number)
 
     def at(self, points: Floats) -> Floats | None:

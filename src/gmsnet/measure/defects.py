@@ -23,7 +23,8 @@ UNMATCHED = "cells with four-sided faces that meet two triangles"
 
 def defects_of(cells: MeasuredSolids) -> dict[str, Rows]:
     """What is wrong → the indices of the cells among all cells of the mesh, where there are any."""
-    found: dict[str, list[Rows]] = {REPEATED: [], FLAT: [], TURNED: [], UNMATCHED: [_unmatched(cells)]}
+    none = np.empty(0, dtype=np.int64)
+    found: dict[str, list[Rows]] = {REPEATED: [none], FLAT: [none], TURNED: [none], UNMATCHED: [_unmatched(cells)]}
     points = space_points(cells)
     for block in cells.blocks:
         kind = CELLS[block.kind]

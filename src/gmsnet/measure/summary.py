@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.measure.cells import MeasuredCells
-from gmsnet.measure.defects import defects_of
+from gmsnet.measure.defects import NAMED, defects_of
 from gmsnet.measure.solids import MeasuredSolids
 from gmsnet.measure.totals import Totals
 from gmsnet.measure.volumes import MeasuredTetrahedra
@@ -24,7 +24,7 @@ THRESHOLDS: dict[str, tuple[float, ...]] = {
     "min_dihedral": (5.0, 10.0, 20.0, 30.0), "max_dihedral": (150.0, 165.0, 175.0),
 }  # fmt: skip
 BEST_IS_LOW = ("max_angle", "max_dihedral")
-NAMED = 10  # cells with a defect are named
+CHUNK = 1 << 15  # values are added up at a time
 HALF = 26  # bits of the halves of a sum: those of 2³⁶ cells do not overflow
 
 
@@ -37,7 +37,8 @@ def summary_of(
     if totals is None:
         return document
     triangles = isinstance(cells, MeasuredCells) and cells.order is None
-    document |= measures_of(cells.names, totals, column, triangles=triangles)
+    known = None if isinstance(cells, MeasuredSolids) else totals
+    document |= measures_of(cells.names, known, column, triangles=triangles)
     if isinstance(cells, MeasuredSolids):
         defects = {what: (len(rows), rows[:NAMED].tolist()) for what, rows in defects_of(cells).items()}
         turned = {kind: len(numbers) for kind, numbers in cells.turned.items()}
@@ -49,15 +50,21 @@ def summary_of(
 
 
 def measures_of(
-    names: Sequence[str], totals: Totals, column: Callable[[str], Floats], *, triangles: bool, over: Executor = serial
+    names: Sequence[str],
+    totals: Totals | None,
+    column: Callable[[str], Floats],
+    *,
+    triangles: bool,
+    over: Executor = serial,
 ) -> dict[str, dict[str, Any]]:
     """What there is to say of each measure. names: of all that the cells have. triangles: all of them are.
 
-    column: the values of a process; over: forms the figures of all.
+    totals: of which the means are taken, None where they have other sums. column: the values of a process; over: forms
+    the figures of all.
     """
     document: dict[str, dict[str, Any]] = {}
-    known = {"shape": totals.shape_mean}
-    if triangles:
+    known = {} if totals is None else {"shape": totals.shape_mean}
+    if triangles and totals is not None:
         known |= {"min_angle": totals.low_mean, "max_angle": totals.high_mean, "aspect": totals.aspect_mean}
     names = [name for name in names if triangles or name != "aspect"]
     names += [] if triangles or "scaled_jacobian" in names else ["scaled_jacobian"]
@@ -105,16 +112,18 @@ def mean_of(values: Floats, over: Executor = serial) -> float:
     top, count = -over.minimum(-top), int(over.total(np.array([len(values)]))[0])
     if int(over.total(np.array([int(bad)]))[0]) or not count:
         return math.nan
-    scale = math.frexp(top)[1]
-    scaled = np.ldexp(values, -scale)  # up to 1
-    high = np.rint(scaled * 2.0**HALF)
-    low = np.rint((scaled - high * 2.0**-HALF) * 2.0 ** (2 * HALF))
-    sums = over.total(np.array([high.astype(np.int64).sum(), low.astype(np.int64).sum()]))
+    scale, sums = math.frexp(top)[1], np.zeros(2, dtype=np.int64)
+    for first in range(0, len(values), CHUNK):
+        scaled = np.ldexp(values[first : first + CHUNK], -scale)  # up to 1
+        high = np.rint(scaled * 2.0**HALF)
+        low = np.rint((scaled - high * 2.0**-HALF) * 2.0 ** (2 * HALF))
+        sums += int(high.sum()), int(low.sum())  # exact: of so few
+    sums = over.total(sums)
     return math.ldexp((int(sums[0]) * 2**HALF + int(sums[1])) / (count * 2 ** (2 * HALF)), scale)
 
 
 def percentile(values: Floats, percent: int, over: Executor = serial) -> float:
-    """What ``np.percentile`` says of the values of all processes."""
+    """The percentile of the values of all processes, between two of them where it falls there."""
     place = percent / 100 * (int(over.total(np.array([len(values)]))[0]) - 1)
     below = int(place)
     low = over.nth(values, below + 1)

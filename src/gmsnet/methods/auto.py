@@ -102,19 +102,19 @@ class Auto(Smoother):
     mean: float
     phase: str
     looks: bool
+    repeats: bool
 
     stops_when_idle = False
     shared_out = True
 
     def __init__(self, phases: Sequence[Phase] = ()) -> None:
-        self.phases = phases
-        self.at = -1
+        self.phases, self.at = phases, -1
         self.creep: Creep | None = None
         self.whole = 0  # how often all nodes have moved at once
         self.slow = self.ideal = self.early = self.doubled = False
         self.turns, self.least_before = 0, -math.inf  # how often all nodes had their turn for the worst cells
-        self.pass_gain = PASS_GAIN
-        self.passes, self.least = 0, -math.inf  # passes over the worst cells, and the least 1/q after the last one
+        self.pass_gain, self.passes = PASS_GAIN, 0  # over the worst cells
+        self.least = -math.inf  # 1/q after the last of these
         self.again = -1  # the phase to go back to in the end, if there is one
 
     def _enter(self, phase: int, field: Field, executor: Executor) -> None:
@@ -141,7 +141,8 @@ class Auto(Smoother):
             planar = isinstance(field.topology, Topology) and not isinstance(field.topology, Shell)
             if not self.phases and field.level != STAR and planar:
                 self.creep = Creep.of(field, executor)
-            self.phases = self.phases or plan_for(field.topology, self.free)
+            own, self.phases = self.phases, self.phases or plan_for(field.topology, self.free)
+            self.repeats = self.phases in IN_SPACE or not (own or field.level == STAR)
             if self.phases in IN_SPACE and self.free > LARGE_VOLUME:
                 self.pass_gain = LARGE_VOLUME_GAIN if self.phases is LARGE_VOLUME_PLAN else LARGE_GAIN
             self._enter(0, field, executor)
@@ -250,7 +251,7 @@ class Auto(Smoother):
             self.slow = self._is_slow(field, executor, ahead, lasts) or (not goes_on and self._is_caught())
             goes_on = goes_on or self.slow
         target_reached = self.smoother.target_reached
-        if isinstance(self.smoother, WorstFirst) and (self.creep is not None or self.phases in IN_SPACE):
+        if isinstance(self.smoother, WorstFirst) and self.repeats:
             self._look_at_worst(self.smoother)
         looks = phase.looks and not (phase.late and self.again >= 0)
         self.looks = self.rounds % phase.often == 0 if goes_on else looks or target_reached

@@ -16,17 +16,19 @@ Flags = NDArray[np.bool_]
 Ids = NDArray[np.int64]
 
 
-def homes(part: Part, topology: Any, active: Flags) -> Ids:
-    """(n,) by places in memory: of the active nodes that hang together over cells the rank of that of the lowest id.
+def patch_ranks(part: Part, topology: Any, active: Flags) -> Ids:
+    """(n,) by places in memory: one rank for all active nodes that hang together over cells, which moves one of them.
 
     −1 of others. active: (n,), of the nodes that this rank moves. All ranks call it.
     """
-    ids, owner = part.around.nodes.ids[topology.memory], part.around.nodes.owner[topology.memory]
-    chosen = part.halo.spread(active)
+    counts = np.array(part.comm.allgather(int(np.count_nonzero(active))))
+    end = np.cumsum(counts)  # of the numbers of each rank's active nodes
+    lowest = np.full(len(active), -1, dtype=np.int64)
+    lowest[active] = end[part.comm.rank] - counts[part.comm.rank] + np.arange(counts[part.comm.rank])
+    lowest = part.halo.spread(lowest)
+    chosen = lowest >= 0
     piece = pieces(topology.near[touching(topology.near, chosen)], chosen)[chosen]
-    lowest = np.full(len(ids), -1, dtype=np.int64)
-    lowest[chosen] = ids[chosen] * part.comm.size + owner[chosen]  # of the node of the lowest id, its rank
-    least = np.empty(len(ids), dtype=np.int64)
+    least = np.empty(len(active), dtype=np.int64)
     while True:
         least[piece] = np.iinfo(np.int64).max
         np.minimum.at(least, piece, lowest[chosen])
@@ -36,4 +38,4 @@ def homes(part: Part, topology: Any, active: Flags) -> Ids:
         if not part.comm.allreduce(bool((lower != lowest).any()), mpi().LOR):
             break
         lowest = lower
-    return np.where(active, lowest % part.comm.size, -1)
+    return np.where(active, np.searchsorted(end, lowest, side="right"), -1)
