@@ -20,7 +20,7 @@ from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.readied import not_plain
 from gmsnet.distributed.told import counts_of
 from gmsnet.errors import GmsnetError
-from gmsnet.measure.defects import UNMATCHED, defects_of, in_words
+from gmsnet.measure.defects import DEFECTS, UNMATCHED, defects_of, in_words
 from gmsnet.measure.overview import Overview
 from gmsnet.measure.report import QualityReport, measure
 from gmsnet.measure.solids import PLURAL, MeasuredSolids
@@ -157,6 +157,5 @@ def _of_solids(own: _Own) -> dict[str, Any]:
     undecided = own.number((own.report.sign == 0)[own.rows] & solids)
     inside = own.number(np.isin(own.rows, cells.invalid_inside if isinstance(cells, MeasuredSolids) else nothing))
     mine = defects_of(cells) if isinstance(cells, MeasuredSolids) else {}
-    every = dict.fromkeys(chain(*own.comm.allgather([what for what in mine if what != UNMATCHED])))
-    defects = {what: own.named(mine.get(what, nothing)) for what in every}
+    defects = {what: own.named(mine.get(what, nothing)) for what in DEFECTS if what != UNMATCHED}
     return of_solids(undecided, inside, {}, {what: found for what, found in defects.items() if found[0]})

@@ -19,6 +19,7 @@ REPEATED = "cells with a node that stands in them twice"
 FLAT = "cells without volume at any corner"
 TURNED = "cells inside out at all corners"
 UNMATCHED = "cells with four-sided faces that meet two triangles"
+DEFECTS = REPEATED, FLAT, TURNED, UNMATCHED  # in the order in which they are told
 
 
 def defects_of(cells: MeasuredSolids) -> dict[str, Rows]:
