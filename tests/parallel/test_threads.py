@@ -96,3 +96,10 @@ def test_two_works_side_by_side(threads):
 def test_side_by_side_means_at_the_same_time():
     both = threading.Barrier(2, timeout=30)
     side_by_side(2, both.wait, both.wait)
+
+
+@given(st.lists(st.sampled_from([-1.0, 0.0, 0.5, 1.0]) | st.floats(-1, 1)), st.integers(1, 30))
+def test_the_nth_value_is_as_sorting_says(values, number):
+    given_values = np.array(values)
+    assert serial.nth(given_values, number) == (sorted(values)[min(number, len(values)) - 1] if values else np.inf)
+    np.testing.assert_array_equal(given_values, values)

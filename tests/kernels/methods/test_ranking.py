@@ -41,14 +41,6 @@ def test_free_nodes_once_each():
     assert not seen.any()
 
 
-@given(values=st.lists(st.sampled_from([-1.0, 0.0, 0.5, 1.0]) | st.floats(-1, 1), min_size=1), data=st.data())
-def test_the_smallest_are_as_sorting_says(values, data):
-    rank = data.draw(st.integers(0, len(values) - 1))
-    before = np.array(values)
-    assert ranking.smallest(before, rank) == sorted(values)[rank]
-    np.testing.assert_array_equal(before, values)
-
-
 @given(st.integers(0, 2**32 - 1), st.integers(1, 400))
 def test_nodes_in_the_order_of_their_ids(seed, count):
     """Few among many, which are sorted, and so many that all are gone through."""
