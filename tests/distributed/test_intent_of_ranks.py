@@ -14,16 +14,11 @@ from gmsnet.generate import layered_volume, random_quad_mesh, random_volume
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
-from support.comm import together
 from support.layer_meshes import rows_around
-from support.ranks import parts_at_random, same, spread
+from support.ranks import on_parts, parts_at_random, same, spread
 
-from gmsnet.distributed.frame import framed
-from gmsnet.distributed.ghosts import surrounded
 from gmsnet.distributed.intent import Look
 from gmsnet.distributed.on_first import LOOKED_AT
-from gmsnet.distributed.part import Part
-from gmsnet.distributed.piece import pieces_of
 from gmsnet.measure.report import connectivity_of
 from gmsnet.preserve.columns import layers_of_volume
 from gmsnet.preserve.layers import _seeds
@@ -39,17 +34,12 @@ HEIGHTS = "cells that have one height"
 
 def look(mesh, ranks, parts):
     """What ranks see, and the cells at walls by coordinates as the first rank has them."""
-    pieces = pieces_of(mesh, np.zeros(len(mesh.points), dtype=bool), parts, ranks)
 
-    def work(comm):
-        around = surrounded(pieces[comm.rank], comm)
-        part = Part.of(around, framed(comm, around.mesh(pieces[comm.rank])), comm, None)
+    def work(part):
         seen = Look.at(part, part.points)
-        at = None if seen.beside is None else seen.beside.at(part.points)
-        part.halo.free()
-        return seen, at
+        return seen, None if seen.beside is None else seen.beside.at(part.points)
 
-    found = together(ranks, work)
+    found = on_parts(mesh, parts, ranks, work)
     assert len({(seen.layers, seen.walls) for seen, _ in found}) == 1
     return found[0]
 

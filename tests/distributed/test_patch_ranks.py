@@ -17,32 +17,16 @@ from gmsnet.generate import random_quad_mesh
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
 from support.comm import together
-from support.ranks import parts_at_random, same, spread
+from support.ranks import on_parts, parts_at_random, same, spread
 
 from gmsnet.distributed import executor
 from gmsnet.distributed.executor import Ranks
-from gmsnet.distributed.frame import framed
-from gmsnet.distributed.ghosts import surrounded
 from gmsnet.distributed.loan import dealt_field
-from gmsnet.distributed.part import Part
 from gmsnet.distributed.patch_ranks import patch_ranks
 from gmsnet.distributed.piece import pieces_of
 from gmsnet.distributed.smoothing import smoothed
 from gmsnet.methods.base import Field
 from gmsnet.run.options import SmoothOptions
-
-
-def on_ranks(mesh, ranks, parts, work):
-    pieces = pieces_of(mesh, np.zeros(len(mesh.points), dtype=bool), parts, ranks)
-
-    def one(comm):
-        around = surrounded(pieces[comm.rank], comm)
-        part = Part.of(around, framed(comm, around.mesh(pieces[comm.rank])), comm, None)
-        found = work(part)
-        part.halo.free()
-        return found
-
-    return together(ranks, one)
 
 
 @settings(max_examples=25, deadline=None)
@@ -70,7 +54,7 @@ def test_what_hangs_together_is_on_one_rank(nodes, share, seed, ranks, how, quad
             at,
         )
 
-    told = on_ranks(mesh, ranks, parts_at_random(mesh, ranks, rng, how), work)
+    told = on_parts(mesh, parts_at_random(mesh, ranks, rng, how), ranks, work)
     ids, home = (np.concatenate([each[k] for each in told]) for k in range(2))
     owner = {node: rank for each in told for node, rank in each[2].items()}
     assert len(np.unique(ids)) == len(ids)
@@ -103,7 +87,7 @@ def test_what_hangs_together_is_on_one_rank(nodes, share, seed, ranks, how, quad
 def test_a_value_of_all_ranks_is_that_of_one(values, number):
     mesh = gmsnet.random_mesh(20, seed=0)
     parts = parts_at_random(mesh, len(values), np.random.default_rng(0), "strips")
-    found = on_ranks(mesh, len(values), parts, lambda part: Ranks(part).nth(np.array(values[part.comm.rank]), number))
+    found = on_parts(mesh, parts, len(values), lambda part: Ranks(part).nth(np.array(values[part.comm.rank]), number))
     every = np.sort(np.concatenate([np.array(each) for each in values]))
     wanted = every[min(number, len(every)) - 1] if len(every) else np.inf
     assert found == [wanted] * len(values)

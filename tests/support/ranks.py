@@ -6,6 +6,9 @@ import numpy as np
 
 import gmsnet
 from gmsnet.distributed.first import follow, release, smooth_from_first
+from gmsnet.distributed.frame import framed
+from gmsnet.distributed.ghosts import surrounded
+from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import pieces_of
 from gmsnet.distributed.smoothing import smoothed
 from gmsnet.measure.worst import places_of, unmet
@@ -26,6 +29,20 @@ def parts_at_random(mesh, ranks, rng, how):
             part[:1] = 0
         found.append(part.astype(np.int32))
     return found
+
+
+def on_parts(mesh, parts, ranks, work):
+    """What work(part) returns on each rank."""
+    pieces = pieces_of(mesh, np.zeros(len(mesh.points), dtype=bool), parts, ranks)
+
+    def one(comm):
+        around = surrounded(pieces[comm.rank], comm)
+        part = Part.of(around, framed(comm, around.mesh(pieces[comm.rank])), comm, None)
+        found = work(part)
+        part.halo.free()
+        return found
+
+    return together(ranks, one)
 
 
 def spread(mesh, options, parts, ranks, fixed=None):
