@@ -142,7 +142,8 @@ def _lattice(name: str) -> Callable[[Given, float, int], Mesh]:
         nodes = given.get("nodes", NODES)
         if nodes < 1:
             raise InputError(f"a mesh needs at least 1 node inside, got --nodes {nodes}")
-        return getattr(generate, name)(given.get("columns", max(_cells_of(nodes), least)), size=size)  # type: ignore[no-any-return]
+        mesh: Mesh = getattr(generate, name)(given.get("columns", max(_cells_of(nodes), least)), size=size)
+        return mesh
 
     return make
 

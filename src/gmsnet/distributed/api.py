@@ -47,9 +47,7 @@ def smooth(
     comm = mpi().COMM_WORLD if comm is None else comm
     asked = everywhere(comm, lambda: SmoothOptions(method=method, **options))
     agreed(comm, asked.asked, "the options")
-    given = everywhere(comm, lambda: _given(mesh, ids, fixed))
-    numbered = _numbered(comm, given[0], numbers)
-    return smoothed(_checked(everywhere(comm, lambda: _piece(*given, numbered)), comm), asked, comm)
+    return smoothed(_own_piece(mesh, ids, numbers, fixed, comm), asked, comm)
 
 
 def quality(mesh: Any, ids: Any, *, numbers: Any = None, threshold: float | None = None, comm: Any = None) -> Overview:
@@ -61,9 +59,14 @@ def quality(mesh: Any, ids: Any, *, numbers: Any = None, threshold: float | None
     """
     comm = mpi().COMM_WORLD if comm is None else comm
     threshold = agreed(comm, everywhere(comm, lambda: _threshold(threshold)), "the threshold")
-    given = everywhere(comm, lambda: _given(mesh, ids, None))
+    return measured(_own_piece(mesh, ids, numbers, None, comm), comm, threshold)
+
+
+def _own_piece(mesh: Any, ids: Any, numbers: Any, fixed: Any, comm: Any) -> Piece:
+    """What a rank gives, checked on all of them. Raises InputError on all alike."""
+    given = everywhere(comm, lambda: _given(mesh, ids, fixed))
     numbered = _numbered(comm, given[0], numbers)
-    return measured(_checked(everywhere(comm, lambda: _piece(*given, numbered)), comm), comm, threshold)
+    return _checked(everywhere(comm, lambda: _piece(*given, numbered)), comm)
 
 
 def _given(mesh: Any, ids: Any, fixed: Any) -> tuple[Mesh, Any, Any]:

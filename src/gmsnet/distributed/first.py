@@ -39,13 +39,9 @@ def follow(comm: Any = None) -> None:
     """What all but the first rank do: they take part in what it smooths, until it says that this is all."""
     comm = mpi().COMM_WORLD if comm is None else comm
     while (options := comm.bcast(None)) is not None:
-        if isinstance(options, FileTask):
+        if isinstance(options, FileTask | QualityTask):
             with contextlib.suppress(GmsnetError):
-                smooth_file(options, comm)
-            continue
-        if isinstance(options, QualityTask):
-            with contextlib.suppress(GmsnetError):
-                measure_file(options, comm)
+                smooth_file(options, comm) if isinstance(options, FileTask) else measure_file(options, comm)
             continue
         piece = comm.scatter(None)
         with contextlib.suppress(GmsnetError):  # the first rank raises it, too, and says it

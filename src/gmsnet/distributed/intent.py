@@ -44,8 +44,8 @@ class Look(NamedTuple):
     beside: WallCells | None = None
 
     @classmethod
-    def at(cls, part: Part, points: Floats) -> Look:
-        """points: as ``Part.points``."""
+    def at(cls, part: Part, points: Floats, *, walls: bool = True) -> Look:
+        """points: as ``Part.points``. walls: are these looked at?"""
         topology = part.topology
         rim = part.halo.spread(rim_of(topology))
         if isinstance(topology, Volume):
@@ -55,8 +55,11 @@ class Look(NamedTuple):
         for column in range(3):
             ring[:, column] = part.halo.spread(ring[:, column])
         suspects = kernels.suspects(topology.near, rim, MOST, FEW, SEED - SLACK, ring) & part.moves
+        layers = _layers(part, topology, points, rim, suspects)
+        if not walls:
+            return cls(layers)
         beside = WallCells.of(part, topology, rows, rim)
-        return cls(_layers(part, topology, points, rim, suspects), _walls(part, topology, points, beside), beside)
+        return cls(layers, _walls(part, topology, points, beside), beside)
 
 
 def _layers_of_volume(part: Part, topology: Volume, points: Floats, wall: Flags) -> bool:
@@ -96,10 +99,11 @@ def _most_together(part: Part, chosen: Flags, pairs: Ints) -> int:
     chosen: (n,) by places in memory, of the nodes that this rank moves. pairs: (p, 2) places, all with a chosen node.
     """
     ids = part.around.nodes.ids[part.topology.memory]
-    came = part.comm.gather((ids[chosen], np.unique(ids[pairs], axis=0)))
-    return int(
-        part.comm.bcast(None if came is None else _largest(*(np.concatenate(x) for x in zip(*came, strict=True))))
-    )
+    came, found = part.comm.gather((ids[chosen], np.unique(ids[pairs], axis=0))), None
+    if came is not None:
+        every, over = zip(*came, strict=True)
+        found = _largest(np.concatenate(every), np.concatenate(over))
+    return int(part.comm.bcast(found))
 
 
 def _largest(chosen: Ids, pairs: Ids) -> int:

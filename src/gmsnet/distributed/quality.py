@@ -12,7 +12,7 @@ from gmsnet.cells.table import CELLS as TABLE
 from gmsnet.distributed.agreement import raise_everywhere
 from gmsnet.distributed.executor import Ranks
 from gmsnet.distributed.frame import framed
-from gmsnet.distributed.gathered import Whole, gathered
+from gmsnet.distributed.gathered import gathered
 from gmsnet.distributed.ghosts import surrounded
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Part
@@ -68,16 +68,12 @@ def _on_first(piece: Piece, comm: Any, threshold: float | None, why: str) -> Ove
     whole, wrong, found = gathered(piece, comm), "", None
     if whole is not None:
         try:
-            found = _of_whole(whole, threshold, why)
+            found = Overview.of(whole.mesh, measure(whole.mesh), threshold, why)
         except GmsnetError as error:
             wrong = str(error)
     raise_everywhere(comm, wrong)
     told: Overview = comm.bcast(found)
     return told
-
-
-def _of_whole(whole: Whole, threshold: float | None, why: str) -> Overview:
-    return Overview.of(whole.mesh, measure(whole.mesh), threshold, why)
 
 
 class _Own:

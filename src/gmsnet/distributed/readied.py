@@ -82,9 +82,9 @@ def _intent(
     wanted = options.preserved != NONE or options.fix_layers
     if not wanted or not part.comm.allreduce(len(part.topology.free)):
         return Intent()
-    look = Look.at(part, part.points if points is None else points)
-    beside = look.beside if options.preserved == SHAPE and points is None and not firm else None
-    if not (look.layers or (look.walls and options.preserved == SHAPE)):
+    look = Look.at(part, part.points if points is None else points, walls=options.preserved == SHAPE)
+    beside = look.beside if points is None and not firm else None
+    if not (look.layers or look.walls):
         return Intent(notes=(NO_LAYERS,) if options.fix_layers else (), beside=beside)
     now = None
     if points is not None:
