@@ -27,9 +27,10 @@ from gmsnet.mesh.checks import (
 )
 from gmsnet.mesh.display import amount, html_table, listed
 from gmsnet.mesh.markers import marker_names
-from gmsnet.mesh.plane import exponent_of, flat_axes
+from gmsnet.mesh.plane import exponent_of, extents, flat_axes
 from gmsnet.mesh.rounding import Rounding
 
+FEW = 64  # cells by which most meshes show that they are in no plane
 SOLIDS = ("hexahedron", "wedge", "pyramid")  # those whose edges are straight
 
 
@@ -203,12 +204,15 @@ class Mesh:
             return (0, 1)
         if (self.points[:, 2] == self.points[:1, 2]).all():  # quickly told: so it is in most files
             return (0, 1)
+        few = [block.nodes[:FEW].ravel() for block in self.cells]
+        if few and (extents(self.points[np.concatenate(few)]) > 1e-8 * extents(self.points).max()).all():
+            return None  # quickly told, too: of nearly all others
         used = np.zeros(len(self.points), dtype=bool)
         for block in self.cells:
             used[block.nodes] = True
         if not used.any():
             return (0, 1)
-        return flat_axes(np.ptp(0.25 * self.points[used], axis=0))  # a quarter, lest it overflow
+        return flat_axes(extents(self.points[used]))
 
     @cached_property
     def box(self) -> NDArray[np.float64] | None:

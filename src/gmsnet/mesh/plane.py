@@ -12,6 +12,11 @@ def in_plane(points: NDArray[np.float64], plane: tuple[int, int] | None) -> NDAr
     return points[:, first : second + 1 : second - first]
 
 
+def extents(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A quarter of what points (N, D) extend along each axis (D,): that does not overflow."""
+    return np.array([0.25 * x.max(initial=-np.inf) - 0.25 * x.min(initial=np.inf) for x in points.T])
+
+
 def flat_axes(extent: NDArray[np.float64]) -> tuple[int, int] | None:
     """The two axes in which nodes vary that extend by so much (3,); None if no coordinate is constant."""
     for flat in (2, 1, 0):

@@ -17,14 +17,17 @@ def doubled(mesh: Mesh, among: Flags) -> tuple[Ints, Ints]:
 
     among: (N,) cells with other nodes are not looked at.
     """
-    numbers = np.random.default_rng(0).integers(1 << 62, size=len(mesh.points))  # their sums tell cells apart
     found: dict[tuple[str, int], list[tuple[Ints, Ints]]] = {}
     before = 0
     for block in mesh.cells:
         if block.dimension == 3:
-            rows = np.flatnonzero(among[block.nodes].all(axis=1))
+            chosen = among[block.nodes[:, 0]]
+            for corner in block.nodes.T[1:]:
+                chosen &= among[corner]
+            rows = np.flatnonzero(chosen)
             found.setdefault((block.kind, block.nodes.shape[1]), []).append((before + rows, block.nodes[rows]))
         before += len(block.nodes)
+    numbers = np.random.default_rng(0).integers(1 << 62, size=len(mesh.points))  # their sums tell cells apart
     later, earlier = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for parts in found.values():
         number, nodes = (np.concatenate(each) for each in zip(*parts, strict=True))

@@ -24,7 +24,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.held import AT_BOUNDARY, reasons_in_space, released, sorted_out
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.solids import KINDS, WoundSolids, roles, tables
-from gmsnet.topology.stars import Colouring, Stars
+from gmsnet.topology.stars import Colouring, Stars, in_blocks
 from gmsnet.topology.volume import MOST, Flags, Volume
 from gmsnet.topology.wound import Wound
 
@@ -163,15 +163,7 @@ class MixedVolume(Volume):
 
     def stars_of(self, nodes: NDArray[np.int64]) -> Stars:
         """See Volume."""
-        colour = self.near_colours[nodes]
-        order = nodes[np.lexsort((nodes, self.order[nodes], colour))].astype(np.int32)
-        colours = max(int(colour.max(initial=-1)) + 1, self.colouring.fewest)
-        sizes = np.bincount(colour, minlength=colours)
-        blocks = -(-sizes // LANES3)
-        of_colour = np.concatenate([[0], np.cumsum(blocks)])
-        begin = np.concatenate([[0], np.cumsum(sizes)])[:-1]
-        within = np.arange(of_colour[-1]) - np.repeat(of_colour[:-1], blocks)
-        first = np.append(np.repeat(begin, blocks) + LANES3 * within, len(order)).astype(np.int64)
+        order, first, of_colour = in_blocks(nodes, self.order[nodes], self.near_colours[nodes], self.colouring.fewest)
         count = len(first) - 1
         _, weights = roles()
         rows, around = np.empty((2, count), dtype=np.int32)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.star import pattern as kernels
 from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.shell import ShellBlocks, ShellStars
-from gmsnet.kernels.star.space_blocks import SpaceBlocks
+from gmsnet.kernels.star.space_blocks import LANES3, SpaceBlocks
 from gmsnet.kernels.topology import connectivity, layout
 from gmsnet.topology.polygons import Offsets
 
@@ -65,6 +66,29 @@ class Stars:
     def colours(self) -> int:
         """How many colours there are."""
         return len(self.first) - 1
+
+
+def in_blocks(
+    nodes: NDArray[np.int64], alike: NDArray[np.int64], colour: Ints, fewest: int
+) -> tuple[Ints, NDArray[np.int64], NDArray[np.int64]]:  # fmt: skip
+    """The stars of some nodes in space in blocks of LANES3 of one colour.
+
+    nodes: (F,) by places in memory. alike, colour: (F,) stars of one number stand beside one another. fewest: as of
+    Colouring. Returns their order (F,), where the stars of each block begin in it (B + 1,), and where the blocks of
+    each colour begin.
+    """
+    order = nodes[np.lexsort((nodes, _short(alike), _short(colour)))].astype(np.int32)
+    sizes = np.bincount(colour, minlength=max(int(colour.max(initial=-1)) + 1, fewest))
+    blocks = -(-sizes // LANES3)
+    of_colour = np.concatenate([[0], np.cumsum(blocks)])
+    begin = np.concatenate([[0], np.cumsum(sizes)])[:-1]
+    within = np.arange(of_colour[-1]) - np.repeat(of_colour[:-1], blocks)
+    return order, np.append(np.repeat(begin, blocks) + LANES3 * within, len(order)).astype(np.int64), of_colour
+
+
+def _short(keys: NDArray[Any]) -> NDArray[Any]:
+    """The same in two bytes, if they fit: NumPy sorts these in linear time."""
+    return keys.astype(np.uint16) if keys.max(initial=0) < 1 << 16 and keys.min(initial=0) >= 0 else keys
 
 
 @dataclass(frozen=True, eq=False)

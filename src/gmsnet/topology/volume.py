@@ -21,7 +21,7 @@ from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.connectivity import Connectivity
 from gmsnet.topology.held import AT_BOUNDARY, reasons_in_space, released, sorted_out
 from gmsnet.topology.polygons import Ints
-from gmsnet.topology.stars import Colouring, Stars
+from gmsnet.topology.stars import Colouring, Stars, in_blocks
 from gmsnet.topology.wound import Wound
 
 Flags = NDArray[np.bool_]
@@ -159,16 +159,9 @@ class Volume(Connectivity):
 
     def stars_of(self, nodes: NDArray[np.int64]) -> Stars:
         """The stars of some free nodes, by places in memory."""
-        cells = np.diff(self.start)[nodes]
-        colour = self.near_colours[nodes]
-        order = nodes[np.lexsort((nodes, cells, colour))].astype(np.int32)
-        colours = max(int(colour.max(initial=-1)) + 1, self.colouring.fewest)
-        sizes = np.bincount(colour, minlength=colours)
-        blocks = -(-sizes // LANES3)
-        of_colour = np.concatenate([[0], np.cumsum(blocks)])
-        begin = np.concatenate([[0], np.cumsum(sizes)])[:-1]
-        within = np.arange(of_colour[-1]) - np.repeat(of_colour[:-1], blocks)
-        first = np.append(np.repeat(begin, blocks) + LANES3 * within, len(order)).astype(np.int64)
+        order, first, of_colour = in_blocks(
+            nodes, np.diff(self.start)[nodes], self.near_colours[nodes], self.colouring.fewest
+        )
         most_rings = np.maximum.reduceat(np.diff(self.ring_start)[order], first[:-1]) if len(order) else first[:-1]
         most_cells = np.maximum.reduceat(np.diff(self.start)[order], first[:-1]) if len(order) else first[:-1]
         rings = np.concatenate([[0], np.cumsum(LANES3 * most_rings)]).astype(np.int64)

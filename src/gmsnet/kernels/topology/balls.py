@@ -45,10 +45,13 @@ def rings(rows, orientation, start, corners, ring_start, ring, local, most):
     Returns how many nodes all rings have.
     """
     nodes = len(start) - 2
-    seen = np.full(nodes, -1, dtype=np.int64)  # 256·node | place in its ring
-    end = 0
+    seen = np.full(nodes, -1, dtype=np.int32)  # since ``base``: base + the place in the ring
+    end, base, limit = 0, 0, (1 << 31) - 1 - most
     for v in range(nodes):
         ring_start[v] = end
+        if base >= limit:
+            seen[:] = -1
+            base = 0
         count = 0
         for row in range(start[v], start[v + 1]):
             corner = corners[np.uint64(row)]
@@ -57,15 +60,15 @@ def rings(rows, orientation, start, corners, ring_start, ring, local, most):
             for i in range(3):
                 spoke = second if i == 1 else 3 - second if i == 2 else 0
                 other = np.uint64(rows[t, OPPOSITE[k, spoke]])
-                known = seen[other]
-                if known >> 8 != v or known < 0:
-                    if count < most:
-                        seen[other] = np.int64(v) << 8 | count
-                        ring[end + count] = other
-                        local[np.uint64(row), i] = count
-                    count += 1
-                else:
-                    local[np.uint64(row), i] = known & 255
+                known = seen[other] - base
+                new = known < 0  # no branch on it: nothing tells which it will be
+                room = min(count, most)
+                place = room if new else known
+                ring[np.uint64(end + room)] = other
+                seen[other] = base + place
+                local[np.uint64(row), i] = place
+                count += 1 if new else 0
+        base += min(count, most) + 1
         end += count if count <= most else 0
     ring_start[nodes] = end
     return end
@@ -80,6 +83,8 @@ def fill_blocks3(order, ring_start, ring, start, local, first, rings, spokes, bl
     """
     centre, to_ring, degree, to_spoke = blocks.centre, blocks.ring, blocks.degree, blocks.spoke
     simplices, number, filled = blocks.simplices, blocks.cells, blocks.filled
+    low, around = np.empty(LANES3, dtype=np.uint64), np.empty(LANES3, dtype=np.int64)
+    begin, own = np.empty(LANES3, dtype=np.uint64), np.empty(LANES3, dtype=np.int64)
     for b in range(len(filled)):
         stars = first[b + 1] - first[b]
         filled[b] = stars
@@ -89,23 +94,19 @@ def fill_blocks3(order, ring_start, ring, start, local, first, rings, spokes, bl
             v = order[first[b] + min(lane, stars - 1)]
             at = np.uint64(b * LANES3 + lane)
             centre[at] = v
-            low, around = np.uint64(ring_start[v]), ring_start[v + 1] - ring_start[v]
-            to = np.uint64(rings[b] + lane)
-            for j in range(around):
-                to_ring[to] = ring[low + np.uint64(j)]
+            low[lane], around[lane] = ring_start[v], ring_start[v + 1] - ring_start[v]
+            begin[lane], own[lane] = start[v], start[v + 1] - start[v]
+            number[at] = own[lane]
+        to = np.uint64(rings[b])
+        for j in range(rows):
+            for lane in range(LANES3):
+                to_ring[to + np.uint64(lane)] = ring[low[lane] + np.uint64(j if j < around[lane] else 0)]
+            to += np.uint64(LANES3)
+        to = np.uint64(spokes[b])
+        for k in range(cells):
+            for i in range(3):
+                for lane in range(LANES3):
+                    has = k < own[lane]
+                    spoke = local[begin[lane] + np.uint64(k if has else 0), np.uint64(i)]
+                    to_spoke[to + np.uint64(lane)] = spoke if has else np.uint8(0)
                 to += np.uint64(LANES3)
-            for _ in range(around, rows):
-                to_ring[to] = ring[low]
-                to += np.uint64(LANES3)
-            own, begin = start[v + 1] - start[v], np.uint64(start[v])
-            number[at] = own
-            to = np.uint64(spokes[b] + lane)
-            for k in range(own):
-                row = begin + np.uint64(k)
-                to_spoke[to] = local[row, 0]
-                to_spoke[to + np.uint64(LANES3)] = local[row, 1]
-                to_spoke[to + np.uint64(2 * LANES3)] = local[row, 2]
-                to += np.uint64(3 * LANES3)
-            for _ in range(own, cells):
-                to_spoke[to] = to_spoke[to + np.uint64(LANES3)] = to_spoke[to + np.uint64(2 * LANES3)] = 0
-                to += np.uint64(3 * LANES3)
