@@ -144,49 +144,42 @@ def count_rows(order, first, own, role, roles, core, rows, ring_rows):
 def fill_mixed_blocks(order, ring_start, ring, core, edges, own, local, role, owner, roles, lanes, first, blocks):
     """Writes stars in blocks (kernels.star.space), SpaceBlocks whose rows are counted and the rest is empty."""
     mixture = blocks.mixture
-    next_row = np.empty(roles, dtype=np.int64)
+    begin, count = np.empty((roles, lanes), dtype=np.uint64), np.empty((roles, lanes), dtype=np.int64)
+    low, inner = np.empty(lanes, dtype=np.uint64), np.empty(lanes, dtype=np.int64)
     for b in range(len(blocks.filled)):
         stars = first[b + 1] - first[b]
         blocks.filled[b] = stars
-        rows, around = np.int64(blocks.simplices[b]), np.int64(blocks.degree[b])
-        at, offset, begin = blocks.at[b], blocks.offset[b], blocks.at[b] // (3 * lanes)
-        for r in range(rows):
-            mixture.present[begin + r] = 0
-        for lane in range(lanes):  # the roles of the rows
-            v = order[first[b] + min(lane, stars - 1)]
-            if lane == 0:
-                next_row[:] = 0
-            i = own[v]
-            while i < own[v + 1]:
-                j = i
-                while j < own[v + 1] and role[j] == role[i]:
-                    j += 1
-                next_row[role[i]] = max(next_row[role[i]], j - i)
-                i = j
-        row = 0
-        for r in range(roles):
-            count = next_row[r]
-            next_row[r] = row
-            for k in range(count):
-                mixture.role[begin + row + k] = r
-            row += count
-        for k in range(3 * lanes * rows):
-            blocks.spoke[at + k] = 0
-        for k in range(lanes * rows):
-            mixture.owner[at // 3 + k] = 0
+        count[:] = 0
         for lane in range(lanes):
             v = order[first[b] + min(lane, stars - 1)]
             blocks.centre[b * lanes + lane] = v
             mixture.edges[b * lanes + lane] = edges[v]
-            for j in range(around):
-                blocks.ring[offset + j * lanes + lane] = ring[ring_start[v] + (j if j < core[v] else 0)]
             blocks.cells[b * lanes + lane] = own[v + 1] - own[v]
-            same, before = 0, -1
-            for i in range(own[v], own[v + 1]):
-                same = same + 1 if role[i] == before else 0
-                before = np.int64(role[i])
-                k = next_row[role[i]] + same
-                mixture.present[begin + k] |= np.uint16(1 << lane)
-                mixture.owner[at // 3 + k * lanes + lane] = owner[i]
-                for j in range(3):
-                    blocks.spoke[at + (3 * k + j) * lanes + lane] = local[i, j]
+            low[lane], inner[lane] = ring_start[v], core[v]
+            before = -1
+            for i in range(own[v], own[v + 1]):  # those of one role stand together
+                r = np.int64(role[i])
+                if r != before:
+                    begin[r, lane] = i
+                before = r
+                count[r, lane] += 1
+        to = np.uint64(blocks.offset[b])
+        for j in range(blocks.degree[b]):
+            for lane in range(lanes):
+                blocks.ring[to + np.uint64(lane)] = ring[low[lane] + np.uint64(j if j < inner[lane] else 0)]
+            to += np.uint64(lanes)
+        to = np.uint64(blocks.at[b])
+        row = to // np.uint64(3 * lanes)
+        for r in range(roles):
+            for k in range(count[r].max()):
+                bits = 0
+                for lane in range(lanes):
+                    has = k < count[r, lane]
+                    i = begin[r, lane] + np.uint64(k) if has else np.uint64(0)
+                    bits |= 1 << lane if has else 0
+                    mixture.owner[row * np.uint64(lanes) + np.uint64(lane)] = owner[i] if has else 0
+                    for j in range(3):
+                        blocks.spoke[to + np.uint64(j * lanes + lane)] = local[i, j] if has else 0
+                mixture.role[row], mixture.present[row] = r, bits
+                row += np.uint64(1)
+                to += np.uint64(3 * lanes)
