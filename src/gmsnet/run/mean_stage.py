@@ -10,6 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import LEVELS, STAR
 from gmsnet.kernels.star.surface import Surface, locate3
 from gmsnet.measure.totals import Totals, totals_of
@@ -40,7 +41,9 @@ def improve_mean(state: State, options: SmoothOptions, executor: Executor) -> St
         return state
     assert isinstance(topology, Volume)
     outer, executor = executor, executor.of(topology)
-    first = totals_of(state.start, topology.scored, executor)
+    of, first = state.first or (None, None)
+    if of is not topology:
+        first = totals_of(state.start, topology.scored, executor)
     assert first is not None
     wanted = first.shape_mean - LOSS if not state.before.inverted else -math.inf
     tried = list[tuple[float, NDArray[np.float64], Totals, Tally]]()
@@ -68,7 +71,10 @@ def _raised(
     smoother, tally, after = MeanInSpace(floor_of(shape)), np.zeros(3, dtype=np.int64), totals
     for _ in range(SWEEPS):
         mean = after.shape_mean
-        tally += smoother.sweep(field, executor, lambda: False)
+        found = smoother.sweep(field, executor, lambda: False)
+        tally += found
+        if not found[MOVED]:
+            break
         measured = totals_of(field.points, topology.scored, executor)
         assert measured is not None
         after = measured

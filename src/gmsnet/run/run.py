@@ -98,6 +98,7 @@ class Run:
         self.first = len(self.history)
         self.tally: Tally = np.zeros(3, dtype=np.int64)  # since the last look
         self.phases: dict[str, None] = {}  # since the last look, in their order
+        self.looked: Score | None = None  # of the last look
         self.best, self.best_score = start.points, start.score or self._score()
         self.interruption: KeyboardInterrupt | None = None
 
@@ -145,7 +146,9 @@ class Run:
 
     def _look(self, *, last: bool) -> Sweep:
         """Measures the mesh as it is now, keeps it if it is the best, and writes the record. last: nothing follows."""
-        score = self._score()
+        score = self.looked
+        if score is None or self.tally[MOVED]:
+            score = self.looked = self._score()
         self._keep_if_best(score, last=last)
         moved, truncated, dropped = self.tally.tolist()
         self.tally[:] = 0

@@ -208,8 +208,12 @@ def _first_of_volume(
         remarks.append(f"read with their corners in the other order, for they are inside out: {turned}")
     start = taken(space_points(given), topology.memory)
     remarks += without_effect(options, second)
+    looks, first = executor.for_blocks(0), None
     if second is None:
-        before = measure(given.without_cells(), topology, start, executor.for_blocks(0))
+        before = measure(given.without_cells(), topology, start, looks)
+        if not options.target:
+            whole = topology.scored is topology.simplices
+            first = before.totals if whole else totals_of(start, topology.scored, looks)
     else:
         before = measure(given)
     if options.target and not len(before.cell):
@@ -218,8 +222,9 @@ def _first_of_volume(
     nothing = np.empty(0, dtype=np.float32)
     protection = protected_volume(topology, options.preserved, options.fix_layers, start, firm=before.inverted > 0)
     return State(
-        given, restore, smoother, before, protection, start, start, nothing, tuple(remarks), sliding=sliding,
-        second_order=second,
+        given, restore, smoother, before, protection, start, start, nothing, tuple(remarks),
+        totals=first if protection.topology is topology else None,
+        first=None if first is None else (topology, first), sliding=sliding, second_order=second,
     )  # fmt: skip
 
 
