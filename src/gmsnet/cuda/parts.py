@@ -18,6 +18,7 @@ from gmsnet.cuda.library import cuda, inside
 from gmsnet.kernels.jit.load import address
 from gmsnet.kernels.jit.retarget import Retarget
 from gmsnet.kernels.simplex.jacobian3 import SIZE, solid_workspace
+from gmsnet.kernels.simplex.slack3 import ALONE, FOR_ONE
 from gmsnet.kernels.star.block import CORNERS, FLOORS, Blocks, ask_ahead, ring_row, workspace_for
 from gmsnet.kernels.star.space import KEPT
 from gmsnet.kernels.star.space_blocks import SpaceBlocks
@@ -71,7 +72,7 @@ def room_for(blocks: Blocks | SpaceBlocks, besides: int) -> int:
     """
     most, sizes = blocks.most, [besides, FEWEST]
     if isinstance(blocks, SpaceBlocks):
-        sizes += [4 * most, KEPT * blocks.most_simplices]
+        sizes += [4 * most, KEPT * blocks.most_simplices, 0 if blocks.mixture is None else ALONE + FOR_ONE]
     else:
         sizes += [2 * (1 + most), FLOORS + most + CORNERS]
     return 1 << (max(sizes) - 1).bit_length()
@@ -81,7 +82,7 @@ def room_for(blocks: Blocks | SpaceBlocks, besides: int) -> int:
 def parts_for(room: int) -> Retarget:
     """What compiles kernels whose longest array has so many numbers."""
     names = {
-        "LANES": 1, "LANES3": 1, "np": _numpy(room), "max": compiled(larger), "min": compiled(smaller),
+        "LANES": 1, "LANES3": 1, "CELLS": 1, "np": _numpy(room), "max": compiled(larger), "min": compiled(smaller),
         "load": compiled(entry_of),
     }  # fmt: skip
     parts = {

@@ -40,10 +40,10 @@ class MixedVolume(Volume):
     ``near`` are the corner simplices of the cells, all of them positive in a valid mesh, in ``all_simplices`` with what
     else belongs to them. core, edges: (N,) how many of the nodes around a node are in its simplices, and how many are
     joined to it by an edge: the first of its ring. role, owner: (M,) of the simplices at nodes (kernels.star.space).
-    order: (N,) by which stars stand beside one another. inexact_at, inexact: in CSR form the cells at each node that
-    may be invalid though their corner simplices are positive. file_numbers: (T,) the kind of each cell in file order, a
-    number in file_kinds. slack, gone, place: see kernels.star.space_blocks.Mixture; the first two are lent to
-    one Field: lent has it.
+    order: (N,) by which stars stand beside one another. inexact_cells: (I,) those that may be invalid though their
+    corner simplices are positive; inexact_at, inexact: in CSR form those at each node. file_numbers: (T,) the kind of
+    each cell in file order, a number in file_kinds. slack, gone: of the first, see kernels.star.space_blocks.Mixture;
+    both are lent to one Field: lent has it.
     """
 
     all_simplices: Tetrahedra
@@ -54,10 +54,10 @@ class MixedVolume(Volume):
     order: NDArray[np.int64]
     inexact_at: NDArray[np.int64]
     inexact: Ints
+    inexact_cells: Ints
     file_numbers: NDArray[np.uint8]
     slack: NDArray[np.float64]
     gone: NDArray[np.float64]
-    place: Ints
     lent: list[object]
     file_kinds = KINDS
 
@@ -95,8 +95,10 @@ class MixedVolume(Volume):
         )  # fmt: skip
         order = np.bincount(node, PLACES[kind[cell], corner], count)
         chosen = tables().inexact[kind[cell]]
-        inexact, place = 8 * cell[chosen] + corner[chosen], np.full(8 * len(kind), -1, dtype=np.int32)
-        place[inexact] = np.arange(len(inexact), dtype=np.int32)
+        inexact_cells = np.flatnonzero(tables().inexact[kind]).astype(np.int32)
+        number = np.empty(len(kind), dtype=np.int32)
+        number[inexact_cells] = np.arange(len(inexact_cells), dtype=np.int32)
+        inexact = 8 * number[cell[chosen]] + corner[chosen]
         inexact_at = np.concatenate([[0], np.cumsum(np.bincount(node[chosen], minlength=count))])
         of_file = np.empty_like(wound.orientation)
         of_file[wound.origin] = wound.orientation
@@ -110,7 +112,7 @@ class MixedVolume(Volume):
             wound.cell, wound.cells, of_file, simplices.rows, simplices.orientation, wound.origin[simplices.cells], own,
             local[:total], ring_start, ring[:end], Colouring(places, ring_start, ring), slid,
             simplices, core, edges, role[:total], owner[:total], order.astype(np.int64), inexact_at,
-            inexact, kinds, np.zeros(len(kind)), np.zeros(len(inexact)), place, [None],
+            inexact, inexact_cells, kinds, np.zeros(len(inexact_cells)), np.zeros(8 * len(inexact_cells)), [None],
             held=held, free=free, memory=wound.memory, near_free=marks == 0,
         )  # fmt: skip
 
@@ -178,7 +180,7 @@ class MixedVolume(Volume):
             np.empty(total, dtype=np.uint8), np.hstack([weights, sigma, sigma / 3.0]).astype(np.float32), weights,
             np.empty(total, dtype=np.uint16), np.empty(total * LANES3, dtype=np.int32),
             np.empty(count * LANES3, dtype=np.int32), solids, self.inexact_at, self.inexact, self.slack, self.gone,
-            self.place,
+            self.inexact_cells,
         )  # fmt: skip
         made = SpaceBlocks(
             np.empty(count * LANES3, dtype=np.int32), np.empty(ring_begin[-1], dtype=np.int32), ring_begin[:-1],

@@ -62,9 +62,13 @@ class Lanes:
         """A row of float32 of an array of such rows."""
         return Vector(builder, load(builder, base, index(row * self.width), self.reals))
 
-    def load_double(self, builder: Any, base: Any) -> Vector:
-        """The first row of an array of float64."""
-        return Vector(builder, load(builder, base, index(0), self.doubles, 8))
+    def load_double(self, builder: Any, base: Any, row: int = 0) -> Vector:
+        """A row of an array of rows of float64."""
+        return Vector(builder, load(builder, base, index(row * self.width), self.doubles, 8))
+
+    def store_double(self, base: Any, row: int, value: Vector) -> None:
+        """Writes one."""
+        store(value.builder, base, index(row * self.width), value.value, 8)
 
     def store_flags(self, builder: Any, base: Any, mask: Any) -> None:
         """Writes a mask as the first row of an array of flags."""
@@ -82,12 +86,12 @@ class Lanes:
         return builder.zext(builder.ctpop(builder.bitcast(mask, ir.IntType(self.width))), INDEX)
 
 
-def lanewise(function: Callable[..., Any]) -> Any:
-    """An intrinsic of WIDTH lanes, of a function of lanes and of the types of its arguments.
+def lanewise(function: Callable[..., Any], width: int = WIDTH) -> Any:
+    """An intrinsic of so many lanes, of a function of lanes and of the types of its arguments.
 
     It returns what the function of an intrinsic does: the signature, and what generates code.
     """
-    made: Any = intrinsic(typed(function, Lanes(WIDTH)))
+    made: Any = intrinsic(typed(function, Lanes(width)))
     made.lanewise = function
     return made
 
@@ -129,6 +133,8 @@ class Vector:
 
     def __add__(self, other: Vector | float) -> Vector:
         return Vector(self.builder, self.builder.fadd(self.value, self._of(other)))
+
+    __radd__ = __add__
 
     def __sub__(self, other: Vector | float) -> Vector:
         return Vector(self.builder, self.builder.fsub(self.value, self._of(other)))
@@ -178,6 +184,14 @@ def larger(one: Vector, other: Vector) -> Vector:
     return Vector(one.builder, one.builder.select(other.below(one), one.value, other.value))
 
 
+def lesser(one: Vector | float, other: Vector) -> Vector:
+    """The smaller of the two in each lane; what is not a number stays so. one: a number in all lanes."""
+    builder = other.builder
+    old = one if isinstance(one, Vector) else Vector(builder, constant(one, other.value.type))
+    lost = builder.fcmp_unordered("uno", other.value, other.value)
+    return Vector(builder, builder.select(builder.or_(other.below(old), lost), other.value, old.value))
+
+
 def root(x: Vector) -> Vector:
     """Square roots."""
     kind = x.value.type
@@ -186,13 +200,13 @@ def root(x: Vector) -> Vector:
     return Vector(x.builder, x.builder.call(function, [x.value]))
 
 
-def as_written(function: Any) -> Callable[..., Any]:
-    """The formula of a part for vectors: what it calls is taken as it is written, too."""
+def as_written(function: Any, **instead: Any) -> Callable[..., Any]:
+    """The formula of a part for vectors: what it calls is taken as it is written, too, but for some names."""
     code = function.py_func
     names = {
         name: as_written(value) if isinstance(value, Part) else value for name, value in code.__globals__.items()
         if name in code.__code__.co_names
-    }  # fmt: skip
+    } | instead  # fmt: skip
     if names.get("math") is math:
         names["math"] = SimpleNamespace(sqrt=root)
     return FunctionType(code.__code__, names)

@@ -22,7 +22,7 @@ from gmsnet.kernels.simplex.jacobian3 import solid_workspace
 from gmsnet.kernels.simplex.mean_ratio3 import HEXAHEDRON, same_cell3, square, weights_at
 from gmsnet.kernels.simplex.orientation3 import determinant_and_bound, largest_component
 from gmsnet.kernels.simplex.predicates import UNIT
-from gmsnet.kernels.simplex.slack3 import slack_of
+from gmsnet.kernels.simplex.slack3 import ALONE, CELLS, FOR_ONE, SLACK, slacks_of
 from gmsnet.kernels.simplex.validity3 import certified_solid
 
 MIXED_BOUND = 2.0  # times ``error_bound3`` where cells are not all tetrahedra
@@ -212,14 +212,14 @@ def sound(mixture, points, i, x, y, z, unit, grain):
         dx, dy, dz = x - points[i, 0], y - points[i, 1], z - points[i, 2]
         away, slack, gone, enough = WIDER * math.sqrt(square(dx, dy, dz)), mixture.slack, mixture.gone, True
         for k in range(mixture.at[i], mixture.at[i + 1]):
-            enough &= slack[mixture.around[k] >> 3] >= gone[k] + away
+            enough &= slack[mixture.around[k] >> 3] >= gone[mixture.around[k]] + away
         if not enough:
             if not renewed(mixture, points, i, x, y, z, unit, grain, away):
                 return False
             for k in range(mixture.at[i], mixture.at[i + 1]):
                 slack[mixture.around[k] >> 3] = abs(slack[mixture.around[k] >> 3])
         for k in range(mixture.at[i], mixture.at[i + 1]):
-            gone[k] += away
+            gone[mixture.around[k]] += away
     return True
 
 
@@ -232,30 +232,38 @@ def moved_elsewhere(points, nodes, before, at, around, slack, gone):
         dx, dy, dz = points[i, 0] - before[j, 0], points[i, 1] - before[j, 1], points[i, 2] - before[j, 2]
         away = WIDER * math.sqrt(square(dx, dy, dz))
         for k in range(at[i], at[i + 1]):
-            gone[k] += away
-            if gone[k] > slack[around[k] >> 3]:
+            gone[around[k]] += away
+            if gone[around[k]] > slack[around[k] >> 3]:
                 slack[around[k] >> 3] = 0.0
 
 
 @part
 def renewed(mixture, points, i, x, y, z, unit, grain, away):
     """Are those that have not slack enough certified? Theirs is made anew, with the other sign."""
-    solids, slack, gone, work = mixture.solids, mixture.slack, mixture.gone, np.empty(72)
-    for k in range(mixture.at[i], mixture.at[i + 1]):
-        cell = mixture.around[k] >> 3
-        if slack[cell] >= gone[k] + away:
-            continue
-        nodes, kind = solids.nodes[cell], solids.kind[cell]
-        found = slack_of(points, nodes, kind == HEXAHEDRON, unit, grain, i, x, y, z, work)
-        if found < 0.0:
-            form = solids.hexahedron if kind == HEXAHEDRON else solids.wedge
-            if not certified_solid(points, nodes, form, 1.0, unit, grain, i, x, y, z, solid_workspace()):
-                for j in range(mixture.at[i], k):  # it does not go there
-                    slack[mixture.around[j] >> 3] = max(slack[mixture.around[j] >> 3], 0.0)
-                return False
-            found = 0.0
-        slack[cell] = -found
-        for corner in range(8 * cell, 8 * cell + 8):
-            if mixture.place[corner] >= 0:
-                gone[mixture.place[corner]] = 0.0
+    solids, slack, gone = mixture.solids, mixture.slack, mixture.gone
+    work, numbers = np.empty(ALONE * CELLS + FOR_ONE), np.empty(CELLS, dtype=np.int32)
+    k = mixture.at[i]
+    while k < mixture.at[i + 1]:
+        count = 0
+        while k < mixture.at[i + 1] and count < CELLS:
+            number = mixture.around[k] >> 3
+            if not slack[number] >= gone[mixture.around[k]] + away:
+                numbers[count] = number
+                count += 1
+            k += 1
+        if count:
+            slacks_of(points, solids, mixture.cells, numbers, count, unit, grain, i, x, y, z, work)
+        for lane in range(count):
+            cell, found = mixture.cells[numbers[lane]], work[SLACK * CELLS + lane]
+            if found < 0.0:
+                form = solids.hexahedron if solids.kind[cell] == HEXAHEDRON else solids.wedge
+                nodes = solids.nodes[cell]
+                if not certified_solid(points, nodes, form, 1.0, unit, grain, i, x, y, z, solid_workspace()):
+                    for j in range(mixture.at[i], mixture.at[i + 1]):  # it does not go there
+                        slack[mixture.around[j] >> 3] = max(slack[mixture.around[j] >> 3], 0.0)
+                    return False
+                found = 0.0
+            slack[numbers[lane]] = -found
+            for corner in range(8):
+                gone[8 * numbers[lane] + corner] = 0.0
     return True

@@ -21,10 +21,10 @@ class Mixture(NamedTuple):
     row of ``weights``: (R, 8) float32 those of |a|², |b|², |c|², |b − a|², |c − b|², |a − c|², then σ and σ/3. exact:
     (R, 6) the same in float64. present: uint16 by [block][row], the lanes that have such a simplex. owner: by
     [block][row][lane], the cell of each. edges: (B·LANES3,) how many nodes of the ring, from the first on, an edge
-    joins to the free one. solids: all cells. at: (N + 1,), those at each node that are not valid just where their
-    corner simplices are positive begin there in ``around``. Their numbers are 8t + the
-    corner; place: (8T,) where a number stands there, or −1. slack: (T,) of each cell (kernels.simplex.slack3). gone:
-    how far each corner in ``around`` has gone of it, if the guard alone has moved points since both were set to 0.
+    joins to the free one. solids: all cells. cells: (I,) those of them that are not valid just where their corner
+    simplices are positive. at: (N + 1,), those at each node begin there in ``around``, as 8 times their number among
+    these + the corner. slack: (I,) of each (kernels.simplex.slack3). gone: (8I,) how far each corner has gone of it, if
+    the guard alone has moved points since both were set to 0.
     """
 
     role: NDArray[np.uint8]
@@ -38,7 +38,7 @@ class Mixture(NamedTuple):
     around: NDArray[np.int32]
     slack: NDArray[np.float64]
     gone: NDArray[np.float64]
-    place: NDArray[np.int32]
+    cells: NDArray[np.int32]
 
 
 class SpaceBlocks(NamedTuple):
