@@ -50,7 +50,7 @@ class Floor:
 
         The worst of all must be among them.
         """
-        few = executor.lowest_rows(shape.astype(np.float64), self.WATCHED, cells)
+        few = executor.lowest_rows(shape.astype(np.float64, copy=False), self.WATCHED, cells)
         self.enough = self.LOOKS
         self._watch(executor.blocks_with(cells[few], LANES))
 

@@ -18,6 +18,7 @@ from gmsnet.kernels.methods.barrier3 import K3
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.kernels.star.surface import Surface, locate3
+from gmsnet.kernels.topology import connectivity
 from gmsnet.measure.dihedral import ratios_of
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.methods.auto import Auto
@@ -89,6 +90,7 @@ def _set_aside(state: State, level: int, executor: Executor) -> Volume | None:
     cells, rest, alike = topology.changeable, None, ALIKE if state.rest else APART
     if state.rest is None and state.totals is not None and _are_alike(points, cells, state.totals, outer):
         return None
+    topology.forget_stars()  # sweeps over all of it have ended
     aside = np.isinf(ratios_of(points, cells, outer))
     if outer.counted(aside):  # with inverted cells in the mesh, sweeps keep nothing of the others
         alike = 0.0
@@ -107,7 +109,10 @@ def _set_aside(state: State, level: int, executor: Executor) -> Volume | None:
         everywhere = free.astype(np.float64)
         executor.exchange(everywhere)
         active = everywhere > 0.0
-        aside |= ~active[cells.rows].any(axis=1)  # cells without a node that may move have no say any more
+        still = np.ones(len(aside), dtype=bool)  # cells without a node that may move have no say any more
+        still[connectivity.touching(cells.rows, active)] = False
+        aside |= still
+        rest = None  # the memory of the last one first
         rest = executor.restricted(topology, active)
         field = Field(points, rest, state.precision, level, constraint=state.constraint)
         WorstInSpace().sweep(field, executor.of(rest), lambda: False)

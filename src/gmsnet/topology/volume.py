@@ -157,6 +157,10 @@ class Volume(Connectivity):
         """The stars of the free nodes in the order in which they are smoothed."""
         return self.stars_of(np.flatnonzero(self.near_free))
 
+    def forget_stars(self) -> None:
+        """Gives the memory of ``stars`` back; who asks for them again has them made again."""
+        self.__dict__.pop("stars", None)
+
     def stars_of(self, nodes: NDArray[np.int64]) -> Stars:
         """The stars of some free nodes, by places in memory."""
         order, first, of_colour = in_blocks(
