@@ -5,7 +5,6 @@ No is certain: no layer starts, and no wall is refined. Else both have to be loo
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,7 +50,7 @@ class Look(NamedTuple):
         if isinstance(topology, Volume):
             return cls(_layers_of_volume(part, topology, points, rim > 0))
         ring = np.zeros((len(rim), 4), dtype=np.float32)
-        rows, _ = kernels.first_ring(points, topology.near, rim, MOST, ring)
+        rows, double = kernels.first_ring(points, topology.near, rim, MOST, ring)
         for column in range(3):
             ring[:, column] = part.halo.spread(ring[:, column])
         suspects = kernels.suspects(topology.near, rim, MOST, FEW, SEED - SLACK, ring) & part.moves
@@ -59,7 +58,10 @@ class Look(NamedTuple):
         if not walls:
             return cls(layers)
         beside = WallCells.of(part, topology, rows, rim)
-        return cls(layers, _walls(part, topology, points, beside), beside)
+        others = np.ones(len(topology.near), dtype=bool)
+        others[part.own_rows] = False
+        double -= float(doubled(points, topology.near[others]).sum())
+        return cls(layers, _walls(part, points, beside, double), beside)
 
 
 def _layers_of_volume(part: Part, topology: Volume, points: Floats, wall: Flags) -> bool:
@@ -119,11 +121,10 @@ def _largest(chosen: Ids, pairs: Ids) -> int:
     return int(np.bincount(piece[number[: len(chosen)]]).max())
 
 
-def _walls(part: Part, topology: Topology, points: Floats, beside: WallCells) -> bool:
-    """Are most of the cells at one of the walls small?"""
+def _walls(part: Part, points: Floats, beside: WallCells, double: float) -> bool:
+    """Are most of the cells at one of the walls small? double: twice the area of the part's own simplices."""
     comm = part.comm
-    total = comm.allreduce(math.fsum(doubled(points, topology.near[part.own_rows])))
-    mean = SURE * total / max(comm.allreduce(len(part.own_rows)), 1)
+    mean = SURE * comm.allreduce(double) / max(comm.allreduce(len(part.own_rows)), 1)
     near = beside.at(points)
     found = False if near is None or beside.beside is None else refined_walls(near, beside.beside, mean)
     return bool(comm.bcast(found))
