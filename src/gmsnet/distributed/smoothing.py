@@ -37,7 +37,8 @@ from gmsnet.methods import Smoother
 from gmsnet.methods.base import CELLS
 from gmsnet.run.options import CPU, SmoothOptions
 from gmsnet.run.outcome import factors_of, greatest_angle, large_angles, merit_of
-from gmsnet.run.set_up import check_options, check_target, without_effect
+from gmsnet.run.remarks import without_effect
+from gmsnet.run.set_up import check_options, check_target
 from gmsnet.run.state import State
 from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.shell import Shell

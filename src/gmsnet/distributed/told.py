@@ -15,7 +15,7 @@ from gmsnet.measure.report import QualityReport
 from gmsnet.measure.worst import NAMED, Place, places_of, unmet
 from gmsnet.mesh.known_cells import unmoved
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.set_up import NOT_MEASURED, repeating
+from gmsnet.run.remarks import NOT_MEASURED, repeating
 from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume

@@ -10,16 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.constraints.options import FEATURE_ANGLE, check_slide
+from gmsnet.constraints.options import check_slide
 from gmsnet.constraints.sliding import Sliding, curves_to_slide_on
 from gmsnet.constraints.sliding_in_space import SurfaceSliding, patches_to_slide_on
 from gmsnet.errors import InputError
-from gmsnet.kernels.topology.connectivity import CHOSEN
 from gmsnet.measure.report import ASPECT, SHAPE, QualityReport, measure
 from gmsnet.measure.target import Target
 from gmsnet.measure.totals import Totals, totals_of, totals_with_others
 from gmsnet.mesh.adapters import to_mesh
-from gmsnet.mesh.display import amount
 from gmsnet.mesh.known_cells import measured, unknown_cells, unmeasured, unmoved
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.selection import fixed_mask, images
@@ -32,25 +30,24 @@ from gmsnet.parallel.threads import side_by_side
 from gmsnet.preserve.protection import METRIC, NONE, SIZE, Protection, protected, protected_volume
 from gmsnet.run.metric_stage import check_given
 from gmsnet.run.options import SmoothOptions
+from gmsnet.run.remarks import NOT_MEASURED, held_anyway, repeating, without_effect
 from gmsnet.run.second_order import second_order_of
 from gmsnet.run.second_order_volumes import second_order_solids_of
 from gmsnet.run.set_up_surface import first_of_surface, renewing
-from gmsnet.run.state import SecondOrder, State
+from gmsnet.run.state import State
 from gmsnet.topology.doubled import doubled_note
-from gmsnet.topology.held import REASONS
 from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
 from gmsnet.topology.ordering import space_points, taken
-from gmsnet.topology.solids import KINDS
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
 from gmsnet.topology.wound import refuse_flat
 
 Floats = NDArray[np.float64]
+Looked = tuple[QualityReport, Totals | None, Protection]
 
 MANY = 20_000  # nodes: for the set-up of fewer a second thread is not worth starting
 # That a call takes at most on a mesh of triangles, copies of them included; ``auto`` takes 251, all nodes at once 550.
 BYTES_PER_NODE = 600
-NOT_MEASURED = "not measured, and their nodes are held: "
 
 
 def first_state(
@@ -79,7 +76,7 @@ def first_state(
         return replace(
             state, remarks=(*state.remarks, *held_anyway(given, asked, matching, shell, fixed, options.slides))
         )
-    threads = options.thread_count if len(given.points) >= MANY else 1
+    threads = _threads(given, options)
     still = asked if moved is None else asked | moved
     curves = curves_to_slide_on(given, options.slide, options.feature_angle, still)
     topology, start = Topology.and_points(given, still, threads, None if curves is None else curves.slides)
@@ -99,7 +96,7 @@ def first_state(
     given = given.without_cells()  # whatever was copied of them is given back
     shapes = np.full(len(topology.near) if target else 0, np.nan, dtype=np.float32)  # of triangles alone it is written
 
-    def looked_at(near: Floats) -> tuple[QualityReport, Totals | None, Protection]:
+    def looked_at(near: Floats) -> Looked:
         looks, first, every = executor.for_blocks(0), None, None
         if not target:  # else the shapes of all cells are wanted
             first = totals_of(near, topology.scored, looks)
@@ -109,10 +106,7 @@ def first_state(
         found = protected(given, topology, options.preserved, options.fix_layers, near, firm=firm)
         return before, first, found
 
-    if threads == 1 or target or not isinstance(smoother, Auto | StarSmoother):
-        before, first, protection = looked_at(start)
-    else:  # most often nothing is protected, and these are the stars that are smoothed
-        (before, first, protection), _ = side_by_side(threads, partial(looked_at, start), lambda: topology.stars)
+    before, first, protection = _beside_stars(partial(looked_at, start), topology, smoother, options, threads)
     if values is not None and before.inverted:
         raise InputError(
             f"{'metric' if options.size is None else 'size'} is given at the nodes of a mesh with "
@@ -135,51 +129,6 @@ def first_state(
         second_order=second,
         nodal=values,
     )
-
-
-def without_effect(options: SmoothOptions, second: SecondOrder | None = None) -> list[str]:
-    """What of the options of sliding, and of surfaces, has no effect on a mesh in a plane, or of volumes."""
-    said = ["update_normals: this mesh is no surface in space, so normals stay"] if options.update_normals else []
-    if options.slides and second is not None:
-        said.append("slide: boundary nodes of second-order cells stay where they are")
-    if not options.slides and options.feature_angle != FEATURE_ANGLE:
-        said.append("feature angle: it has no effect, as no node is to slide: ask for that by slide")
-    return said
-
-
-def held_anyway(
-    given: Mesh, asked: NDArray[np.bool_], matching: NDArray[np.bool_], topology: Topology | Volume, fixed: Any,
-    slides: bool,
-) -> list[str]:  # fmt: skip
-    """Says so where all nodes that are to be held are held for other reasons. slides: else some might slide.
-
-    And how many are held because they must match others, ``matching`` (N,) bool, where they might move else.
-    """
-    asked = asked & ~matching
-    on_surface = given.plane is None and not given.has_volumes
-    said = []
-    if matching.any() and (slides or on_surface):
-        said.append(f"nodes of periodic boundaries are held, so that they go on to match: {matching.sum():,}")
-    if not asked.any() or REASONS[CHOSEN] in topology.held:
-        return said
-    count = np.count_nonzero(asked)
-    named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
-    where = " by the point data 'fixed' of the mesh" if fixed is None else ""
-    return [
-        *said,
-        f"fixed: {named}{where}, and {'does' if count == 1 else 'do'} not slide"
-        if slides
-        else f"fixed: {named}{where}, and held for other reasons anyway",
-    ]
-
-
-def repeating(counts: Mapping[str, int], known: int) -> str:
-    """How many volumes name a node twice, in words; "" if none do. They count as invalid in ``measure`` alone.
-
-    counts: kind → how many cells. known: how many of them have a connectivity (``WoundSolids``).
-    """
-    many = sum(counts.get(kind, 0) for kind in KINDS) - known
-    return f"{amount(many, 'cell')} that {'names' if many == 1 else 'name'} a node twice" if many else ""
 
 
 def _first_of_volume(
@@ -208,24 +157,44 @@ def _first_of_volume(
         remarks.append(f"read with their corners in the other order, for they are inside out: {turned}")
     start = taken(space_points(given), topology.memory)
     remarks += without_effect(options, second)
-    looks, first = executor.for_blocks(0), None
-    if second is None:
-        before = measure(given.without_cells(), topology, start, looks)
-        if not options.target:
+    bare, nothing = given.without_cells(), np.empty(0, dtype=np.float32)
+
+    def looked_at() -> Looked:
+        looks, first = executor.for_blocks(0), None
+        before = measure(bare, topology, start, looks) if second is None else measure(given)
+        if second is None and not options.target:
             whole = topology.scored is topology.simplices
             first = before.totals if whole else totals_of(start, topology.scored, looks)
-    else:
-        before = measure(given)
-    if options.target and not len(before.cell):
-        raise InputError(f"a target is asked of cells that can be measured, and this mesh has none: {left_out}")
-    given = given.without_cells()
-    nothing = np.empty(0, dtype=np.float32)
-    protection = protected_volume(topology, options.preserved, options.fix_layers, start, firm=before.inverted > 0)
+        if options.target and not len(before.cell):
+            raise InputError(f"a target is asked of cells that can be measured, and this mesh has none: {left_out}")
+        firm = before.inverted > 0
+        return before, first, protected_volume(topology, options.preserved, options.fix_layers, start, firm=firm)
+
+    threads = 1 if second is not None else _threads(given, options)
+    before, first, protection = _beside_stars(looked_at, topology, smoother, options, threads)
+    given = bare
     return State(
         given, restore, smoother, before, protection, start, start, nothing, tuple(remarks),
         totals=first if protection.topology is topology else None,
         first=None if first is None else (topology, first), sliding=sliding, second_order=second,
     )  # fmt: skip
+
+
+def _threads(mesh: Mesh, options: SmoothOptions) -> int:
+    """On how many threads the set-up is made."""
+    return options.thread_count if len(mesh.points) >= MANY else 1
+
+
+def _beside_stars(
+    look: Callable[[], Looked], topology: Topology | Volume, smoother: Smoother, options: SmoothOptions, threads: int
+) -> Looked:  # fmt: skip
+    """What a look returns, with the stars made beside it where there is a thread for that.
+
+    Most often nothing is protected, and these are the stars that are smoothed.
+    """
+    if threads == 1 or options.target or not isinstance(smoother, Auto | StarSmoother):
+        return look()
+    return side_by_side(threads, look, lambda: topology.stars)[0]
 
 
 def check_options(mesh: Mesh, options: SmoothOptions, counts: Mapping[str, int] | None = None) -> None:

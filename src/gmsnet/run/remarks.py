@@ -1,0 +1,67 @@
+"""What there is to say of a mesh before it is smoothed: options without effect, and nodes that are held anyway."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gmsnet.constraints.options import FEATURE_ANGLE
+from gmsnet.kernels.topology.connectivity import CHOSEN
+from gmsnet.mesh.display import amount
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.run.options import SmoothOptions
+from gmsnet.run.state import SecondOrder
+from gmsnet.topology.held import REASONS
+from gmsnet.topology.solids import KINDS
+from gmsnet.topology.topology import Topology
+from gmsnet.topology.volume import Volume
+
+NOT_MEASURED = "not measured, and their nodes are held: "
+
+
+def without_effect(options: SmoothOptions, second: SecondOrder | None = None) -> list[str]:
+    """What of the options of sliding, and of surfaces, has no effect on a mesh in a plane, or of volumes."""
+    said = ["update_normals: this mesh is no surface in space, so normals stay"] if options.update_normals else []
+    if options.slides and second is not None:
+        said.append("slide: boundary nodes of second-order cells stay where they are")
+    if not options.slides and options.feature_angle != FEATURE_ANGLE:
+        said.append("feature angle: it has no effect, as no node is to slide: ask for that by slide")
+    return said
+
+
+def held_anyway(
+    given: Mesh, asked: NDArray[np.bool_], matching: NDArray[np.bool_], topology: Topology | Volume, fixed: Any,
+    slides: bool,
+) -> list[str]:  # fmt: skip
+    """Says so where all nodes that are to be held are held for other reasons. slides: else some might slide.
+
+    And how many are held because they must match others, ``matching`` (N,) bool, where they might move else.
+    """
+    asked = asked & ~matching
+    on_surface = given.plane is None and not given.has_volumes
+    said = []
+    if matching.any() and (slides or on_surface):
+        said.append(f"nodes of periodic boundaries are held, so that they go on to match: {matching.sum():,}")
+    if not asked.any() or REASONS[CHOSEN] in topology.held:
+        return said
+    count = np.count_nonzero(asked)
+    named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
+    where = " by the point data 'fixed' of the mesh" if fixed is None else ""
+    return [
+        *said,
+        f"fixed: {named}{where}, and {'does' if count == 1 else 'do'} not slide"
+        if slides
+        else f"fixed: {named}{where}, and held for other reasons anyway",
+    ]
+
+
+def repeating(counts: Mapping[str, int], known: int) -> str:
+    """How many volumes name a node twice, in words; "" if none do. They count as invalid in ``measure`` alone.
+
+    counts: kind → how many cells. known: how many of them have a connectivity (``WoundSolids``).
+    """
+    many = sum(counts.get(kind, 0) for kind in KINDS) - known
+    return f"{amount(many, 'cell')} that {'names' if many == 1 else 'name'} a node twice" if many else ""
