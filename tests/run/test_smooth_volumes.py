@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from support import volumes
+from support.blocks import block
 
 import gmsnet
 from gmsnet.errors import InputError
-from gmsnet.run import stop
+from gmsnet.parallel.threads import side_by_side
+from gmsnet.run import set_up, stop
 from gmsnet.topology.volume import Volume
 
 
@@ -219,3 +221,22 @@ def test_marks_of_planar_meshes_stay_what_they_were():
     one, other = gmsnet.smooth(mesh, max_sweeps=5), gmsnet.smooth(with_nothing, max_sweeps=5)
     assert one.points.tobytes() == other.points.tobytes()
     assert "1/q" in repr(one)
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: volumes.mesh_of(*volumes.cube(400, 3)), lambda: block(5, 5, 5, jitter=0.2, seed=1)]
+)
+def test_stars_are_made_beside_the_look_where_there_are_threads(make, monkeypatch):
+    mesh, beside = make(), []
+
+    def counted(threads, one, other):
+        beside.append(threads)
+        return side_by_side(threads, one, other)
+
+    monkeypatch.setattr(set_up, "MANY", 0)
+    monkeypatch.setattr(set_up, "side_by_side", counted)
+    one, two = (gmsnet.smooth(mesh, threads=threads) for threads in (1, 2))
+    assert beside == [2]
+    assert one.points.tobytes() == two.points.tobytes()
+    gmsnet.smooth(mesh, threads=2, target_quality=0.1)
+    assert beside == [2]
