@@ -138,12 +138,13 @@ def _first_of_volume(
     """The same of a mesh of volumes."""
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     still = asked if moved is None else asked | moved
-    wound, sliding = wound_of(given, still), None
+    threads = _threads(given, options)
+    wound, sliding = wound_of(given, still, threads), None
     surface = patches_to_slide_on(given, wound, names, options.feature_angle, still, options.distance)
     if surface is None:
-        topology = volume_of(wound)
+        topology = volume_of(wound, None, threads)
     else:
-        topology = volume_of(wound, surface[1].slides | surface[1].curves.slides)
+        topology = volume_of(wound, surface[1].slides | surface[1].curves.slides, threads)
         sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, options.distance, options.geometry)
     remarks = held_anyway(given, asked, matching, topology, fixed, options.slides)
     remarks += doubled_note(given, topology)
@@ -170,7 +171,7 @@ def _first_of_volume(
         firm = before.inverted > 0
         return before, first, protected_volume(topology, options.preserved, options.fix_layers, start, firm=firm)
 
-    threads = 1 if second is not None else _threads(given, options)
+    threads = 1 if second is not None else threads
     before, first, protection = _beside_stars(looked_at, topology, smoother, options, threads)
     given = bare
     return State(

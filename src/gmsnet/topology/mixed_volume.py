@@ -195,11 +195,11 @@ class MixedVolume(Volume):
         return Stars(made, of_colour.astype(np.int32))
 
 
-def wound_of(mesh: Mesh, fixed: Flags | None = None) -> Wound | WoundSolids:
-    """The cells of a mesh with volumes, read alike; ``fixed`` and errors: see ``Volume.of``."""
-    return WoundSolids.of(mesh, fixed) if mesh.has_solids else Wound.of(mesh, fixed)
+def wound_of(mesh: Mesh, fixed: Flags | None = None, threads: int = 1) -> Wound | WoundSolids:
+    """The cells of a mesh with volumes, read alike; ``fixed`` and errors: see ``Volume.of``. threads: one or two."""
+    return WoundSolids.of(mesh, fixed) if mesh.has_solids else Wound.of(mesh, fixed, threads)
 
 
-def volume_of(wound: Wound | WoundSolids, slides: Flags | None = None) -> Volume:
-    """Their connectivity. slides: see ``Volume.made``."""
-    return Volume.made(wound, slides) if isinstance(wound, Wound) else MixedVolume.mixed(wound, slides)
+def volume_of(wound: Wound | WoundSolids, slides: Flags | None = None, threads: int = 1) -> Volume:
+    """Their connectivity. slides, threads: see ``Volume.made``."""
+    return Volume.made(wound, slides, threads) if isinstance(wound, Wound) else MixedVolume.mixed(wound, slides)

@@ -9,7 +9,7 @@ plane: by ids at the doors, and by places in memory inside.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.space_blocks import LANES3, SpaceBlocks
 from gmsnet.kernels.topology import balls, connectivity
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.parallel.threads import side_by_side
 from gmsnet.topology.connectivity import Connectivity
 from gmsnet.topology.held import AT_BOUNDARY, reasons_in_space, released, sorted_out
 from gmsnet.topology.polygons import Ints
@@ -63,8 +64,11 @@ class Volume(Connectivity):
         return cls.made(Wound.of(mesh, fixed))
 
     @classmethod
-    def made(cls, wound: Wound, slides: Flags | None = None) -> Volume:
-        """Of cells that are wound. slides: (N,) bool by id, nodes of the boundary that may move all the same, on it."""
+    def made(cls, wound: Wound, slides: Flags | None = None, threads: int = 1) -> Volume:
+        """Of cells that are wound. slides: (N,) bool by id, nodes of the boundary that may move all the same, on it.
+
+        threads: one or two.
+        """
         rows, marks, position, nodes = wound.rows, wound.marks.copy(), wound.position, len(wound.marks)
         rim, slid = np.zeros(nodes, dtype=np.int64), dict[str, NDArray[np.int64]]()  # rim: facets there
         if slides is not None:
@@ -74,10 +78,7 @@ class Volume(Connectivity):
         balls.count_stars(rows, marks, start)
         corners = np.empty(start[-1], dtype=np.int32)
         balls.list_stars(rows, marks, start, corners)
-        room = (3 * len(corners) + int(rim.sum())) // 2 + nodes
-        ring_start, ring = np.empty(nodes + 1, dtype=np.int64), np.empty(room, dtype=np.int32)
-        local = np.empty((len(corners), 3), dtype=np.uint8)
-        end = balls.rings(rows, wound.orientation, start, corners, ring_start, ring, local, MOST)
+        ring_start, padded, local = _rings(wound, start, corners, int(rim.sum()), threads)
         start, around = start[:-1], np.diff(ring_start)
         marks[(marks == 0) & (around == 0)] |= np.uint16(connectivity.HIGH_VALENCE)
         # The link of a node is a triangulated sphere, at the boundary a disk.
@@ -86,10 +87,9 @@ class Volume(Connectivity):
         held, free, places = sorted_out(marks, position, reasons_in_space(MOST))
         of_cell = np.empty_like(wound.orientation)
         of_cell[wound.origin] = wound.orientation
-        padded = np.append(ring[:end], np.zeros(connectivity.WIDTH, dtype=np.int32))
         return cls(
             wound.cell, wound.cells, of_cell, rows, wound.orientation, wound.origin, start, local, ring_start,
-            ring[:end], Colouring(places, ring_start, padded), slid,
+            padded[: ring_start[-1]], Colouring(places, ring_start, padded), slid,
             held=held, free=free, memory=wound.memory, near_free=marks == 0,
         )  # fmt: skip
 
@@ -179,3 +179,30 @@ class Volume(Connectivity):
         )  # fmt: skip
         balls.fill_blocks3(order, self.ring_start, self.ring, self.start, self.local, first, rings, spokes, made)
         return Stars(made, of_colour.astype(np.int32))
+
+
+def _rings(
+    wound: Wound, start: NDArray[np.int64], corners: Ints, rim: int, threads: int
+) -> tuple[NDArray[np.int64], Ints, NDArray[np.uint8]]:
+    """The nodes around each node in CSR form, with WIDTH zeros behind them, and the spokes: see ``balls.rings``.
+
+    rim: how many facets at nodes that slide are free.
+    """
+    nodes = len(start) - 2
+    middle = int(np.searchsorted(start[:nodes], start[nodes] // 2)) if threads > 1 else 0
+    ring_start, local = np.zeros(nodes + 1, dtype=np.int64), np.empty((len(corners), 3), dtype=np.uint8)
+
+    def some(first: int, last: int) -> Ints:
+        room = (3 * int(start[last] - start[first]) + rim) // 2 + last - first + connectivity.WIDTH
+        ring = np.empty(room, dtype=np.int32)  # of what is left out no page is ever touched
+        end = balls.rings(
+            wound.rows, wound.orientation, start, corners, first, last, ring_start, ring, local, MOST
+        )  # fmt: skip
+        ring[end : end + connectivity.WIDTH] = 0
+        return ring[: end + connectivity.WIDTH]
+
+    one, other = side_by_side(threads, partial(some, 0, middle), partial(some, middle, nodes))
+    one = one[: -connectivity.WIDTH]
+    ring_start[middle:] += len(one)
+    ring_start[nodes] = len(one) + len(other) - connectivity.WIDTH
+    return ring_start, np.concatenate([one, other]) if middle else other, local

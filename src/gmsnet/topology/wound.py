@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from gmsnet.kernels.topology import connectivity, facets
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
+from gmsnet.parallel.threads import side_by_side
 from gmsnet.topology.fans import Marks
 from gmsnet.topology.ordering import memory_order, space_points
 from gmsnet.topology.polygons import Ints
@@ -51,14 +52,15 @@ class Wound:
     position: Ints
 
     @classmethod
-    def of(cls, mesh: Mesh, fixed: Flags | None = None) -> Wound:
-        """Of a mesh; ``fixed`` and errors: see ``Volume.of``."""
+    def of(cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1) -> Wound:
+        """Of a mesh; ``fixed`` and errors: see ``Volume.of``. threads: one or two."""
         refuse_flat(mesh)
-        cells, cell, region = _tetrahedra(mesh)
-        nodes = len(mesh.points)
-        refuse_unless_free(len(cells) * BYTES_PER_CELL, f"the connectivity of {len(cells):,} tetrahedra")
+        nodes, count = len(mesh.points), sum(len(block.nodes) for block in mesh.cells if block.kind in SMOOTHED)
+        refuse_unless_free(count * BYTES_PER_CELL, f"the connectivity of {count:,} tetrahedra")
         points = space_points(mesh)
-        memory, position = memory_order(points, mesh.box)
+        (memory, position), (cells, cell, region) = side_by_side(
+            threads, partial(memory_order, points, mesh.box), partial(_tetrahedra, mesh)
+        )
         place, origin = np.empty_like(cells), np.empty(len(cells), dtype=np.int32)
         used = np.zeros(nodes, dtype=np.bool_)
         facets.order_cells(cells, position, np.zeros(nodes + 2, dtype=np.int32), place, origin, used)

@@ -37,17 +37,16 @@ def list_stars(rows, marks, start, corners):
 
 
 @kernel
-def rings(rows, orientation, start, corners, ring_start, ring, local, most):
-    """The nodes around each node, in the order in which its cells name them, and the spokes by their places there.
+def rings(rows, orientation, start, corners, first, last, ring_start, ring, local, most):
+    """The nodes around the nodes first…last, in the order in which cells name them, and the spokes by places there.
 
-    Writes ring_start (N + 1,), ring, with room for 3M/2 + N, and local (M, 3) uint8, in which nodes of the ring the
-    spokes of each cell end, of positive volume from the node. A star with more than ``most`` nodes has an empty ring.
-    Returns how many nodes all rings have.
+    Writes ring_start (N,), from 0 on, ring, with room for 3/2 of their corners and one a node more, and local (M, 3)
+    uint8, in which nodes of the ring the spokes of each cell end, of positive volume from the node. A star with more
+    than ``most`` nodes has an empty ring. Returns how many nodes these rings have.
     """
-    nodes = len(start) - 2
-    seen = np.full(nodes, -1, dtype=np.int32)  # since ``base``: base + the place in the ring
+    seen = np.full(len(start) - 2, -1, dtype=np.int32)  # since ``base``: base + the place in the ring
     end, base, limit = 0, 0, (1 << 31) - 1 - most
-    for v in range(nodes):
+    for v in range(first, last):
         ring_start[v] = end
         if base >= limit:
             seen[:] = -1
@@ -70,7 +69,6 @@ def rings(rows, orientation, start, corners, ring_start, ring, local, most):
                 count += 1 if new else 0
         base += min(count, most) + 1
         end += count if count <= most else 0
-    ring_start[nodes] = end
     return end
 
 
