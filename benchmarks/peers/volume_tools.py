@@ -89,7 +89,7 @@ def netgen_moves(points, cells, faces, held) -> Found:
     mesh.AddElements(dim=2, index=1, data=faces.astype(np.int32), base=0)
     parameters = netgen.MeshingParameters(optimize3d="m", optsteps3d=3, parallel_meshing=False)
     seconds = timed(lambda: mesh.OptimizeVolumeMesh(parameters))
-    return np.asarray(mesh.Coordinates()), seconds
+    return np.array(mesh.Coordinates()), seconds  # its memory goes with the mesh
 
 
 def mfem_tmop(metric: int, iterations: int) -> Callable[..., Found]:
