@@ -20,6 +20,12 @@ from peers.peer import Plane
 EVERY, APART, MOST = 12, 1.25, 400  # efforts one by one up to EVERY, then each APART times the last; sweeps at most
 
 
+def spread(last: int) -> tuple[int, ...]:
+    """Efforts from one sweep to so many."""
+    wanted = {*range(1, EVERY), *(round(EVERY * APART**k) for k in range(20)), last}
+    return tuple(sorted(effort for effort in wanted if effort <= last))
+
+
 class Smooth:
     def __init__(self, plane: Plane, method: str, threads: int = 1, **options: str) -> None:
         self.arrays = mesh_of(plane) if len(plane.quads) else (plane.points, plane.cells)
@@ -37,9 +43,7 @@ class Smooth:
     def efforts(self) -> tuple[int, ...]:
         """From one sweep to all that the method makes."""
         self.smooth(MOST)
-        last = self.result.sweeps
-        wanted = {*range(1, EVERY), *(round(EVERY * APART**k) for k in range(20)), last}
-        return tuple(sorted(effort for effort in wanted if effort <= last))
+        return spread(self.result.sweeps)
 
     def smoothing_alone(self, effort: int, clock: Callable[[], float] = time.process_time) -> float:
         """Seconds for the sweeps and the looks between them, when all else is there."""

@@ -56,3 +56,30 @@ def test_every_tool_that_is_there_keeps_valid_cells(case):
         assert after[5] < 1e-9
     assert "KeyError" in made.run("no tool", 100.0)
     assert made.run("gmsnet", 0.01) == "more than 0.01 s"
+
+
+class Steps:
+    """Calls that gain 0.1 of the least and 0.2 of the mean η a sweep, and take a second and one more for each."""
+
+    points = 0
+
+    def run(self, tool, limit):
+        sweeps = int(tool.split(", ")[1].removesuffix(" sweeps"))
+        return sweeps, 1.0 + sweeps
+
+    def figures(self, points):
+        return 0.1 * points, 0.2 * points, 0.0, 180.0, 0, 0.0
+
+
+def test_times_are_those_of_the_first_call_that_comes_to_what_a_tool_came_to(capsys):
+    def end(name, least, mean, seconds):
+        return {"name": name, "seconds": seconds, "figures": {"min": least, "mean": mean}}
+
+    ends = [end("gmsnet", 0.9, 0.9, 20.0), end("better", 0.25, 0.3, 12.0), end("worse", 0.1, -0.1, 1.0)]
+    volume_peers.print_times(Steps(), {each["name"]: each for each in ends}, 1.0)
+    said = capsys.readouterr().out
+    *_, better, worse = said.splitlines()
+    assert " ".join(better.split()) == "better 0.6 4.0 (6.0) by auto, 2 sweeps 3.0 (6.0) by auto, 3 sweeps"
+    assert " ".join(worse.split()) == "worse 0.1 – (0.5) 0.5 (0.5) by auto, 1 sweeps"
+    assert "auto, 3 sweeps" in said
+    assert "auto, 4 sweeps" not in said
