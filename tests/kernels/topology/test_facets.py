@@ -141,9 +141,11 @@ def test_stars_and_rings(seed, nodes, count, of):
     balls.list_stars(cells, marks, start, corners)
     most = int(rng.integers(3, 12))
     ring_start, local = np.empty(nodes + 1, dtype=np.int64), np.empty((len(corners), 3), dtype=np.uint8)
-    ring = np.empty(3 * len(corners) + nodes, dtype=np.int32)
-    end = balls.rings(cells, turn, start, corners, ring_start, ring, local, most)
-    assert end == ring_start[-1]
+    ring, middle = np.empty(3 * len(corners) + nodes + 1, dtype=np.int32), int(rng.integers(nodes + 1))
+    end = balls.rings(cells, turn, start, corners, 0, middle, ring_start, ring, local, most)
+    rest = balls.rings(cells, turn, start, corners, middle, nodes, ring_start, ring[end:], local, most)
+    ring_start[middle:] += end
+    ring_start[nodes] = end + rest
     for v in range(nodes):
         at = corners[start[v] : start[v + 1]]
         assert (cells[at >> 2, at & 3] == v).all()
