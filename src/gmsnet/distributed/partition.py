@@ -12,6 +12,7 @@ from gmsnet.distributed.library import metis
 from gmsnet.kernels.topology.layout import morton_codes
 from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.mesh.plane import extents
 
 Ranks = NDArray[np.int32]
 Floats = NDArray[np.float64]
@@ -42,7 +43,7 @@ def bisection(points: Floats, parts: int) -> Ranks:
         if count == 1 or not len(chosen):
             found[chosen] = first
             continue
-        axis = int(np.argmax(np.ptp(0.25 * points[chosen], axis=0)))  # a quarter, lest it overflow
+        axis = int(np.argmax(extents(points[chosen])))
         order = chosen[np.argsort(points[chosen, axis], kind="stable")]
         left = count // 2
         middle = len(order) * left // count
