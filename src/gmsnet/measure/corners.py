@@ -30,7 +30,7 @@ def of_corners(points: Floats, nodes: NDArray[np.int32], kind: CellKind, orienta
     """(4, C) smallest and largest dihedral angle in degrees, η and scaled Jacobian of cells (C, n) of one kind."""
     if kind.corners == 4:  # all its corners are alike
         columns = np.empty((COLUMNS, len(nodes)))
-        per_tetrahedron(points, np.ascontiguousarray(nodes[:, :4], dtype=np.int32), orientation, columns)
+        per_tetrahedron(points, np.ascontiguousarray(nodes[:, :4], dtype=np.int32), orientation, 0, len(nodes), columns)
         return columns[:4]
     found = np.empty((4, len(nodes)))
     for first in range(0, len(nodes), AT_ONCE):

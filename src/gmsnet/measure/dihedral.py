@@ -63,11 +63,16 @@ def most_shape_below(measure: float, wide: float) -> float:
     return SHARE * max(most_shape_with(max(measure, 0.0)), most_shape_with(greatest) if greatest < 180.0 else 0.0)
 
 
-def columns_of(points: Floats, cells: Tetrahedra, rows: Rows | None = None) -> Floats:
+def columns_of(points: Floats, cells: Tetrahedra, rows: Rows | None = None, executor: Executor = serial) -> Floats:
     """The measures (5, K) of some tetrahedra (kernels.simplex.tetra_measures). points: (N, 3 or 4)."""
     some = cells if rows is None else cells.take(rows)
-    columns = np.empty((COLUMNS, len(some.rows)))
-    per_tetrahedron(points, some.rows, some.orientation, columns)
+    count = len(some.rows)
+    columns = np.empty((COLUMNS, count))
+
+    def look(first: int, last: int) -> None:
+        per_tetrahedron(points, some.rows, some.orientation, first * LANES, min(last * LANES, count), columns)
+
+    executor.map(look, 0, -(-count // LANES))
     return columns
 
 
@@ -108,7 +113,7 @@ def below(points: Floats, cells: Tetrahedra, measure: float, wide: float, execut
     """The cells whose measure is less than this, or that are inverted."""
     ratios = ratios_of(points, cells, executor)
     rows = np.flatnonzero(~(ratios < 432.0 / most_shape_below(measure, wide) ** 3)).astype(np.int32)
-    found = measures_of(columns_of(points, cells, rows), wide)
+    found = measures_of(columns_of(points, cells, rows, executor), wide)
     chosen = (found < measure) | np.isinf(ratios[rows])
     order = np.argsort(found[chosen], kind="stable")
     return Ranked.of(rows[chosen][order], found[chosen][order], executor)
@@ -128,11 +133,11 @@ def worst(
     """
     ratios = ratios_of(points, cells, executor) if ratios is None else ratios
     rows = executor.lowest_rows(-ratios, MORE * count)
-    found = measures_of(columns_of(points, cells, rows), wide)
+    found = measures_of(columns_of(points, cells, rows, executor), wide)
     if MORE * count < executor.counted(np.ones(len(ratios), dtype=bool)):
         limit = most_shape_below(Ranked.of(*_lowest(found, count, rows, executor), executor).most, wide)
         rows = np.flatnonzero(~(ratios < 432.0 / limit**3)).astype(np.int32)
-        found = measures_of(columns_of(points, cells, rows), wide)
+        found = measures_of(columns_of(points, cells, rows, executor), wide)
     return Ranked.of(*_lowest(found, count, rows, executor), executor)
 
 

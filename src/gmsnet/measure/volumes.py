@@ -54,7 +54,7 @@ class MeasuredTetrahedra:
         corners = self.corners if rows is None else self.corners[rows]
         orientation = self.orientation if rows is None else self.orientation[rows]
         columns = np.empty((kernels.COLUMNS, len(corners)))
-        kernels.per_tetrahedron(space_points(self), corners, orientation, columns)
+        kernels.per_tetrahedron(space_points(self), corners, orientation, 0, len(corners), columns)
         with np.errstate(over="ignore", under="ignore"):  # a volume can be beyond the range where coordinates are not
             columns[kernels.VOLUME] = np.ldexp(columns[kernels.VOLUME], 3 * self.exponent)
         return columns

@@ -72,11 +72,11 @@ def figures(ax, ay, az, bx, by, bz, cx, cy, cz, sign):
 
 
 @kernel
-def per_tetrahedron(points, rows, orientation, columns):
-    """LOW, HIGH, SHAPE, SCALED_JACOBIAN and VOLUME of each cell (T, 4) into columns (5, T); angles in degrees."""
+def per_tetrahedron(points, rows, orientation, first, last, columns):
+    """LOW, HIGH, SHAPE, SCALED_JACOBIAN and VOLUME of the cells first…last into columns (5, T); angles in degrees."""
     work = np.zeros(10 * LANES)
-    for start in range(0, len(rows), LANES):
-        count = min(LANES, len(rows) - start)
+    for start in range(first, last, LANES):
+        count = min(LANES, last - start)
         gather(points, rows, orientation, start, count, work)
         for lane in range(count):
             low, high, shape, scaled, volume = figures(
