@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from support import volumes
 from support.blocks import block
+from support.same import same
 
 import gmsnet
 from gmsnet.errors import InputError
-from gmsnet.parallel.threads import side_by_side
 from gmsnet.run import set_up, stop
 from gmsnet.topology.volume import Volume
 
@@ -227,16 +227,19 @@ def test_marks_of_planar_meshes_stay_what_they_were():
     "make", [lambda: volumes.mesh_of(*volumes.cube(400, 3)), lambda: block(5, 5, 5, jitter=0.2, seed=1)]
 )
 def test_stars_are_made_beside_the_look_where_there_are_threads(make, monkeypatch):
-    mesh, beside = make(), []
+    mesh, beside, plainly = make(), [], Volume.stars_beside
 
-    def counted(threads, one, other):
-        beside.append(threads)
-        return side_by_side(threads, one, other)
+    def counted(topology, look):
+        found = plainly(topology, look)
+        again = topology.stars_of(np.flatnonzero(topology.near_free))
+        assert same(topology.stars, again)
+        beside.append(topology)
+        return found
 
     monkeypatch.setattr(set_up, "MANY", 0)
-    monkeypatch.setattr(set_up, "side_by_side", counted)
+    monkeypatch.setattr(Volume, "stars_beside", counted)
     one, two = (gmsnet.smooth(mesh, threads=threads) for threads in (1, 2))
-    assert beside == [2]
+    assert len(beside) == 1
     assert one.points.tobytes() == two.points.tobytes()
     gmsnet.smooth(mesh, threads=2, target_quality=0.1)
-    assert beside == [2]
+    assert len(beside) == 1

@@ -9,12 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support import volumes
+from support.same import same
 from support.space import simplices_of
 
 from gmsnet.errors import InputError
 from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.parallel import memory as available_memory
 from gmsnet.topology.volume import MOST, Volume
+from gmsnet.topology.wound import Wound
 
 BOUNDARY, INTERFACE, CHOSEN = "boundary", "interface between regions", "fixed by the user"
 NO_SIDE, UNWOUND = "part of zero volume, which has no positive side", "part that cannot be wound consistently"
@@ -103,6 +105,8 @@ def test_free_nodes_of_meshes_with_holes_regions_and_mixed_orientation(seed, kin
     check_against_twin(mesh, topology, fixed=[] if fixed is None else np.flatnonzero(fixed))
     if len(topology.free) < 40:
         check_stars(topology)
+    halves = Volume.made(Wound.of(mesh, fixed, threads=2), threads=2)
+    assert same(halves, topology)
 
 
 def test_stars_and_colours_of_a_random_cube():

@@ -26,7 +26,6 @@ from gmsnet.methods.auto import Auto
 from gmsnet.methods.cells import check_cells, counts_of
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.memory import refuse_unless_free
-from gmsnet.parallel.threads import side_by_side
 from gmsnet.preserve.protection import METRIC, NONE, SIZE, Protection, protected, protected_volume
 from gmsnet.run.metric_stage import check_given
 from gmsnet.run.options import SmoothOptions
@@ -195,7 +194,7 @@ def _beside_stars(
     """
     if threads == 1 or options.target or not isinstance(smoother, Auto | StarSmoother):
         return look()
-    return side_by_side(threads, look, lambda: topology.stars)[0]
+    return topology.stars_beside(look)
 
 
 def check_options(mesh: Mesh, options: SmoothOptions, counts: Mapping[str, int] | None = None) -> None:

@@ -7,6 +7,7 @@ may slide, it is 1, as on a disk.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -163,7 +164,7 @@ class MixedVolume(Volume):
         inner.__dict__["changeable"] = around
         return inner
 
-    def stars_of(self, nodes: NDArray[np.int64]) -> Stars:
+    def _empty_stars(self, nodes: NDArray[np.int64]) -> tuple[Stars, Callable[[int, int], None]]:
         """See Volume."""
         order, first, of_colour = in_blocks(nodes, self.order[nodes], self.near_colours[nodes], self.colouring.fewest)
         count = len(first) - 1
@@ -188,11 +189,14 @@ class MixedVolume(Volume):
             rows, np.empty(count * LANES3, dtype=np.int32), np.empty(count, dtype=np.int32),
             int(around.max(initial=0)), int(rows.max(initial=0)), mixture,
         )  # fmt: skip
-        kernels.fill_mixed_blocks(
-            order, self.ring_start, self.ring, self.core, self.edges, self.start, self.local, self.role, self.owner,
-            len(weights), LANES3, first, made,
-        )  # fmt: skip
-        return Stars(made, of_colour.astype(np.int32))
+
+        def fill(begin: int, end: int) -> None:
+            kernels.fill_mixed_blocks(
+                order, self.ring_start, self.ring, self.core, self.edges, self.start, self.local, self.role, self.owner,
+                len(weights), LANES3, first, begin, end, made,
+            )  # fmt: skip
+
+        return Stars(made, of_colour.astype(np.int32)), fill
 
 
 def wound_of(mesh: Mesh, fixed: Flags | None = None, threads: int = 1) -> Wound | WoundSolids:

@@ -7,6 +7,7 @@ looks at some of the cells, or adds over all of them, takes them in that order.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
@@ -17,6 +18,7 @@ from gmsnet.kernels.simplex.mean_ratio2 import Simplices
 from gmsnet.kernels.star import pattern as kernels_stars
 from gmsnet.kernels.topology import connectivity, links, patch
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.parallel.executor import Result
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
 from gmsnet.topology.connectivity import Connectivity
@@ -175,6 +177,10 @@ class Topology(Connectivity):
     def stars(self) -> Stars:
         """The patches in the order in which they are smoothed."""
         return self.in_blocks()
+
+    def stars_beside(self, work: Callable[[], Result]) -> Result:
+        """What a work returns, with ``stars`` made beside it on another thread."""
+        return side_by_side(2, work, lambda: self.stars)[0]
 
     def in_blocks(self) -> Stars:
         """The same, made anew."""

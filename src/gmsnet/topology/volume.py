@@ -8,6 +8,7 @@ plane: by ids at the doors, and by places in memory inside.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -18,8 +19,11 @@ from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.space_blocks import LANES3, SpaceBlocks
 from gmsnet.kernels.topology import balls, connectivity
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.parallel.executor import Result
 from gmsnet.parallel.threads import side_by_side
+from gmsnet.topology.bins import Counts, in_bins
 from gmsnet.topology.connectivity import Connectivity
+from gmsnet.topology.fans import Marks
 from gmsnet.topology.held import AT_BOUNDARY, reasons_in_space, released, sorted_out
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.stars import Colouring, Stars, in_blocks
@@ -74,12 +78,9 @@ class Volume(Connectivity):
         if slides is not None:
             near, slid = released(marks, slides[wound.memory], position, AT_BOUNDARY, reasons_in_space(MOST))
             rim[near] = np.bincount(wound.boundary.ravel(), minlength=nodes)[near]
-        start = np.zeros(nodes + 2, dtype=np.int64)
-        balls.count_stars(rows, marks, start)
-        corners = np.empty(start[-1], dtype=np.int32)
-        balls.list_stars(rows, marks, start, corners)
+        start, corners = _cells_at(rows, marks, threads)
         ring_start, padded, local = _rings(wound, start, corners, int(rim.sum()), threads)
-        start, around = start[:-1], np.diff(ring_start)
+        around = np.diff(ring_start)
         marks[(marks == 0) & (around == 0)] |= np.uint16(connectivity.HIGH_VALENCE)
         # The link of a node is a triangulated sphere, at the boundary a disk.
         ball = 2 * around == np.diff(start) + np.where(rim > 0, rim + 2, 4)
@@ -157,12 +158,27 @@ class Volume(Connectivity):
         """The stars of the free nodes in the order in which they are smoothed."""
         return self.stars_of(np.flatnonzero(self.near_free))
 
+    def stars_beside(self, work: Callable[[], Result]) -> Result:
+        """What a work returns, with ``stars`` made beside it on another thread."""
+        nodes = np.flatnonzero(self.near_free)
+        found, (stars, fill) = side_by_side(2, work, lambda: self._empty_stars(nodes))
+        count = int(stars.first[-1])
+        side_by_side(2, partial(fill, 0, count // 2), partial(fill, count // 2, count))
+        self.__dict__["stars"] = stars
+        return found
+
     def forget_stars(self) -> None:
         """Gives the memory of ``stars`` back; who asks for them again has them made again."""
         self.__dict__.pop("stars", None)
 
     def stars_of(self, nodes: NDArray[np.int64]) -> Stars:
         """The stars of some free nodes, by places in memory."""
+        stars, fill = self._empty_stars(nodes)
+        fill(0, int(stars.first[-1]))
+        return stars
+
+    def _empty_stars(self, nodes: NDArray[np.int64]) -> tuple[Stars, Callable[[int, int], None]]:
+        """The same but for what is in their blocks, and what fills some of these."""
         order, first, of_colour = in_blocks(
             nodes, np.diff(self.start)[nodes], self.near_colours[nodes], self.colouring.fewest
         )
@@ -177,8 +193,27 @@ class Volume(Connectivity):
             np.empty(count, dtype=np.int32), np.empty(count * LANES3, dtype=np.int32), np.empty(count, dtype=np.int32),
             int(most_rings.max(initial=0)), int(most_cells.max(initial=0)),
         )  # fmt: skip
-        balls.fill_blocks3(order, self.ring_start, self.ring, self.start, self.local, first, rings, spokes, made)
-        return Stars(made, of_colour.astype(np.int32))
+
+        def fill(begin: int, end: int) -> None:
+            balls.fill_blocks3(
+                order, self.ring_start, self.ring, self.start, self.local, first, rings, spokes, begin, end, made
+            )
+
+        return Stars(made, of_colour.astype(np.int32)), fill
+
+
+def _cells_at(rows: Ints, marks: Marks, threads: int) -> tuple[NDArray[np.int64], Ints]:
+    """In CSR form the cells at each node without a mark: start (N + 1,), and corners, 4t + k of cell t at corner k."""
+    corners = np.empty(4 * len(rows), dtype=np.int32)  # of what is left out no page is ever touched
+
+    def count(first: int, last: int, counts: Counts) -> None:
+        balls.count_stars(rows, first, last, marks, counts)
+
+    def write(first: int, last: int, place: Counts) -> None:
+        balls.list_stars(rows, first, last, marks, place, corners)
+
+    start = in_bins(len(rows), len(marks), threads, count, write)
+    return start, corners[: start[-1]]
 
 
 def _rings(
@@ -188,7 +223,7 @@ def _rings(
 
     rim: how many facets at nodes that slide are free.
     """
-    nodes = len(start) - 2
+    nodes = len(start) - 1
     middle = int(np.searchsorted(start[:nodes], start[nodes] // 2)) if threads > 1 else 0
     ring_start, local = np.zeros(nodes + 1, dtype=np.int64), np.empty((len(corners), 3), dtype=np.uint8)
 

@@ -16,8 +16,9 @@ from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.parallel.threads import side_by_side
+from gmsnet.topology.bins import Counts, in_bins
 from gmsnet.topology.fans import Marks
-from gmsnet.topology.ordering import memory_order, space_points
+from gmsnet.topology.ordering import memory_order, space_points, taken
 from gmsnet.topology.polygons import Ints
 
 Flags = NDArray[np.bool_]
@@ -55,18 +56,16 @@ class Wound:
     def of(cls, mesh: Mesh, fixed: Flags | None = None, threads: int = 1) -> Wound:
         """Of a mesh; ``fixed`` and errors: see ``Volume.of``. threads: one or two."""
         refuse_flat(mesh)
-        nodes, count = len(mesh.points), sum(len(block.nodes) for block in mesh.cells if block.kind in SMOOTHED)
+        count = sum(len(block.nodes) for block in mesh.cells if block.kind in SMOOTHED)
         refuse_unless_free(count * BYTES_PER_CELL, f"the connectivity of {count:,} tetrahedra")
         points = space_points(mesh)
         (memory, position), (cells, cell, region) = side_by_side(
             threads, partial(memory_order, points, mesh.box), partial(_tetrahedra, mesh)
         )
-        place, origin = np.empty_like(cells), np.empty(len(cells), dtype=np.int32)
-        used = np.zeros(nodes, dtype=np.bool_)
-        facets.order_cells(cells, position, np.zeros(nodes + 2, dtype=np.int32), place, origin, used)
-        rows, region = place.take(origin, axis=0), region.take(origin) if len(region) else region
+        origin, rows, used = _ordered(cells, position, threads)
+        region = region.take(origin) if len(region) else region
         marks = _known_marks(mesh, fixed, position)
-        orientation = _wound(points[memory], rows, region, marks)
+        orientation = _wound(taken(points, memory), rows, region, marks, threads)
         marks[~used & (marks & OF_OTHER_CELLS == 0)] |= np.uint16(connectivity.UNUSED)
         return cls(cell, cells, rows, orientation, region, origin, marks, memory, position)
 
@@ -122,6 +121,24 @@ def _tetrahedra(mesh: Mesh) -> tuple[Ints, NDArray[np.int64], NDArray[np.int64]]
     return cells, numbers[0] if len(numbers) == 1 else np.concatenate(numbers), region
 
 
+def _ordered(cells: Ints, position: Ints, threads: int) -> tuple[Ints, Ints, Flags]:
+    """Cells by the lowest place of their nodes in memory, else as they are.
+
+    Returns their numbers (T,) and their corners (T, 4) by places in memory, and (N,) which places have cells.
+    """
+    place, rows, used = np.empty_like(cells), np.empty_like(cells), np.zeros(len(position), dtype=np.bool_)
+    origin = np.empty(len(cells), dtype=np.int32)
+
+    def count(first: int, last: int, counts: Counts) -> None:
+        facets.place_cells(cells, first, last, position, place, used, counts)
+
+    def write(first: int, last: int, begin: Counts) -> None:
+        facets.order_cells(place, first, last, begin, origin, rows)
+
+    in_bins(len(cells), len(position), threads, count, write)
+    return origin, rows, used
+
+
 def mark_of(block: CellBlock) -> int:
     """Why the nodes of cells of other kinds are held."""
     if block.dimension not in (3, None):
@@ -141,13 +158,18 @@ def _known_marks(mesh: Mesh, fixed: Flags | None, position: Ints) -> NDArray[np.
     return marks
 
 
-def _wound(points: Floats, rows: Ints, region: NDArray[np.int64], marks: NDArray[np.uint16]) -> NDArray[np.int8]:
+def _wound(
+    points: Floats, rows: Ints, region: NDArray[np.int64], marks: NDArray[np.uint16], threads: int
+) -> NDArray[np.int8]:
     """The orientation of each cell; marks the nodes of the boundary, of interfaces and of what cannot be wound."""
     count = len(rows)
-    positive, negative = orientation3.count_signs(points, rows)
+    (positive, negative), (area, meeting) = side_by_side(
+        threads, partial(orientation3.count_signs, points, rows), partial(_enclosed, rows, region, len(marks))
+    )
     if count in (positive, negative):
         orientation = np.full(count, 1 if positive == count else -1, dtype=np.int8)
-        if _marked_alike(rows, region, marks):
+        marks |= meeting
+        if _marked_alike(rows, area, marks):
             return orientation
     twin, nothing = _matched(rows, len(marks)), np.empty(0, dtype=np.uint64)
     piece, orientation = np.full(count, -1, dtype=np.int32), np.ones(count, dtype=np.int8)
@@ -163,19 +185,23 @@ def _wound(points: Floats, rows: Ints, region: NDArray[np.int64], marks: NDArray
     return orientation
 
 
-def _marked_alike(rows: Ints, region: NDArray[np.int64], marks: NDArray[np.uint16]) -> bool:
-    """The same marks where all cells have one orientation; False if some see a facet from the same side.
-
-    Only the cells at nodes around which they do not close are looked at for facets.
-    """
-    nodes = len(marks)
+def _enclosed(rows: Ints, region: NDArray[np.int64], nodes: int) -> tuple[NDArray[np.uint64], NDArray[np.uint16]]:
+    """(N,) 0 where the cells close around a node, if all have one orientation; and marks of where regions meet."""
     places, area = np.empty((nodes, 2), dtype=np.uint64), np.zeros(nodes, dtype=np.uint64)
     facets.scatter(places)
-    own = np.empty(nodes if len(region) else 0, dtype=np.int64)
-    facets.enclose(rows, region, places, area, own, marks, connectivity.INTERFACE)
+    own, meeting = np.empty(nodes if len(region) else 0, dtype=np.int64), np.zeros(nodes, dtype=np.uint16)
+    facets.enclose(rows, region, places, area, own, meeting, connectivity.INTERFACE)
+    return area, meeting
+
+
+def _marked_alike(rows: Ints, area: NDArray[np.uint64], marks: NDArray[np.uint16]) -> bool:
+    """The marks of facets where all cells have one orientation; False if some see a facet from the same side.
+
+    Only the cells at nodes around which they do not close are looked at for facets. area: see ``_enclosed``.
+    """
     outer = connectivity.touching(rows, area != 0)
-    part, alike = rows[outer], np.ones(len(outer), dtype=np.int8)
-    if not facets.mark_facets(part, _matched(part, nodes), region[:0], alike, area, *BITS, marks):
+    part, alike, whole = rows[outer], np.ones(len(outer), dtype=np.int8), np.empty(0, dtype=np.int64)
+    if not facets.mark_facets(part, _matched(part, len(marks)), whole, alike, area, *BITS, marks):
         return False
     marks[(area != 0) & (marks == 0)] |= np.uint16(connectivity.NOT_A_DISK)
     return True

@@ -10,29 +10,27 @@ from gmsnet.kernels.topology.facets import OPPOSITE
 
 
 @kernel
-def count_stars(rows, marks, start):
-    """Counts the cells at each node without a mark: start (N + 2,), zeros before, becomes CSR with one place ahead."""
-    for t in range(len(rows)):
-        for k in range(4):
-            v = rows[t, k]
-            if not marks[v]:
-                start[v + 2] += 1
-    for v in range(2, len(start)):
-        start[v] += start[v - 1]
-
-
-@kernel
-def list_stars(rows, marks, start, corners):
-    """Writes corners (M,), 4t + k of each cell t at a node without a mark that is its corner k.
-
-    start: as ``count_stars`` leaves it; afterwards those of node v are start[v] … start[v + 1] − 1.
-    """
-    for t in range(len(rows)):
+def count_stars(rows, first, last, marks, count):
+    """Adds to count (N,) how many of the cells first…last are at each node without a mark."""
+    for t in range(first, last):
         for k in range(4):
             v = np.uint64(rows[t, k])
             if not marks[v]:
-                at = start[v + np.uint64(1)]
-                start[v + np.uint64(1)] = at + 1
+                count[v] += 1
+
+
+@kernel
+def list_stars(rows, first, last, marks, place, corners):
+    """Writes corners (M,), 4t + k of each of the cells first…last at a node without a mark that is its corner k.
+
+    place: (N,) where those of each node are to begin; afterwards, where they end.
+    """
+    for t in range(first, last):
+        for k in range(4):
+            v = np.uint64(rows[t, k])
+            if not marks[v]:
+                at = place[v]
+                place[v] = at + 1
                 corners[np.uint64(at)] = 4 * t + k
 
 
@@ -44,7 +42,7 @@ def rings(rows, orientation, start, corners, first, last, ring_start, ring, loca
     uint8, in which nodes of the ring the spokes of each cell end, of positive volume from the node. A star with more
     than ``most`` nodes has an empty ring. Returns how many nodes these rings have.
     """
-    seen = np.full(len(start) - 2, -1, dtype=np.int32)  # since ``base``: base + the place in the ring
+    seen = np.full(len(start) - 1, -1, dtype=np.int32)  # since ``base``: base + the place in the ring
     end, base, limit = 0, 0, (1 << 31) - 1 - most
     for v in range(first, last):
         ring_start[v] = end
@@ -73,17 +71,18 @@ def rings(rows, orientation, start, corners, first, last, ring_start, ring, loca
 
 
 @kernel
-def fill_blocks3(order, ring_start, ring, start, local, first, rings, spokes, blocks):
-    """Writes stars in blocks of LANES3. order: the free nodes by colour, of one colour by how many cells they have.
+def fill_blocks3(order, ring_start, ring, start, local, first, rings, spokes, low_block, high_block, blocks):
+    """Writes the stars of the blocks low_block…high_block of LANES3.
 
-    first: (B + 1,) where the stars of each block begin in ``order``. rings, spokes: (B + 1,) where each block begins in
-    ring and spoke. blocks: a SpaceBlocks (kernels.star.space), whose other arrays are written.
+    order: the free nodes by colour, of one colour by how many cells they have. first: (B + 1,) where the stars of each
+    block begin in ``order``. rings, spokes: (B + 1,) where each block begins in ring and spoke. blocks: a SpaceBlocks
+    (kernels.star.space), whose other arrays are written.
     """
     centre, to_ring, degree, to_spoke = blocks.centre, blocks.ring, blocks.degree, blocks.spoke
     simplices, number, filled = blocks.simplices, blocks.cells, blocks.filled
     low, around = np.empty(LANES3, dtype=np.uint64), np.empty(LANES3, dtype=np.int64)
     begin, own = np.empty(LANES3, dtype=np.uint64), np.empty(LANES3, dtype=np.int64)
-    for b in range(len(filled)):
+    for b in range(low_block, high_block):
         stars = first[b + 1] - first[b]
         filled[b] = stars
         rows, cells = (rings[b + 1] - rings[b]) // LANES3, (spokes[b + 1] - spokes[b]) // (3 * LANES3)

@@ -17,24 +17,33 @@ FEW = 24  # facets of a node: more are sorted
 
 
 @kernel
-def order_cells(cells, position, begin, place, order, used):
-    """Orders cells (T, 4), by node ids, by the lowest place of their nodes in memory, else as they are.
+def place_cells(cells, first, last, position, place, used, count):
+    """Writes place (T, 4), the corners of the cells first…last of (T, 4) by their places in memory, by node ids before.
 
-    position: (N,). begin: (N + 2,) zeros. Writes place, the corners by their places in memory, order (T,), and used
-    (N,) bool, False before: which places the cells have.
+    position: (N,). used: (N,) bool, becomes True of the places that they have. Adds to count (N,) how many cells have
+    each place as their lowest.
     """
-    for t in range(len(cells)):
+    for t in range(first, last):
         a, b = position[np.uint64(cells[t, 0])], position[np.uint64(cells[t, 1])]
         c, d = position[np.uint64(cells[t, 2])], position[np.uint64(cells[t, 3])]
         place[t, 0], place[t, 1], place[t, 2], place[t, 3] = a, b, c, d
         used[np.uint64(a)] = used[np.uint64(b)] = used[np.uint64(c)] = used[np.uint64(d)] = True
-        begin[np.uint64(min(min(a, b), min(c, d)) + 2)] += 1
-    for k in range(2, len(begin)):
-        begin[k] += begin[k - 1]
-    for t in range(len(cells)):
-        low = np.uint64(min(min(place[t, 0], place[t, 1]), min(place[t, 2], place[t, 3])) + 1)
-        order[np.uint64(begin[low])] = t
+        count[np.uint64(min(min(a, b), min(c, d)))] += 1
+
+
+@kernel
+def order_cells(place, first, last, begin, order, rows):
+    """Writes the cells first…last of ``place`` to where those of their lowest corner begin (N,), one after the other.
+
+    order: (T,) their numbers; rows: (T, 4) their corners. Raises begin by how many are written.
+    """
+    for t in range(first, last):
+        a, b, c, d = place[t, 0], place[t, 1], place[t, 2], place[t, 3]
+        low = np.uint64(min(min(a, b), min(c, d)))
+        to = np.uint64(begin[low])
         begin[low] += 1
+        order[to] = t
+        rows[to, 0], rows[to, 1], rows[to, 2], rows[to, 3] = a, b, c, d
 
 
 @inlined

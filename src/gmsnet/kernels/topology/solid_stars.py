@@ -141,12 +141,17 @@ def count_rows(order, first, own, role, roles, core, rows, ring_rows):
 
 
 @kernel
-def fill_mixed_blocks(order, ring_start, ring, core, edges, own, local, role, owner, roles, lanes, first, blocks):
-    """Writes stars in blocks (kernels.star.space), SpaceBlocks whose rows are counted and the rest is empty."""
+def fill_mixed_blocks(
+    order, ring_start, ring, core, edges, own, local, role, owner, roles, lanes, first, low_block, high_block, blocks
+):
+    """Writes the stars of the blocks low_block…high_block of SpaceBlocks whose rows are counted and the rest is empty.
+
+    See kernels.star.space_blocks.
+    """
     mixture = blocks.mixture
     begin, count = np.empty((roles, lanes), dtype=np.uint64), np.empty((roles, lanes), dtype=np.int64)
     low, inner = np.empty(lanes, dtype=np.uint64), np.empty(lanes, dtype=np.int64)
-    for b in range(len(blocks.filled)):
+    for b in range(low_block, high_block):
         stars = first[b + 1] - first[b]
         blocks.filled[b] = stars
         count[:] = 0
