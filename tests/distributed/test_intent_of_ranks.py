@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import gmsnet
-from gmsnet.generate import layered_volume, random_quad_mesh, random_volume
+from gmsnet.generate import random_quad_mesh, random_volume
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
@@ -19,14 +19,11 @@ from support.ranks import on_parts, parts_at_random, same, spread
 
 from gmsnet.distributed.intent import Look
 from gmsnet.distributed.on_first import LOOKED_AT
-from gmsnet.measure.report import connectivity_of
-from gmsnet.preserve.columns import layers_of_volume
 from gmsnet.preserve.layers import _seeds
 from gmsnet.preserve.survey import Survey
 from gmsnet.preserve.wall_edges import Beside
 from gmsnet.preserve.walls import near_walls, refined_walls
 from gmsnet.run.options import SmoothOptions
-from gmsnet.topology.ordering import near_points
 from gmsnet.topology.topology import Topology
 
 HEIGHTS = "cells that have one height"
@@ -63,15 +60,6 @@ def test_layers_start_for_ranks_where_they_start_serially(nodes, factor, seed, r
     assert at[seen.beside.beside.simplices.rows].tobytes() == survey.points[whole.simplices.rows].tobytes()
     assert seen.walls == refined_walls(survey.points, whole, survey.double)
     assert seen.walls or not near_walls(mesh, topology).kept.nodes.any()
-
-
-def test_feet_here_and_there_are_no_layers():
-    """Random cubes have flat cells at their sides, but few beside one another; layers have many."""
-    for mesh, layers in ((random_volume(3_000, seed=1), False), (layered_volume(8, kind="wedge", seed=0), True)):
-        topology = connectivity_of(mesh)
-        assert bool(layers_of_volume(topology, near_points(mesh, topology))) == layers
-        parts = parts_at_random(mesh, 3, np.random.default_rng(0), "strips")
-        assert look(mesh, 3, parts)[0].layers == layers
 
 
 @pytest.mark.parametrize("mesh", [gmsnet.random_mesh(3_000, seed=2), random_volume(2_000, seed=3)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from gmsnet.mesh.cell_block import CellBlock
@@ -116,3 +118,36 @@ def with_fans(cells, rows=14, side=12, fan=5, first=2e-3, growth=1.3):
         halves = np.concatenate([triangles, made(points, quads, "triangle").cells[0].nodes])
         blocks = (CellBlock("triangle", halves, np.zeros(len(halves), dtype=int)),)
     return Mesh(points[used], blocks), node[: rows + 1]
+
+
+def around_a_cube(kind, side=6, rows=14, first=0.01, growth=1.3):
+    """Rows around a cube of edge 1, and its nodes row by row. Those on edges and corners are higher, by √2 and √3."""
+    grid = np.array(list(itertools.product(range(side + 1), repeat=3)))
+    surface = grid[((grid == 0) | (grid == side)).any(axis=1)]
+    number = {tuple(node): k for k, node in enumerate(surface.tolist())}
+    quads = []
+    for axis, end in itertools.product(range(3), (0, side)):
+        one, two = np.eye(3, dtype=int)[(axis + 1) % 3], np.eye(3, dtype=int)[(axis + 2) % 3]
+        for i, j in itertools.product(range(side), repeat=2):
+            foot = end * np.eye(3, dtype=int)[axis] + i * one + j * two
+            quad = [number[tuple((foot + way).tolist())] for way in (0 * one, one, one + two, two)]
+            quads.append(quad if end else quad[::-1])
+    height = np.append(0.0, np.cumsum(first * growth ** np.arange(rows)))
+    away = (surface == side) * 1.0 - (surface == 0)
+    points = np.concatenate([surface / side - 0.5 + h * away for h in height])
+    node = np.arange(len(points)).reshape(len(height), -1)
+    quads = np.array(quads)
+    if kind == "hexahedron":
+        cells = [np.hstack([node[k][quads], node[k + 1][quads]]) for k in range(rows)]
+        return Mesh(points, (CellBlock(kind, np.concatenate(cells), np.zeros(rows * len(quads), dtype=int)),)), node
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    wedges = np.concatenate([np.hstack([node[k][triangles], node[k + 1][triangles]]) for k in range(rows)])
+    if kind == "wedge":
+        return Mesh(points, (CellBlock(kind, wedges, np.zeros(len(wedges), dtype=int)),)), node
+    tetrahedra = []
+    for wedge in wedges.tolist():  # its thirds, so that neighbours have one diagonal: from the lower row's larger id
+        a, b, c = sorted(range(3), key=lambda k, wedge=wedge: wedge[k])
+        low, high = wedge[:3], wedge[3:]
+        tetrahedra += [[low[a], low[b], low[c], high[c]], [low[a], low[b], high[b], high[c]],
+                       [low[a], high[a], high[b], high[c]]]  # fmt: skip
+    return Mesh(points, (CellBlock("tetra", np.array(tetrahedra), np.zeros(len(tetrahedra), dtype=int)),)), node

@@ -1,4 +1,4 @@
-"""Whether anything in a mesh may be there on purpose: what ranks can tell of their own parts.
+"""Whether anything in a mesh in a plane may be there on purpose: what ranks can tell of their own parts.
 
 No is certain: no layer starts, and no wall is refined. Else both have to be looked for in the whole mesh.
 """
@@ -15,13 +15,11 @@ from gmsnet.distributed.part import Part
 from gmsnet.distributed.wall_cells import WallCells
 from gmsnet.kernels.simplex import survey as kernels
 from gmsnet.kernels.topology.connectivity import touching
-from gmsnet.preserve import columns
 from gmsnet.preserve.layers import coherent, fewest_in
 from gmsnet.preserve.survey import FEW, MOST, SEED, SLACK, rim_of
 from gmsnet.preserve.wall_edges import doubled
 from gmsnet.preserve.walls import refined_walls
 from gmsnet.topology.topology import Topology
-from gmsnet.topology.volume import Volume
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -47,8 +45,7 @@ class Look(NamedTuple):
         """points: as ``Part.points``. walls: are these looked at?"""
         topology = part.topology
         rim = part.halo.spread(rim_of(topology))
-        if isinstance(topology, Volume):
-            return cls(_layers_of_volume(part, topology, points, rim > 0))
+        assert isinstance(topology, Topology)
         ring = np.zeros((len(rim), 4), dtype=np.float32)
         rows, double = kernels.first_ring(points, topology.near, rim, MOST, ring)
         for column in range(3):
@@ -62,14 +59,6 @@ class Look(NamedTuple):
         others[part.own_rows] = False
         double -= float(doubled(points, topology.near[others]).sum())
         return cls(layers, _walls(part, points, beside, double), beside)
-
-
-def _layers_of_volume(part: Part, topology: Volume, points: Floats, wall: Flags) -> bool:
-    """Do as many nodes hang together from which columns may start as a layer has?"""
-    foot = np.zeros(len(wall), dtype=bool)
-    foot[columns.feet(points, topology, wall)] = True
-    foot &= part.moves
-    return _most_together(part, foot, columns.linked(topology.near, foot, wall)) >= columns.FEWEST
 
 
 def _layers(part: Part, topology: Topology, points: Floats, rim: NDArray[np.uint8], suspects: Flags) -> bool:

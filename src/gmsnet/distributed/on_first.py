@@ -22,13 +22,13 @@ from gmsnet.measure.worst import places_of, unmet
 from gmsnet.mesh.display import amount
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods.banded import Kept
-from gmsnet.preserve.protection import WALL, Protection, protected, protected_volume, wall_note
+from gmsnet.preserve.protection import WALL, Protection, protected, wall_note
 from gmsnet.run.api import smooth_with
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.stop import INTERRUPTED
 from gmsnet.topology.ordering import near_points
-from gmsnet.topology.volume import Volume
+from gmsnet.topology.topology import Topology
 
 Floats = NDArray[np.float64]
 
@@ -54,9 +54,9 @@ def intent_of(
     piece: Piece, options: SmoothOptions, comm: Any, known: Whole | None, mended: Floats | None, along: Along | None, *,
     firm: bool,
 ) -> Intent:  # fmt: skip
-    """What is there on purpose, told by the first rank of the whole mesh. known: see ``gathered``.
+    """What is there on purpose in a plane, told by the first rank of the whole mesh. known: see ``gathered``.
 
-    mended: (n, 2), of volumes (n, 4), of the piece as ``near_points``, where no cell is inverted any more. firm: as of
+    mended: (n, 2) of the piece as ``near_points``, where no cell is inverted any more. firm: as of
     ``protected``.
     """
     whole, layers, kept, told = gathered(piece, comm, known), None, None, None
@@ -64,13 +64,11 @@ def intent_of(
     if whole is not None:
         cells = np.arange(sum(len(block.nodes) for block in whole.mesh.cells))
         topology = connected(whole.mesh, whole.fixed, whole.ids, cells, along)
+        assert isinstance(topology, Topology)
         near = near_points(whole.mesh, topology) if now is None else now[topology.memory]
-        if isinstance(topology, Volume):
-            found = protected_volume(topology, options.preserved, options.fix_layers, near, firm=firm)
-        else:
-            mesh = whole.mesh if now is None else whole.mesh.with_points(_written(whole.mesh, now))
-            sure = firm or bool(options.target)
-            found = protected(mesh, topology, options.preserved, options.fix_layers, near, firm=sure)
+        mesh = whole.mesh if now is None else whole.mesh.with_points(_written(whole.mesh, now))
+        sure = firm or bool(options.target)
+        found = protected(mesh, topology, options.preserved, options.fix_layers, near, firm=sure)
         layers = np.zeros(len(whole.ids), dtype=bool) if found.layers is None else found.layers
         kept = None if found.walls is None else np.column_stack(found.walls)
         told = _of_walls(found), [*found.notes, *[LOOKED_AT] * (known is None)]

@@ -12,6 +12,7 @@ from gmsnet.distributed.gathered import Whole
 from gmsnet.distributed.intent import Look
 from gmsnet.distributed.mending import Mended, inverted_in, mended
 from gmsnet.distributed.on_first import Intent, intent_of
+from gmsnet.distributed.on_ranks import OnRanks
 from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.stages import Meant
@@ -20,9 +21,10 @@ from gmsnet.kernels.topology.places import places_in
 from gmsnet.measure.report import SHAPE
 from gmsnet.measure.totals import Totals
 from gmsnet.methods.banded import Kept
-from gmsnet.preserve.protection import LAYER, NO_LAYERS, NONE, WALL
+from gmsnet.preserve.protection import LAYER, NO_LAYERS, NONE, WALL, protected_volume
 from gmsnet.run.options import SmoothOptions
 from gmsnet.topology.shell import Shell
+from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 
@@ -82,14 +84,19 @@ def _intent(
     wanted = options.preserved != NONE or options.fix_layers
     if not wanted or not part.comm.allreduce(len(part.topology.free)):
         return Intent()
+    at = part.topology.places[places_in(part.around.nodes.ids, piece.ids)]
+    if isinstance(part.topology, Volume):
+        near = part.points if points is None else points
+        found = protected_volume(
+            part.topology, options.preserved, options.fix_layers, near, firm=firm, shared=OnRanks(part)
+        )
+        layers = None if found.layers is None else part.halo.spread(found.layers[part.topology.memory])[at]
+        return Intent(layers, notes=found.notes)
     look = Look.at(part, part.points if points is None else points, walls=options.preserved == SHAPE)
     beside = look.beside if points is None and not firm else None
     if not (look.layers or look.walls):
         return Intent(notes=(NO_LAYERS,) if options.fix_layers else (), beside=beside)
-    now = None
-    if points is not None:
-        at = part.topology.places[places_in(part.around.nodes.ids, piece.ids)]
-        now = points[at]
+    now = None if points is None else points[at]
     return intent_of(piece, options, part.comm, known, now, part.along, firm=firm)._replace(beside=beside)
 
 

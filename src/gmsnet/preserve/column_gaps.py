@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.topology import connectivity
 from gmsnet.kernels.topology.columns import EDGES
+from gmsnet.preserve.shared import Shared
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.volume import Volume
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
+Ids = NDArray[np.int64]
 
 SHARE = 0.5  # of the columns: rows that fewer of them reach are not followed
 MOST = 3.0  # times as many nodes as are in columns: else the columns are what is between others
@@ -33,30 +35,42 @@ def neighbours(rows: Ints, chosen: Flags) -> tuple[Ints, Ints]:
     return np.concatenate([one, two]), np.concatenate([two, one])
 
 
-def with_gaps(topology: Volume, points: Floats, columns: Ints, heights: Floats, wall: Flags) -> Flags:
+def with_gaps(
+    topology: Volume, points: Floats, columns: Ids, heights: Floats, number: Ids, wall: Flags, shared: Shared
+) -> Flags:
     """(N,) by places: the nodes of columns (C, R), and those of the same rows between and beside them.
 
-    heights: (C, R − 1) of the rows. wall: (N,) the nodes of walls.
+    columns: names of nodes, −1 behind their ends; number: (C,) of each among those of all processes. heights:
+    (C, R − 1) of the rows. wall: (N,) the nodes of walls. R is the same for all processes.
     """
     row, high = np.full(len(points), -1, dtype=np.int32), np.zeros(len(points))
-    row[columns[:, 0]] = 0
-    for k in range(1, columns.shape[1]):
-        going = columns[:, k] >= 0
-        row[columns[going, k]], high[columns[going, k]] = k, np.log(heights[going, k - 1])
+
+    def put(places: Ids, k: Ids, number: Ids, logarithm: Floats) -> tuple[()]:
+        order = np.lexsort((number, k))  # the last one of a node stays
+        row[places[order]], high[places[order]] = k[order], logarithm[order]
+        return ()
+
+    column, at = np.nonzero(columns >= 0)
+    logarithm = np.log(np.where(at > 0, heights[column, at - 1], 1.0))
+    shared.ask(columns[column, at], (at, number[column], logarithm), put)
+    row, high = shared.spread(row), shared.spread(high)
     alone: Flags = row >= 0
     shell = topology.near[connectivity.touching(topology.near, alone)]
     shell = shell[(topology.near_free & ~alone)[shell].any(axis=1)]
-    number = (columns >= 0).sum(axis=0)
-    for k in range(1, int(np.argmin(np.append(number >= SHARE * number[0], False)))):
+    reach = shared.total((columns >= 0).sum(axis=0))
+    own = shared.own
+    for k in range(1, int(np.argmin(np.append(reach >= SHARE * reach[0], False)))):
         new, around = row == k, shell
         below = wall if k == 1 else row == k - 1
-        while new.any():
+        while shared.total(int((new & own).any())):
             new = _beside(topology, points, around[new[around].any(axis=1)], row == k, below, row, high)
             row[new] = k
+            new, row, high = shared.spread(new), shared.spread(row), shared.spread(high)
             around = topology.near[connectivity.touching(topology.near, new)]
             shell = np.concatenate([shell, around])
     whole: Flags = row >= 0
-    return whole if np.count_nonzero(whole) <= MOST * np.count_nonzero(alone) else alone
+    many, few = shared.total(np.array([np.count_nonzero(whole & own), np.count_nonzero(alone & own)]))
+    return whole if many <= MOST * few else alone
 
 
 def _beside(

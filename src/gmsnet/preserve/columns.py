@@ -11,20 +11,24 @@ and higher ones follow. What lies around edges of the wall, between columns, bel
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.topology import columns as kernels
 from gmsnet.kernels.topology import connectivity
+from gmsnet.preserve.accepted_columns import FEWEST, accepted_of, linked
 from gmsnet.preserve.column_gaps import neighbours, with_gaps
 from gmsnet.preserve.layers import Layers
+from gmsnet.preserve.shared import Alone, Shared
 from gmsnet.topology.held import ON_BOUNDARY, ON_INTERFACE
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.volume import Volume
 
 Flags = NDArray[np.bool_]
 Floats = NDArray[np.float64]
+Ids = NDArray[np.int64]
 
 WALLS = (ON_BOUNDARY, ON_INTERFACE)  # why the nodes of walls are held
 FLAT, STILL_FLAT = 2.5, 1.7  # how many times longer than thick cells are, in the mean around a node: at a wall, inside
@@ -37,52 +41,75 @@ HIGHER = 2.5  # times as high as the row before it: no row of the same layer
 LAST = 1.6  # the same for the last row
 AT_ONCE = 1.1  # times as high as the lowest next row are rows that grow together
 ROWS = 2  # nodes of a column above its wall
-FEWEST, SHARE = 12, 0.66  # columns beside one another; of the feet there
-GROWN = 1.25  # times as flat at the wall as at the end of the column, or as high there, in the median
-EVEN = 0.03  # of its height: by how much that of a row differs from column to column, in the median
-# In columns of rows of one height: up to these shares of the free nodes, the last row must be so many times as high as
-# the first. Rows that do not grow and are most of a mesh are a grid.
-SHARES, GROWN_BY = (0.35, 0.75), (0.0, 1.1, GROWN)
 DETERMINANT = 1.0 / 45.0  # of a moment of trace 1: less is flat by 2 or more
 
 
-def layers_of_volume(topology: Volume, points: Floats) -> Layers:
-    """The layers of a mesh of volumes as it is now; their cells in memory order. points: (N, 4) in memory order."""
+class _Front(NamedTuple):
+    """The columns of a process, in the order of their feet. foot: (C,) names; number: (C,) among all of the mesh.
+
+    normal: (C, 3); flatness: (C,) of the cells at the feet; width: (C,) of these cells.
+    """
+
+    foot: Ids
+    number: Ids
+    normal: Floats
+    flatness: Floats
+    width: Floats
+
+
+def layers_of_volume(topology: Volume, points: Floats, shared: Shared | None = None) -> Layers:
+    """The layers of a mesh of volumes as it is now; their cells in memory order. points: (N, 4) in memory order.
+
+    shared: with the other processes that have parts of the mesh; each finds its own nodes and cells.
+    """
+    shared = Alone(topology) if shared is None else shared
     nodes, rows = len(points), topology.near
-    none = Layers(np.zeros(nodes, dtype=bool), np.zeros(len(rows), dtype=bool), 1.0, 1.0, 0)
-    wall = _wall_nodes(topology)
+    none = Layers(np.zeros(nodes, dtype=bool), np.zeros(len(rows), dtype=bool), 1.0, 1.0, 0, (0, 0))
+    wall = shared.spread(_wall_nodes(topology))
     broad = BROAD_THIRDS if topology.simplices.shapes is None else BROAD
     foot, normal, flatness = _feet(points, rows, wall, broad)
-    if len(foot) < FEWEST:
+    own = shared.own[foot]
+    if shared.total(int(np.count_nonzero(own))) < FEWEST:
         return none
-    width = _widths(points, rows, wall, foot)
-    columns, heights, last, top, above = _grown(topology, points, foot, normal, width, broad)
+    foot, chosen = foot[own], np.zeros(nodes, dtype=bool)
+    chosen[foot] = True
+    number, width = shared.numbers(chosen), _widths(points, rows, wall, foot)
+    front = _Front(shared.names[foot], number, normal[own], flatness[own], width)
+    columns, heights, last, whole, high = _grown(topology, points, front, broad, shared)
     long: Flags = np.asarray((columns[:, ROWS : ROWS + 1] >= 0).any(axis=1))
-    if long.sum() < FEWEST:
+    if shared.total(int(np.count_nonzero(long))) < FEWEST:
         return none
-    whole, heights = _ended(columns, heights, top, above)
-    chosen = long & _accepted(rows, columns, heights, flatness, last, long, wall, len(topology.free))
-    if not chosen.any():
+    chosen[foot] = long
+    pairs = shared.names[linked(shared.own_near, shared.spread(chosen), wall)]
+    free, row = shared.total(len(topology.free)), (columns[:, 1:] >= 0).sum(axis=1)
+    accepted, found = shared.at_first(
+        lambda *given: accepted_of(*given, free=free),
+        (front.foot, long, heights[:, 0], np.nan_to_num(heights).max(axis=1), row, front.flatness, last),
+        (pairs,),
+    )
+    if found is None:
         return none
     solids = topology.simplices.solids
     nodes_of = rows if solids is None else solids.nodes
     inside = np.zeros(nodes, dtype=bool)
-    members = columns[chosen]
-    inside[members[members >= 0]] = True
-    if not inside[nodes_of].all(axis=1).any():  # columns without a cell between them are none
-        return none
-    inside = with_gaps(topology, points, whole[chosen], heights[chosen], wall)
-    cells: Flags = np.asarray(inside[nodes_of].all(axis=1))
+
+    def put(places: Ids) -> tuple[()]:
+        inside[places] = True
+        return ()
+
+    members = columns[accepted]
+    shared.ask(members[members >= 0], (), put)
+    inside = shared.spread(inside)
+    if not shared.total(int((inside[nodes_of].all(axis=1) & shared.own_cells).any())):
+        return none  # columns without a cell between them are none
+    whole, high = whole[accepted], high[accepted]
+    inside = with_gaps(topology, points, whole, high, number[accepted], wall, shared)
+    cells: Flags = np.asarray(inside[nodes_of].all(axis=1)) & shared.own_cells
     held = np.zeros(nodes, dtype=bool)
     held[topology.memory] = inside & topology.near_free
-    found = flatness[chosen]
-    return Layers(held, cells, float(np.median(found)), float(found.max()), 0)
-
-
-def feet(points: Floats, topology: Volume, wall: Flags) -> Ints:
-    """At which of these nodes of walls (N,) layers may start, by places; of fewer than FEWEST there are none."""
-    broad = BROAD_THIRDS if topology.simplices.shapes is None else BROAD
-    return _feet(points, topology.near, wall, broad)[0]
+    counts = shared.total(np.array([np.count_nonzero(cells), np.count_nonzero(shared.own_cells)]))
+    median, largest = found
+    return Layers(held, cells, median, largest, 0, (int(counts[0]), int(counts[1])))
 
 
 def _wall_nodes(topology: Volume) -> Flags:
@@ -122,110 +149,84 @@ def _widths(points: Floats, rows: Ints, wall: Flags, foot: Ints) -> Floats:
 
 
 def _grown(
-    topology: Volume, points: Floats, foot: Ints, normal: Floats, width: Floats, broad: float
-) -> tuple[Ints, Floats, Floats, Ints, Floats]:
-    """The columns: (C, R) places from the foot on, −1 behind their ends; heights (C, R − 1); flatness of the last.
+    topology: Volume, points: Floats, front: _Front, broad: float, shared: Shared
+) -> tuple[Ids, Floats, Floats, Ids, Floats]:
+    """The columns: (C, R) names from the foot on, −1 behind their ends; heights (C, R − 1); flatness of the last.
 
-    And (C,) the node at the top of the last row, −1 where there is none, with the height of that row: cells above are
-    not flat any more, and so not all of those around that node. width: (C,) of cells at the feet. The lowest rows come
-    first: so a layer that reaches from a wall to another one grows from where it is thin.
+    And columns and heights with the node at the top of the last row, where there is one that is in no column: cells
+    above are not flat any more, and so not all of those around that node. The lowest rows of all come first: so a layer
+    that reaches from a wall to another one grows from where it is thin.
     """
-    nodes, inner = len(points), topology.near_free & (np.diff(topology.start) > 0)
-    at, normal, last = foot.copy(), normal.copy(), np.full(len(foot), np.nan)
-    top, above = np.full(len(foot), -1, dtype=np.int32), np.zeros(len(foot))
-    taken = np.zeros(nodes, dtype=bool)
-    taken[foot] = True
-    rows, row = list[tuple[Ints, Ints, Ints, Floats]](), np.zeros(len(foot), dtype=np.int64)
-    before, stale = np.full(len(foot), np.inf), np.ones(len(foot), dtype=bool)
-    to, height = np.full(len(foot), -1, dtype=np.int32), np.zeros(len(foot))
-    while stale.any() or (to >= 0).any():
-        if stale.any():
-            front = np.full(nodes, -1, dtype=np.int32)
-            front[at[stale]] = np.flatnonzero(stale)
-            near = topology.near[connectivity.touching(topology.near, front >= 0)]
-            found, length = np.full(len(foot), -1, dtype=np.int32), np.full(len(foot), TURN)
-            kernels.next_in_columns(points, near, front, normal, inner, taken, found, length)
-            found[length > HIGHER * before] = -1
-            to[stale], height[stale] = found[stale], length[stale]
-        lowest = np.min(height, where=to >= 0, initial=np.inf)
+    count, names = len(front.foot), shared.names
+    inner = shared.spread(topology.near_free & (np.diff(topology.start) > 0))
+    at, normal, last = front.foot.copy(), front.normal.copy(), np.full(count, np.nan)
+    top, above = np.full(count, -1), np.zeros(count)
+    taken = np.zeros(len(points), dtype=bool)
+    rows, row = list[tuple[Ids, Ids, Ids, Floats]](), np.zeros(count, dtype=np.int64)
+    before, stale = np.full(count, np.inf), np.ones(count, dtype=bool)
+    to, height = np.full(count, -1), np.zeros(count)
+
+    def take(places: Ids, takes: Flags) -> tuple[Flags]:
+        """Takes some nodes, and tells which are taken then."""
+        taken[places[takes]] = True
+        return (taken[places],)
+
+    def next_ones(places: Ids, normal: Floats) -> tuple[Ids, Floats]:
+        """The next node over each, −1 where there is none, and how high it is."""
+        if not len(places):
+            return places, normal[:, 0]
+        ends = np.full(len(points), -1, dtype=np.int32)
+        ends[places] = np.arange(len(places))
+        near = topology.near[connectivity.touching(topology.near, ends >= 0)]
+        found, length = np.full(len(places), -1, dtype=np.int32), np.full(len(places), TURN)
+        kernels.next_in_columns(points, near, ends, normal, inner, taken, found, length)
+        return np.where(found >= 0, names[found], -1), length
+
+    def first_ones(places: Ids, height: Floats, number: Ids) -> tuple[Flags, Floats]:
+        """Of columns that would go on to one node the lowest, else the first one; and the moments around that node."""
+        order = np.lexsort((number, height))
+        first, mean = np.zeros(len(places), dtype=bool), np.empty((len(places), kernels.MOMENTS))
+        first[order[np.unique(places[order], return_index=True)[1]]] = True
+        kernels.of_stars(
+            points, places.astype(np.int32), topology.start, topology.local, topology.ring_start, topology.ring, mean
+        )
+        return first, mean
+
+    shared.ask(front.foot, (np.ones(count, dtype=bool),), take)
+    while shared.total(int(stale.any() or (to >= 0).any())):
+        taken = shared.spread(taken)
+        to[stale], height[stale] = shared.ask(at[stale], (normal[stale],), next_ones)
+        to[stale & (height > HIGHER * before)] = -1
+        lowest = shared.least(float(np.min(height, where=to >= 0, initial=np.inf)))
         step = np.flatnonzero((to >= 0) & (height <= AT_ONCE * lowest))
-        step = step[np.argsort(height[step], kind="stable")]
-        _, first = np.unique(to[step], return_index=True)  # two columns may not go on to one node
-        ahead, there = np.sort(step[first]), to.copy()
-        mean = np.empty((len(ahead), kernels.MOMENTS))
-        kernels.of_stars(points, to[ahead], topology.start, topology.local, topology.ring_start, topology.ring, mean)
-        flatness, direction = _flat(mean, broad)
+        first, mean = shared.ask(to[step], (height[step], front.number[step]), first_ones)
+        ahead, there = step[first], to.copy()
+        flatness, direction = _flat(mean[first], broad)
         alike = (flatness >= STILL_FLAT) & (abs((direction * normal[ahead]).sum(axis=1)) >= TURN)
         going, ending = ahead[alike], ahead[~alike]
-        low = (height <= LAST * before) & (height * STILL_FLAT <= width)
+        low = (height <= LAST * before) & (height * STILL_FLAT <= front.width)
         top[ending] = np.where(low[ending], to[ending], -1)
         above[ahead] = before[ahead] = height[ahead]
         to[step] = -1
         last[going], normal[going] = flatness[alike], direction[alike]
-        at[going], taken[there[going]] = there[going], True
+        at[going] = there[going]
         row[going] += 1
         rows.append((going, row[going], there[going], height[going]))
-        stale = (to >= 0) & taken[to]
-        stale[going] = True
-    columns = np.full((len(foot), 1 + int(row.max(initial=0))), -1, dtype=np.int32)
-    heights = np.full((len(foot), columns.shape[1] - 1), np.nan)
-    columns[:, 0] = foot
+        waiting = np.flatnonzero(to >= 0)
+        takes = np.repeat([True, False], [len(going), len(waiting)])
+        (known,) = shared.ask(np.concatenate([there[going], to[waiting]]), (takes,), take)
+        stale[:] = False
+        stale[waiting], stale[going] = known[len(going) :], True
+    columns = np.full((count, 2 + int(-shared.least(-float(row.max(initial=0))))), -1)
+    heights = np.full((count, columns.shape[1] - 1), np.nan)
+    columns[:, 0] = front.foot
     for of, number, node, high in rows:
         columns[of, number], heights[of, number - 1] = node, high
-    return columns, heights, last, top, above
-
-
-def _ended(columns: Ints, heights: Floats, top: Ints, above: Floats) -> tuple[Ints, Floats]:
-    """Columns and heights with the tops of their last rows, which no column goes through."""
-    free = (top >= 0) & ~np.isin(top, columns)
-    columns = np.column_stack([columns, np.full(len(columns), -1, dtype=np.int32)])
-    heights = np.column_stack([heights, np.full(len(columns), np.nan)])
-    end = (columns >= 0).sum(axis=1)
-    columns[free, end[free]], heights[free, end[free] - 1] = top[free], above[free]
-    return columns, heights
-
-
-def _accepted(
-    rows: Ints, columns: Ints, heights: Floats, flatness: Floats, last: Floats, long: Flags, wall: Flags, free: int
-) -> Flags:
-    """(C,) which columns stand beside enough others and have grown, or are of rows of one height that are not the mesh.
-
-    free: how many nodes may move.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components  # loads what few runs need
-
-    number = np.full(len(wall), -1, dtype=np.int64)
-    number[columns[long, 0]] = np.flatnonzero(long)
-    others = np.flatnonzero(wall & (number < 0))  # they link columns as well, those of a face with those around an edge
-    number[others] = len(columns) + np.arange(len(others))
-    pairs = number[linked(rows, (number >= 0) & (number < len(columns)), wall)]
-    count = len(columns) + len(others)
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    piece = connected_components(graph, directed=False)[1]
-    feet = np.bincount(piece[number[columns[:, 0]]], minlength=count)  # of each piece
-    piece = piece[: len(columns)]
-    pairs = pairs[(pairs < len(columns)).all(axis=1)]
-    accepted = np.zeros(len(columns), dtype=bool)
-    first = heights[:, 0]
-    higher = np.nan_to_num(heights).max(axis=1) / np.where(first > 0.0, first, np.inf)
-    differ = abs(first[pairs[:, 0]] - first[pairs[:, 1]]) / np.maximum(first[pairs[:, 0]], first[pairs[:, 1]])
-    least = GROWN_BY[int(np.searchsorted(SHARES, np.count_nonzero(columns[long, 1:] >= 0) / max(free, 1)))]
-    for name in np.unique(piece[long]).tolist():
-        own = long & (piece == name)
-        if own.sum() < max(FEWEST, SHARE * feet[name]):
-            continue
-        grown = np.median(flatness[own]) >= GROWN * np.median(last[own])
-        even = np.median(differ[piece[pairs[:, 0]] == name], axis=None) <= EVEN
-        accepted[own] = grown or (even and np.median(higher[own]) >= least)
-    return accepted
-
-
-def linked(rows: Ints, foot: Flags, wall: Flags) -> Ints:
-    """The edges (E, 2) of cells between nodes of walls (N,), one of them or both a foot; once for each simplex."""
-    corners = rows[connectivity.touching(rows, foot)]
-    pairs = np.concatenate([corners[:, [a, b]] for a, b in kernels.EDGES])
-    return np.asarray(pairs[wall[pairs].all(axis=1) & foot[pairs].any(axis=1)])
+    topped = np.flatnonzero(top >= 0)
+    (known,) = shared.ask(top[topped], (np.zeros(len(topped), dtype=bool),), take)
+    whole, high, free = columns.copy(), heights.copy(), topped[~known]
+    whole[free, 1 + row[free]], high[free, row[free]] = top[free], above[free]
+    return columns[:, :-1], heights[:, :-1], last, whole, high
 
 
 def _tensors(moments: Floats) -> Floats:

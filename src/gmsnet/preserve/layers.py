@@ -61,7 +61,8 @@ class Layers:
     to the shorter axis of their Steiner ellipse (1 where there are none). damaged: how many of those cells are
     inverted, or thin and of less than a twentieth of the area of those around (in fans around corners cells are small,
     and as thick as long); their nodes are left out of ``nodes``, so that they can be untangled, but for those of which
-    half the cells are as large as those around: they are not what damaged them.
+    half the cells are as large as those around: they are not what damaged them. counts: how many cells are stretched,
+    and how many there are, where the mesh has more than these.
     """
 
     nodes: Flags
@@ -69,16 +70,18 @@ class Layers:
     median: float
     largest: float
     damaged: int
+    counts: tuple[int, int] | None = None
 
     def __bool__(self) -> bool:
-        return bool(self.cells.any())
+        return bool(self.cells.any() if self.counts is None else self.counts[0])
 
     @property
     def summary(self) -> str:
         """One sentence for a warning; "" where there are no layers."""
         if not self:
             return ""
-        count, share = int(self.cells.sum()), self.cells.mean()
+        count, every = (int(self.cells.sum()), len(self.cells)) if self.counts is None else self.counts
+        share = count / every
         where = "all cells" if share == 1.0 else f"{count:,} cells ({plain(max(100.0 * share, 0.1), 2)} %)"
         damaged = f"; {self.damaged:,} of them are damaged" if self.damaged else ""
         return (

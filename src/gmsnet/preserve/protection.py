@@ -19,6 +19,7 @@ from gmsnet.methods.banded import Kept
 from gmsnet.preserve.anchored import split
 from gmsnet.preserve.columns import layers_of_volume
 from gmsnet.preserve.layers import Layers, stretched_layers
+from gmsnet.preserve.shared import Alone, Shared
 from gmsnet.preserve.survey import Survey
 from gmsnet.preserve.wall_edges import Beside
 from gmsnet.preserve.walls import NEAR, near_walls
@@ -95,9 +96,10 @@ def protected(
     if found and not fix_layers:
         found, elsewhere = split(mesh, topology, survey, found)
     layers = found.nodes if found and (fix_layers or preserve not in (METRIC, NONE)) else None
+    alone = Alone(topology)
     if firm and layers is not None:
-        layers = _certain(layers, topology, exact_signs(near, topology.near, topology.near_orientation) > 0)
-    protection = _with_layers(topology, found, layers, preserve, fix_layers)
+        layers = _certain(layers, topology, exact_signs(near, topology.near, topology.near_orientation) > 0, alone)
+    protection = _with_layers(topology, found, layers, preserve, fix_layers, alone)
     notes = protection.notes
     if elsewhere and preserve != METRIC:
         notes.append(f"{elsewhere.away_from_walls}; if they are meant, fix_layers holds them")
@@ -113,17 +115,21 @@ def protected(
     return replace(last, beside=Beside.of(topology.simplices, survey.beside, survey.rim))
 
 
-def protected_volume(topology: Volume, preserve: str, fix_layers: bool, near: Floats, *, firm: bool) -> Protection:
-    """The same of a mesh of volumes: its stretched layers. near: (N, 4)."""
-    found = layers_of_volume(topology, near)
+def protected_volume(
+    topology: Volume, preserve: str, fix_layers: bool, near: Floats, *, firm: bool, shared: Shared | None = None
+) -> Protection:
+    """The same of a mesh of volumes: its stretched layers. near: (N, 4). shared: with whom, of a part of a mesh."""
+    shared = Alone(topology) if shared is None else shared
+    found = layers_of_volume(topology, near, shared)
     layers = found.nodes if found and (fix_layers or preserve not in (METRIC, NONE)) else None
     if firm and layers is not None:
-        layers = _certain(layers, topology, exact_signs3(near, topology.near, topology.near_orientation) > 0)
-    return _with_layers(topology, found, layers, preserve, fix_layers)
+        positive = exact_signs3(near, topology.near, topology.near_orientation) > 0
+        layers = _certain(layers, topology, positive, shared)
+    return _with_layers(topology, found, layers, preserve, fix_layers, shared)
 
 
 def _with_layers(
-    topology: Topology | Volume, found: Layers, layers: Flags | None, preserve: str, fix_layers: bool
+    topology: Topology | Volume, found: Layers, layers: Flags | None, preserve: str, fix_layers: bool, shared: Shared
 ) -> Protection:
     """The protection of layers and what to say of it. layers: (N,) by id, which nodes are to be held."""
     notes: list[str] = []
@@ -131,7 +137,7 @@ def _with_layers(
     if layers is not None:
         why = "fix_layers" if preserve in (METRIC, NONE) else f"preserve={preserve!r}"
         mend = "leave fix_layers out" if fix_layers else "preserve='none' lets them move"
-        amount = _amount(len(protection.outer.held.get(LAYER, ())))
+        amount = _amount(shared.total(len(protection.outer.held.get(LAYER, ()))))
         notes.append(f"{found.summary}; {amount} held for that ({why}); if it is not meant, {mend}")
     elif found and preserve != METRIC:
         notes.append(f"{found.summary}; nothing is held for that (preserve={preserve!r})")
@@ -140,42 +146,45 @@ def _with_layers(
     return protection
 
 
-def _certain(layers: Flags, topology: Topology | Volume, positive: Flags) -> Flags:
+def _certain(layers: Flags, topology: Topology | Volume, positive: Flags, shared: Shared) -> Flags:
     """Of the nodes of layers (N,) by id, those without an inverted cell, and those that share a layer's cell with one.
 
     positive: which of the simplices are. Beside inverted cells others may look like a layer by chance, or have been
     thrown out of one.
     """
-    inside, bad = layers[topology.memory], np.zeros(len(layers), dtype=bool)
+    inside, bad = shared.spread(layers[topology.memory]), np.zeros(len(layers), dtype=bool)
     bad[topology.near[~positive]] = True
-    if not bad.any():
+    bad = shared.spread(bad)
+    if not shared.total(int(bad.any())):
         return layers
     core = inside & ~bad
     cells = topology.near[positive & inside[topology.near].all(axis=1)]
     certain = core.copy()
     certain[cells[core[cells].any(axis=1)]] = True
-    certain = _in_place(certain, topology, positive)
+    certain = _in_place(shared.spread(certain), topology, positive, shared)
     found = np.zeros_like(layers)
     found[topology.memory[certain]] = True
     return found
 
 
-def _in_place(certain: Flags, topology: Topology | Volume, positive: Flags) -> Flags:
+def _in_place(certain: Flags, topology: Topology | Volume, positive: Flags, shared: Shared) -> Flags:
     """Of certain nodes (N,) by places, those that make no inverted cell with one another and with held ones.
 
     Of each such cell those nodes are left out, round by round, of whose cells the largest share is inverted.
     """
-    found = certain & topology.near_free  # the others stay anyhow
-    fixed = found | ~topology.near_free
+    free = shared.spread(topology.near_free)
+    found = certain & free  # the others stay anyhow
+    fixed = found | ~free
     rows = np.flatnonzero(fixed[topology.near].all(axis=1) & found[topology.near].any(axis=1))
     corners, inverted = topology.near[rows], ~positive[rows]
-    while inverted.any():
+    while shared.total(int(inverted.any())):
         every, bad = (np.bincount(some.ravel(), minlength=len(found)) for some in (corners, corners[inverted]))
-        share = np.where(found, bad / np.maximum(every, 1), 0.0)[corners[inverted]]
+        share = shared.spread(np.where(found, bad / np.maximum(every, 1), 0.0))[corners[inverted]]
         found[corners[inverted][share == share.max(axis=1, keepdims=True)]] = False
-        left = (found | ~topology.near_free)[corners].all(axis=1)
+        found = shared.spread(found)
+        left = (found | ~free)[corners].all(axis=1)
         corners, inverted = corners[left], inverted[left]
-    return found | (certain & ~topology.near_free)
+    return found | (certain & ~free)
 
 
 def wall_note(walls: Kept, nodes: int, moved: bool) -> str:
