@@ -18,8 +18,7 @@ are many alike, all nodes move at once for these, and all phases have another tu
 A phase goes on as long as more than its ``gain`` in the mean of 1/q (of a sample of the cells) is to come, if gains go
 on as the last two did. What each phase is worth is measured by ``benchmarks/auto.py``; see docs/auto.md.
 
-With a target (``target_quality``, ``target_angle``) the cells that miss it are smoothed alone (methods/below.py), after
-Newton sweeps on Σq where they are many.
+For a target there is another plan (methods/for_target.py).
 """
 
 from __future__ import annotations
@@ -31,21 +30,17 @@ import numpy as np
 
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.guard import STAR
-from gmsnet.measure.target import Target
+from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import ALL_CELLS, Field, Method, Smoother, Tally
-from gmsnet.methods.below import GENTLE, MANY, NEAR, WIDE, Below
-from gmsnet.methods.below_in_space import BelowInSpace
 from gmsnet.methods.creep import Creep
-from gmsnet.methods.gains import mean_shape, to_come
+from gmsnet.methods.gains import Falling, mean_shape, to_come
 from gmsnet.methods.phases import (
     LARGE_VOLUME,
     LARGE_VOLUME_PLAN,
     MIXED_PLAN,
-    NEWTON,
     SMALL_PLAN,
     SURFACE_PLAN,
     VOLUME_PLAN,
-    WORST,
     Phase,
     plan_for,
 )
@@ -69,6 +64,7 @@ PASSES = 8  # over the worst cells and what follows them, at most
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
 LARGE_GAIN = 0.008  # of meshes in space of more than LARGE_VOLUME free nodes
 LARGE_VOLUME_GAIN = 0.02  # of those of tetrahedra alone: with two turns they are at 98 % of what many reach
+MOST_ROUNDS = 100  # of a phase in which the sum of q falls
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS, EARLY = "whole mesh, worst cells", (3, 2), (2, 3, 1)  # q⁸, q⁴, q²
 GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
@@ -116,6 +112,7 @@ class Auto(Smoother):
         self.pass_gain, self.passes = PASS_GAIN, 0  # over the worst cells
         self.least = -math.inf  # 1/q after the last of these
         self.again = -1  # the phase to go back to in the end, if there is one
+        self.falling: Falling | None = None
 
     def _enter(self, phase: int, field: Field, executor: Executor) -> None:
         if self.again >= 0 and (phase == len(self.phases) or (phase and self.phases[phase - 1].between)):
@@ -131,6 +128,7 @@ class Auto(Smoother):
             self.turns, self.least_before = self.turns + 1, self.least
             return
         self.smoother = self.phases[phase].create()
+        self.falling = Falling(self.phases[phase].falling) if self.phases[phase].falling else None
         if self.phases[phase].rounds > 1 and not self.phases[phase].first:  # what those gain at first does not count
             self.mean = mean_shape(field, executor)
 
@@ -250,6 +248,11 @@ class Auto(Smoother):
             self.mean = mean
             self.slow = self._is_slow(field, executor, ahead, lasts) or (not goes_on and self._is_caught())
             goes_on = goes_on or self.slow
+        if self.falling is not None and self.falling.goes_on(field, executor):
+            if not goes_on and isinstance(self.smoother, Barrier):
+                self.smoother.hasten()
+                self.falling.long = True
+            goes_on = goes_on or self.rounds < MOST_ROUNDS
         target_reached = self.smoother.target_reached
         if isinstance(self.smoother, WorstFirst) and self.repeats:
             self._look_at_worst(self.smoother)
@@ -264,29 +267,6 @@ class Auto(Smoother):
             if self.early:
                 return
             self._enter(len(self.phases) if target_reached or is_ideal else self.at + 1, field, executor)
-
-
-def for_target(target: Target, share: float, *, rings: int, floor: float | None = None) -> Auto:
-    """The plan for patches around the cells that miss a target. share: these, of the patches' cells.
-
-    rings: of free nodes that move. With more than one, all of them move at first, for the cells that miss it; then come
-    the worst cells alone, and another try that keeps these; with more than two, Newton's sweeps on Σq over the patches
-    come before all.
-
-    floor: in space, of D/S^(3/2) while dihedral angles gain (BelowInSpace); what is left there is left to sweeps over
-    the cells that miss it, after one of Newton's where they are many.
-    """
-    plan = WIDE if rings > 1 else NEAR if target.angle is None else GENTLE
-    many = share > MANY or rings > 2
-    if floor is not None:
-        in_space = Phase("cells that miss the target", lambda: BelowInSpace(target, floor, everywhere=rings > 1), 1)
-        return Auto([VOLUME_PLAN[0], in_space] if many else [in_space])
-    below = Phase("cells that miss the target", lambda: Below(target, plan, everywhere=False), 1)
-    phases = [NEWTON._replace(looks=False)] if many else []
-    if rings > 1:
-        wide = below._replace(create=lambda: Below(target, plan, everywhere=True), looks=False)
-        phases += [wide, WORST._replace(looks=False)]
-    return Auto([*phases, below])
 
 
 METHOD = Method(

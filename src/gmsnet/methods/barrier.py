@@ -33,7 +33,7 @@ from gmsnet.parallel.executor import Executor
 
 POWERS = {"q2": 2, "q": 1, "q4": 4}
 IN_SPACE = {"q2": 0, "q": -1, "q4": 1}  # k of q^p: q there stands for the mean ratio to the power of 3/2
-IN_SPACE_MOST = 1.3  # ω; more gains nothing
+IN_SPACE_MOST, IN_SPACE_LONG = 1.3, 1.8  # ω; more gains nothing, but for long waves
 RELAXATION, RELAXED = 1.6, 8  # ω, and for how many sweeps
 STRETCH, MEANS = 1.1, 1  # how far to the mean, and in how many sweeps
 
@@ -59,7 +59,11 @@ class Barrier(StarSmoother):
         self.power, self.power3 = Power.of(POWERS[objective]), Power3.of(IN_SPACE[objective])
         self.doublings = POWERS[objective].bit_length() - 1
         self.relaxation, self.relaxed, self.means = relaxation, relaxed, means
-        self.sweeps = 0
+        self.sweeps, self.most_in_space = 0, IN_SPACE_MOST
+
+    def hasten(self) -> None:
+        """Steps in space are longer from now on: so many cells grow or shrink together in fewer sweeps."""
+        self.relaxation = self.most_in_space = IN_SPACE_LONG
 
     @property
     def in_plane(self) -> Visit:
@@ -68,7 +72,7 @@ class Barrier(StarSmoother):
 
     def in_space(self, guard: Guard) -> Visit:
         """See StarSmoother."""
-        relaxation = min(self.relaxation, IN_SPACE_MOST) if self.sweeps < self.relaxed else 1.0
+        relaxation = min(self.relaxation, self.most_in_space) if self.sweeps < self.relaxed else 1.0
         return Visit(sweep3, (self.power3, relaxation))
 
     def visit_on_surface(

@@ -19,6 +19,8 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 
 SAMPLE = 32  # blocks of cells
+# By which share the sum of q^(3/2) falls in a sweep where it goes on to, at least, and over that in the sweep before.
+LITTLE, LASTING = 0.0005, 0.6
 OF_QUADS = 256  # blocks of corners of planar quads and mixed cells, which gain less a sweep: fewer do not show it
 
 
@@ -51,6 +53,32 @@ def low_shape(field: Field, share: float, executor: Executor = serial) -> float:
     ratios = executor.in_order(executor.row_numbers(some), ratios_of(field.points, simplices.take(some)))
     count = math.ceil(share * len(ratios))
     return float(K3 / np.partition(ratios, -count)[-count]) ** (1.0 / 3.0) if count else 0.0
+
+
+class Falling:
+    """Whether the sum of q^(3/2) of a volume goes on to fall.
+
+    Of ordinary meshes each sweep brings a third of what the one before it brought. It falls for long where many cells
+    have to grow or shrink together, as beside a jump in their sizes, and the mean of η does not tell that. at_first:
+    the share by which it then falls between the first two looks. long: it has been so.
+    """
+
+    long = False
+
+    def __init__(self, at_first: float) -> None:
+        self.at_first, self.last, self.fell = at_first, math.nan, math.nan
+
+    def goes_on(self, field: Field, executor: Executor) -> bool:
+        """Looks at some of the cells, evenly taken; after each round of one sweep."""
+        simplices = field.topology.changeable
+        assert isinstance(simplices, Tetrahedra)
+        some = executor.every(_stride(len(simplices.rows), executor), len(simplices.rows))
+        ratios = executor.in_order(executor.row_numbers(some), ratios_of(field.points, simplices.take(some)))
+        last, before = self.last, self.fell
+        self.last = float(np.cumsum(np.sqrt(ratios))[-1]) if len(ratios) else math.nan
+        self.fell = 1.0 - self.last / last  # nan where one is unknown, or infinite
+        slowly = self.fell > (self.at_first if math.isnan(before) else LASTING * before)
+        return self.fell > LITTLE and (self.long or slowly)
 
 
 def to_come(before: float, gained: float) -> float:

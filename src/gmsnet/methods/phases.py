@@ -32,6 +32,7 @@ class Phase(NamedTuple):
     less than this share of the gain before, no nodes creep: so gains fall where short waves are left, which sweeps even
     out. looks: whether the mesh is measured after it; late: not if the worst cells have another turn. often: after so
     many rounds of it, too. between: the worst cells have their next turn after it, and it is left out after their last.
+    falling: on volumes, it goes on where the sum of q^(3/2) falls still, by this share at first (gains.Falling).
     """
 
     name: str
@@ -46,6 +47,7 @@ class Phase(NamedTuple):
     often: int = 4
     late: bool = False
     between: bool = False
+    falling: float = 0.0
 
 
 def newton(relaxation: float = RELAXATION, *, means: int = 0) -> Barrier:
@@ -84,7 +86,9 @@ QUADS_PLAN = (
 )
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 # Of volumes; q there is the mean ratio to the power of 3/2.
-ON_Q = Phase("Newton on q", lambda: Barrier("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False)
+ON_Q = Phase("Newton on q", lambda: Barrier("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False)._replace(
+    falling=0.008
+)
 IN_SPACE_WORST = Phase("worst first", WorstFirst, 1, looks=False)
 ROOM = Phase("room for the worst", lambda: Above(0.17, 3, 1.0), 1, looks=False, between=True)
 VOLUME_PLAN = (
@@ -94,7 +98,7 @@ VOLUME_PLAN = (
     Phase("mean, worst kept", lambda: Above(0.0, 5, 0.03, 1.6), 1, rounds=40, gain=0.00002, looks=False),
 )
 LARGE_VOLUME_PLAN = (
-    ON_Q._replace(first=2, rounds=1),
+    ON_Q._replace(first=1, rounds=2, falling=0.025),
     Phase("Newton above a wall", lambda: Above(0.23, 2, 1.0), 1, looks=False),
     IN_SPACE_WORST,
     ROOM._replace(between=False),
@@ -116,7 +120,7 @@ SURFACE_PLAN = (
 
 # Of other volumes, grids among which have an ideal mesh.
 MIXED_PLAN = (
-    ON_Q,
+    ON_Q._replace(falling=0.0),
     IN_SPACE_WORST,
     Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0005),
     Phase("Newton on q, in float64", ToTheEnd, 1),

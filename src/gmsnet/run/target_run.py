@@ -14,8 +14,9 @@ from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.kernels.topology.patch import around
 from gmsnet.measure.target import Target
 from gmsnet.measure.totals import totals_of
-from gmsnet.methods.auto import Auto, for_target
+from gmsnet.methods.auto import Auto
 from gmsnet.methods.base import Field
+from gmsnet.methods.for_target import for_target
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import serial
