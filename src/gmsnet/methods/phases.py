@@ -9,6 +9,7 @@ from typing import NamedTuple
 from gmsnet.methods.above import Above
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Smoother
+from gmsnet.methods.flat_in_space import OnQ
 from gmsnet.methods.optimize import Newton
 from gmsnet.methods.to_the_end import ToTheEnd
 from gmsnet.methods.worst_first import CYCLES, LAST, WorstFirst
@@ -86,7 +87,7 @@ QUADS_PLAN = (
 )
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 # Of volumes; q there is the mean ratio to the power of 3/2.
-ON_Q = Phase("Newton on q", lambda: Barrier("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False)._replace(
+ON_Q = Phase("Newton on q", lambda: OnQ("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False)._replace(
     falling=0.008
 )
 IN_SPACE_WORST = Phase("worst first", WorstFirst, 1, looks=False)

@@ -133,9 +133,12 @@ class Attempt:
             (np.ones(int(inner.sum())), (row[inner], number[other[inner]])), shape=(len(free), len(free))
         )
         jacobi = scipy.sparse.diags_array(1.0 / count)
+        beside = self.points[other[~inner]]
+        middle = beside.mean(axis=0) if len(beside) else np.zeros(4)  # else a mesh far from the origin loses its digits
         for axis in range(3):
-            held = np.bincount(row[~inner], self.points[other[~inner], axis], minlength=len(free))
+            held = np.bincount(row[~inner], beside[:, axis] - middle[axis], minlength=len(free))
             found, _ = scipy.sparse.linalg.cg(laplacian, held, rtol=HARMONIC, maxiter=ITERATIONS, M=jacobi)
+            found += middle[axis]
             self.points[free, axis] = np.float32(found) if self.precision.single else found
         self.look()
         return UntanglingStep("all nodes to the means of their neighbours", len(free), 1, self.left)
