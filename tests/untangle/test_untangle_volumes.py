@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 from support import volumes
+from support.hard_volumes import delaunay
 
 import gmsnet
 from gmsnet.kernels.star.guard import Precision
@@ -130,3 +131,19 @@ def test_what_cannot_be_mended_takes_little_else_back(seed):
     assert result.before.inverted > 80
     assert 0 < result.after.inverted <= at_held
     assert result.after.shape.min() >= result.before.shape.min()
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_is_left_is_tried_again_in_the_same_call(seed):
+    """Points with heavy tails, all thrown by an edge: one go leaves more than half of the inverted cells."""
+    rng = np.random.default_rng(seed)
+    mesh = delaunay(rng.normal(size=(500, 3)) ** 3)
+    volume = Volume.of(mesh)
+    pairs = mesh.cells[0].nodes[:, [[a, b] for a in range(4) for b in range(4) if a != b]].reshape(-1, 2)
+    points, length = mesh.points.copy(), np.full(len(mesh.points), np.inf)
+    np.minimum.at(length, pairs[:, 0], np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1))
+    away = rng.normal(size=(len(volume.free), 3))
+    points[volume.free] += away / np.linalg.norm(away, axis=1)[:, None] * length[volume.free, None]
+    result = gmsnet.smooth(mesh.with_points(points))
+    assert result.before.inverted > 100
+    assert result.after.inverted == 0

@@ -31,6 +31,7 @@ from gmsnet.kernels.topology.places import places_in
 from gmsnet.kernels.topology.write_back import put_back
 from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import QualityReport, measure
+from gmsnet.measure.target import Nearness
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.measure.worst import Place
 from gmsnet.methods import Smoother
@@ -194,7 +195,8 @@ def _written(
         last = measure(written, topology, near)
         missed, least = missing(part, last, options)
         missed_before, least_before = missing(part, first, options)
-        better = (inverted, missed, -least) <= (inverted_before, missed_before, -least_before)
+        now_near = Nearness.of(inverted, missed, least, of_free.after)
+        better = now_near <= Nearness.of(inverted_before, missed_before, least_before, of_free.before)
         angles = [greatest_angle(report, options) for report in (first, last)]
         greatest = [float(part.comm.allreduce(angle, mpi().MAX)) for angle in angles]
         final = last if better else first

@@ -18,6 +18,7 @@ from gmsnet.measure.cells import MeasuredCells
 from gmsnet.measure.dihedral import SHARE, columns_of, most_shape_below, ratios_of
 from gmsnet.measure.report import QualityReport
 from gmsnet.measure.solids import MeasuredSolids
+from gmsnet.measure.totals import Totals
 from gmsnet.measure.volumes import MeasuredTetrahedra
 from gmsnet.topology.ordering import planar_points, space_points
 
@@ -25,7 +26,45 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Rows = NDArray[np.int32]
 
+MUCH = 4.0  # times the least 1/q: more than any number of cells that miss a target
 SURE = 1.0 + 1e-12  # times the target: what is above it is so however it is measured
+
+
+@dataclass(frozen=True)
+class Nearness:
+    """How near a mesh is to a target: by inverted cells, then by cells that miss it, then by the worst of these.
+
+    But where both miss it, one whose least 1/q or η of cells with a free node is MUCH times that of the other is
+    nearer, whatever the counts: else a few cells that miss it by little would outweigh a sliver.
+    """
+
+    inverted: int
+    missed: int
+    worst: float
+    least: float
+
+    @classmethod
+    def of(cls, inverted: int, missed: int, worst: float, totals: Totals | None) -> Nearness:
+        """worst: of the cells that miss it. totals: of the cells with a free node."""
+        return cls(inverted, missed, worst, math.inf if totals is None else totals.shape_min)
+
+    def __lt__(self, other: Nearness) -> bool:
+        """Nearer."""
+        if not (self.inverted or other.inverted) and self.missed and other.missed:
+            if self.least >= MUCH * max(other.least, 0.0):
+                return True
+            if other.least >= MUCH * max(self.least, 0.0):
+                return False
+        return self.counts < other.counts
+
+    def __le__(self, other: Nearness) -> bool:
+        """As near, or nearer."""
+        return not other < self
+
+    @property
+    def counts(self) -> tuple[int, int, float]:
+        """Less is nearer, where no least is MUCH larger."""
+        return self.inverted, self.missed, -self.worst
 
 
 @dataclass(frozen=True)
@@ -136,10 +175,10 @@ class Target:
         """Do all these corner simplices miss it, however they are measured?"""
         return len(self.corners_missing(points, simplices, SURE**-2)) == len(simplices.rows)
 
-    def rank(self, report: QualityReport) -> tuple[int, int, float]:
-        """Of two meshes that of the lesser rank is nearer: by inverted cells, cells that miss it, the worst one."""
+    def rank(self, report: QualityReport, totals: Totals | None) -> Nearness:
+        """How near a mesh is. totals: of the cells with a node that may move."""
         rows, shape = self.missed_with_shapes(report)
-        return report.inverted, len(rows), -float(shape.min(initial=np.inf))
+        return Nearness.of(report.inverted, len(rows), float(shape.min(initial=np.inf)), totals)
 
     @property
     def limits(self) -> tuple[float, float]:

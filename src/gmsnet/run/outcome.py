@@ -257,7 +257,7 @@ def inverted_alone(report: QualityReport, _: Totals | None) -> int:
 def ranking(options: SmoothOptions) -> Rank:
     """Nearer to the target, of all cells, if there is one."""
     target = options.target
-    return (lambda report, _: target.rank(report)) if target else rank_by(options.best_by)
+    return target.rank if target else rank_by(options.best_by)
 
 
 def rank_by(best_by: str) -> Rank:

@@ -54,7 +54,7 @@ def _rank(state: State, points: Floats, options: SmoothOptions, executor: Execut
         return rank
     assert state.second_order is not None
     there = replace(state, points=points, protection=corners_alone(state.second_order))
-    return (*rank_to_target(there, options, executor)[:2], *rank)
+    return (*rank_to_target(there, options, executor).counts[:2], *rank)
 
 
 def _with_room(

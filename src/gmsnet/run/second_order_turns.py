@@ -68,7 +68,7 @@ def _worth(state: State, options: SmoothOptions, executor: Executor) -> tuple[fl
     assert given is not None
     rank: tuple[float, ...]
     if options.target:
-        rank = rank_to_target(replace(state, protection=corners_alone(given)), options, executor)
+        rank = rank_to_target(replace(state, protection=corners_alone(given)), options, executor).counts
     else:
         rank = rank_at(state.points, with_corners(state), options, executor)
     return tuple(-value for value in (given.invalid[1], *rank))

@@ -10,6 +10,7 @@ import numpy as np
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.constraint import locate
 from gmsnet.kernels.star.surface import Surface, locate3
+from gmsnet.measure.target import Nearness
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods.auto import Auto
 from gmsnet.parallel.executor import Executor
@@ -104,10 +105,11 @@ def _going_on(state: State) -> State:
     return replace(state, stop_reason="") if state.stop_reason == NO_PROGRESS else state
 
 
-def rank_to_target(state: State, options: SmoothOptions, executor: Executor) -> tuple[int, int, float]:
+def rank_to_target(state: State, options: SmoothOptions, executor: Executor) -> Nearness:
     """Of two states that of the lesser rank is closer to the target."""
     totals, missing = totals_of(state.points, state.topology.scored, executor), _missing(state, options, executor)
-    return (0, missing, -math.inf) if totals is None else (totals.inverted, missing, -totals.shape_min)
+    inverted, worst = (0, math.inf) if totals is None else (totals.inverted, totals.shape_min)
+    return Nearness.of(inverted, missing, worst, totals)
 
 
 def _sweep_all(state: State, options: SmoothOptions, executor: Executor) -> State:

@@ -29,6 +29,7 @@ Flags = NDArray[np.bool_]
 RINGS = (2, 6, 10**9)  # around the cells that are bad
 SWEEPS = (30, 40, 60)  # at most
 CLOSE = (0, 1, 2)  # rings, where some cells are left
+LAST, FEW = (1, 3, 9, 1, 3, 9), 0.1  # the same, where so few of the cells are
 EARLY, MANY = 2, 0.1  # after so many rounds, with so many of the cells bad still, another start is taken
 SHRINK, FINEST = 0.6, 1e-4  # of ε from sweep to sweep, and of the median of |D| at last
 HARMONIC, ITERATIONS = 1e-6, 2000
@@ -245,6 +246,10 @@ def untangle_volume(
         places.append(attempt.points.copy())
     if attempt.left and len(topology.free):
         steps += _from_the_means(attempt)
+    for rings in LAST:
+        if not 0 < attempt.left <= FEW * before:
+            break
+        steps.append(attempt.sweeps(rings, SWEEPS[-1]))
     broken = attempt.give_back()
     if attempt.left:
         steps += _take_best(attempt, places)
