@@ -99,7 +99,7 @@ VOLUME_PLAN = (
     Phase("mean, worst kept", lambda: Above(0.0, 5, 0.03, 1.6), 1, rounds=40, gain=0.00002, looks=False),
 )
 LARGE_VOLUME_PLAN = (
-    ON_Q._replace(first=1, rounds=2, falling=0.025),
+    ON_Q._replace(first=1, rounds=2, falling=0.08),
     Phase("Newton above a wall", lambda: Above(0.23, 2, 1.0), 1, looks=False),
     IN_SPACE_WORST,
     ROOM._replace(between=False),
