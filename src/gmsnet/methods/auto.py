@@ -113,6 +113,7 @@ class Auto(Smoother):
         self.least = -math.inf  # 1/q after the last of these
         self.again = -1  # the phase to go back to in the end, if there is one
         self.falling: Falling | None = None
+        self.lost, self.mean_of_q = 0.0, math.nan  # of the mean of η in the end, and what it was after sweeps on q
 
     def _enter(self, phase: int, field: Field, executor: Executor) -> None:
         if self.again >= 0 and (phase == len(self.phases) or (phase and self.phases[phase - 1].between)):
@@ -126,6 +127,8 @@ class Auto(Smoother):
             gained = self.turns == 0 or self.doubled or self.least >= self.least_before + enough
             self.converged = not gained or not (self.ideal or self._is_even(field, executor))
             self.turns, self.least_before = self.turns + 1, self.least
+            if not math.isnan(self.mean_of_q):
+                self.lost = self.mean_of_q - mean_shape(field, executor)
             return
         self.smoother = self.phases[phase].create()
         self.falling = Falling(self.phases[phase].falling) if self.phases[phase].falling else None
@@ -259,6 +262,8 @@ class Auto(Smoother):
         looks = phase.looks and not (phase.late and self.again >= 0)
         self.looks = self.rounds % phase.often == 0 if goes_on else looks or target_reached
         if not goes_on:
+            if self.falling is not None:
+                self.mean_of_q = mean_shape(field, executor)
             is_ideal = isinstance(self.smoother, WorstFirst) and self.smoother.least >= self.smoother.enough
             few = self.creep is not None and not self.whole and self.free <= EXACT
             self.ideal = is_ideal and few

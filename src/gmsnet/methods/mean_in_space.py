@@ -21,12 +21,12 @@ RELAXATION = 1.3  # ω, as of the barrier
 
 
 class MeanInSpace(Smoother):
-    """floor: of D/S^(3/2), in the place of the guard's."""
+    """floor: of D/S^(3/2), in the place of the guard's. power, relaxation: of the steps."""
 
     phase = "mean of η"
 
-    def __init__(self, floor: float) -> None:
-        self.floor = floor
+    def __init__(self, floor: float, power: Power3 = POWER, relaxation: float = RELAXATION) -> None:
+        self.floor, self.power, self.relaxation = floor, power, relaxation
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
@@ -36,6 +36,6 @@ class MeanInSpace(Smoother):
         guard = MeshGuard(*field.precision, self.floor, field.constraint)
 
         def visit(blocks: SpaceBlocks, first: int, last: int, counts: Tally) -> None:
-            sweep3(field.points, blocks, first, last, guard, POWER, RELAXATION, counts)
+            sweep3(field.points, blocks, first, last, guard, self.power, self.relaxation, counts)
 
         return over_stars(visit, field.topology.stars, field.points, executor)

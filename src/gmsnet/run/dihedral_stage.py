@@ -27,6 +27,7 @@ from gmsnet.topology.volume import Volume
 # By so much may the largest q = 1/η grow, at first, and once more if the least η was at least ROOM.
 SPENT, ROOM = (0.015, 0.06), 0.5
 GAIN = 0.005  # in the merit, each time: with less the mesh stays as it was
+MEAN = 0.003  # of the mean η: with more of it lost the mesh stays, too
 
 
 def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -53,7 +54,7 @@ def improve_dihedrals(state: State, options: SmoothOptions, executor: Executor) 
         after = totals_of(field.points, topology.scored, executor)
         assert after is not None
         gained = merit(after, smoother.after) - merit(taken, smoother.before)
-        if gained < GAIN or after.uncertain:
+        if gained < GAIN or after.uncertain or after.shape_mean < totals.shape_mean - MEAN:
             break
         best, taken, tally = field.points.copy(), after, tally + found
     if taken is totals:

@@ -8,7 +8,7 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.run.carry_out import Stage, carry_out_all
 from gmsnet.run.dihedral_stage import improve_dihedrals
-from gmsnet.run.mean_stage import improve_mean
+from gmsnet.run.mean_stage import improve_mean, return_mean
 from gmsnet.run.metric_stage import take_metric
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import write_back
@@ -21,12 +21,13 @@ from gmsnet.run.untangle_stage import protect_untangled, untangle_all, untangle_
 from gmsnet.run.wall_stage import improve_in_turns
 
 STAGES: tuple[Stage, ...] = (
-    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_rest, improve_dihedrals,
-    improve_mean, improve_in_turns, untangle_second_order, take_turns,
+    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_rest, return_mean,
+    improve_dihedrals, improve_mean, improve_in_turns, untangle_second_order, take_turns,
 )  # fmt: skip
 
 
-SWEEPS: tuple[Stage, ...] = (sweep, improve_rest, improve_dihedrals, improve_mean)  # of a valid mesh, without walls
+# Of a valid mesh, without walls.
+SWEEPS: tuple[Stage, ...] = (sweep, improve_rest, return_mean, improve_dihedrals, improve_mean)
 
 
 def carry_out(state: State, options: SmoothOptions, executor: Executor, stages: Sequence[Stage] = STAGES) -> State:
