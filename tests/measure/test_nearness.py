@@ -7,14 +7,17 @@ import math
 
 import pytest
 
-from gmsnet.measure.target import MUCH, Nearness
+from gmsnet.measure.target import MUCH, SLIVER, Nearness
 
 NEARER = [  # each is nearer than all behind it
     Nearness(0, 0, math.inf, 0.9),
     Nearness(0, 3, 0.4, 0.4),
     Nearness(0, 3, 0.3, 0.3),
-    Nearness(0, 900, 0.2, 0.11),
+    Nearness(0, 900, 0.2, 0.13),
+    Nearness(0, 3, 0.12, 0.12),
+    Nearness(0, 4, 0.12, 0.12),
     Nearness(0, 2, 0.02, 0.02),
+    Nearness(0, 1, 0.0, 0.0),
     Nearness(1, 1, -0.1, -0.1),
     Nearness(1, 5, -0.1, -0.1),
     Nearness(2, 2, 0.1, 0.3),
@@ -29,9 +32,13 @@ def test_fewest_inverted_then_fewest_that_miss_it_then_the_worst_but_no_sliver(o
     assert not other <= one
 
 
-def test_equal_ones_and_the_bound():
+def test_equal_ones_and_the_bounds():
     one = Nearness(0, 7, 0.1, 0.1)
     assert one <= one
     assert not one < one
-    assert Nearness(0, 9, 0.1, MUCH * 0.1) < one < Nearness(0, 9, 0.1, MUCH * 0.0999)
     assert Nearness(0, 0, math.inf, 0.1) < Nearness(0, 1, 0.5, 0.5), "one that meets it is nearer"
+    assert Nearness(0, 9, 0.2, SLIVER) < Nearness(0, 1, 0.2, 0.999 * SLIVER), "no sliver"
+    assert Nearness(0, 9, 0.1, SLIVER / MUCH) < Nearness(0, 1, 0.1, 0.999 * SLIVER / MUCH), "a thicker one"
+    nothing = Nearness.of(0, 3, 0.1, None)
+    assert nothing <= nothing
+    assert not nothing < nothing

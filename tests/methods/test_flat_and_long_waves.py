@@ -14,7 +14,7 @@ from gmsnet.kernels.methods.barrier3 import K3
 from gmsnet.measure.dihedral import ratios_of
 from gmsnet.methods import Field
 from gmsnet.methods.flat_in_space import FLAT, unflattened
-from gmsnet.methods.gains import LASTING, LITTLE, Falling
+from gmsnet.methods.gains import BEGUN, LASTING, LITTLE, Falling
 from gmsnet.parallel.threads import serial
 from gmsnet.run.run import precision_of
 from gmsnet.topology.ordering import space_points
@@ -75,10 +75,12 @@ def test_what_falls_slowly_goes_on(monkeypatch):
         falling.long = long
         return [falling.goes_on(field, serial) for _ in value]
 
-    assert looks(0.02) == [False, True]
+    assert looks(0.02) == [False, True], "much at first"
     assert looks(0.005) == [False, False]
-    assert looks(0.02, 0.9 * LASTING * 0.02, 0.9 * LASTING * 0.02) == [False, True, False, True]
-    assert looks(0.5 * LITTLE, 0.5 * LITTLE) == [False, False, False]
-    assert looks(0.02, 2 * LITTLE, long=True) == [False, True, True]
+    assert looks(0.02, 0.9 * LASTING * 0.02) == [False, True, False], "it falls fast"
+    assert looks(0.005, 1.1 * LASTING * 0.005) == [False, False, True], "it falls slowly"
+    assert looks(0.9 * BEGUN, 0.9 * BEGUN) == [False, False, False], "by too little to begin with"
+    assert looks(0.9 * BEGUN, 1.1 * LITTLE, long=True) == [False, True, True], "but not to go on with"
+    assert looks(0.9 * LITTLE, long=True) == [False, False]
     assert looks(math.nan) == [False, False]
     assert looks(-0.1, 0.2) == [False, False, True]

@@ -162,3 +162,15 @@ def test_rows_from_wall_to_wall_grow_from_where_they_are_thin(rows, growth):
     layers, free = found(mesh)
     assert free.sum() > 200 * (rows - 1)
     assert layers.nodes[free].mean() > 0.97
+
+
+def test_even_rows_have_grown_if_the_row_under_their_tops_is_higher():
+    """Cells above it are not flat, so no column goes through it."""
+    side, height = np.linspace(0.0, 1.0, 9), np.cumsum([0.0, 0.02, 0.02, 0.02, 0.023, *[0.125] * 4])
+    points = np.stack(np.meshgrid(side, side, height, indexing="ij"), axis=-1).reshape(-1, 3)
+    node = np.arange(len(points)).reshape(9, 9, -1)
+    corners = node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]
+    ends = slice(None, -1), slice(1, None)
+    cells = np.stack([each[..., end].ravel() for end in ends for each in corners], axis=1)
+    layers, _ = found(Mesh(points, (CellBlock("hexahedron", cells, np.zeros(len(cells), dtype=int)),)))
+    assert layers.nodes.sum() == 4 * 7**2

@@ -44,8 +44,8 @@ class Look(NamedTuple):
     def at(cls, part: Part, points: Floats, *, walls: bool = True) -> Look:
         """points: as ``Part.points``. walls: are these looked at?"""
         topology = part.topology
-        rim = part.halo.spread(rim_of(topology))
         assert isinstance(topology, Topology)
+        rim = part.halo.spread(rim_of(topology))
         ring = np.zeros((len(rim), 4), dtype=np.float32)
         rows, double = kernels.first_ring(points, topology.near, rim, MOST, ring)
         for column in range(3):

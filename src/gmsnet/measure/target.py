@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Rows = NDArray[np.int32]
 
-MUCH = 4.0  # times the least 1/q: more than any number of cells that miss a target
+SLIVER, MUCH, THINNEST = 0.125, 4.0, 40  # the largest 1/q of a sliver; between bounds, and how many there are
 SURE = 1.0 + 1e-12  # times the target: what is above it is so however it is measured
 
 
@@ -34,8 +34,9 @@ SURE = 1.0 + 1e-12  # times the target: what is above it is so however it is mea
 class Nearness:
     """How near a mesh is to a target: by inverted cells, then by cells that miss it, then by the worst of these.
 
-    But where both miss it, one whose least 1/q or η of cells with a free node is MUCH times that of the other is
-    nearer, whatever the counts: else a few cells that miss it by little would outweigh a sliver.
+    But of two that miss it, a mesh without slivers is nearer than one with any, and one of thick slivers than one of
+    thin ones: else a few cells that miss it by little would outweigh them. Slivers are cells with a free node of a 1/q
+    or η below SLIVER; those are as thick that lie between the same two bounds, each MUCH times the one below.
     """
 
     inverted: int
@@ -50,21 +51,24 @@ class Nearness:
 
     def __lt__(self, other: Nearness) -> bool:
         """Nearer."""
-        if not (self.inverted or other.inverted) and self.missed and other.missed:
-            if self.least >= MUCH * max(other.least, 0.0):
-                return True
-            if other.least >= MUCH * max(self.least, 0.0):
-                return False
-        return self.counts < other.counts
+        return self._key < other._key
 
     def __le__(self, other: Nearness) -> bool:
         """As near, or nearer."""
-        return not other < self
+        return self._key <= other._key
 
     @property
     def counts(self) -> tuple[int, int, float]:
-        """Less is nearer, where no least is MUCH larger."""
+        """Less is nearer, where slivers are alike."""
         return self.inverted, self.missed, -self.worst
+
+    @property
+    def _key(self) -> tuple[int, bool, int, int, float]:
+        inverted, missed, worst = self.counts
+        thin, bound = 0, SLIVER
+        while missed and not inverted and self.least < bound and thin < THINNEST:
+            thin, bound = thin + 1, bound / MUCH
+        return inverted, missed > 0, thin, missed, worst
 
 
 @dataclass(frozen=True)

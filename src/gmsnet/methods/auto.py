@@ -251,11 +251,12 @@ class Auto(Smoother):
             self.mean = mean
             self.slow = self._is_slow(field, executor, ahead, lasts) or (not goes_on and self._is_caught())
             goes_on = goes_on or self.slow
-        if self.falling is not None and self.falling.goes_on(field, executor):
-            if not goes_on and isinstance(self.smoother, Barrier):
+        falling = self.falling
+        if falling is not None and falling.goes_on(field, executor) and not goes_on and self.rounds < MOST_ROUNDS:
+            goes_on = True
+            if falling.slowly and isinstance(self.smoother, Barrier):
                 self.smoother.hasten()
-                self.falling.long = True
-            goes_on = goes_on or self.rounds < MOST_ROUNDS
+                falling.long = True
         target_reached = self.smoother.target_reached
         if isinstance(self.smoother, WorstFirst) and self.repeats:
             self._look_at_worst(self.smoother)

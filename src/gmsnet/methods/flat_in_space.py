@@ -6,7 +6,6 @@ of the nodes of such cells descend on Σq in float64 after the first sweep, unti
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -15,11 +14,13 @@ from gmsnet.kernels.methods.barrier3 import K3
 from gmsnet.kernels.methods.descent3 import sweep3
 from gmsnet.kernels.methods.newton import STEPS
 from gmsnet.kernels.simplex.objectives3 import Aim3, Q
+from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.measure.dihedral import ratios_of
 from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import Field, Tally, over_stars
+from gmsnet.methods.floor import floor_of
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.volume import Volume
@@ -35,8 +36,8 @@ class OnQ(Barrier):
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
         tally = super().sweep(field, executor, test)
-        first = field.floor.first  # of D/S^(3/2), before this sweep; not known at all levels
-        if self.sweeps == 1 and (first is None or first < math.sqrt(FLAT**3 / K3)):
+        first = field.floor.first  # of D/S^(3/2), of the input; not known at all levels
+        if self.sweeps == 1 and (first is None or first < floor_of(FLAT)):
             tally += unflattened(field, executor)
         return tally
 
@@ -60,6 +61,6 @@ def unflattened(field: Field, executor: Executor) -> Tally:
 
         found = over_stars(visit, stars, field.points, executor)
         tally += found
-        if not found.any():
+        if not found[MOVED]:
             break
     return tally

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.methods import ranking
@@ -19,8 +20,8 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.threads import serial
 
 SAMPLE = 32  # blocks of cells
-# By which share the sum of q^(3/2) falls in a sweep where it goes on to, at least, and over that in the sweep before.
-LITTLE, LASTING = 0.0005, 0.6
+# By which share the sum of q^(3/2) falls in a sweep where it goes on to: at least, to begin with, over that before.
+LITTLE, BEGUN, LASTING = 0.0005, 0.002, 0.6
 OF_QUADS = 256  # blocks of corners of planar quads and mixed cells, which gain less a sweep: fewer do not show it
 
 
@@ -45,12 +46,17 @@ def _stride(rows: int, executor: Executor, blocks: int = SAMPLE) -> int:
     return max(1, executor.counted(np.ones(rows, dtype=bool)) // (blocks * LANES))
 
 
-def low_shape(field: Field, share: float, executor: Executor = serial) -> float:
-    """The η below which this share of the tetrahedra lies, of some, evenly taken; 0 if inverted ones are."""
+def _some_ratios(field: Field, executor: Executor) -> NDArray[np.float64]:
+    """432·η⁻³ of some of the tetrahedra, evenly taken, in their order."""
     simplices = field.topology.changeable
     assert isinstance(simplices, Tetrahedra)
     some = executor.every(_stride(len(simplices.rows), executor), len(simplices.rows))
-    ratios = executor.in_order(executor.row_numbers(some), ratios_of(field.points, simplices.take(some)))
+    return executor.in_order(executor.row_numbers(some), ratios_of(field.points, simplices.take(some)))
+
+
+def low_shape(field: Field, share: float, executor: Executor = serial) -> float:
+    """The η below which this share of the tetrahedra lies, of some, evenly taken; 0 if inverted ones are."""
+    ratios = _some_ratios(field, executor)
     count = math.ceil(share * len(ratios))
     return float(K3 / np.partition(ratios, -count)[-count]) ** (1.0 / 3.0) if count else 0.0
 
@@ -60,25 +66,23 @@ class Falling:
 
     Of ordinary meshes each sweep brings a third of what the one before it brought. It falls for long where many cells
     have to grow or shrink together, as beside a jump in their sizes, and the mean of η does not tell that. at_first:
-    the share by which it then falls between the first two looks. long: it has been so.
+    the share by which it then falls between the first two looks. slowly: one look has brought almost as much as the
+    one before it. long: so it is taken to go on, as long as it brings anything.
     """
 
-    long = False
+    slowly = long = False
 
     def __init__(self, at_first: float) -> None:
         self.at_first, self.last, self.fell = at_first, math.nan, math.nan
 
     def goes_on(self, field: Field, executor: Executor) -> bool:
         """Looks at some of the cells, evenly taken; after each round of one sweep."""
-        simplices = field.topology.changeable
-        assert isinstance(simplices, Tetrahedra)
-        some = executor.every(_stride(len(simplices.rows), executor), len(simplices.rows))
-        ratios = executor.in_order(executor.row_numbers(some), ratios_of(field.points, simplices.take(some)))
-        last, before = self.last, self.fell
+        ratios, last, before = _some_ratios(field, executor), self.last, self.fell
         self.last = float(np.cumsum(np.sqrt(ratios))[-1]) if len(ratios) else math.nan
         self.fell = 1.0 - self.last / last  # nan where one is unknown, or infinite
-        slowly = self.fell > (self.at_first if math.isnan(before) else LASTING * before)
-        return self.fell > LITTLE and (self.long or slowly)
+        self.slowly = self.fell > BEGUN and self.fell > LASTING * before
+        much = math.isnan(before) and self.fell > self.at_first
+        return self.slowly or much or (self.long and self.fell > LITTLE)
 
 
 def to_come(before: float, gained: float) -> float:

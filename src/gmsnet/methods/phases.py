@@ -87,13 +87,11 @@ QUADS_PLAN = (
 )
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
 # Of volumes; q there is the mean ratio to the power of 3/2.
-ON_Q = Phase("Newton on q", lambda: OnQ("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False)._replace(
-    falling=0.008
-)
+ON_Q = Phase("Newton on q", lambda: OnQ("q", 1.3, ALWAYS), 1, first=3, rounds=20, gain=0.002, looks=False)
 IN_SPACE_WORST = Phase("worst first", WorstFirst, 1, looks=False)
 ROOM = Phase("room for the worst", lambda: Above(0.17, 3, 1.0), 1, looks=False, between=True)
 VOLUME_PLAN = (
-    ON_Q,
+    ON_Q._replace(falling=0.008),
     IN_SPACE_WORST,
     ROOM,
     Phase("mean, worst kept", lambda: Above(0.0, 5, 0.03, 1.6), 1, rounds=40, gain=0.00002, looks=False),
@@ -121,7 +119,7 @@ SURFACE_PLAN = (
 
 # Of other volumes, grids among which have an ideal mesh.
 MIXED_PLAN = (
-    ON_Q._replace(falling=0.0),
+    ON_Q._replace(create=lambda: Barrier("q", 1.3, ALWAYS)),
     IN_SPACE_WORST,
     Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0005),
     Phase("Newton on q, in float64", ToTheEnd, 1),

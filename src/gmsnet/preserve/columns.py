@@ -84,7 +84,7 @@ def layers_of_volume(topology: Volume, points: Floats, shared: Shared | None = N
     free, row = shared.total(len(topology.free)), (columns[:, 1:] >= 0).sum(axis=1)
     accepted, found = shared.at_first(
         lambda *given: accepted_of(*given, free=free),
-        (front.foot, long, heights[:, 0], np.nan_to_num(heights).max(axis=1), row, front.flatness, last),
+        (front.foot, long, heights[:, 0], np.nan_to_num(high).max(axis=1), row, front.flatness, last),
         (pairs,),
     )
     if found is None:

@@ -62,7 +62,7 @@ class Layers:
     inverted, or thin and of less than a twentieth of the area of those around (in fans around corners cells are small,
     and as thick as long); their nodes are left out of ``nodes``, so that they can be untangled, but for those of which
     half the cells are as large as those around: they are not what damaged them. counts: how many cells are stretched,
-    and how many there are, where the mesh has more than these.
+    and how many there are, where these are those of a part of the mesh.
     """
 
     nodes: Flags

@@ -45,7 +45,7 @@ from gmsnet.kernels.star.stars3 import truncate3
 from gmsnet.kernels.star.surface import directions_at, on_curves
 
 TRIALS, SHIFTS = 10, 12  # halvings of a step, and values of μ that are tried
-REACH, END, MUCH, ARMIJO = 0.5, 1e-9, 1e-6, 1e-4
+REACH, END, STEEP, ARMIJO = 0.5, 1e-9, 1e-6, 1e-4
 SOFT = 1e-6  # the first μ over the largest entry of H's diagonal
 MARGIN = 0.1
 MOST = 0.5  # of angles, the inverse of how much longer a step can become: more costs the mean of η
@@ -164,7 +164,7 @@ def newton3(aim, scale, way, ends, count, steps, lowest, sums, mixture):
         dx, dy, dz = newton_step3(sums)
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         slope, taken = gx * dx + gy * dy + gz * dz, False
-        if not (value < np.inf and (length > END or -slope > MUCH * value)):  # short steps are long beside a flat cell
+        if not (value < np.inf and (length > END or -slope > STEEP * value)):  # short steps are long beside a flat cell
             break
         if aim.kind == DIHEDRAL:
             longer = 1.0 / max(1.0 + (1.0 + 0.5**aim.doublings) * slope / value, MOST)
