@@ -263,8 +263,8 @@ class Auto(Smoother):
         looks = phase.looks and not (phase.late and self.again >= 0)
         self.looks = self.rounds % phase.often == 0 if goes_on else looks or target_reached
         if not goes_on:
-            if self.falling is not None:
-                self.mean_of_q = mean_shape(field, executor)
+            if falling is not None:
+                self.mean_of_q = self.mean if self.rounds < phase.rounds else mean_shape(field, executor)
             is_ideal = isinstance(self.smoother, WorstFirst) and self.smoother.least >= self.smoother.enough
             few = self.creep is not None and not self.whole and self.free <= EXACT
             self.ideal = is_ideal and few

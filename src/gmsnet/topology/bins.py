@@ -23,11 +23,11 @@ def in_bins(items: int, bins: int, threads: int, count: Pass, write: Pass) -> Co
     middle = items // 2 if threads > 1 else 0
     early, late = np.zeros((2, bins), dtype=np.int64)
     side_by_side(threads, partial(count, 0, middle, early), partial(count, middle, items, late))
-    # Where those before the middle, and the others, are to begin stands in the same two arrays.
     start = np.zeros(bins + 1, dtype=np.int64)
     late += early
     np.cumsum(late, out=start[1:])
-    early += start[:-1]
-    late[:] = start[:-1]
-    side_by_side(threads, partial(write, 0, middle, late), partial(write, middle, items, early))
+    first, rest = late, early  # where the items before the middle begin, and the others; in the same memory
+    first[:] = start[:-1]
+    rest += start[:-1]
+    side_by_side(threads, partial(write, 0, middle, first), partial(write, middle, items, rest))
     return start

@@ -29,7 +29,10 @@ Flags = NDArray[np.bool_]
 RINGS = (2, 6, 10**9)  # around the cells that are bad
 SWEEPS = (30, 40, 60)  # at most
 CLOSE = (0, 1, 2)  # rings, where some cells are left
-LAST, FEW = (1, 3, 9, 1, 3, 9), 0.1  # the same, where so few of the cells are
+LAST, FEW = (
+    (1, 3, 9, 1, 3, 9),
+    0.1,
+)  # rings, before nodes go back, where at most this share of the inverted cells is left
 EARLY, MANY = 2, 0.1  # after so many rounds, with so many of the cells bad still, another start is taken
 SHRINK, FINEST = 0.6, 1e-4  # of ε from sweep to sweep, and of the median of |D| at last
 HARMONIC, ITERATIONS = 1e-6, 2000
