@@ -20,7 +20,10 @@ from support.blocks import block
 from support.ranks import parts_at_random, same, spread
 from support.surface_meshes import ball, halves, wavy
 
+from gmsnet.distributed import skin, smoothing
+from gmsnet.distributed.gathered import gathered as gathered_whole
 from gmsnet.errors import InputError
+from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.run.options import SmoothOptions
 from gmsnet.topology.held import ON_INTERFACE
@@ -203,3 +206,39 @@ def test_any_partition(kind, seed, ranks, how, method):
     mesh, rng = MESHES[kind], np.random.default_rng(seed)
     fixed = rng.random(len(mesh.points)) < 0.05
     same(mesh, slid(method=method, max_sweeps=40), cut(mesh, ranks, how, seed), ranks, fixed)
+
+
+@pytest.mark.parametrize("how", ["strips", "interleaved"])
+@pytest.mark.parametrize("kind", VOLUMES)
+def test_what_slides_on_volumes_is_found_at_the_boundary(kind, how, monkeypatch):
+    """The first rank never has the whole mesh, and says the same as one process."""
+    mesh, seen = VOLUMES[kind], []
+
+    def gathered(piece, comm, known=None):
+        found = gathered_whole(piece, comm, known)
+        seen.extend([] if found is None else [found])
+        return found
+
+    monkeypatch.setattr(skin, "gathered", gathered)
+    monkeypatch.setattr(smoothing, "gathered", None)
+    fixed = np.zeros(len(mesh.points), dtype=bool)
+    fixed[np.setdiff1d(np.arange(len(fixed)), connectivity_of(mesh).free)[:3]] = True
+    told = same(mesh, slid(method="barrier", max_sweeps=3), cut(mesh, 3, how), 3, fixed)
+    serial = gmsnet.smooth(mesh, "barrier", slide="all", max_sweeps=3, preserve="none", fixed=fixed)
+    assert told.notes == serial.notes
+    (found,) = seen
+    outer = np.unique(mesh.points[found.ids], axis=0)
+    assert len(outer) < len(mesh.points)
+    assert sum(len(each.nodes) for each in found.mesh.cells) < sum(len(each.nodes) for each in mesh.cells)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_boundary_whose_cells_are_read_otherwise_is_seen_whole(seed):
+    """More of the cells at it are inverted than not: they alone would be read inside out."""
+    mesh = gmsnet.generate.random_volume(200, seed=seed)
+    middle = mesh.points.mean(axis=0)
+    points = mesh.points.copy()
+    inside = connectivity_of(mesh).free
+    points[inside] = middle + 3.0 * (points[inside] - middle)
+    tangled = mesh.with_points(points)
+    same(tangled, slid(max_sweeps=5), cut(tangled, 3, "interleaved", seed), 3)

@@ -104,8 +104,8 @@ def test_cells_inside_out_as_a_whole_are_read_the_other_way_round(mesh):
     topology, plain = connectivity_of(mirrored), connectivity_of(mesh)
     assert (topology.orientation == -1).all()
     assert set(topology.free) == set(plain.free)
-    assert topology.inside_out
-    assert not plain.inside_out
+    assert topology.inside_out().any()
+    assert not plain.inside_out().any()
 
 
 def test_one_cell_inside_out_among_others_is_read_as_they_are():

@@ -22,9 +22,11 @@ from gmsnet.kernels.star.chords import CLOSER
 from gmsnet.kernels.star.off_surface import farthest
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.mixed_volume import volume_of
 from gmsnet.topology.ordering import space_points
 from gmsnet.topology.polygons import Ints
 from gmsnet.topology.solids import WoundSolids
+from gmsnet.topology.volume import Volume
 from gmsnet.topology.wound import Wound
 
 Floats = NDArray[np.float64]
@@ -93,8 +95,24 @@ class SurfaceSliding:
 
 def enclosed(points: Floats, facets: Facets) -> float:
     """The volume that facets enclose."""
-    a, b, c = (points[facets.rows[:, k]] - points.mean(axis=0) for k in range(3))
+    corners = points[facets.rows]
+    a, b, c = (corners - corners.mean(axis=(0, 1))).transpose(1, 0, 2)
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def sliding_volume(
+    mesh: Mesh, wound: Wound | WoundSolids, names: Sequence[str] | None, feature_angle: float, held: Flags | None,
+    tolerance: float, geometry: Geometry | None, threads: int = 1,
+) -> tuple[Volume, SurfaceSliding | None]:  # fmt: skip
+    """The connectivity of a mesh of volumes, and what nodes of its boundary slide on; None where no node is to.
+
+    names, held, tolerance: see ``patches_to_slide_on``. geometry: see ``SurfaceSliding.of``.
+    """
+    surface = patches_to_slide_on(mesh, wound, names, feature_angle, held, tolerance)
+    if surface is None:
+        return volume_of(wound, None, threads), None
+    topology = volume_of(wound, surface[1].slides | surface[1].curves.slides, threads)
+    return topology, SurfaceSliding.of(mesh, *surface, topology.memory, topology.free, tolerance, geometry)
 
 
 def patches_to_slide_on(

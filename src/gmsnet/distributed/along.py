@@ -1,4 +1,6 @@
-"""What nodes slide on, over ranks: the first one finds it in the whole mesh, and all have it.
+"""What nodes slide on, over ranks: the first one finds it, and all have it.
+
+It looks at the whole mesh, or at the cells at the boundary of volumes (distributed/skin.py).
 
 Its shape is one for all ranks, while each has the places of its own nodes on it. On a surface in space it tells also on
 which side each cell shows.
@@ -67,9 +69,8 @@ class Along:
     sides: NDArray[np.float32] | None
 
     @classmethod
-    def of(cls, state: State, ids: Ids) -> Along:
-        """Of the first state of the whole mesh. ids: (N,) of its nodes, ascending."""
-        base, sliding = state.protection.base, state.sliding
+    def of(cls, base: Topology | Volume, sliding: Any, ids: Ids) -> Along:
+        """Of what nodes of the whole mesh slide on. ids: (N,) of its nodes, ascending."""
         linked = isinstance(base, Topology) and base.patterns is not None
         sides = None
         if isinstance(base, Shell):
@@ -145,16 +146,18 @@ def put_on(rail: Rail, where: Floats) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What the first rank has found. why: it cannot be shared out, "" if it can. before: the figures of the input.
-    whole, state: on the first rank.
+    """What the first rank has found. why: it cannot be shared out, "" if it can. before, remarks: of the input, where
+    it was seen whole. whole: what was seen; base, sliding: of it; state: of a whole mesh. These on the first rank.
     """
 
     along: Along
-    before: Totals | None
-    remarks: tuple[str, ...]
-    why: str
-    whole: Whole | None
-    state: State | None
+    before: Totals | None = None
+    remarks: tuple[str, ...] | None = None
+    why: str = ""
+    whole: Whole | None = None
+    base: Topology | Volume | None = None
+    sliding: Any = None
+    state: State | None = None
 
     def judged(self, points: Floats, piece: Piece, options: SmoothOptions, comm: Any) -> tuple[bool, Figures]:
         """Of a surface: is the mesh with these points (n, dim) of the piece no worse than the input? And what to say of
@@ -180,18 +183,23 @@ class Found:
     ) -> list[str]:
         """What to say of nodes that have slid. points, moved: of the piece; where: (n,) likewise, see ``where_on``.
         hausdorff: that was asked for. All ranks call it."""
+        chosen = np.isin(piece.ids, self.along.ids)  # no other node of the boundary moves
         on = np.zeros(len(points)) if where is None else where
-        every, said = brought(self.whole, np.column_stack([points, moved, on]), piece, comm), None
-        if self.whole is not None and self.state is not None and every is not None:
-            sliding, said = self.state.sliding, []
-            if isinstance(sliding, Sliding | SurfaceSliding):
-                if sliding.constraint is not None:
-                    put_on(sliding.constraint, every[self.state.protection.base.memory, -1])
-                mesh = self.whole.mesh.with_points(every[:, :-2])
-                compared = compared_of(sliding, self.whole.mesh.points, mesh.points)
-                said = [sliding.note(mesh, every[:, -2] > 0.0), *bound_note(compared, hausdorff)]
+        parcels, said = comm.gather((piece.ids[chosen], points[chosen], moved[chosen], on[chosen])), None
+        if parcels is not None and self.whole is not None and self.base is not None:
+            said = []
+            if isinstance(self.sliding, Sliding | SurfaceSliding):
+                before, count = self.whole.mesh.points, len(self.whole.ids)
+                after, slid, on = before.copy(), np.zeros(count, dtype=bool), np.zeros(count)
+                for ids, *values in parcels:
+                    at = places_in(self.whole.ids, ids)
+                    after[at], slid[at], on[at] = values
+                if self.sliding.constraint is not None:
+                    put_on(self.sliding.constraint, on[self.base.memory])
+                compared = compared_of(self.sliding, before, after)
+                said = [self.sliding.note(self.whole.mesh.with_points(after), slid), *bound_note(compared, hausdorff)]
         found: list[str] = comm.bcast(said)
-        return [*found, *self.remarks]
+        return found
 
 
 def found_on_first(whole: Whole | None, smoother: Smoother, options: SmoothOptions, comm: Any) -> Found:
@@ -210,6 +218,8 @@ def found_on_first(whole: Whole | None, smoother: Smoother, options: SmoothOptio
             why = "cells are wound in both directions"
         elif isinstance(topology, Shell) and state.untangling:
             why = "the surface is folded over, and mended as a whole"
-        told = Along.of(state, whole.ids), state.before.totals, state.remarks, why
-    along, before, remarks, why = comm.bcast(told)
-    return Found(along, before, remarks, why, whole, state)
+        told = Along.of(topology, state.sliding, whole.ids), state.before.totals, state.remarks, why
+    found = Found(*comm.bcast(told))
+    if state is None:
+        return found
+    return replace(found, whole=whole, base=state.protection.base, sliding=state.sliding, state=state)

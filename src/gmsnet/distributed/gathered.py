@@ -26,7 +26,7 @@ class Whole(NamedTuple):
 def gathered(piece: Piece, comm: Any, known: Whole | None = None) -> Whole | None:
     """The mesh of all pieces, nodes by global ids and cells by their numbers, on the first rank; None elsewhere.
 
-    known: the mesh, if the first rank has it anyway.
+    known: the mesh, if the first rank has it anyway. A cell that several ranks bring is there once.
     """
     if comm.bcast(known is not None):
         return known
@@ -40,7 +40,7 @@ def gathered(piece: Piece, comm: Any, known: Whole | None = None) -> Whole | Non
         fixed[places_in(ids, part.ids[part.fixed])] = True
     blocks = []
     for cells in zip(*(part.blocks for part in parts), strict=True):
-        order = np.argsort(np.concatenate([block.numbers for block in cells]))
+        _, order = np.unique(np.concatenate([block.numbers for block in cells]), return_index=True)
         nodes = np.concatenate([block.nodes for block in cells])[order]
         regions = np.concatenate([block.regions for block in cells])[order]
         blocks.append(CellBlock(cells[0].kind, places_in(ids, nodes), regions))

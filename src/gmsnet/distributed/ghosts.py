@@ -34,6 +34,11 @@ class Nodes(NamedTuple):
     owner: Ids
     fixed: Flags
 
+    def held_on(self, rank: int) -> Flags:
+        """(n,) those that are fixed, and those that others move."""
+        held: Flags = self.fixed | (self.owner != rank)
+        return held
+
     def of(self, ids: Ids) -> Nodes:
         """Those with some ids."""
         at = places_in(self.ids, ids)

@@ -29,10 +29,13 @@ from gmsnet.kernels.topology.places import places_in
 from gmsnet.kernels.topology.ready import colour_ready, waits_for_others
 from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.topology.mixed_volume import volume_of
 from gmsnet.topology.ordering import planar_points, space_points, taken
+from gmsnet.topology.solids import WoundSolids
 from gmsnet.topology.stars import Colouring, Ints
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
+from gmsnet.topology.wound import Wound
 
 Floats = NDArray[np.float64]
 Rows = Simplices | Tetrahedra | ShellSimplices
@@ -77,12 +80,16 @@ class Part:
     rail: Rail | None = None
 
     @classmethod
-    def of(cls, around: Surrounded, mesh: Mesh, comm: Any, along: Along | None) -> Part:
-        """Of what a rank has and what lies around, ``mesh`` as a part of the mesh of all."""
+    def of(
+        cls, around: Surrounded, mesh: Mesh, comm: Any, along: Along | None, wound: Wound | WoundSolids | None = None
+    ) -> Part:
+        """Of what a rank has and what lies around, ``mesh`` as a part of the mesh of all; wound: its volumes."""
         ids = around.nodes.ids
         moves = around.nodes.owner == comm.rank
-        held = around.nodes.fixed | ~moves
-        topology = connected(mesh, held, ids, around.numbers, along)
+        if wound is None:
+            topology = connected(mesh, around.nodes.held_on(comm.rank), ids, around.numbers, along)
+        else:
+            topology = volume_of(wound, None if along is None else along.slides_at(ids))
         near = taken(planar_points(mesh) if mesh.plane else space_points(mesh), topology.memory)
         halo = around.halo(comm, topology.places)
         topology = _coloured(comm, topology, halo)

@@ -24,8 +24,9 @@ from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
 from gmsnet.distributed.readied import Ready, meant, readied
 from gmsnet.distributed.result import RankResult
+from gmsnet.distributed.skin import found_on_the_skin
 from gmsnet.distributed.stages import swept
-from gmsnet.distributed.told import counts_of, held, missing, not_measured, worst_of
+from gmsnet.distributed.told import counts_of, held, missing, remarks, worst_of
 from gmsnet.errors import InputError
 from gmsnet.kernels.topology.places import places_in
 from gmsnet.kernels.topology.write_back import put_back
@@ -38,9 +39,9 @@ from gmsnet.methods import Smoother
 from gmsnet.methods.base import CELLS
 from gmsnet.run.options import CPU, SmoothOptions
 from gmsnet.run.outcome import factors_of, greatest_angle, large_angles, merit_of
-from gmsnet.run.remarks import without_effect
 from gmsnet.run.set_up import check_options, check_target
 from gmsnet.run.state import State
+from gmsnet.topology.mixed_volume import wound_of
 from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.solids import KINDS
@@ -68,13 +69,17 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
     why = _not_shared(counts, smoother, options)
     if why:
         return smoothed_on_first(piece, options, comm, why, began, given)
-    mesh, found = framed(comm, around.mesh(piece)), None
-    if options.slides or (mesh.plane is None and not mesh.has_volumes):
+    mesh, found, wound = framed(comm, around.mesh(piece)), None, None
+    if mesh.has_volumes:
+        wound = wound_of(mesh, around.nodes.held_on(comm.rank))
+        if options.slides and not comm.bcast(known is not None):
+            found = found_on_the_skin(piece, around, mesh, wound, options, comm)
+    if found is None and (options.slides or (mesh.plane is None and not mesh.has_volumes)):
         known = gathered(piece, comm, known)
         found = found_on_first(known, smoother, options, comm)
         if found.why:
             return smoothed_on_first(piece, options, comm, found.why, began, given or known)
-    part = Part.of(around, mesh, comm, None if found is None else found.along)
+    part = Part.of(around, mesh, comm, None if found is None else found.along, wound)
     try:
         everywhere(comm, lambda: check_target(part.mesh, options.target))
         everywhere(comm, lambda: check_options(part.mesh, options, counts))
@@ -122,8 +127,7 @@ def _shared(
     if found is not None:
         where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
         notes += found.note(points[at], moved[at], where, options.hausdorff, piece, part.comm)
-    else:
-        notes += [*not_measured(part, counts), *without_effect(options)]
+    notes += remarks(part, counts, options) if found is None or found.remarks is None else found.remarks
     if intent.beside is not None and part.comm.allreduce(bool(moved.any()), mpi().LOR):
         notes += intent.beside.note(part.points, state.points)
     notes += judged.note(before, after, "η" if part.mesh.has_volumes else "1/q")

@@ -11,11 +11,13 @@ import numpy as np
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Part
 from gmsnet.distributed.piece import Piece
+from gmsnet.kernels.topology.connectivity import CHOSEN
 from gmsnet.measure.report import QualityReport
 from gmsnet.measure.worst import NAMED, Place, places_of, unmet
 from gmsnet.mesh.known_cells import unmoved
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.remarks import NOT_MEASURED, repeating
+from gmsnet.run.remarks import NOT_MEASURED, held_anyway_note, inside_out_note, repeating, without_effect
+from gmsnet.topology.held import REASONS
 from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
@@ -40,16 +42,20 @@ def held(part: Part, topology: Topology | Volume) -> dict[str, int]:
     return {reason: number for reason, number in found.items() if number}
 
 
-def not_measured(part: Part, counts: Mapping[str, int]) -> list[str]:
-    """The volumes that are left out, in words. counts: kind → how many cells the mesh has."""
-    if not isinstance(part.topology, Volume):
-        return []
-    others = [unmoved(counts)]
-    if isinstance(part.topology, MixedVolume):
-        known = int(part.comm.allreduce(int(np.count_nonzero(part.own_cells[part.topology.cell]))))
-        others.append(repeating(counts, known))
-    left_out = ", ".join(filter(None, others))
-    return [NOT_MEASURED + left_out] if left_out else []
+def remarks(part: Part, counts: Mapping[str, int], options: SmoothOptions) -> list[str]:
+    """What there is to say before a run. counts: kind → how many cells the mesh has."""
+    nodes, topology, comm = part.around.nodes, part.topology, part.comm
+    asked = int(comm.allreduce(int(np.count_nonzero(nodes.fixed & (nodes.owner == comm.rank)))))
+    said = [] if REASONS[CHOSEN] in held(part, topology) else held_anyway_note(asked, "", options.slides)
+    if isinstance(topology, Volume):
+        others = [unmoved(counts)]
+        if isinstance(topology, MixedVolume):
+            own = part.own_cells[topology.cell]
+            others.append(repeating(counts, int(comm.allreduce(int(np.count_nonzero(own))))))
+            said += inside_out_note(comm.allreduce(topology.inside_out(own)))
+        left_out = ", ".join(filter(None, others))
+        said += [NOT_MEASURED + left_out] if left_out else []
+    return [*said, *without_effect(options)]
 
 
 def worst_of(part: Part, report: QualityReport, options: SmoothOptions) -> tuple[Place, ...]:

@@ -45,17 +45,26 @@ def held_anyway(
     said = []
     if matching.any() and (slides or on_surface):
         said.append(f"nodes of periodic boundaries are held, so that they go on to match: {matching.sum():,}")
-    if not asked.any() or REASONS[CHOSEN] in topology.held:
+    if REASONS[CHOSEN] in topology.held:
         return said
-    count = np.count_nonzero(asked)
-    named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
     where = " by the point data 'fixed' of the mesh" if fixed is None else ""
-    return [
-        *said,
-        f"fixed: {named}{where}, and {'does' if count == 1 else 'do'} not slide"
-        if slides
-        else f"fixed: {named}{where}, and held for other reasons anyway",
-    ]
+    return [*said, *held_anyway_note(int(np.count_nonzero(asked)), where, slides)]
+
+
+def held_anyway_note(count: int, where: str, slides: bool) -> list[str]:
+    """The same of so many nodes that are to be held. where: by what they are named."""
+    if not count:
+        return []
+    named = "1 node is named" if count == 1 else f"{count:,} nodes are named"
+    why = f"{'does' if count == 1 else 'do'} not slide" if slides else "held for other reasons anyway"
+    return [f"fixed: {named}{where}, and {why}"]
+
+
+def inside_out_note(counts: NDArray[np.int64]) -> list[str]:
+    """What to say of cells that are read in the other order. counts: of each of KINDS; tetrahedra are not told."""
+    each = zip(KINDS[1:], counts[1:].tolist(), strict=True)
+    turned = ", ".join(f"{count:,} {name}" for name, count in each if count)
+    return [f"read with their corners in the other order, for they are inside out: {turned}"] if turned else []
 
 
 def repeating(counts: Mapping[str, int], known: int) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.options import check_slide
 from gmsnet.constraints.sliding import Sliding, curves_to_slide_on
-from gmsnet.constraints.sliding_in_space import SurfaceSliding, patches_to_slide_on
+from gmsnet.constraints.sliding_in_space import sliding_volume
 from gmsnet.errors import InputError
 from gmsnet.measure.report import ASPECT, SHAPE, QualityReport, measure
 from gmsnet.measure.target import Target
@@ -29,13 +29,13 @@ from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.preserve.protection import METRIC, NONE, SIZE, Protection, protected, protected_volume
 from gmsnet.run.metric_stage import check_given
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.remarks import NOT_MEASURED, held_anyway, repeating, without_effect
+from gmsnet.run.remarks import NOT_MEASURED, held_anyway, inside_out_note, repeating, without_effect
 from gmsnet.run.second_order import second_order_of
 from gmsnet.run.second_order_volumes import second_order_solids_of
 from gmsnet.run.set_up_surface import first_of_surface, renewing
 from gmsnet.run.state import State
 from gmsnet.topology.doubled import doubled_note
-from gmsnet.topology.mixed_volume import MixedVolume, volume_of, wound_of
+from gmsnet.topology.mixed_volume import MixedVolume, wound_of
 from gmsnet.topology.ordering import space_points, taken
 from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
@@ -138,13 +138,10 @@ def _first_of_volume(
     names = check_slide(given, options.slide, options.feature_angle, options.geometry)
     still = asked if moved is None else asked | moved
     threads = _threads(given, options)
-    wound, sliding = wound_of(given, still, threads), None
-    surface = patches_to_slide_on(given, wound, names, options.feature_angle, still, options.distance)
-    if surface is None:
-        topology = volume_of(wound, None, threads)
-    else:
-        topology = volume_of(wound, surface[1].slides | surface[1].curves.slides, threads)
-        sliding = SurfaceSliding.of(given, *surface, topology.memory, topology.free, options.distance, options.geometry)
+    topology, sliding = sliding_volume(
+        given, wound_of(given, still, threads), names, options.feature_angle, still, options.distance,
+        options.geometry, threads,
+    )  # fmt: skip
     remarks = held_anyway(given, asked, matching, topology, fixed, options.slides)
     remarks += doubled_note(given, topology)
     second = second_order_solids_of(given, topology, options)
@@ -153,8 +150,8 @@ def _first_of_volume(
         others.append(repeating(counts_of(given), len(topology.cell)))
     if left_out := ", ".join(filter(None, others)):
         remarks.append(NOT_MEASURED + left_out)
-    if isinstance(topology, MixedVolume) and (turned := topology.inside_out):
-        remarks.append(f"read with their corners in the other order, for they are inside out: {turned}")
+    if isinstance(topology, MixedVolume):
+        remarks += inside_out_note(topology.inside_out())
     start = taken(space_points(given), topology.memory)
     remarks += without_effect(options, second)
     bare, nothing = given.without_cells(), np.empty(0, dtype=np.float32)

@@ -129,11 +129,10 @@ class MixedVolume(Volume):
         """Others than the guard have moved some nodes (k,), by places in memory, that were at ``before`` (k, 3)."""
         moved_elsewhere(points, nodes, before, self.inexact_at, self.inexact, self.slack, self.gone)
 
-    @property
-    def inside_out(self) -> str:
-        """How many cells of which kinds are read in the other order, tetrahedra apart: "" if there are none."""
-        counts = np.bincount(self.file_numbers[self.orientation < 0], minlength=len(KINDS))[1:].tolist()
-        return ", ".join(f"{count:,} {name}" for name, count in zip(KINDS[1:], counts, strict=True) if count)
+    def inside_out(self, chosen: Flags | None = None) -> NDArray[np.int64]:
+        """How many cells of each of KINDS are read in the other order, of all or of those chosen (T,)."""
+        turned = self.orientation < 0 if chosen is None else (self.orientation < 0) & chosen
+        return np.bincount(self.file_numbers[turned], minlength=len(KINDS)).astype(np.int64)
 
     @property
     def simplices(self) -> Tetrahedra:

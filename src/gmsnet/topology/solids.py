@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any
 
@@ -14,7 +14,7 @@ from gmsnet.cells.table import CELLS
 from gmsnet.kernels.simplex.mean_ratio3 import WEIGHTS3, Solids, Tetrahedra
 from gmsnet.kernels.topology import connectivity
 from gmsnet.kernels.topology import solids as kernels
-from gmsnet.kernels.topology.facets import ALONE, OPPOSITE
+from gmsnet.kernels.topology.facets import ALONE, NON_MANIFOLD, OPPOSITE
 from gmsnet.kernels.topology.solids import FACETS, NONE, Tables
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import SOLIDS, Mesh
@@ -36,6 +36,7 @@ MIRRORED = np.array([
 CORNERS = np.array([CELLS[name].corners for name in KINDS])
 SIMPLICES = np.array([len(CELLS[name].simplices) for name in KINDS])
 BITS = connectivity.BOUNDARY, connectivity.INTERFACE, connectivity.NON_MANIFOLD, connectivity.MISMATCHED
+ELSEWHERE = NON_MANIFOLD  # as twin of a facet: it has none here, and is none of the boundary
 BYTES_PER_CELL = 2_000  # that the set-up takes at most, of a hexahedron
 
 
@@ -136,6 +137,17 @@ class WoundSolids:
         marks[~used & (marks & OF_OTHER_CELLS == 0)] |= np.uint16(connectivity.UNUSED)
         solids = Solids(near, kind, form_of("hexahedron"), form_of("wedge"))
         return cls(cell, cells, solids, corners, orientation, region, origin, twin, marks, memory, position)
+
+    def bounded_at(self, nodes: Flags) -> WoundSolids:
+        """The same as a part of more cells, which has all of those at the nodes (N,) by id of their boundary."""
+        near = nodes[self.memory]
+        number = np.flatnonzero(self.twin == ALONE)
+        corners = tables().facets[self.solids.kind[number // FACETS], number % FACETS]
+        inside = ~(near[self.solids.nodes[(number // FACETS)[:, None], corners]] & (corners != NONE)).any(axis=1)
+        twin = self.twin.copy()
+        twin[number[inside]] = ELSEWHERE
+        within = np.where(near, np.uint16(0), np.uint16(connectivity.BOUNDARY))
+        return replace(self, twin=twin, marks=self.marks & ~within)
 
     @cached_property
     def boundary_cell(self) -> NDArray[np.int64]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -68,6 +68,11 @@ class Wound:
         orientation = _wound(taken(points, memory), rows, region, marks, threads)
         marks[~used & (marks & OF_OTHER_CELLS == 0)] |= np.uint16(connectivity.UNUSED)
         return cls(cell, cells, rows, orientation, region, origin, marks, memory, position)
+
+    def bounded_at(self, nodes: Flags) -> Wound:
+        """The same as a part of more cells, which has all of those at the nodes (N,) by id of their boundary."""
+        inside = np.where(nodes[self.memory], np.uint16(0), np.uint16(connectivity.BOUNDARY))
+        return replace(self, marks=self.marks & ~inside)
 
     @cached_property
     def outer(self) -> NDArray[np.int64]:

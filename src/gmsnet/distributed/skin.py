@@ -1,0 +1,85 @@
+"""The cells at the boundary of volumes on the first rank, who finds what nodes slide on in them alone.
+
+A facet of the boundary has only nodes there, a facet where the others are cut off has none: else the cell behind it
+were here, too. So boundary, patches and normals are those of the whole mesh, nodes and cells being in its order.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gmsnet.constraints.options import check_slide
+from gmsnet.constraints.sliding_in_space import sliding_volume
+from gmsnet.distributed.along import Along, Found
+from gmsnet.distributed.gathered import Whole, gathered
+from gmsnet.distributed.ghosts import Surrounded
+from gmsnet.distributed.piece import Flags, Ids, Piece
+from gmsnet.distributed.winding import Winding
+from gmsnet.errors import GmsnetError
+from gmsnet.kernels.topology.connectivity import BOUNDARY
+from gmsnet.kernels.topology.places import places_in
+from gmsnet.mesh.mesh import Mesh
+from gmsnet.run.options import SmoothOptions
+from gmsnet.topology.mixed_volume import wound_of
+from gmsnet.topology.solids import WoundSolids
+from gmsnet.topology.wound import Wound
+
+
+def found_on_the_skin(
+    piece: Piece, around: Surrounded, mesh: Mesh, wound: Wound | WoundSolids, options: SmoothOptions, comm: Any
+) -> Found | None:  # fmt: skip
+    """What nodes of volumes slide on; None, on all ranks, where it has to be seen whole. All ranks call it.
+
+    mesh, wound: the cells of a rank and those around, the nodes held that others move.
+    """
+    forth, back = (bool(comm.allreduce(bool((wound.orientation == sign).any()))) for sign in (1, -1))
+    if forth and back:
+        return None
+    outer = np.zeros(len(around.nodes.ids), dtype=bool)
+    outer[wound.memory[wound.marks & np.uint16(BOUNDARY) != 0]] = True
+    outer &= around.nodes.owner == comm.rank  # whose stars are here
+    skin = gathered(_cells_at(outer, piece, around, mesh), comm)
+    ids = comm.gather(around.nodes.ids[outer])
+    found = None if skin is None else _seen(skin._replace(mesh=skin.mesh.in_frame_of(mesh)), ids, forth, options)
+    return _told(found, comm)
+
+
+def _told(found: Found | None, comm: Any) -> Found | None:
+    """What the first rank has found, on all of them."""
+    along = comm.bcast(None if found is None else found.along)
+    return found if found is not None or along is None else Found(along)
+
+
+def _cells_at(outer: Flags, piece: Piece, around: Surrounded, mesh: Mesh) -> Piece:
+    """The cells at some nodes (n,), those of a rank that are no volumes, and the nodes that reach furthest."""
+    used, blocks = np.zeros(len(outer), dtype=bool), []
+    if len(mesh.points):
+        used[[mesh.points.argmin(axis=0), mesh.points.argmax(axis=0)]] = True
+    for block, shape, own in zip(around.blocks, mesh.cells, around.own, strict=True):
+        chosen: Flags = own if shape.dimension in (0, 1, 2) else np.asarray(outer[shape.nodes].any(axis=1))
+        used[shape.nodes[chosen]] = True
+        blocks.append(block.take(chosen))
+    nodes = around.nodes
+    return Piece(
+        nodes.ids[used], nodes.points[used], nodes.fixed[used], tuple(blocks), piece.single, piece.names, piece.rounding
+    )
+
+
+def _seen(skin: Whole, ids: list[Ids], forth: bool, options: SmoothOptions) -> Found | None:
+    """What the first rank finds. ids: of the nodes at the boundary, of each rank."""
+    mesh, outer = skin.mesh, np.zeros(len(skin.ids), dtype=bool)
+    outer[places_in(skin.ids, np.concatenate(ids))] = True
+    still = skin.fixed | ~outer
+    try:
+        names = check_slide(mesh, options.slide, options.feature_angle, options.geometry)
+        wound = wound_of(mesh, still).bounded_at(outer)
+        topology, sliding = sliding_volume(
+            mesh, wound, names, options.feature_angle, still, options.distance, options.geometry
+        )
+    except GmsnetError:  # which the whole mesh has, too, and tells better
+        return None
+    if not Winding.of(topology).reads(forth=forth):
+        return None
+    return Found(Along.of(topology, sliding, skin.ids), whole=skin, base=topology, sliding=sliding)
