@@ -91,20 +91,11 @@ def layers_of_volume(topology: Volume, points: Floats, shared: Shared | None = N
         return none
     solids = topology.simplices.solids
     nodes_of = rows if solids is None else solids.nodes
-    inside = np.zeros(nodes, dtype=bool)
-
-    def put(places: Ids) -> tuple[()]:
-        inside[places] = True
-        return ()
-
-    members = columns[accepted]
-    shared.ask(members[members >= 0], (), put)
-    inside = shared.spread(inside)
-    if not shared.total(int((inside[nodes_of].all(axis=1) & shared.own_cells).any())):
-        return none  # columns without a cell between them are none
     whole, high = whole[accepted], high[accepted]
     inside = with_gaps(topology, points, whole, high, number[accepted], wall, shared)
     cells: Flags = np.asarray(inside[nodes_of].all(axis=1)) & shared.own_cells
+    if not shared.total(int(cells.any())):
+        return none  # columns without a cell between them are none
     held = np.zeros(nodes, dtype=bool)
     held[topology.memory] = inside & topology.near_free
     counts = shared.total(np.array([np.count_nonzero(cells), np.count_nonzero(shared.own_cells)]))
