@@ -59,7 +59,8 @@ AHEAD = 50  # times the last gain are at most expected to come
 TURNS, TURN_GAIN, LATE_TURN_GAIN = 3, 0.01, 0.05
 VERY_POOR, HOPELESS = 0.1, 1e-5  # between these a turn that doubled the least 1/q has another
 COARSER = 10.0  # times what a phase must gain to go on, once these have been moved
-PASSES = 8  # over the worst cells and what follows them, at most
+PASSES, LATE_PASSES = 8, 24  # over the worst cells and what follows them, at most; of volumes that gain LATE_GAIN still
+LATE_GAIN = 0.005
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
 LARGE_GAIN = 0.008  # of meshes in space of more than LARGE_VOLUME free nodes
@@ -206,10 +207,12 @@ class Auto(Smoother):
     def _look_at_worst(self, smoother: WorstFirst) -> None:
         """Is the worst cell to have another turn, once others have made room for it?"""
         self.passes += 1
-        gains = smoother.least >= self.least + self.pass_gain
+        late = self.passes >= PASSES
+        gains = smoother.least >= self.least + (max(self.pass_gain, LATE_GAIN) if late else self.pass_gain)
         if self.passes == 1 and self.phases is not SMALL_PLAN and self.phases not in IN_SPACE:
             gains = smoother.gained >= LAST_GAIN
-        self.again = self.at if gains and self.passes < PASSES else -1
+        most = LATE_PASSES if self.phases in IN_SPACE and self.phases is not SURFACE_PLAN else PASSES
+        self.again = self.at if gains and self.passes < most else -1
         self.least = smoother.least
 
     def _is_even(self, field: Field, executor: Executor) -> bool:

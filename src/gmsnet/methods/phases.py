@@ -119,7 +119,7 @@ SURFACE_PLAN = (
 
 # Of other volumes, grids among which have an ideal mesh.
 MIXED_PLAN = (
-    ON_Q._replace(create=lambda: Barrier("q", 1.3, ALWAYS)),
+    ON_Q._replace(create=lambda: Barrier("q", 1.3, ALWAYS), falling=0.02),
     IN_SPACE_WORST,
     Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0005),
     Phase("Newton on q, in float64", ToTheEnd, 1),
