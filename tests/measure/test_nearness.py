@@ -42,3 +42,9 @@ def test_equal_ones_and_the_bounds():
     nothing = Nearness.of(0, 3, 0.1, None)
     assert nothing <= nothing
     assert not nothing < nothing
+
+
+def test_of_two_that_miss_it_alike_the_one_with_the_better_mean_is_nearer():
+    one, other = Nearness(0, 3, 0.2, 0.3, 0.8), Nearness(0, 3, 0.2, 0.3, 0.7)
+    assert one < other
+    assert Nearness(0, 0, math.inf, 0.4, 0.7) <= Nearness(0, 0, math.inf, 0.5, 0.8), "one that meets it is enough"

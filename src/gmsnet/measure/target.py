@@ -34,6 +34,8 @@ SURE = 1.0 + 1e-12  # times the target: what is above it is so however it is mea
 class Nearness:
     """How near a mesh is to a target: by inverted cells, then by cells that miss it, then by the worst of these.
 
+    In space, of two that miss it alike the one with the greater mean of 1/q or η is nearer.
+
     But of two that miss it, a mesh without slivers is nearer than one with any, and one of thick slivers than one of
     thin ones: else a few cells that miss it by little would outweigh them. Slivers are cells with a free node of a 1/q
     or η below SLIVER; those are as thick that lie between the same two bounds, each MUCH times the one below.
@@ -43,11 +45,14 @@ class Nearness:
     missed: int
     worst: float
     least: float
+    mean: float = 0.0
 
     @classmethod
     def of(cls, inverted: int, missed: int, worst: float, totals: Totals | None) -> Nearness:
         """worst: of the cells that miss it. totals: of the cells with a free node."""
-        return cls(inverted, missed, worst, math.inf if totals is None else totals.shape_min)
+        if totals is None:
+            return cls(inverted, missed, worst, math.inf)
+        return cls(inverted, missed, worst, totals.shape_min, 0.0 if totals.in_plane else totals.shape_mean)
 
     def __lt__(self, other: Nearness) -> bool:
         """Nearer."""
@@ -63,12 +68,12 @@ class Nearness:
         return self.inverted, self.missed, -self.worst
 
     @property
-    def _key(self) -> tuple[int, bool, int, int, float]:
+    def _key(self) -> tuple[int, bool, int, int, float, float]:
         inverted, missed, worst = self.counts
         thin, bound = 0, SLIVER
         while missed and not inverted and self.least < bound and thin < THINNEST:
             thin, bound = thin + 1, bound / MUCH
-        return inverted, missed > 0, thin, missed, worst
+        return inverted, missed > 0, thin, missed, worst, -self.mean if missed else 0.0
 
 
 @dataclass(frozen=True)
