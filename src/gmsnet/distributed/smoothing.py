@@ -80,6 +80,7 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
         if found.why:
             return smoothed_on_first(piece, options, comm, found.why, began, given or known)
     part = Part.of(around, mesh, comm, None if found is None else found.along, wound)
+    del wound  # whose facets are wanted no more: they would stay while nodes move
     try:
         everywhere(comm, lambda: check_target(part.mesh, options.target))
         everywhere(comm, lambda: check_options(part.mesh, options, counts))
