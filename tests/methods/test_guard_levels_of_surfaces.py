@@ -32,6 +32,8 @@ from gmsnet.topology.shell import Shell
 
 EXAMPLES = int(os.environ.get("GMSNET_GUARD_EXAMPLES", "12"))
 SWEEPS = 2
+SIXTY = Fraction(1, 4)  # the square of its cosine
+ROUNDING = Fraction(1, 10**9)  # of float64, in angles that were larger before
 
 
 def takes_surfaces(choice):
@@ -79,21 +81,25 @@ def minus(a, b):
 
 
 def worth(points, simplices):
-    """Of each cell: is it upright at all corners, and the least signed square of 1/q of them: Fractions."""
+    """Of each cell: is it upright at all corners, the least signed square of 1/q of them, and of each corner that of
+    the cosine of the angle to its side: Fractions."""
     numbers, _ = whole(points[:, :3].ravel().tolist())
     exact = [numbers[k : k + 3] for k in range(0, len(numbers), 3)]
     cells = simplices.cells if simplices.cells is not None else np.arange(len(simplices.rows))
     found = {}
     for cell in np.unique(cells):
         own = np.flatnonzero(cells == cell)
-        upright, least = True, None
+        upright, least, cosines = True, None, []
         for t in own:
             v, p, q = (exact[i] for i in simplices.rows[t].tolist())
             if simplices.orientation[t] < 0:
                 p, q = q, p
             a, b = minus(p, v), minus(q, v)
             c = cross(a, b)
-            upright = upright and dot(c, whole(simplices.side[t].tolist())[0]) > 0
+            side, common = whole(simplices.side[t].tolist())
+            shows, length = Fraction(dot(c, side), common), dot(c, c)
+            upright = upright and shows > 0
+            cosines.append(shows * abs(shows) / length if length else Fraction(0))
             if len(own) == 1:
                 edges = dot(a, a) + dot(b, b) + dot(minus(b, a), minus(b, a))
                 value = Fraction(12 * dot(c, c), edges**2) if edges else Fraction(0)
@@ -105,15 +111,19 @@ def worth(points, simplices):
                 square = dot(c, d) * abs(dot(c, d))
                 value = Fraction(4 * square, area * edges**2) if area * edges else Fraction(0)
             least = value if least is None else min(least, value)
-        found[int(cell)] = (upright, least)
+        found[int(cell)] = (upright, least, cosines)
     return found
 
 
-def check(level, before, after, stars):
-    """before, after: what ``worth`` says. stars: of each node that was free, its cells."""
-    for cell, (upright, value) in before.items():
+def check(level, before, after, stars, written=False):
+    """before, after: what ``worth`` says. stars: of each node that was free, its cells. written: ``after`` of places that
+    are rounded anew."""
+    for cell, (upright, value, cosines) in before.items():
         assert after[cell][0] or not upright
         assert after[cell][1] > 0 or value <= 0
+        for was, now in zip(cosines, after[cell][2], strict=True):
+            assert now > SIXTY or was <= SIXTY + ROUNDING
+            assert now > SIXTY or now >= was - ROUNDING or written
     if level == VALID:
         return
     groups = stars if level == STAR else [list(before)]
@@ -196,7 +206,7 @@ def test_what_is_written_with_few_digits_keeps_the_level_too(level, seed, kind, 
     for _ in range(3):
         written = field.points.copy()
         written[moved] += off * rng.choice([-1.0, 1.0], written[moved].shape)
-        check(level, before, worth(written, simplices), stars)
+        check(level, before, worth(written, simplices), stars, True)
 
 
 def test_shells_of_few_digits_move():

@@ -58,13 +58,13 @@ def torn_apart(points: Floats, rim: NDArray[np.int64] | NDArray[np.int32] | None
 def sides_of(mesh: Mesh, topology: Topology, patches: Patches, vertices: Vertices) -> NDArray[np.float32]:
     """(S, 3) the vector n of each row of ``topology.near`` (kernels.star.shell). vertices: see ``vertices_of``.
 
-    Of a triangle, the mean of the reference's normals at its corners, or its own normal where the two are on different
-    sides; of a quad the normal of its diagonals.
+    Of a triangle, its own normal, or where it has none the mean of the reference's at its corners; of a quad the normal
+    of its diagonals.
     """
     points = space_points(mesh)[:, :3]
     triangles = len(topology.triangles)
     of_triangles = np.empty((triangles, 3))
-    kernels.mean_sides(patches.unit, vertices.own, vertices.table, of_triangles)
+    kernels.own_sides(patches.unit, vertices.own, vertices.table, of_triangles)
     if np.array_equal(topology.face_cell, topology.cell):
         return of_triangles.astype(np.float32)[topology.near_origin]
     quads = points[topology.quads]

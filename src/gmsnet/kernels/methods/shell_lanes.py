@@ -19,7 +19,7 @@ from gmsnet.kernels.methods.shell import MOST, improve
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.certificate import COARSE, WIDER
 from gmsnet.kernels.star.landing import ask_for_facets, land, landing_place
-from gmsnet.kernels.star.shell import DATA, LEAN, crossed, square
+from gmsnet.kernels.star.shell import DATA, LEAN, TURN, crossed, square
 from gmsnet.kernels.star.surface import on_curves
 
 FLAT = 300.0  # mean Q of a star: beyond, float32 does not tell enough
@@ -141,9 +141,9 @@ def to_mean(local, n, stretch, step):
 
 @part
 def judge(local, sides, n, step, normal, floor, sums):
-    """F, the least of D − φL and c·n, and of how little simplices lean, after the step."""
+    """F, the least of D − φL and c·n − D·TURN, and of how little simplices lean, after the step."""
     real = np.float32
-    twice, lean = real(2.0 * WIDER * floor), real(LEAN)
+    twice, lean, turn = real(2.0 * WIDER * floor), real(LEAN), real(TURN)
     for lane in range(LANES):
         sums[AFTER * LANES + lane] = 0.0
         sums[MARGIN * LANES + lane] = sums[LEANS * LANES + lane] = np.inf
@@ -159,7 +159,7 @@ def judge(local, sides, n, step, normal, floor, sums):
             half = square(ax, ay, az) + square(bx, by, bz) - ((ax * bx + ay * by) + az * bz)
             shows = (cx * side[lane] + cy * side[LANES + lane]) + cz * side[2 * LANES + lane]
             upright = (cx * normal[lane] + cy * normal[LANES + lane]) + cz * normal[2 * LANES + lane]
-            margin = min(double - twice * half, shows)
+            margin = min(double - twice * half, shows - turn * double)
             sums[AFTER * LANES + lane] += half / double
             least = sums[MARGIN * LANES + lane]
             sums[MARGIN * LANES + lane] = margin if not margin >= least else least

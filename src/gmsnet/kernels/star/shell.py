@@ -9,6 +9,7 @@ D does not tell on which side a simplex shows. So each has a *side*: a vector n 
 (constraints/shell.py). A simplex is *upright* if c·n > 0. A move is allowed if after it each simplex of the star
 
 - is certified upright: c·n exceeds its error bound; and
+- is certified turned by less than 60° from n: c·n − |c|/2 exceeds its error bound; or was not, and does not turn further;
 - is certified above its floor φ, or above 0: D − φL exceeds its error bound; and
 - does not lean further from the reference's normal at the place where the node comes to lie than LEAN, or than before.
 
@@ -35,7 +36,8 @@ from gmsnet.kernels.star.block import Blocks
 from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.pattern import Patterns, count_of, other_of, pair_of, weights_of
 
-LEAN = 0.5  # the cosine of the angle up to which a triangle may lean
+LEAN = 0.5  # the cosine of the angle up to which a simplex may lean from the reference
+TURN = 0.5  # the cosine of the angle up to which it may turn from its side
 ROUNDING, DATA = 256.0, 40.0  # of E
 ROOT_3 = math.sqrt(3.0)
 
@@ -172,6 +174,17 @@ def fourth_is_clear(star, a, d, b, x, y, z, delta, floor):
 
 
 @inlined
+def leans(star, i, j, was, normal, shows, double, cosine):
+    """Does a simplex, with its c·n and |c| given, lean further from a normal n than with its node where it was, or did
+    it lean there by less than the angle of this cosine?"""
+    ax, ay, az = star[3 * i] - was[0], star[3 * i + 1] - was[1], star[3 * i + 2] - was[2]
+    bx, by, bz = star[3 * j] - was[0], star[3 * j + 1] - was[1], star[3 * j + 2] - was[2]
+    cx, cy, cz = crossed(ax, ay, az, bx, by, bz)
+    before, length = (cx * normal[0] + cy * normal[1]) + cz * normal[2], math.sqrt(square(cx, cy, cz))
+    return before > cosine * length or shows * length < before * double
+
+
+@inlined
 def allowed(star, n, pattern, stars, at, floors, guard, reach, x, y, z, was, normal):
     """May the free node go to (x, y, z)? Are all its simplices certified there?
 
@@ -187,10 +200,12 @@ def allowed(star, n, pattern, stars, at, floors, guard, reach, x, y, z, was, nor
         bx, by, bz = star[3 * j] - x, star[3 * j + 1] - y, star[3 * j + 2] - z
         cx, cy, cz = crossed(ax, ay, az, bx, by, bz)
         bound = error_bound_of(largest6(ax, ay, az, bx, by, bz), delta)
-        nx, ny, nz = side[at + k, 0], side[at + k, 1], side[at + k, 2]
-        if not (cx * nx + cy * ny) + cz * nz > bound:
+        shows = (cx * side[at + k, 0] + cy * side[at + k, 1]) + cz * side[at + k, 2]
+        if not shows > bound:
             return False
         double = math.sqrt(square(cx, cy, cz))
+        if not shows - TURN * double > bound and leans(star, i, j, was, side[at + k], shows, double, TURN):
+            return False
         weights, floor, of_length = weights_of(pattern, k, np.float64), floor_of(guard, floors, n, i, j, other), double
         lengths = 2.0 * half_lengths3(ax, ay, az, bx, by, bz, weights)
         if pattern is not None and weights.a * weights.b * weights.opposite == 0.0:
@@ -205,10 +220,6 @@ def allowed(star, n, pattern, stars, at, floors, guard, reach, x, y, z, was, nor
             return False
         upright = (cx * normal[0] + cy * normal[1]) + cz * normal[2]
         if upright < LEAN * double and (normal[0] != 0.0 or normal[1] != 0.0 or normal[2] != 0.0):
-            ax, ay, az = star[3 * i] - was[0], star[3 * i + 1] - was[1], star[3 * i + 2] - was[2]
-            bx, by, bz = star[3 * j] - was[0], star[3 * j + 1] - was[1], star[3 * j + 2] - was[2]
-            cx, cy, cz = crossed(ax, ay, az, bx, by, bz)
-            before = (cx * normal[0] + cy * normal[1]) + cz * normal[2]
-            if upright * math.sqrt(square(cx, cy, cz)) < before * double:
+            if leans(star, i, j, was, normal, upright, double, 1.0):
                 return False
     return True

@@ -163,20 +163,21 @@ def find_planes(own, part, low, high, plane):
 
 
 @kernel
-def mean_sides(unit, own, table, out):
-    """Writes the mean of the normals at the vertices of each facet (F, 3), at length 1, or the facet's own normal where
-    the two are on different sides. unit: (F, 3). own: (F, 3) vertices. table: (V, 6) points and normals."""
+def own_sides(unit, own, table, out):
+    """Writes the normal of each facet (F, 3), or where it has none the mean of those at its vertices, at length 1.
+
+    unit: (F, 3), 0 where a facet has no area. own: (F, 3) vertices. table: (V, 6) points and normals.
+    """
     for f in range(len(out)):
-        a, b, c = own[f, 0], own[f, 1], own[f, 2]
-        x, y, z = (
-            (table[a, 3] + table[b, 3]) + table[c, 3],
-            (table[a, 4] + table[b, 4]) + table[c, 4],
-            (table[a, 5] + table[b, 5]) + table[c, 5],
-        )
-        length = length_of(x, y, z)
-        if length > 0.0:
-            x, y, z = x / length, y / length, z / length
-        u, v, w = unit[f, 0], unit[f, 1], unit[f, 2]
-        if (u * x + v * y) + w * z > 0.0 or (u == 0.0 and v == 0.0 and w == 0.0):
-            u, v, w = x, y, z
-        out[f, 0], out[f, 1], out[f, 2] = u, v, w
+        x, y, z = unit[f, 0], unit[f, 1], unit[f, 2]
+        if x == 0.0 and y == 0.0 and z == 0.0:
+            a, b, c = own[f, 0], own[f, 1], own[f, 2]
+            x, y, z = (
+                (table[a, 3] + table[b, 3]) + table[c, 3],
+                (table[a, 4] + table[b, 4]) + table[c, 4],
+                (table[a, 5] + table[b, 5]) + table[c, 5],
+            )
+            length = length_of(x, y, z)
+            if length > 0.0:
+                x, y, z = x / length, y / length, z / length
+        out[f, 0], out[f, 1], out[f, 2] = x, y, z
