@@ -116,8 +116,8 @@ def worth(points, simplices):
 
 
 def check(level, before, after, stars, written=False):
-    """before, after: what ``worth`` says. stars: of each node that was free, its cells. written: ``after`` of places that
-    are rounded anew."""
+    """before, after: of ``worth``. stars: of each node that was free, its cells. written: are places of ``after``
+    rounded anew?"""
     for cell, (upright, value, cosines) in before.items():
         assert after[cell][0] or not upright
         assert after[cell][1] > 0 or value <= 0

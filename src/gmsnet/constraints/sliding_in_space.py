@@ -37,7 +37,7 @@ class SurfaceSliding:
     """facets, patches: of the boundary. start: (N, 3) points of the input by ids, over 2 to the power of ``exponent``.
 
     memory: (N,) ids in memory order. nodes: (N,) bool by ids, those that slide. constraint: for the kernels; None where
-    no node slides.
+    no node slides. mended: were folds taken out of the input's facets before?
     """
 
     facets: Facets
@@ -47,11 +47,13 @@ class SurfaceSliding:
     memory: Ints
     nodes: Flags
     constraint: Surface | None
+    mended: bool = False
 
     @classmethod
     def of(
         cls, mesh: Mesh, facets: Facets, patches: Patches, memory: Ints, free: Ints, tolerance: float = math.inf,
         geometry: Geometry | None = None, vertices: Vertices | None = None, hausdorff: float | None = None,
+        mended: bool = False,
     ) -> SurfaceSliding:  # fmt: skip
         """Of a mesh and the patches of its boundary; memory, free: of its topology.
 
@@ -72,7 +74,7 @@ class SurfaceSliding:
         constraint = None
         if nodes.any():
             constraint = surface_of(patches, points, memory, mesh.single, limit, on, facets.closed, vertices, bound)
-        return cls(facets, patches, points, mesh.exponent, memory, nodes, constraint)
+        return cls(facets, patches, points, mesh.exponent, memory, nodes, constraint, mended)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:
         """What to say of it. mesh: as it has become. moved: (N,) bool."""
@@ -81,10 +83,10 @@ class SurfaceSliding:
             return "slide: no node of the boundary can move along it" if closed else "surface: no node can move on it"
         points = np.ldexp(mesh.points, -self.exponent)  # its own exponent may differ
         away = farthest(self.constraint, points[self.memory], moved[self.memory])
+        of = "the facets as mended" if self.mended else "the input's facets"
         said = (
             f"{'slide' if closed else 'surface'}: {int((self.nodes & moved).sum()):,} of {int(self.nodes.sum()):,} "
-            f"nodes have moved {'along the boundary' if closed else 'on it'}, at most {away:.2g} of an edge from the "
-            "input's facets"
+            f"nodes have moved {'along the boundary' if closed else 'on it'}, at most {away:.2g} of an edge from {of}"
         )
         if not closed:
             return said

@@ -116,7 +116,8 @@ def bound_note(compared: Compared | None, asked: float | None) -> list[str]:
     if change is None or asked is None or change.hausdorff <= asked * change.diagonal:
         return []
     return [
-        f"hausdorff: the bound is not kept, the distance is {change.hausdorff / change.diagonal:.2g} of the diagonal: "
+        f"hausdorff: the bound is not kept, the distance is {change.hausdorff / change.diagonal:.3g} of the diagonal, "
+        f"and {asked:.3g} was asked for: "
         "it is looked at in places of facets alone, of which those at tips and folds lie over one another"
     ]
 

@@ -60,6 +60,7 @@ def first_of_surface(
         options.geometry,
         vertices,
         options.hausdorff,
+        bool(notes),
     )
     others = unmeasured(given)
     remarks: tuple[str, ...] = (f"not measured, and their nodes are held: {others}",) if others else ()

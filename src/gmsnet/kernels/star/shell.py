@@ -9,7 +9,7 @@ D does not tell on which side a simplex shows. So each has a *side*: a vector n 
 (constraints/shell.py). A simplex is *upright* if c·n > 0. A move is allowed if after it each simplex of the star
 
 - is certified upright: c·n exceeds its error bound; and
-- is certified turned by less than 60° from n: c·n − |c|/2 exceeds its error bound; or was not, and does not turn further;
+- is certified turned by less than 60° from n: c·n − |c|/2 exceeds its error bound; or was not, and turns no more; and
 - is certified above its floor φ, or above 0: D − φL exceeds its error bound; and
 - does not lean further from the reference's normal at the place where the node comes to lie than LEAN, or than before.
 
@@ -219,7 +219,7 @@ def allowed(star, n, pattern, stars, at, floors, guard, reach, x, y, z, was, nor
         if not of_length - floor * lengths > bound:
             return False
         upright = (cx * normal[0] + cy * normal[1]) + cz * normal[2]
-        if upright < LEAN * double and (normal[0] != 0.0 or normal[1] != 0.0 or normal[2] != 0.0):
-            if leans(star, i, j, was, normal, upright, double, 1.0):
-                return False
+        known = normal[0] != 0.0 or normal[1] != 0.0 or normal[2] != 0.0
+        if known and upright < LEAN * double and leans(star, i, j, was, normal, upright, double, 1.0):
+            return False
     return True
