@@ -13,7 +13,7 @@ from support import volumes
 
 import gmsnet
 from gmsnet.errors import InputError
-from gmsnet.generate import disturb, o_grid_section, random_volume, swept_volume
+from gmsnet.generate import block_volume, disturb, o_grid_section, random_volume, swept_volume
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.measure.target import SURE, Target
 from gmsnet.parallel import threads as workers
@@ -219,3 +219,15 @@ def test_a_target_out_of_reach_leaves_no_sliver(raw, quality):
     result = gmsnet.smooth(raw, target_quality=quality)
     assert result.after.shape.min() >= 4.0 * result.before.shape.min()
     assert result.after.shape.min() > 0.2
+
+
+@pytest.mark.parametrize(("target", "reached"), [(0.15, True), (0.198, True), (0.4, False)])
+def test_a_small_mesh_that_patches_leave_as_it_is_is_smoothed_as_a_whole(target, reached):
+    """A block of hexahedra with a dent: its few worst cells need room that only cells far from them have."""
+    mesh = block_volume(8)
+    height = 1.0 - 0.8 * np.exp(-30.0 * ((mesh.points[:, :2] - 0.5) ** 2).sum(axis=1))
+    mesh = gmsnet.Mesh(mesh.points * np.column_stack([np.ones((len(height), 2)), height]), mesh.cells)
+    result = gmsnet.smooth(mesh, target_quality=target)
+    assert (result.stop_reason == stop.TARGET_REACHED) == reached
+    assert (float(result.after.shape.min()) >= target) == reached
+    assert result.after.shape.min() >= min(target, 0.199) > result.before.shape.min()

@@ -26,6 +26,7 @@ from gmsnet.topology.volume import Volume
 # Shares of the cells, and cells: of so many that miss a target, one of η or of dihedral angles, all are smoothed.
 MANY, MANY_ANGLES, FEW = 0.15, 0.02, 100
 SOME, FEWER = 0.02, 20  # the same where patches around them come first, and do not bring all to it
+SMALL = 50_000  # free nodes: on meshes of so many, all are smoothed then for any cell, if half as many miss it then
 
 
 def sweep(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -43,19 +44,38 @@ def _to_target(state: State, options: SmoothOptions, executor: Executor) -> Stat
         second = reach_target(state, options, executor)
     else:
         first = reach_target(state, options, executor)
-        if first.stop_reason != NO_PROGRESS or not _miss_it(state, options, executor, SOME, FEWER):
+        if first.stop_reason != NO_PROGRESS:
+            return first
+        many = _miss_it(state, options, executor, SOME, FEWER)
+        if not many and not (_is_small(state, executor) and _miss_it(first, options, executor, 0.0, 0)):
             return first
         second = _at_large(_going_on(first), options, executor)
+        if not many and not _much_closer(second, first, options, executor):
+            return _back_to(first, second)
     return _closer_one(second, first, options, executor)
 
 
 def _closer_one(state: State, other: State, options: SmoothOptions, executor: Executor) -> State:
     """The one that is closer to the target, the other one if neither is; ended from outside if the first one is."""
-    if _closer(state, other, options, executor):
-        return state
-    if other.constraint is not None:  # it has followed the nodes of the state that is given up
-        (locate3 if isinstance(other.constraint, Surface) else locate)(other.constraint, other.points)
-    return other.ended_as(state)
+    return state if _closer(state, other, options, executor) else _back_to(other, state)
+
+
+def _back_to(state: State, later: State) -> State:
+    """The state, ended from outside if a later one was, which is given up."""
+    if state.constraint is not None:  # it has followed the nodes of the later one
+        (locate3 if isinstance(state.constraint, Surface) else locate)(state.constraint, state.points)
+    return state.ended_as(later)
+
+
+def _is_small(state: State, executor: Executor) -> bool:
+    """Has the mesh so few free nodes that all of them are smoothed for one cell?"""
+    return int(executor.total(np.array(len(state.topology.free)))) <= SMALL
+
+
+def _much_closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
+    """Do half as many cells as in another state miss the target, or fewer, and are no more inverted?"""
+    one, two = (rank_to_target(each, options, executor) for each in (state, other))
+    return one.inverted <= two.inverted and 2 * one.missed <= two.missed
 
 
 def _closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
