@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 from support import volumes
 from support.surfaces import Twin, boundary, cylinder, ell, facets_of, patches, solid, sphere, turned
 
+import gmsnet
 from gmsnet.constraints.facets import boundary_of, facet_keys
-from gmsnet.constraints.patches import NOTHING, linked, patches_of
+from gmsnet.constraints.patches import FEW, NOTHING, alone_of, linked, patches_of
 from gmsnet.constraints.sliding_in_space import enclosed
 from gmsnet.constraints.smooth_patches import vertices_of
+from gmsnet.generate import disturb_on, sphere_surface
 from gmsnet.topology.wound import Wound
 
 
@@ -193,3 +195,26 @@ def test_numbers_of_facets(rows):
     keys = facet_keys(np.array(rows, dtype=np.int64).reshape(-1, 3), 7).tolist()
     for one, key in zip(rows, keys, strict=True):
         assert [k == key for k in keys] == [sorted(row) == sorted(one) for row in rows]
+
+
+@given(st.lists(st.tuples(*[st.integers(0, 12)] * 2).filter(lambda edge: edge[0] < edge[1]), max_size=20), st.data())
+def test_edges_that_hang_together_with_few_others(edges, data):
+    little = data.draw(st.lists(st.booleans(), min_size=len(edges), max_size=len(edges)))
+    found = set(alone_of(np.array(edges, dtype=np.int64).reshape(-1, 2), np.array(little, dtype=bool)).tolist())
+    for edge in edges:
+        part = set(edge)
+        while any(part & set(other) and not set(other) <= part for other in edges):
+            part |= {node for other in edges if part & set(other) for node in other}
+        own = [k for k, other in enumerate(edges) if set(other) <= part]
+        assert (set(edge) <= found) == (len(own) <= FEW and all(little[k] for k in own))
+    assert found <= {node for edge in edges for node in edge}
+
+
+def test_nodes_that_uneven_cells_hold_are_told():
+    """A sphere has no features; of one that was thrown far some edges bend by more than the feature angle."""
+    mesh = disturb_on(sphere_surface(300), 0.45, seed=1).mesh
+    result, larger = gmsnet.smooth(mesh), gmsnet.smooth(mesh, feature_angle=45)
+    note = next(note for note in result.notes if note.startswith("surface: "))
+    assert note.endswith("a feature angle of 45 lets them")
+    assert larger.after.shape.min() > 0.9 > 5 * result.after.shape.min()
+    assert not any("lets them" in note for note in gmsnet.smooth(sphere_surface(300).mesh).notes)

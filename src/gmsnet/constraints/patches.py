@@ -16,6 +16,7 @@ from gmsnet.kernels.whole import facets as kernels
 
 Floats = NDArray[np.float64]
 NOTHING = -1
+FEW, LITTLE = 3, 1.5  # sharp edges that hang together are no crease yet, if they bend by less than this times the angle
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +26,8 @@ class Patches:
     curves: those of its sharp edges. slides: (N,) bool, the nodes inside of patches that slide. rows: (F, 3) node ids.
     patch: (F,) the patch of each facet. beside: (F, 3) the facet across the edge from corner k to k + 1, NOTHING where
     that is sharp. unit: (F, 3) normals, 0 where a facet has no area. area: (F,) twice the area. flat: (F, 3) bool, the
-    facet across lies in the same plane. tips: (N,) bool, see ``tips_of``.
+    facet across lies in the same plane. tips: (N,) bool, see ``tips_of``. alone: how many nodes would slide but for
+    edges of ``alone_of``, and the feature angle that would let them.
     """
 
     curves: Curves
@@ -37,6 +39,7 @@ class Patches:
     area: Floats
     flat: Flags
     tips: Flags
+    alone: tuple[int, float] = (0, 0.0)
 
 
 def patches_of(
@@ -86,14 +89,37 @@ def patches_of(
         still[chosen // nodes] = still[chosen % nodes] = True
     outline = _outline(facets, found[sharp], f[sharp], g[sharp], line_keys, still)
     curves = curves_along(outline, points, single, feature_angle, may)
-    at_sharp = np.zeros(nodes, dtype=bool)
+    at_sharp, by_angle = np.zeros(nodes, dtype=bool), two[sharp] & ~np.isin(found[sharp], line_keys)
     at_sharp[outline.edges] = True
+    by_angle &= (size[f] > 0.0)[sharp] & (size[g] > 0.0)[sharp] & (facets.label[f] == facets.label[g])[sharp]
+    larger = min(LITTLE * feature_angle, 90.0)
+    alone = alone_of(outline.edges, by_angle & (cosine[sharp] > math.cos(math.radians(larger))))
     slides = np.zeros(nodes, dtype=bool)
     slides[rows] = True
     tips = tips_of(rows, unit, least, ~at_sharp)
     slides &= ~at_sharp & ~tips & ~still & may
-    across = beside.reshape(-1, 3)
-    return Patches(curves, slides, rows, linked(across), across, unit, area, flat.reshape(-1, 3), tips)
+    across, beside_few = beside.reshape(-1, 3), (int(np.count_nonzero(~still[alone] & may[alone])), larger)
+    return Patches(curves, slides, rows, linked(across), across, unit, area, flat.reshape(-1, 3), tips, beside_few)
+
+
+def alone_of(edges: Longs, little: Flags) -> Longs:
+    """The nodes of sharp edges (E, 2) that hang together with FEW others at most, and of which all bend little.
+
+    Uneven nodes make such edges on a curved surface; a crease has more of them.
+    """
+    if not little.any():
+        return edges[:0, 0]
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    ids, ends = np.unique(edges, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    graph = coo_array((np.ones(len(ends), dtype=np.int8), (ends[:, 0], ends[:, 1])), shape=(len(ids), len(ids)))
+    parts, part = connected_components(graph, directed=False)
+    of_edge = part[ends[:, 0]]
+    chosen = (np.bincount(of_edge, minlength=parts) <= FEW) & (np.bincount(of_edge, ~little, minlength=parts) == 0)
+    found: Longs = ids[chosen[part]]
+    return found
 
 
 def tips_of(rows: Longs, unit: Floats, least: float, among: Flags) -> Flags:

@@ -88,6 +88,12 @@ class SurfaceSliding:
             f"{'slide' if closed else 'surface'}: {int((self.nodes & moved).sum()):,} of {int(self.nodes.sum()):,} "
             f"nodes have moved {'along the boundary' if closed else 'on it'}, at most {away:.2g} of an edge from {of}"
         )
+        count, angle = self.patches.alone
+        if count:
+            said += (
+                f"; {count:,} nodes do not, for they are at edges that bend by less than {angle:g}°, three in a row at "
+                f"most, as uneven nodes make them on a curved surface: a feature angle of {angle:g} lets them"
+            )
         if not closed:
             return said
         before, after = enclosed(self.start, self.facets), enclosed(points, self.facets)
