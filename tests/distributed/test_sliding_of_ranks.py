@@ -208,11 +208,30 @@ def test_any_partition(kind, seed, ranks, how, method):
     same(mesh, slid(method=method, max_sweeps=40), cut(mesh, ranks, how, seed), ranks, fixed)
 
 
+def with_regions_and_lines(mesh):
+    """Two regions, and line cells of two markers, on the boundary and inside."""
+    edges, blocks = [], []
+    for shape in mesh.cells:
+        right = mesh.points[shape.nodes].mean(axis=1)[:, 0] > 0.5
+        blocks.append(CellBlock(shape.kind, shape.nodes, right + 1))
+        edges += [shape.nodes[:, [k, (k + 1) % shape.corners]] for k in range(shape.corners)]
+    edges = np.unique(np.sort(np.concatenate(edges), axis=1), axis=0)
+    middle = mesh.points[edges].mean(axis=1)
+    lines = edges[(middle[:, 0] < 0.02) | (abs(middle[:, 1] - 0.5) < 0.03)]
+    named = (mesh.points[lines].mean(axis=1)[:, 0] > 0.02) + 1
+    return gmsnet.Mesh(mesh.points, (*blocks, CellBlock("line", lines, named)), {(1, 1): "left", (1, 2): "inside"})
+
+
+BOUNDED = {**VOLUMES, **IN_PLANE} | {
+    f"{kind} of two regions": with_regions_and_lines(IN_PLANE[kind]) for kind in ("square", "quads", "mixed")
+}
+
+
 @pytest.mark.parametrize("how", ["strips", "interleaved"])
-@pytest.mark.parametrize("kind", VOLUMES)
-def test_what_slides_on_volumes_is_found_at_the_boundary(kind, how, monkeypatch):
+@pytest.mark.parametrize("kind", BOUNDED)
+def test_what_slides_is_found_at_the_boundary(kind, how, monkeypatch):
     """The first rank never has the whole mesh, and says the same as one process."""
-    mesh, seen = VOLUMES[kind], []
+    mesh, seen = BOUNDED[kind], []
 
     def gathered(piece, comm, known=None):
         found = gathered_whole(piece, comm, known)
@@ -232,10 +251,19 @@ def test_what_slides_on_volumes_is_found_at_the_boundary(kind, how, monkeypatch)
     assert sum(len(each.nodes) for each in found.mesh.cells) < sum(len(each.nodes) for each in mesh.cells)
 
 
+@pytest.mark.parametrize("marker", ["left", "inside"])
+def test_a_marker_in_a_plane_slides_alone(marker):
+    mesh = BOUNDED["mixed of two regions"]
+    told = same(mesh, slid(slide=[marker], max_sweeps=5), cut(mesh, 3, "interleaved"), 3)
+    assert told.gathered == ""
+    assert told.notes[0].startswith("slide: ")
+
+
 @pytest.mark.parametrize("seed", range(3))
-def test_a_boundary_whose_cells_are_read_otherwise_is_seen_whole(seed):
+@pytest.mark.parametrize("make", [gmsnet.generate.random_volume, gmsnet.random_mesh])
+def test_a_boundary_whose_cells_are_read_otherwise_is_seen_whole(make, seed):
     """More of the cells at it are inverted than not: they alone would be read inside out."""
-    mesh = gmsnet.generate.random_volume(200, seed=seed)
+    mesh = make(200, seed=seed)
     middle = mesh.points.mean(axis=0)
     points = mesh.points.copy()
     inside = connectivity_of(mesh).free

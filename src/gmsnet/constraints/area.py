@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.constraints.outline import NON_MANIFOLD, Longs, heads, sides, twins
+from gmsnet.constraints.outline import NON_MANIFOLD, Flags, Longs, heads, sides, twins
 from gmsnet.kernels.simplex.exact import SPLITTER
 from gmsnet.kernels.topology import winding
 from gmsnet.mesh.mesh import Mesh
@@ -30,8 +30,8 @@ class Borders:
     regions: tuple[int, ...]
 
 
-def borders_of(mesh: Mesh, points: Floats) -> Borders:
-    """The borders of the regions of a mesh whose nodes lie at points (N, 2).
+def borders_of(mesh: Mesh, points: Floats, bounded_at: Flags | None = None) -> Borders:
+    """The borders of the regions of a mesh whose nodes lie at points (N, 2). bounded_at: see ``outline.sides``.
 
     Faces of a part that can be wound consistently are read so that its area is positive, all others as they are
     written.
@@ -43,7 +43,7 @@ def borders_of(mesh: Mesh, points: Floats) -> Borders:
     turn[~consistent[part]] = 1
     area, _ = winding.part_areas(points, faces.first, faces.corner, part, turn, len(consistent))
     turn[area[part] < 0.0] *= -1
-    halves, kinds, _ = sides(faces, twin)
+    halves, kinds, _ = sides(faces, twin, bounded_at)
     if not consistent.all() or (kinds == NON_MANIFOLD).any():
         halves = np.arange(len(twin))  # what does not cancel between faces must be added
     face = halves // 3 if faces.face is None else faces.face[halves]

@@ -62,8 +62,9 @@ class Curves:
 
 
 def curves_of(
-    mesh: Mesh, slide: SlideChoice = True, feature_angle: float = FEATURE_ANGLE, held: Flags | None = None
-) -> Curves:
+    mesh: Mesh, slide: SlideChoice = True, feature_angle: float = FEATURE_ANGLE, held: Flags | None = None,
+    bounded_at: Flags | None = None,
+) -> Curves:  # fmt: skip
     """The curves of a planar mesh, and which nodes slide on them.
 
     A curve is a maximal chain of edges of one kind (boundary, interface, line cells inside a region), between the same
@@ -73,14 +74,15 @@ def curves_of(
     slide: None (no node slides), True (all may), or names of ``mesh.markers``: only nodes of these slide.
     feature_angle: in degrees, between 0 and 180; a node at which a curve turns by more than 90° always is an end.
     held: (N,) bool, nodes that stay for other reasons; the curve goes on through them. Nodes of cells that are not
-    smoothed stay as well.
+    smoothed stay as well. bounded_at: see ``outline.sides``.
 
     Raises InputError for a mesh that is not planar, unknown markers and angles out of range.
     """
     names = check_slide(mesh, slide, feature_angle)
     if mesh.plane is None:
         raise InputError("curves are of meshes in a plane: of one in space they follow from its patches")
-    return curves_along(outline_of(mesh), planar_points(mesh), mesh.single, feature_angle, may_slide(mesh, names, held))
+    outline, may = outline_of(mesh, bounded_at), may_slide(mesh, names, held)
+    return curves_along(outline, planar_points(mesh), mesh.single, feature_angle, may)
 
 
 def curves_along(outline: Outline, points: Floats, single: bool, feature_angle: float, may: Flags) -> Curves:

@@ -35,11 +35,11 @@ class Outline:
     still: Flags
 
 
-def outline_of(mesh: Mesh) -> Outline:
-    """The outline of a mesh; linear in its faces."""
+def outline_of(mesh: Mesh, bounded_at: Flags | None = None) -> Outline:
+    """The outline of a mesh; linear in its faces. bounded_at: see ``sides``."""
     faces, nodes = Faces.of(mesh), len(mesh.points)
     twin, head = twins(faces, nodes), heads(faces)
-    halves, kinds, regions = sides(faces, twin)
+    halves, kinds, regions = sides(faces, twin, bounded_at)
     side_keys = edge_keys(faces.corner[halves], head[halves], nodes)
     lines, marks, still = line_cells(mesh)
     line_keys = edge_keys(lines[:, 0], lines[:, 1], nodes)
@@ -85,8 +85,11 @@ def heads(faces: Faces) -> Ints:
     return head
 
 
-def sides(faces: Faces, twin: Offsets) -> tuple[Longs, Longs, Longs]:
-    """Half-edges of boundary, interface and non-manifold edges, the kind of each, and its two regions (S, 2)."""
+def sides(faces: Faces, twin: Offsets, bounded_at: Flags | None = None) -> tuple[Longs, Longs, Longs]:
+    """Half-edges of boundary, interface and non-manifold edges, the kind of each, and its two regions (S, 2).
+
+    bounded_at: (N,) bool, nodes with all their faces, where others are cut off: no side has another one.
+    """
     if len(faces.region):
         face = np.arange(len(twin)) // 3 if faces.face is None else faces.face
         region = faces.region[face]
@@ -94,6 +97,8 @@ def sides(faces: Faces, twin: Offsets) -> tuple[Longs, Longs, Longs]:
     else:
         region, differs = np.zeros(len(twin), dtype=np.int64), np.zeros(len(twin), dtype=bool)
     halves = np.flatnonzero(differs | (twin < 0))
+    if bounded_at is not None:
+        halves = halves[bounded_at[faces.corner[halves]] & bounded_at[heads(faces)[halves]]]
     other = twin[halves]
     kinds = np.select([other == winding.ALONE, other >= 0], [BOUNDARY, INTERFACE], NON_MANIFOLD)
     one, two = region[halves], region[np.where(other >= 0, other, halves)]

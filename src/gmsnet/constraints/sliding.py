@@ -16,6 +16,7 @@ from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.ordering import planar_points
+from gmsnet.topology.topology import Topology
 
 Flags = NDArray[np.bool_]
 REASON = "node of a curve that slides"  # why such nodes stand still while cells are untangled
@@ -45,9 +46,10 @@ class Sliding:
 
     @classmethod
     def of(
-        cls, mesh: Mesh, curves: Curves, memory: NDArray[np.int32], free: NDArray[np.int32], geometry: Geometry | None
-    ) -> Sliding:
-        """Of a mesh and its curves; memory, free: of its topology.
+        cls, mesh: Mesh, curves: Curves, memory: NDArray[np.int32], free: NDArray[np.int32],
+        geometry: Geometry | None, bounded_at: Flags | None = None,
+    ) -> Sliding:  # fmt: skip
+        """Of a mesh and its curves; memory, free: of its topology. bounded_at: see ``outline.sides``.
 
         Raises InputError for a geometry that does not fit the mesh.
         """
@@ -56,7 +58,8 @@ class Sliding:
         nodes[free] = True
         nodes &= curves.slides
         constraint = constraint_of(curves, points, memory, mesh.single, geometry, mesh.exponent)
-        return cls(curves, borders_of(mesh, points), points, mesh.exponent, nodes, constraint if nodes.any() else None)
+        borders = borders_of(mesh, points, bounded_at)
+        return cls(curves, borders, points, mesh.exponent, nodes, constraint if nodes.any() else None)
 
     def note(self, mesh: Mesh, moved: Flags) -> str:
         """What to say of it. mesh: as it has become. moved: (N,) bool."""
@@ -71,8 +74,16 @@ class Sliding:
         )
 
 
-def curves_to_slide_on(mesh: Mesh, slide: Any, feature_angle: float, fixed: Flags) -> Curves | None:
-    """The curves of a planar mesh; None where no node is to slide. fixed: (N,) bool, nodes that stay."""
+def sliding_in_plane(
+    mesh: Mesh, slide: Any, feature_angle: float, fixed: Flags, geometry: Geometry | None, threads: int = 1,
+    bounded_at: Flags | None = None,
+) -> tuple[Topology, NDArray[np.float64], Sliding | None]:  # fmt: skip
+    """The connectivity of a planar mesh, its ``near_points``, and what its nodes slide on; None where none is to.
+
+    fixed: (N,) bool, nodes that stay. bounded_at: see ``outline.sides``.
+    """
     if slide is None or slide is False:
-        return None
-    return curves_of(mesh, slide, feature_angle, held=fixed)
+        return *Topology.and_points(mesh, fixed, threads), None
+    curves = curves_of(mesh, slide, feature_angle, fixed, bounded_at)
+    topology, near = Topology.and_points(mesh, fixed, threads, curves.slides)
+    return topology, near, Sliding.of(mesh, curves, topology.memory, topology.free, geometry, bounded_at)

@@ -100,5 +100,7 @@ def pieces_of(mesh: Mesh, fixed: Flags, parts: Sequence[NDArray[np.int32]], rank
             blocks.append(Cells(block.kind, block.nodes[rows], block.regions[rows], rows))
             inside[block.nodes[rows]] = True
         ids = np.flatnonzero(inside)
-        found.append(Piece(ids, mesh.points[ids], fixed[ids], tuple(blocks), mesh.single, rounding=mesh.rounding))
+        found.append(
+            Piece(ids, mesh.points[ids], fixed[ids], tuple(blocks), mesh.single, dict(mesh.region_names), mesh.rounding)
+        )
     return found

@@ -72,8 +72,8 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
     mesh, found, wound = framed(comm, around.mesh(piece)), None, None
     if mesh.has_volumes:
         wound = wound_of(mesh, around.nodes.held_on(comm.rank))
-        if options.slides and not comm.bcast(known is not None):
-            found = found_on_the_skin(piece, around, mesh, wound, options, comm)
+    if options.slides and (mesh.has_volumes or mesh.plane is not None) and not comm.bcast(known is not None):
+        found = found_on_the_skin(piece, around, mesh, wound, options, comm)
     if found is None and (options.slides or (mesh.plane is None and not mesh.has_volumes)):
         known = gathered(piece, comm, known)
         found = found_on_first(known, smoother, options, comm)

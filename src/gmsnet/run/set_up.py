@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.options import check_slide
-from gmsnet.constraints.sliding import Sliding, curves_to_slide_on
+from gmsnet.constraints.sliding import sliding_in_plane
 from gmsnet.constraints.sliding_in_space import sliding_volume
 from gmsnet.errors import InputError
 from gmsnet.measure.report import ASPECT, SHAPE, QualityReport, measure
@@ -77,11 +77,9 @@ def first_state(
         )
     threads = _threads(given, options)
     still = asked if moved is None else asked | moved
-    curves = curves_to_slide_on(given, options.slide, options.feature_angle, still)
-    topology, start = Topology.and_points(given, still, threads, None if curves is None else curves.slides)
-    sliding = None
-    if curves is not None:
-        sliding = Sliding.of(given, curves, topology.memory, topology.free, options.geometry)
+    topology, start, sliding = sliding_in_plane(
+        given, options.slide, options.feature_angle, still, options.geometry, threads
+    )
     second = second_order_of(given, topology, options)
     remarks += held_anyway(given, asked, matching, topology, fixed, options.slides)
     remarks += without_effect(options, second)
