@@ -66,8 +66,8 @@ def _told(found: Found | None, comm: Any) -> Found | None:
 
 
 def _cells_at(outer: Flags, piece: Piece, around: Surrounded, mesh: Mesh) -> Piece:
-    """The cells at some nodes (n,), those of a rank that are marks alone, and the nodes that reach furthest."""
-    used, blocks = np.zeros(len(outer), dtype=bool), []
+    """Some nodes (n,) and the cells at them, a rank's cells that are marks, and the nodes that reach furthest."""
+    used, blocks = outer.copy(), []
     if len(mesh.points):
         used[[mesh.points.argmin(axis=0), mesh.points.argmax(axis=0)]] = True
     for block, shape, own in zip(around.blocks, mesh.cells, around.own, strict=True):
