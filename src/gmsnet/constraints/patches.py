@@ -63,18 +63,18 @@ def patches_of(
     turning, size = _of_cells(facets, normal, unit, area)
     cosine = np.empty(edges)
     kernels.cosines(turning, one, other, cosine)
-    smooth = two & (size[f] > 0.0) & (size[g] > 0.0) & (facets.label[f] == facets.label[g])
+    like = two & (size[f] > 0.0) & (size[g] > 0.0) & (facets.label[f] == facets.label[g])
     least = math.cos(math.radians(feature_angle)) + SLACK
-    gentle = smooth & (cosine >= least)
+    gentle = like & (cosine >= least)
     if np.any(free_needles):
         triangles, chosen = len(rows) - facets.halves, np.broadcast_to(free_needles, len(rows))
         alike = two & chosen[f] & chosen[g]
         alike &= (facets.label[f] == facets.label[g]) & (np.maximum(f, g) < triangles)
         freed, unit = free_edges(points[rows], unit, area, one, other, gentle, alike, least)
         gentle |= freed
-    smooth = gentle
     line_keys = edge_keys(facets.lines[:, 0], facets.lines[:, 1], nodes)
-    smooth &= ~np.isin(found, line_keys)
+    unmarked = ~np.isin(found, line_keys)
+    smooth = gentle & unmarked
 
     beside, flat = np.full(rows.size, NOTHING, dtype=np.int64), np.zeros(rows.size, dtype=bool)
     kernels.find_level(
@@ -89,11 +89,11 @@ def patches_of(
         still[chosen // nodes] = still[chosen % nodes] = True
     outline = _outline(facets, found[sharp], f[sharp], g[sharp], line_keys, still)
     curves = curves_along(outline, points, single, feature_angle, may)
-    at_sharp, by_angle = np.zeros(nodes, dtype=bool), two[sharp] & ~np.isin(found[sharp], line_keys)
+    at_sharp = np.zeros(nodes, dtype=bool)
     at_sharp[outline.edges] = True
-    by_angle &= (size[f] > 0.0)[sharp] & (size[g] > 0.0)[sharp] & (facets.label[f] == facets.label[g])[sharp]
     larger = min(LITTLE * feature_angle, 90.0)
-    alone = alone_of(outline.edges, by_angle & (cosine[sharp] > math.cos(math.radians(larger))))
+    little = like & unmarked & (cosine > math.cos(math.radians(larger)))
+    alone = alone_of(outline.edges, little[sharp])
     slides = np.zeros(nodes, dtype=bool)
     slides[rows] = True
     tips = tips_of(rows, unit, least, ~at_sharp)
@@ -110,7 +110,7 @@ def alone_of(edges: Longs, little: Flags) -> Longs:
     if not little.any():
         return edges[:0, 0]
     from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    from scipy.sparse.csgraph import connected_components  # loads what few runs need
 
     ids, ends = np.unique(edges, return_inverse=True)
     ends = ends.reshape(-1, 2)

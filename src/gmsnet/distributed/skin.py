@@ -88,7 +88,7 @@ def _seen(skin: Whole, ids: list[Ids], forth: bool, options: SmoothOptions) -> F
     still = skin.fixed | ~outer
     try:
         names = check_slide(mesh, options.slide, options.feature_angle, options.geometry)
-        topology, sliding = _sliding(skin.mesh, outer, names, still, options)
+        topology, sliding = _sliding(mesh, outer, names, still, options)
     except GmsnetError:  # which the whole mesh has, too, and tells better
         return None
     if not Winding.of(topology).reads(forth=forth) or REASONS[NON_MANIFOLD] in topology.held:
