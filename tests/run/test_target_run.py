@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gmsnet
-from gmsnet.generate import disturb, random_mesh, random_quad_mesh
+from gmsnet.generate import disturb, kershaw_mesh, random_mesh, random_quad_mesh, sheared_mesh
 from gmsnet.kernels.topology.patch import around
 from gmsnet.measure.report import measure
 from gmsnet.measure.target import Target
@@ -214,6 +214,30 @@ def test_where_many_cannot_reach_it_no_more_miss_it_than_after_a_full_run(seed, 
     target = share * float(full.min())
     result = gmsnet.smooth(mesh, target_quality=target)
     assert (result.after.shape < target).sum() <= (full < target).sum() < (result.before.shape < target).sum()
+
+
+@pytest.mark.parametrize(
+    ("mesh", "angle", "quality"),
+    [
+        (sheared_mesh(30, amplitude=0.3), None, 0.8659),
+        (kershaw_mesh(12, flatness=0.05), 21.28, None),
+    ],
+)
+def test_a_target_just_below_what_a_full_run_reaches_is_met_where_sweeps_from_patches_end_worse(mesh, angle, quality):
+    result = gmsnet.smooth(mesh, target_angle=angle, target_quality=quality)
+    assert result.stop_reason == stop.TARGET_REACHED
+    assert result.after.shape.min() >= (quality or 0.0)
+    assert result.after.min_angle.min() >= (angle or 0.0)
+    assert [each.index for each in result.history] == sorted({each.index for each in result.history})
+
+
+@pytest.mark.parametrize(("seed", "share"), [(2, 1.2), (8, 1.4), (15, 1.4), (23, 1.4), (32, 1.4), (39, 1.2), (55, 1.2)])
+def test_on_the_smallest_meshes_no_more_miss_it_than_after_a_full_run(seed, share):
+    mesh = gmsnet.random_mesh((12, 20, 35, 60, 90)[seed % 5], seed=seed)
+    full = gmsnet.smooth(mesh).after.shape
+    target = share * float(full.min())
+    result = gmsnet.smooth(mesh, target_quality=target)
+    assert (result.after.shape < target).sum() <= (full < target).sum()
 
 
 def test_a_cell_in_one_place_meets_no_angle():

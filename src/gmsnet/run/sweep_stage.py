@@ -26,7 +26,9 @@ from gmsnet.topology.volume import Volume
 # Shares of the cells, and cells: of so many that miss a target, one of η or of dihedral angles, all are smoothed.
 MANY, MANY_ANGLES, FEW = 0.15, 0.02, 100
 SOME, FEWER = 0.02, 20  # the same where patches around them come first, and do not bring all to it
-SMALL = 50_000  # free nodes: on meshes of so many, all are smoothed then for any cell, if half as many miss it then
+SMALL = (
+    50_000  # free nodes: on meshes of so many, all are smoothed then for any cell, if that is worth it (_is_worth_it)
+)
 
 
 def sweep(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -42,17 +44,32 @@ def _to_target(state: State, options: SmoothOptions, executor: Executor) -> Stat
         if first.stop_reason != NO_PROGRESS or _closer(first, state, options, executor):
             return first
         second = reach_target(state, options, executor)
-    else:
-        first = reach_target(state, options, executor)
-        if first.stop_reason != NO_PROGRESS:
-            return first
-        many = _miss_it(state, options, executor, SOME, FEWER)
-        if not many and not (_is_small(state, executor) and _miss_it(first, options, executor, 0.0, 0)):
-            return first
-        second = _at_large(_going_on(first), options, executor)
-        if not many and not _much_closer(second, first, options, executor):
-            return _back_to(first, second)
-    return _closer_one(second, first, options, executor)
+        return _closer_one(second, first, options, executor)
+    first = reach_target(state, options, executor)
+    if first.stop_reason != NO_PROGRESS:
+        return first
+    many = _miss_it(state, options, executor, SOME, FEWER)
+    if not many and not (_is_small(state, executor) and _miss_it(first, options, executor, 0.0, 0)):
+        return first
+    found = _all_moved(first, first, many, options, executor)
+    if found.stop_reason == NO_PROGRESS and _is_small(state, executor) and _differ(state, first, executor):
+        # patches may have led to where sweeps end worse: once more without them, as a method that knows of no sweep
+        again = replace(state, history=found.history, smoother=options.smoother())
+        found = _all_moved(_back_to(again, found), found, many, options, executor)
+    return found
+
+
+def _all_moved(start: State, other: State, many: bool, options: SmoothOptions, executor: Executor) -> State:
+    """All free nodes moved from a state on; another one, if that is not closer, or few miss it and little is gained."""
+    later = _at_large(_going_on(start), options, executor)
+    if not many and not _is_worth_it(later, other, options, executor):
+        return _back_to(other, later)
+    return _closer_one(later, other, options, executor)
+
+
+def _differ(state: State, other: State, executor: Executor) -> bool:
+    """Are nodes of one state elsewhere in another?"""
+    return bool(executor.total(np.array(np.count_nonzero(state.points != other.points))))
 
 
 def _closer_one(state: State, other: State, options: SmoothOptions, executor: Executor) -> State:
@@ -72,10 +89,11 @@ def _is_small(state: State, executor: Executor) -> bool:
     return int(executor.total(np.array(len(state.topology.free)))) <= SMALL
 
 
-def _much_closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
-    """Do half as many cells as in another state miss the target, or fewer, and are no more inverted?"""
+def _is_worth_it(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
+    """Have all nodes been moved for much: half of the cells that miss the target elsewhere, or a share of all?"""
     one, two = (rank_to_target(each, options, executor) for each in (state, other))
-    return one.inverted <= two.inverted and 2 * one.missed <= two.missed
+    much = min(two.missed / 2, SOME * executor.cell_count(state.topology.changeable))
+    return one.inverted <= two.inverted and two.missed - one.missed >= much
 
 
 def _closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
