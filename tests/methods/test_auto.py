@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.generate import random_quad_mesh, sheared_mesh
+from gmsnet.generate import random_quad_mesh, sheared_mesh, structured_mesh
 from gmsnet.methods.auto import WHOLE, WHOLE_WORST, Auto
 from gmsnet.methods.gains import to_come
 from gmsnet.methods.phases import LARGE_PLAN, QUADS_PLAN, SMALL, SMALL_PLAN
@@ -111,6 +111,23 @@ def test_a_call_on_a_stretched_mesh_ends_before_its_sweeps_do_and_leaves_little_
     assert one.stop_reason == NO_PROGRESS
     assert WHOLE_WORST in told(one.history)
     assert two.after.shape.min() < one.after.shape.min() + 0.05
+
+
+@pytest.mark.parametrize(("columns", "rows", "height"), [(24, 7, 0.5), (30, 9, 0.65), (18, 12, 0.6)])
+def test_all_nodes_of_a_small_grid_of_quads_over_a_bump_have_a_turn(columns, rows, height, monkeypatch):
+    """The worst quads lie above its flanks, among few like them; the mean is far above."""
+    mesh = structured_mesh(columns, rows)
+    x, y = 3.0 * mesh.points[:, 0], mesh.points[:, 1]
+    bump = height * np.exp(-8.0 * (x - 1.5) ** 2)
+    mesh = mesh.with_points(np.column_stack([x, bump + (1.0 - bump) * y]))
+    one = gmsnet.smooth(mesh)
+    assert WHOLE_WORST in told(one.history)
+    two = gmsnet.smooth(one.mesh).judged.after
+    assert two.shape_min < one.judged.after.shape_min + 0.01
+    assert two.shape_mean < one.judged.after.shape_mean + 0.01
+    monkeypatch.setattr(Auto, "_is_even", lambda *_: False)
+    without = gmsnet.smooth(mesh).judged.after
+    assert one.judged.after.shape_min > without.shape_min + 0.02
 
 
 def test_powers_are_tried_on_all_nodes_before_single_cells_raise_the_floor():

@@ -69,6 +69,7 @@ MOST_ROUNDS = 100  # of a phase in which the sum of q falls
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS, EARLY = "whole mesh, worst cells", (3, 2), (2, 3, 1)  # q⁸, q⁴, q²
 GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
+FEW, FEW_QUADS = 256, 2000  # free nodes: so many have their turn in any case
 EXACT = 20_000  # free nodes: up to so many, all nodes of such a mesh go to the minimum of Σq, which is near
 IN_SPACE = (VOLUME_PLAN, LARGE_VOLUME_PLAN, MIXED_PLAN, SURFACE_PLAN)
 NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
@@ -106,6 +107,7 @@ class Auto(Smoother):
 
     def __init__(self, phases: Sequence[Phase] = ()) -> None:
         self.phases, self.at = phases, -1
+        self.at_once = self.quads = False  # may all nodes move at once? are there quads?
         self.creep: Creep | None = None
         self.whole = 0  # how often all nodes have moved at once
         self.slow = self.ideal = self.early = self.doubled = False
@@ -141,8 +143,9 @@ class Auto(Smoother):
         if self.at < 0:
             self.free = int(executor.total(np.array(len(field.topology.free))))
             planar = isinstance(field.topology, Topology) and not isinstance(field.topology, Shell)
-            if not self.phases and field.level != STAR and planar:
-                self.creep = Creep.of(field, executor)
+            self.at_once = not self.phases and field.level != STAR and planar
+            self.quads = self.at_once and bool(executor.total(np.array(field.planar.near_shapes is not None)))
+            self.creep = Creep.of(field, executor) if self.at_once else None
             own, self.phases = self.phases, self.phases or plan_for(field.topology, self.free)
             self.repeats = self.phases in IN_SPACE or not (own or field.level == STAR)
             if self.phases in IN_SPACE and self.free > LARGE_VOLUME:
@@ -216,10 +219,13 @@ class Auto(Smoother):
         self.least = smoother.least
 
     def _is_even(self, field: Field, executor: Executor) -> bool:
-        """Is the worst cell one of many like it, which one star at a time cannot better?"""
+        """May the worst cell be one of many like it, which one star at a time cannot better?"""
         small, moved = self.phases is SMALL_PLAN, self.whole > 0
-        if self.creep is None or self.least >= (GOOD_MOVED if small and moved else GOOD):
+        fewest = small and self.free <= (FEW_QUADS if self.quads else FEW)
+        if not self.at_once or self.least >= (GOOD_MOVED if small and (moved or fewest) else GOOD):
             return False
+        if fewest:  # it takes little time
+            return True
         mean = mean_shape(field, executor)
         return (small and (moved or mean < STILL_POOR)) or ((small or moved) and self.least > mean - NEAR_MEAN)
 
@@ -272,7 +278,7 @@ class Auto(Smoother):
             few = self.creep is not None and not self.whole and self.free <= EXACT
             self.ideal = is_ideal and few
             moved = self.at == 0 and self.whole > 0 and self.phases is SMALL_PLAN
-            self.early = moved and field.planar.near_shapes is None
+            self.early = moved and not self.quads
             if self.early:
                 return
             self._enter(len(self.phases) if target_reached or is_ideal else self.at + 1, field, executor)
