@@ -1,11 +1,12 @@
 """Layers of tetrahedra at walls: flat cells in columns of nodes that start at a boundary or an interface.
 
 The halves and thirds of prisms that were grown from a wall have their nodes in columns. A column starts at a node of a
-wall around which all cells are flat, as one, and along the wall. It goes on, from row to row, to the next node along
-its own direction, as long as the cells there are flat alike. Slivers are flat in directions of their own, which cancel
-out around a node, and a mesh that was squeezed has no rows. So columns count that have ROWS rows or more, FEWEST or
-more beside one another, whose cells are thinner at the wall than at their ends, or whose first rows have one height,
-and higher ones follow. What lies around edges of the wall, between columns, belongs to them (see column_gaps.py).
+wall around which all cells are flat along the wall, as one or one by one (see flat_cells.py). It goes on, from row to
+row, to the next node along its own direction, as long as the cells there are flat alike. Slivers are flat in directions
+of their own, which cancel out around a node, and a mesh that was squeezed has no rows. So columns count that have ROWS
+rows or more, FEWEST or more beside one another, whose cells are thinner at the wall than at their ends, or whose first
+rows have one height, and higher ones follow. What lies around edges of the wall, between columns, belongs to them (see
+column_gaps.py).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from gmsnet.kernels.topology import columns as kernels
 from gmsnet.kernels.topology import connectivity
 from gmsnet.preserve.accepted_columns import FEWEST, accepted_of, linked
 from gmsnet.preserve.column_gaps import neighbours, with_gaps
+from gmsnet.preserve.flat_cells import BROAD, BROAD_THIRDS, feet, in_stars
 from gmsnet.preserve.layers import Layers
 from gmsnet.preserve.shared import Alone, Shared
 from gmsnet.topology.held import ON_BOUNDARY, ON_INTERFACE
@@ -31,17 +33,12 @@ Floats = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
 WALLS = (ON_BOUNDARY, ON_INTERFACE)  # why the nodes of walls are held
-FLAT, STILL_FLAT = 2.5, 1.7  # how many times longer than thick cells are, in the mean around a node: at a wall, inside
-# How many times longer than thick flat cells are in the shorter of the two directions: else they are long one way
-# alone, as where a section was swept. The thirds of prisms lie askew, which evens that out.
-BROAD, BROAD_THIRDS = 1.5, 1.2
-ALONG_WALL = 0.1  # of the squared length of the edges on a wall: what may lie across it
+STILL_FLAT = 1.7  # how many times longer than thick cells are around a node inside
 TURN = math.cos(math.radians(30.0))  # of a column from row to row
 HIGHER = 2.5  # times as high as the row before it: no row of the same layer
 LAST = 1.6  # the same for the last row
 AT_ONCE = 1.1  # times as high as the lowest next row are rows that grow together
 ROWS = 2  # nodes of a column above its wall
-DETERMINANT = 1.0 / 45.0  # of a moment of trace 1: less is flat by 2 or more
 
 
 class _Front(NamedTuple):
@@ -67,7 +64,7 @@ def layers_of_volume(topology: Volume, points: Floats, shared: Shared | None = N
     none = Layers(np.zeros(nodes, dtype=bool), np.zeros(len(rows), dtype=bool), 1.0, 1.0, 0, (0, 0))
     wall = shared.spread(_wall_nodes(topology))
     broad = BROAD_THIRDS if topology.simplices.shapes is None else BROAD
-    foot, normal, flatness = _feet(points, rows, wall, broad)
+    foot, normal, flatness = feet(points, rows, wall, broad)
     own = shared.own[foot]
     if shared.total(int(np.count_nonzero(own))) < FEWEST:
         return none
@@ -110,21 +107,6 @@ def _wall_nodes(topology: Volume) -> Flags:
         for reason in WALLS:
             wall[topology.places[reasons.get(reason, np.empty(0, dtype=np.int64))]] = True
     return wall
-
-
-def _feet(points: Floats, rows: Ints, wall: Flags, broad: float) -> tuple[Ints, Floats, Floats]:
-    """The nodes of walls where all cells are flat along the wall: places, unit normals (K, 3), flatness (K,)."""
-    moments, along = np.zeros((2, len(wall), kernels.MOMENTS))
-    count = np.zeros(len(wall), dtype=np.int32)
-    kernels.around_nodes(points, rows, wall, moments, along, count)
-    some = np.flatnonzero(wall & (count > 0))
-    mean = moments[some] / count[some, None]
-    few = _determinant(mean) < DETERMINANT
-    some, mean = some[few].astype(np.int32), mean[few]
-    flatness, normal = _flat(mean, broad)
-    across = np.einsum("ki,kij,kj->k", normal, _tensors(along[some]), normal)
-    good = (flatness >= FLAT) & (across <= ALONG_WALL * along[some, :3].sum(axis=1))
-    return some[good], normal[good], flatness[good]
 
 
 def _widths(points: Floats, rows: Ints, wall: Flags, foot: Ints) -> Floats:
@@ -173,15 +155,12 @@ def _grown(
         kernels.next_in_columns(points, near, ends, normal, inner, taken, found, length)
         return np.where(found >= 0, names[found], -1), length
 
-    def first_ones(places: Ids, height: Floats, number: Ids) -> tuple[Flags, Floats]:
-        """Of columns that would go on to one node the lowest, else the first one; and the moments around that node."""
+    def first_ones(places: Ids, height: Floats, number: Ids) -> tuple[Flags, Floats, Floats]:
+        """Of columns that would go on to one node the lowest, else the first one; how flat cells are there, and how."""
         order = np.lexsort((number, height))
-        first, mean = np.zeros(len(places), dtype=bool), np.empty((len(places), kernels.MOMENTS))
+        first = np.zeros(len(places), dtype=bool)
         first[order[np.unique(places[order], return_index=True)[1]]] = True
-        kernels.of_stars(
-            points, places.astype(np.int32), topology.start, topology.local, topology.ring_start, topology.ring, mean
-        )
-        return first, mean
+        return first, *in_stars(topology, points, places.astype(np.int32), broad, STILL_FLAT)
 
     shared.ask(front.foot, (np.ones(count, dtype=bool),), take)
     while shared.total(int(stale.any() or (to >= 0).any())):
@@ -190,9 +169,8 @@ def _grown(
         to[stale & (height > HIGHER * before)] = -1
         lowest = shared.least(float(np.min(height, where=to >= 0, initial=np.inf)))
         step = np.flatnonzero((to >= 0) & (height <= AT_ONCE * lowest))
-        first, mean = shared.ask(to[step], (height[step], front.number[step]), first_ones)
-        ahead, there = step[first], to.copy()
-        flatness, direction = _flat(mean[first], broad)
+        first, flatness, direction = shared.ask(to[step], (height[step], front.number[step]), first_ones)
+        ahead, there, flatness, direction = step[first], to.copy(), flatness[first], direction[first]
         alike = (flatness >= STILL_FLAT) & (abs((direction * normal[ahead]).sum(axis=1)) >= TURN)
         going, ending = ahead[alike], ahead[~alike]
         low = (height <= LAST * before) & (height * STILL_FLAT <= front.width)
@@ -218,27 +196,3 @@ def _grown(
     whole, high, free = columns.copy(), heights.copy(), topped[~known]
     whole[free, 1 + row[free]], high[free, row[free]] = top[free], above[free]
     return columns[:, :-1], heights[:, :-1], last, whole, high
-
-
-def _tensors(moments: Floats) -> Floats:
-    """(K, 3, 3)."""
-    tensors: Floats = moments[:, [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
-    return tensors
-
-
-def _determinant(moments: Floats) -> Floats:
-    xx, yy, zz, xy, xz, yz = moments.T
-    found: Floats = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
-    return found
-
-
-def _flat(moments: Floats, broad: float) -> tuple[Floats, Floats]:
-    """How many times longer than thick cells of these moments are (K,), and the direction in which they are thin.
-
-    1.0 of cells that are long one way alone. broad: BROAD, or BROAD_THIRDS of tetrahedra.
-    """
-    values, vectors = np.linalg.eigh(_tensors(moments))
-    values = np.maximum(values, 1e-30)
-    flatness: Floats = np.sqrt(np.sqrt(values[:, 1] * values[:, 2]) / values[:, 0])
-    flatness[values[:, 1] < broad**2 * values[:, 0]] = 1.0
-    return flatness, vectors[:, :, 0]

@@ -26,12 +26,18 @@ def add_edge(moment, x, y, z, weight):
     moment[5] += weight * y * z
 
 
+@inlined
+def determinant(m):
+    """Of the matrix of a moment."""
+    return m[0] * (m[1] * m[2] - m[5] * m[5]) - m[3] * (m[3] * m[2] - m[5] * m[4]) + m[4] * (m[3] * m[5] - m[1] * m[4])
+
+
 @kernel
-def around_nodes(points, rows, chosen, moments, along, count):
+def around_nodes(points, rows, chosen, bound, moments, along, count, thin):
     """Adds up, at chosen nodes (N,) bool, the moments of their cells, of trace 1, into moments (N, 6).
 
     along: (N, 6), the same of their edges to other chosen nodes alone, each of trace 1 and once for each cell. count:
-    (N,) cells. All are zeros before.
+    (N,) cells; thin: (N,) those of a determinant below the bound. All are zeros before.
     """
     own = np.empty(MOMENTS)
     for t in range(len(rows)):
@@ -48,21 +54,22 @@ def around_nodes(points, rows, chosen, moments, along, count):
                 add_edge(along[j], x, y, z, 1.0 / square)
         trace = own[0] + own[1] + own[2]
         if trace > 0.0:
+            is_thin = determinant(own) < bound * trace * trace * trace
             for k in range(4):
                 i = rows[t, k]
                 if chosen[i]:
                     count[i] += 1
+                    thin[i] += is_thin
                     for m in range(MOMENTS):
                         moments[i, m] += own[m] / trace
 
 
 @kernel
 def of_stars(points, nodes, start, local, ring_start, ring, moments):
-    """The mean of the moments of the cells around free nodes, which have a star each, into moments (K, 6)."""
-    own, corner = np.empty(MOMENTS), np.empty((4, 3))
-    for i in range(len(nodes)):
-        v = nodes[i]
-        moments[i, :] = 0.0
+    """The moments of the cells around free nodes, which have a star each, of trace 1, into moments (M, 6), star by
+    star."""
+    own, corner, number = np.empty(MOMENTS), np.empty((4, 3)), 0
+    for v in nodes:
         for row in range(start[v], start[v + 1]):
             own[:] = 0.0
             for k in range(3):
@@ -75,9 +82,9 @@ def of_stars(points, nodes, start, local, ring_start, ring, moments):
                     own, corner[b, 0] - corner[a, 0], corner[b, 1] - corner[a, 1], corner[b, 2] - corner[a, 2], 1.0
                 )
             trace = own[0] + own[1] + own[2]
-            if trace > 0.0:
-                for m in range(MOMENTS):
-                    moments[i, m] += own[m] / (trace * (start[v + 1] - start[v]))
+            for m in range(MOMENTS):
+                moments[number, m] = own[m] / trace if trace > 0.0 else 0.0
+            number += 1
 
 
 @kernel
