@@ -144,7 +144,7 @@ class Auto(Smoother):
             self.free = int(executor.total(np.array(len(field.topology.free))))
             planar = isinstance(field.topology, Topology) and not isinstance(field.topology, Shell)
             self.at_once = not self.phases and field.level != STAR and planar
-            self.quads = self.at_once and bool(executor.total(np.array(field.planar.near_shapes is not None)))
+            self.quads = self.at_once and bool(executor.total(np.array(int(field.planar.near_shapes is not None))))
             self.creep = Creep.of(field, executor) if self.at_once else None
             own, self.phases = self.phases, self.phases or plan_for(field.topology, self.free)
             self.repeats = self.phases in IN_SPACE or not (own or field.level == STAR)
