@@ -117,6 +117,17 @@ def test_a_node_of_a_non_manifold_edge_is_held():
     assert result.moved.any()
 
 
+def test_far_from_the_origin_nodes_slide_that_are_apart_by_as_much_as_there():
+    """A survey of 5 m in UTM coordinates: two millionths of these are 10 m."""
+    mesh = wavy(kind="triangle")
+    here = gmsnet.smooth(mesh.with_points(5.0 * mesh.points), slide=True)
+    there = gmsnet.smooth(mesh.with_points(5.0 * mesh.points + (5e5, 5.4e6, 0.0)), slide=True)
+    assert here.moved[here.held["boundary"]].sum() == there.moved[there.held["boundary"]].sum()
+    assert here.moved.sum() == there.moved.sum()
+    assert there.after.shape.mean() == pytest.approx(here.after.shape.mean(), abs=1e-3)
+    assert "another one" not in " ".join(there.notes)
+
+
 def test_what_is_not_joined_stays_together_and_is_told():
     mesh = wavy(kind="triangle")
     rows, points = mesh.cells[0].nodes.copy(), mesh.points

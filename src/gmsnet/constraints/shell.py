@@ -24,7 +24,7 @@ from gmsnet.topology.topology import Topology
 Floats = NDArray[np.float64]
 
 FEATURE = "feature of the surface"  # why nodes of sharp edges are held
-SAME = 2e-6  # of the largest coordinate: so far apart may be what would be one point but for rounding
+SAME = 2e-6  # of the longest side of the box: so far apart may be what would be one point but for rounding
 
 
 def patches_of_surface(
@@ -50,7 +50,7 @@ def torn_apart(points: Floats, rim: NDArray[np.int64] | NDArray[np.int32] | None
         from scipy.spatial import cKDTree  # it takes a tenth of a second to import
 
         at = points[rim]
-        near = SAME * abs(at).max()
+        near = SAME * np.ptp(at, axis=0).max() + 4.0 * np.spacing(abs(at).max())
         found[rim] = cKDTree(at).query(at, k=[2], distance_upper_bound=near)[0][:, 0] <= near
     return found
 
