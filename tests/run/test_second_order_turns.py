@@ -67,6 +67,26 @@ def test_turns_go_on_where_straight_cells_alone_meet_the_target(volume, amount, 
     assert result.invalid_curved == 0
 
 
+@pytest.mark.parametrize(
+    ("volume", "amount", "seed", "share"),
+    [
+        (lattice_volume(2), 0.8, 8, 0.999),
+        (block_volume(2, "wedge"), 1.2, 0, 0.9),
+        (block_volume(2, "hexahedron"), 1.2, 2, 0.999),
+        (block_volume(2, "wedge"), 1.2, 4, 0.999),
+    ],
+)
+def test_a_target_below_what_a_run_without_one_reaches_is_met(volume, amount, seed, share):
+    """Sweeps around the cells that miss it end where curved cells are in their way."""
+    mesh = thrown(volume, amount, seed)
+    full = gmsnet.smooth(mesh).judged.after.shape_min
+    result = gmsnet.smooth(mesh, target_quality=share * full)
+    assert result.stop_reason == stop.TARGET_REACHED
+    assert result.after.shape.min() >= share * full
+    assert result.invalid_curved == 0
+    assert [look.index for look in result.history] == sorted(look.index for look in result.history)
+
+
 def test_where_corners_are_stopped_is_a_stage_of_its_own():
     """The sweeps before it tell of the straight cells that the method saw."""
     history = gmsnet.smooth(MESHES["tetra10 1"]()).history

@@ -41,6 +41,7 @@ from gmsnet.run.options import CPU, SmoothOptions
 from gmsnet.run.outcome import factors_of, greatest_angle, large_angles, merit_of
 from gmsnet.run.set_up import check_options, check_target
 from gmsnet.run.state import State
+from gmsnet.run.stop import by_target
 from gmsnet.topology.mixed_volume import wound_of
 from gmsnet.topology.ordering import planar_points, space_points, taken
 from gmsnet.topology.shell import Shell
@@ -139,7 +140,7 @@ def _shared(
         before=before,
         after=after,
         sweeps=state.history[-1].index if state.history else 0,
-        stop_reason=state.stop_reason,
+        stop_reason=by_target(state.stop_reason, missed, swept=bool(state.history)),
         history=[*state.history],
         notes=notes,
         held=held(part, state.protection.base),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -120,6 +120,11 @@ class SmoothOptions:
     def target(self) -> Target:
         """What every cell is to reach; false where nothing is asked for."""
         return Target(self.target_quality, self.target_angle, self.target_dihedral)
+
+    @property
+    def without_target(self) -> SmoothOptions:
+        """The same for all cells."""
+        return replace(self, target_quality=None, target_angle=None, target_dihedral=None)
 
     @property
     def thread_count(self) -> int:

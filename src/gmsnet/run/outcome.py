@@ -27,7 +27,7 @@ from gmsnet.preserve.wall_heights import height_note
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.state import Final, State, with_corners
-from gmsnet.run.stop import NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
+from gmsnet.run.stop import by_target
 from gmsnet.run.untangle_stage import still_inverted
 from gmsnet.topology.held import OF_FACE, OF_LINE, OF_SECOND_ORDER, ON_BOUNDARY
 from gmsnet.topology.ordering import near_points
@@ -55,9 +55,9 @@ def write_back(state: State, options: SmoothOptions, executor: Executor) -> Stat
         plane = list(state.mesh.plane or (0, 1))  # in the units of the input, though its extent may be another now
         near = np.ldexp(final.points[:, plane][state.topology.memory], -state.mesh.exponent)
         state = replace(state, conformity=(*state.conformity, Conformity.of(near, state.planar, state.metric)))
-    claimed = state.second_order is not None and state.stop_reason == TARGET_REACHED  # by stages for their own cells
-    if claimed and len(options.target.missed_in(final.after)):
-        state = state.ended(NO_PROGRESS if state.history else NOTHING_TO_MOVE)
+    missed = len(options.target.missed_in(final.after)) if options.target else None
+    reason = by_target(state.stop_reason, missed, swept=bool(state.history))
+    state = replace(state, stop_reason=reason)
     beside = state.protection.beside
     if beside is not None and final.moved.any() and not state.before.inverted and state.motion is None:
         heights = height_note(beside, state.start, state.points)

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from gmsnet.kernels.star.guard import LEVELS, VALID
 from gmsnet.methods import planar_cells, solid_cells
 from gmsnet.parallel.executor import Executor
@@ -16,7 +18,7 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.room_stage import make_room, raise_bounds
 from gmsnet.run.second_order import corners_alone, rank_at, smooth_corners
 from gmsnet.run.state import SecondOrder, State, with_corners
-from gmsnet.run.sweep_stage import rank_to_target
+from gmsnet.run.sweep_stage import SMALL, SOME, rank_to_target
 
 TURN = (smooth_corners, make_room, raise_bounds)
 TURNS = 8  # at most
@@ -35,9 +37,25 @@ def take_turns(state: State, options: SmoothOptions, executor: Executor) -> Stat
         return state
     if options.guard != LEVELS[VALID]:
         state = replace(state, second_order=replace(given, room=_room(given)))
+    best, most = _turns(state, options, executor)
+    if not options.target or best.cut_short or not most[MISSING] or np.count_nonzero(given.free) > SMALL:
+        return best
+    # What a target asks of few cells may end where curved cells are in the way: once more for the shape of all.
+    other, worth = _turns(replace(state, history=best.history), options, executor, for_all=True)
+    much = min(-most[MISSING] / 2, SOME * len(given.cells))
+    if worth[:MISSING] >= most[:MISSING] and worth[MISSING] - most[MISSING] >= much:
+        return other
+    return best.ended_as(other)
+
+
+def _turns(
+    state: State, options: SmoothOptions, executor: Executor, *, for_all: bool = False
+) -> tuple[State, tuple[float, ...]]:
+    """The best mesh of the turns, and its worth. for_all: the turns are as without the target."""
     best, most, idle = state, _worth(state, options, executor), 0
+    asked = options.without_target if for_all else options
     for turn in range(TURNS):
-        state = carry_out_all(state, options, executor, TURN)
+        state = carry_out_all(state, asked, executor, TURN)
         worth = _worth(state, options, executor)
         gained = max(new - old for new, old in zip(worth, most, strict=True))
         idle = 0 if gained >= GAIN else idle + 1
@@ -45,7 +63,7 @@ def take_turns(state: State, options: SmoothOptions, executor: Executor) -> Stat
             best, most = state, worth
         if not _goes_on(state, worth, options) or idle == PATIENCE:
             break
-    return best.ended_as(state)
+    return best.ended_as(state), most
 
 
 def _room(given: SecondOrder) -> float:

@@ -124,7 +124,7 @@ def _missing(state: State, options: SmoothOptions, executor: Executor) -> int:
 def _at_large(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Sweeps over all free nodes, without a target, then patches; with the stage of the mean between, where that is
     closer to the target."""
-    plain = replace(options, target_quality=None, target_angle=None, target_dihedral=None)
+    plain = options.without_target
     swept = _sweep_all(state, plain, executor)
     if swept.cut_short:
         return swept

@@ -75,12 +75,13 @@ def reach_target(state: State, options: SmoothOptions, executor: Executor) -> St
     """
     if state.stop_reason and isinstance(state.topology, Volume):  # the sweeps before (sweep_stage) have ended it
         return state
-    corners, clear = cells_missing(state, options.target, executor)
+    near_free = state.topology.near_free.astype(np.float64)
+    executor.exchange(near_free)
+    free = near_free > 0.0
+    corners, clear = cells_missing(state, options.target, free, executor)
     if not executor.total(np.array(len(corners))):
         return state.ended(TARGET_REACHED)
-    free = state.topology.near_free.astype(np.float64)
-    executor.exchange(free)
-    able = (free > 0.0)[corners].any(axis=1)
+    able = free[corners].any(axis=1)
     if not executor.total(np.array(np.count_nonzero(able))):
         return _without_gain(state)
     aim = Aim(
@@ -184,8 +185,13 @@ def _floor_in_space(state: State, options: SmoothOptions, executor: Executor) ->
     return floor_for_angles(state, LEVELS.index(options.guard), shape, executor)
 
 
-def cells_missing(state: State, target: Target, executor: Executor) -> tuple[NDArray[np.int32], bool]:
-    """The corners (K, 3 or 4) of the cells that miss the target; do all of them, however they are measured?"""
+def cells_missing(
+    state: State, target: Target, free: Flags, executor: Executor
+) -> tuple[NDArray[np.int32], bool]:  # fmt: skip
+    """The corners (K, 3 or 4) of the cells that miss the target; do all of them, however they are measured?
+
+    free: (N,) the nodes that may move, on other processes, too.
+    """
     topology, points, before = state.topology, state.points, state.before
     if points is not state.start or before.inverted:  # the report is of other points, or of more cells
         return corners_missing(points, topology, target), True
@@ -195,7 +201,7 @@ def cells_missing(state: State, target: Target, executor: Executor) -> tuple[NDA
             return corners_missing(points, topology, target), True
         return topology.places[topology.cells[target.missed_in(before)]], False
     rows = rows_missing(points, topology, target, state.shapes if len(state.shapes) else None)
-    corners = topology.near.take(rows, axis=0)
+    corners = topology.near.take(_with_free(rows, topology, free), axis=0)
     clear = topology.near_shapes is not None or target.clearly_missed(points, topology.simplices.take(rows))
     if executor.minimum(float(clear)):
         return corners, True
@@ -211,7 +217,7 @@ def _changeable_missing(
     points: Floats, topology: Topology | Volume, patch: Topology | Volume, target: Target
 ) -> NDArray[np.int32]:
     """The corners of the cells in the patch that miss the target and have a node that is free in the whole mesh."""
-    return _changeable(corners_missing(points, patch, target), topology)
+    return _changeable(corners_missing(points, patch, target, topology.near_free), topology)
 
 
 def too_large(rings: int, active: Flags, left: float, free: int) -> bool:
@@ -235,8 +241,25 @@ def rows_missing(
     return rows
 
 
-def corners_missing(points: Floats, topology: Topology | Volume, target: Target) -> NDArray[np.int32]:
-    """The corners (K, 3 or 4) of these."""
+def corners_missing(
+    points: Floats, topology: Topology | Volume, target: Target, free: Flags | None = None
+) -> NDArray[np.int32]:  # fmt: skip
+    """The corners (K, 3 or 4) of these. free: (N,) the nodes that may move; those of the topology."""
     if isinstance(topology, Volume):
         return topology.near.take(target.tetrahedra_missing(points, topology.simplices)[0], axis=0)
-    return topology.near.take(rows_missing(points, topology, target), axis=0)
+    rows = rows_missing(points, topology, target)
+    return topology.near.take(_with_free(rows, topology, topology.near_free if free is None else free), axis=0)
+
+
+def _with_free(
+    rows: NDArray[np.integer[Any]], topology: Topology, free: Flags
+) -> NDArray[np.integer[Any]]:  # fmt: skip
+    """The rows, of quads in space others of the same cell where these have no free node: all four give its normal."""
+    if not isinstance(topology, Shell) or topology.near_cells is None:
+        return rows
+    able: Flags = np.asarray(free[topology.near].any(axis=1))
+    some = np.flatnonzero(able)[::-1]
+    one = np.full(int(topology.near_cells.max(initial=-1)) + 1, -1)
+    one[topology.near_cells[some]] = some
+    other = one[topology.near_cells[rows]]
+    return np.where(able[rows] | (other < 0), rows, other)
