@@ -59,3 +59,19 @@ def test_the_same_bits_for_any_number_of_threads():
     mesh = ball(6000, seed=3)
     one, two = (gmsnet.smooth(mesh, threads=threads, target_quality=0.75).points for threads in (1, 2))
     assert np.array_equal(one, two)
+
+
+def test_a_quad_with_one_free_node_opposite_to_its_worst_corner_is_not_held():
+    """All four of its nodes give its normal, and so the 1/q of each corner."""
+    grid = generate.structured_mesh(3)
+    points = np.column_stack([grid.points[:, :2], np.zeros(16)])
+    points[0] += (0.1, 0.1, 0.05)  # a corner of the sheet, whose quad opens wide there
+    points[5, 2] = 0.12
+    mesh = gmsnet.Mesh(points, grid.cells)
+    before = gmsnet.quality(mesh).shape
+    least = float(before.min())
+    assert before.argmin() == 0
+    result = gmsnet.smooth(mesh, target_quality=least + 0.002)
+    assert result.stop_reason == "target reached"
+    assert result.after.shape.min() >= least + 0.002
+    assert not result.moved[result.held["boundary"]].any()
