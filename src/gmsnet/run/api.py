@@ -66,7 +66,8 @@ def smooth(
     mesh: (points, cells) arrays, a dict of arrays, a Mesh, or an object of meshio, meshlane, PyVista, scikit-fem,
     Matplotlib or SciPy; it is not changed. method: a name
     in METHODS. variant, objective: names out of the method's own lists (default: their first). max_sweeps: at most
-    so many sweeps; in most, each node is visited once, in those of ``worst-first`` some nodes are often. threads:
+    so many sweeps (as many again for second-order cells that have missed a target); in most, each node is visited
+    once, in those of ``worst-first`` some nodes are often. threads:
     at most so many (default: the processors at hand); the result is the same bits for any number. target_quality,
     target_angle: the minimum 1/q, in (0, 1], and the minimum angle, in (0, 60] degrees, that every cell is to have:
     only cells that miss it and what is around them are smoothed, until none misses it. target_dihedral: the minimum

@@ -41,21 +41,21 @@ def take_turns(state: State, options: SmoothOptions, executor: Executor) -> Stat
     if not options.target or best.cut_short or not most[MISSING] or np.count_nonzero(given.free) > SMALL:
         return best
     # What a target asks of few cells may end where curved cells are in the way: once more for the shape of all.
-    other, worth = _turns(replace(state, history=best.history), options, executor, for_all=True)
+    used = best.history[-1].index if best.history else 0
+    asked = replace(options.without_target, max_sweeps=options.max_sweeps + used)
+    other, _ = _turns(replace(state, history=best.history), asked, executor)
+    worth = _worth(other, options, executor)
     much = min(-most[MISSING] / 2, SOME * len(given.cells))
     if worth[:MISSING] >= most[:MISSING] and worth[MISSING] - most[MISSING] >= much:
         return other
     return best.ended_as(other)
 
 
-def _turns(
-    state: State, options: SmoothOptions, executor: Executor, *, for_all: bool = False
-) -> tuple[State, tuple[float, ...]]:
-    """The best mesh of the turns, and its worth. for_all: the turns are as without the target."""
+def _turns(state: State, options: SmoothOptions, executor: Executor) -> tuple[State, tuple[float, ...]]:
+    """The best mesh of the turns, and its worth."""
     best, most, idle = state, _worth(state, options, executor), 0
-    asked = options.without_target if for_all else options
     for turn in range(TURNS):
-        state = carry_out_all(state, asked, executor, TURN)
+        state = carry_out_all(state, options, executor, TURN)
         worth = _worth(state, options, executor)
         gained = max(new - old for new, old in zip(worth, most, strict=True))
         idle = 0 if gained >= GAIN else idle + 1
