@@ -132,7 +132,9 @@ def _shared(
     notes += remarks(part, counts, options) if found is None or found.remarks is None else found.remarks
     if intent.beside is not None and part.comm.allreduce(bool(moved.any()), mpi().LOR):
         notes += intent.beside.note(part.points, state.points)
-    notes += judged.note(before, after, "η" if part.mesh.has_volumes else "1/q")
+    symbol = "η" if part.mesh.has_volumes else "1/q"
+    notes += judged.note(before, after, symbol)
+    notes += [] if options.target else judged.price(symbol)
     notes += large_angles(greatest, missed, options)
     return RankResult(
         points=points[at],

@@ -32,12 +32,24 @@ class Judged(NamedTuple):
             rows.append(f"q-hat {_change(first.qhat, last.qhat)}")
         return [f"of the cells with a free node: {', '.join(rows)}; all nodes of a worse cell are held"]
 
+    def price(self, symbol: str) -> list[str]:
+        """A sentence on the mean where that of a valid mesh has fallen by more than DEAR for the least, else none."""
+        first, last = self
+        if first is None or last is None or first.inverted or last.shape_min <= first.shape_min:
+            return []
+        if last.shape_mean > first.shape_mean - DEAR:
+            return []
+        paid = f"the mean {symbol} fell from {first.shape_mean:.4f} to {last.shape_mean:.4f}"
+        gained = f"for the least, {_change(first.shape_min, last.shape_min)}"
+        return [f"{paid} {gained}; with target_quality only cells that miss it, and those around them, are smoothed"]
+
     def summary(self) -> dict[str, Any]:
         """Plain numbers, ready for JSON."""
         return {name: None if totals is None else _plain(totals) for name, totals in self._asdict().items()}
 
 
 UNKNOWN = Judged(None, None)
+DEAR = 0.02
 ROUNDING = 1e-9  # in a 1/q: so far two ways to measure it may be apart
 
 

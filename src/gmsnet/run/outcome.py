@@ -166,6 +166,8 @@ def _notes(state: State, options: SmoothOptions) -> list[str]:
     if state.final is not None:
         _, _, after, compared = state.final
         held = compared.note(state.before.totals, after.totals, after.symbol)
+        other = state.motion is not None or state.metric is not None or (given is not None and given.invalid[0])
+        held += [] if options.target or other else compared.price(after.symbol)
     return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks, *held, *of_order]
 
 
