@@ -72,3 +72,23 @@ def test_files_of_few_digits(method):
         exact = gmsnet.smooth(replace(mesh, rounding=None), method, threads=1, guard="star")
         found = compared(mesh, 3, method=method, guard="star")
         assert (found.points != exact.points).any()
+
+
+@pytest.mark.parametrize("fix_layers", [False, True])
+def test_layers_are_told_as_they_are_once_cells_are_mended(fix_layers):
+    """Those of the tangled input are none, or others."""
+    mesh = gmsnet.generate.layered_mesh(8, 100, 40, cells="quad", body="circle")
+    free = np.setdiff1d(np.arange(len(mesh.points)), gmsnet.smooth(mesh, max_sweeps=0).held["boundary"])
+    tangled = gmsnet.generate.disturb(mesh, free, 1.0, seed=1, keep_valid=False)
+    found = compared(tangled, fix_layers=fix_layers)
+    assert found.before.inverted > 0
+    assert "mended" in " ".join(found.notes)
+
+
+def test_layers_in_space_are_told_as_they_are_once_cells_are_mended():
+    mesh = gmsnet.generate.layered_volume(6, 4, seed=1)
+    inner = ((mesh.points > mesh.points.min(axis=0)) & (mesh.points < mesh.points.max(axis=0))).all(axis=1)
+    low = np.flatnonzero(inner)
+    thrown = low[np.argsort(mesh.points[low, 2])[-len(low) // 4 :]]
+    found = compared(gmsnet.generate.disturb(mesh, thrown, 1.0, seed=2, keep_valid=False))
+    assert found.before.inverted > 0

@@ -30,7 +30,8 @@ from gmsnet.run.outcome import result_of, write_back
 from gmsnet.run.set_up import first_state
 from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.state import State
-from gmsnet.topology.ordering import near_points
+from gmsnet.run.untangle_stage import protect_untangled
+from gmsnet.topology.ordering import near_points, taken
 
 Floats = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ def follow(comm: Any = None) -> None:
         with contextlib.suppress(GmsnetError):  # the first rank raises it, too, and says it
             found = smoothed(piece, options, comm)
             if found.gathered == "" or found.interrupted:
-                comm.gather(found.points)
+                comm.gather((found.points, found.mended))
 
 
 class _Together(contextlib.AbstractContextManager["_Together"]):
@@ -84,9 +85,13 @@ def smooth_from_first(mesh: Mesh, options: SmoothOptions, fixed: Any = None, com
         found = smoothed(comm.scatter(pieces), options, comm, whole)
         if found.whole is not None and not found.interrupted:
             return found.whole
-        for piece, places in zip(pieces, comm.gather(found.points), strict=True):
-            points[piece.ids] = places
-    done = partial(_as_a_state, mesh, points, fixed, options, found)
+        came = comm.gather((found.points, found.mended))
+    mended = None if found.mended is None else np.empty((len(points), found.mended.shape[1]))
+    for piece, (places, near) in zip(pieces, came, strict=True):
+        points[piece.ids] = places
+        if mended is not None:
+            mended[piece.ids] = near
+    done = partial(_as_a_state, mesh, points, mended, fixed, options, found)
     return ended(done, lambda state: result_of(state, options, began))
 
 
@@ -106,9 +111,14 @@ def measure_file_from_first(task: QualityTask, comm: Any = None) -> Overview:
         return measure_file(task, comm)
 
 
-def _as_a_state(mesh: Mesh, points: Floats, fixed: Any, options: SmoothOptions, found: RankResult) -> State:
-    """The end of a serial run that came to the same points (N, dim)."""
+def _as_a_state(
+    mesh: Mesh, points: Floats, mended: Floats | None, fixed: Any, options: SmoothOptions, found: RankResult
+) -> State:  # fmt: skip
+    """The end of a serial run that came to the same points (N, dim). mended: those after untangling, by ids."""
     state = first_state(mesh, fixed, options.smoother(), options, serial)
+    if mended is not None:
+        state = replace(state, points=taken(mended, state.topology.memory), untangling=found.untangling)
+        state = protect_untangled(state, options, serial)
     near = near_points(mesh.with_points(points).in_frame_of(mesh), state.topology)
     interruption = KeyboardInterrupt() if found.interrupted else None
     state = replace(

@@ -156,6 +156,7 @@ def _shared(
         missed=missed,
         judged=judged,
         untangling=untangling,
+        mended=None if done is None else done.points[part.topology.places[at]],
         released=state.released,
         worst=worst,
     )
