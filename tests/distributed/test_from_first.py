@@ -14,6 +14,7 @@ from gmsnet.mesh.rounding import Rounding
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
 from support.ranks import from_first
+from support.surface_meshes import ball
 
 from gmsnet.run.options import SmoothOptions
 
@@ -92,3 +93,19 @@ def test_layers_in_space_are_told_as_they_are_once_cells_are_mended():
     thrown = low[np.argsort(mesh.points[low, 2])[-len(low) // 4 :]]
     found = compared(gmsnet.generate.disturb(mesh, thrown, 1.0, seed=2, keep_valid=False))
     assert found.before.inverted > 0
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_how_far_nodes_of_a_surface_are_from_it_is_told_alike(seed):
+    """From the facets that the sweeps have followed them on, which need not be the nearest ones now."""
+    found = compared(ball(60, seed=seed), ranks=3, hausdorff=0.001)
+    assert any("of an edge from the input's facets" in note for note in found.notes)
+
+
+def test_nodes_without_cells_stay_where_they_are():
+    mesh = gmsnet.random_mesh(80, seed=3)
+    points = np.vstack([mesh.points[:40], [[5.0, 5.0]], mesh.points[40:]])
+    block = mesh.cells[0]
+    nodes = block.nodes + (block.nodes >= 40)
+    found = compared(gmsnet.Mesh(points, (gmsnet.CellBlock("triangle", nodes, block.regions),)))
+    assert found.points[40].tolist() == [5.0, 5.0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from types import TracebackType
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.distributed.along import put_on
 from gmsnet.distributed.file_run import FileTask, QualityTask, measure_file, smooth_file
 from gmsnet.distributed.gathered import Whole
 from gmsnet.distributed.library import mpi
@@ -34,6 +36,7 @@ from gmsnet.run.untangle_stage import protect_untangled
 from gmsnet.topology.ordering import near_points, taken
 
 Floats = NDArray[np.float64]
+Ids = NDArray[np.int64]
 
 
 def follow(comm: Any = None) -> None:
@@ -48,7 +51,7 @@ def follow(comm: Any = None) -> None:
         with contextlib.suppress(GmsnetError):  # the first rank raises it, too, and says it
             found = smoothed(piece, options, comm)
             if found.gathered == "" or found.interrupted:
-                comm.gather((found.points, found.mended))
+                comm.gather((found.points, found.mended, found.where))
 
 
 class _Together(contextlib.AbstractContextManager["_Together"]):
@@ -78,20 +81,16 @@ def smooth_from_first(mesh: Mesh, options: SmoothOptions, fixed: Any = None, com
     began, comm = time.perf_counter(), mpi().COMM_WORLD if comm is None else comm
     chosen = fixed_mask(mesh, fixed)
     pieces = pieces_of(mesh, chosen, partition(mesh, comm.size), comm.size)
-    points = mesh.points.copy()
     with _TOGETHER:
         comm.bcast(replace(options, callback=None))
         whole = Whole(mesh, np.arange(len(mesh.points)), chosen)
         found = smoothed(comm.scatter(pieces), options, comm, whole)
         if found.whole is not None and not found.interrupted:
             return found.whole
-        came = comm.gather((found.points, found.mended))
-    mended = None if found.mended is None else np.empty((len(points), found.mended.shape[1]))
-    for piece, (places, near) in zip(pieces, came, strict=True):
-        points[piece.ids] = places
-        if mended is not None:
-            mended[piece.ids] = near
-    done = partial(_as_a_state, mesh, points, mended, fixed, options, found)
+        points, mended, where = zip(*comm.gather((found.points, found.mended, found.where)), strict=True)
+    together = partial(_put_together, [piece.ids for piece in pieces], len(mesh.points))
+    found = replace(found, mended=together(mended), where=together(where))
+    done = partial(_as_a_state, mesh, together(points, mesh.points), found, fixed, options)
     return ended(done, lambda state: result_of(state, options, began))
 
 
@@ -111,13 +110,26 @@ def measure_file_from_first(task: QualityTask, comm: Any = None) -> Overview:
         return measure_file(task, comm)
 
 
-def _as_a_state(
-    mesh: Mesh, points: Floats, mended: Floats | None, fixed: Any, options: SmoothOptions, found: RankResult
-) -> State:  # fmt: skip
-    """The end of a serial run that came to the same points (N, dim). mended: those after untangling, by ids."""
+def _put_together(ids: Sequence[Ids], nodes: int, values: Sequence[Any], others: Floats | None = None) -> Any:
+    """Values at the nodes of pieces as those of the mesh, (N, …) by ids; None if there are none.
+
+    ids: (n,) of each piece. others: (N, …) of nodes without cells, which are in no piece; else they have 0.
+    """
+    if values[0] is None:
+        return None
+    found = np.zeros((nodes, *values[0].shape[1:])) if others is None else others.copy()
+    for places, each in zip(ids, values, strict=True):
+        found[places] = each
+    return found
+
+
+def _as_a_state(mesh: Mesh, points: Floats, found: RankResult, fixed: Any, options: SmoothOptions) -> State:
+    """The end of a serial run that came to the same points (N, dim). found: with what is by node by ids of the mesh."""
     state = first_state(mesh, fixed, options.smoother(), options, serial)
-    if mended is not None:
-        state = replace(state, points=taken(mended, state.topology.memory), untangling=found.untangling)
+    if found.where is not None and state.constraint is not None:
+        put_on(state.constraint, found.where[state.topology.memory])
+    if found.mended is not None:
+        state = replace(state, points=taken(found.mended, state.topology.memory), untangling=found.untangling)
         state = protect_untangled(state, options, serial)
     near = near_points(mesh.with_points(points).in_frame_of(mesh), state.topology)
     interruption = KeyboardInterrupt() if found.interrupted else None

@@ -26,8 +26,9 @@ class RankResult:
     seconds: for the whole call. messages, bytes: that this rank sent after colours. interrupted: this is the best mesh
     so far. missed: how many cells miss the target, None without one. judged: as of a SmoothResult. untangling: those of
     the notes that are of it. mended: (n, 2) or (n, 4) the nodes of the piece after it, as ``near_points``; None where
-    nothing was mended. released: nodes near walls were let go at the end. worst: of the cells that are inverted
-    or miss the target the worst ones, by their numbers in the mesh. whole: the SmoothResult of the first rank, where
+    nothing was mended. where: (n,) where on their curves or facets they are (along.where_on), if any slide. released:
+    nodes near walls were let go at the end. worst: of the cells that are inverted or miss the target the worst ones, by
+    their numbers in the mesh. whole: the SmoothResult of the first rank, where
     that has one.
     """
 
@@ -51,6 +52,7 @@ class RankResult:
     judged: Judged = UNKNOWN
     untangling: tuple[str, ...] = ()
     mended: NDArray[np.float64] | None = field(default=None, repr=False)
+    where: NDArray[np.float64] | None = field(default=None, repr=False)
     released: bool = False
     worst: tuple[Place, ...] = ()
     whole: SmoothResult | None = field(default=None, repr=False)

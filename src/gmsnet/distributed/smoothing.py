@@ -126,8 +126,8 @@ def _shared(
     points, moved, after, missed, greatest, judged, worst = written
     untangling = () if done is None else (done.note,)
     notes = [*intent.notes, *intent.of_walls[state.released :][:1], *untangling]
+    where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
     if found is not None:
-        where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
         notes += found.note(points[at], moved[at], where, options.hausdorff, piece, part.comm)
     notes += remarks(part, counts, options) if found is None or found.remarks is None else found.remarks
     if intent.beside is not None and part.comm.allreduce(bool(moved.any()), mpi().LOR):
@@ -157,6 +157,7 @@ def _shared(
         judged=judged,
         untangling=untangling,
         mended=None if done is None else done.points[part.topology.places[at]],
+        where=where,
         released=state.released,
         worst=worst,
     )
