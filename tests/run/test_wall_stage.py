@@ -162,10 +162,14 @@ def test_sweeps_go_on_elsewhere_where_the_worst_cell_is(monkeypatch):
     assert near.any()
 
 
-@pytest.mark.parametrize("most", [34, 40, 50, 57])
-def test_sweeps_that_end_early_elsewhere_keep_what_is_near_walls(most):
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 1.0])
+def test_sweeps_that_end_early_elsewhere_keep_what_is_near_walls(share):
     mesh = recombine(plate(0.3))
-    first, last = gmsnet.smooth(mesh, max_sweeps=33), gmsnet.smooth(mesh, max_sweeps=most)
+    ends = [sweep.index for sweep in gmsnet.smooth(mesh).history if sweep.stage == PHASE]
+    assert len(ends) == 2 * len(PLAN)
+    once, twice = ends[len(PLAN) - 1], ends[-1]
+    most = once + 1 + int(share * (twice - once - 2))  # from one sweep after the first turn to one before the end
+    first, last = gmsnet.smooth(mesh, max_sweeps=once), gmsnet.smooth(mesh, max_sweeps=most)
     assert [sweep.stage for sweep in first.history].count(PHASE) == len(PLAN)
     assert last.sweeps <= most
     assert last.judged.after.shape_min >= first.judged.after.shape_min
