@@ -18,7 +18,7 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.room_stage import make_room, raise_bounds
 from gmsnet.run.second_order import corners_alone, rank_at, smooth_corners
 from gmsnet.run.state import SecondOrder, State, with_corners
-from gmsnet.run.sweep_stage import SMALL, SOME, rank_to_target
+from gmsnet.run.sweep_stage import SMALL, much_fewer, rank_to_target
 
 TURN = (smooth_corners, make_room, raise_bounds)
 TURNS = 8  # at most
@@ -45,8 +45,8 @@ def take_turns(state: State, options: SmoothOptions, executor: Executor) -> Stat
     asked = replace(options.without_target, max_sweeps=options.max_sweeps + used)
     other, _ = _turns(replace(state, history=best.history), asked, executor)
     worth = _worth(other, options, executor)
-    much = min(-most[MISSING] / 2, SOME * len(given.cells))
-    if worth[:MISSING] >= most[:MISSING] and worth[MISSING] - most[MISSING] >= much:
+    fewer = much_fewer(int(-worth[MISSING]), int(-most[MISSING]), len(given.cells))
+    if worth[:MISSING] >= most[:MISSING] and fewer:
         return other
     return best.ended_as(other)
 

@@ -26,9 +26,7 @@ from gmsnet.topology.volume import Volume
 # Shares of the cells, and cells: of so many that miss a target, one of η or of dihedral angles, all are smoothed.
 MANY, MANY_ANGLES, FEW = 0.15, 0.02, 100
 SOME, FEWER = 0.02, 20  # the same where patches around them come first, and do not bring all to it
-SMALL = (
-    50_000  # free nodes: on meshes of so many, all are smoothed then for any cell, if that is worth it (_is_worth_it)
-)
+SMALL = 50_000  # free nodes: on meshes of so many, all are smoothed then for any cell, if that is worth it
 
 
 def sweep(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -92,8 +90,13 @@ def _is_small(state: State, executor: Executor) -> bool:
 def _is_worth_it(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
     """Have all nodes been moved for much: half of the cells that miss the target elsewhere, or a share of all?"""
     one, two = (rank_to_target(each, options, executor) for each in (state, other))
-    much = min(two.missed / 2, SOME * executor.cell_count(state.topology.changeable))
-    return one.inverted <= two.inverted and two.missed - one.missed >= much
+    cells = executor.cell_count(state.topology.changeable)
+    return one.inverted <= two.inverted and much_fewer(one.missed, two.missed, cells)
+
+
+def much_fewer(missed: int, before: int, cells: int) -> bool:
+    """Is half of the cells that missed a target gone, or a share of all cells?"""
+    return before - missed >= min(before / 2, SOME * cells)
 
 
 def _closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
