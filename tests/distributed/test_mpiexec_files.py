@@ -90,6 +90,16 @@ def test_a_target(folder, quality, code):
     assert ("target not met" in done.stderr) == (code == 1)
     worst = int(serial.after.cell[np.argmin(serial.after.shape)])
     assert (f"\n  cell {worst} at " in done.stderr) == (code == 1)
+    least = float(serial.after.shape.min())
+    gap = f"the minimum shape is {least:.4g}, {float(quality) - least:.4g} below {quality}; {missed:,} cells"
+    assert (gap in done.stderr) == (code == 1)
+
+
+def test_what_is_wrong_with_the_mesh_of_a_file_names_the_file(folder):
+    done = smooth(2, "a.pvtu", "b.pvtu", "--target-dihedral", "10", cwd=folder)
+    assert done.returncode == 2
+    assert done.stderr.startswith("gmsnet: error: a.pvtu: target_dihedral is of tetrahedra")
+    assert not (folder / "b.pvtu").exists()
 
 
 @pytest.mark.parametrize("target", ["a.pvtu", "b.pvtu"])

@@ -13,7 +13,7 @@ from gmsnet.cli.file_work import FileWork
 from gmsnet.cli.fix import chosen, names_markers
 from gmsnet.cli.ranks import rank_of
 from gmsnet.constraints.options import ALL
-from gmsnet.mesh.display import amount, miss_it, visible
+from gmsnet.mesh.display import visible
 from gmsnet.parallel.interrupts import interruptible
 
 if TYPE_CHECKING:
@@ -67,12 +67,9 @@ def smooth_in_pieces(work: FileWork, options: SmoothOptions, format: str, fix: S
         lines = [f"{work.input}: {'; '.join(found.lines())}; {written}"]
         for line in lines if work.number else [*repr(found).splitlines(), written]:
             typer.echo(visible(f"{work.number}{line}"))
-    inverted = 0 if found.after is None else found.after.inverted
-    if inverted:
-        typer.echo(f"gmsnet: {work.number}{amount(inverted, 'cell')} inverted still", err=True)
-    if found.missed:
-        missed = f"target not met: {amount(found.missed, 'cell')} {miss_it(found.missed)}"
-        typer.echo(f"gmsnet: {work.number}{missed}", err=True)
+    faults = found.faults(options.target)
+    for fault in faults:
+        typer.echo(f"gmsnet: {visible(f'{work.number}{fault}')}", err=True)
     for line in found.named():
         typer.echo(f"  {line}", err=True)
-    return 1 if inverted or found.missed else 0
+    return 1 if faults else 0

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from gmsnet.distributed.chosen import Chosen, holding
 from gmsnet.distributed.file_pieces import read_pieces
@@ -16,6 +17,8 @@ from gmsnet.distributed.smoothing import smoothed
 from gmsnet.errors import InputError
 from gmsnet.measure.overview import Overview
 from gmsnet.run.options import SmoothOptions
+
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -42,10 +45,15 @@ class QualityTask:
 def measure_file(task: QualityTask, comm: Any) -> Overview:
     """All ranks call it. Raises InputError, on all ranks alike."""
     given = _read(task, comm)
+    return _named(task.source, lambda: measured(given.piece, comm, task.threshold))
+
+
+def _named(source: str, make: Callable[[], Value]) -> Value:
+    """What is made of the mesh in a file, which an error names."""
     try:
-        return measured(given.piece, comm, task.threshold)
+        return make()
     except InputError as error:
-        raise InputError(f"{task.source}: {error}") from error
+        raise InputError(f"{source}: {error}") from error
 
 
 def _read(task: FileTask | QualityTask, comm: Any) -> Any:
@@ -57,7 +65,8 @@ def smooth_file(task: FileTask, comm: Any) -> RankResult:
     """All ranks call it. The files have the bytes that a serial run writes. Raises InputError, on all ranks alike;
     then nothing is written."""
     given = _read(task, comm)
-    found = smoothed(holding(given.piece, task.chosen, comm), task.options, comm)
+    piece = holding(given.piece, task.chosen, comm)
+    found = _named(task.source, lambda: smoothed(piece, task.options, comm))
     if task.target is not None:
         moved = bool(comm.allreduce(int((found.points != given.piece.points).any())))
         if moved or os.path.abspath(task.source) != os.path.abspath(task.target):

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.measure.judged import UNKNOWN, Judged
+from gmsnet.measure.target import Target
 from gmsnet.measure.totals import Totals
-from gmsnet.measure.worst import Place, named_places
+from gmsnet.measure.worst import Place, named_numbers, named_places
 from gmsnet.mesh.display import amount, miss_it, plain
 from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.sweep import Sweep
@@ -72,6 +73,17 @@ class RankResult:
         if self.missed:
             lines.append(f"target not met: {amount(self.missed, 'cell')} {miss_it(self.missed)}")
         return "\n".join([f"RankResult: {first}", *lines, *self.notes])
+
+    def faults(self, target: Target) -> list[str]:
+        """What was asked for and is not so, in words: cells that miss the target, cells that are inverted still."""
+        found, after = list[str](), self.after
+        if self.missed and after is not None:
+            figures = target.shortfall(after.shape_min, after.low_min, "shape")
+            figures.append(named_numbers([each.cell for each in self.worst], self.missed, miss_it(self.missed)))
+            found.append(f"target not met: {'; '.join(figures)}")
+        if after is not None and after.inverted:
+            found.append(f"inverted still: {amount(after.inverted, 'cell')}")
+        return found
 
     def named(self) -> list[str]:
         """The cells in ``worst``, a line for each."""

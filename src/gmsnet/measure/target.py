@@ -106,6 +106,19 @@ class Target:
         kinds = ((symbol, self.quality, ""), ("angles", self.angle, "°"), ("dihedral angles", self.dihedral, "°"))
         return " and ".join(f"{kind} of {least:g}{unit} or more" for kind, least, unit in kinds if least is not None)
 
+    def shortfall(self, shape: float, angle: float, symbol: str) -> list[str]:
+        """By how much a mesh misses it, in words. shape: its minimum quality, called ``symbol``; angle: its minimum
+        angle, NaN where that is not known."""
+        found = []
+        if self.quality is not None and shape < self.quality:
+            gap = self.quality - shape
+            found.append(f"the minimum {symbol} is {shape:.4g}, {gap:.4g} below {self.quality:g}")
+        least = self.least_angle
+        if least is not None and angle < least:
+            kind = "angle" if self.dihedral is None else "dihedral angle"
+            found.append(f"the minimum {kind} is {angle:.4g}°, {least - angle:.4g}° below {least:g}°")
+        return found
+
     def missed(self, shape: Floats, min_angle: Floats) -> Flags:
         """Which cells miss it, by their 1/q and their smallest angles (of tetrahedra, dihedral ones) in degrees."""
         missed: Flags = np.zeros(len(shape), dtype=bool)

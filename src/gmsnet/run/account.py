@@ -82,14 +82,8 @@ class Account:
     def shortfall(self) -> str:
         """By how much the target is missed, and by which cells."""
         after = self.result.after
-        figures, wanted = [], self.target
-        if wanted.quality is not None and self.least < wanted.quality:
-            gap = wanted.quality - self.least
-            figures.append(f"the minimum {after.symbol} is {self.least:.4g}, {gap:.4g} below {wanted.quality:g}")
-        least, angle = wanted.least_angle, float(after.column(after.angles[0]).min(initial=math.inf))
-        if least is not None and angle < least:
-            kind = "angle" if wanted.dihedral is None else "dihedral angle"
-            figures.append(f"the minimum {kind} is {angle:.4g}°, {least - angle:.4g}° below {least:g}°")
+        angle = float(after.column(after.angles[0]).min(initial=math.inf))
+        figures = self.target.shortfall(self.least, angle, after.symbol)
         cells = self.missed[:NAMED]
         why = self.result.limits.reasons(cells, self.target.shape)
         reasons = "".join(f"\n  cell {after.cell[row]}: {why[row]}" for row in cells.tolist())
