@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.generate import Curve, disturb, good_mesh, recombine
+from gmsnet.generate import Curve, disturb, good_mesh, layered_mesh, recombine
 
 pytest.importorskip("mpi4py", reason="mpi4py is not installed")
 
@@ -55,6 +55,19 @@ def test_turns_are_shared_out(how):
     assert told.gathered == ""
     assert [sweep.stage for sweep in told.history].count(PHASE) == 3 * len(PLAN)
     assert WALL not in told.held
+
+
+@pytest.mark.parametrize("share", [0.02, 0.95])
+@pytest.mark.parametrize("cells", ["triangle", "quad"])
+def test_targets_near_walls_are_reached_alike(cells, share):
+    mesh = layered_mesh(10, 50.0, 49, cells=cells, body="airfoil")
+    free = gmsnet.smooth(mesh, threads=1).judged
+    target = free.before.shape_min + share * (free.after.shape_min - free.before.shape_min)
+    options = SmoothOptions(threads=1, target_quality=target)
+    told = same(mesh, options, parts_at_random(mesh, 3, np.random.default_rng(7), "strips"), 3)
+    assert told.gathered == ""
+    assert told.judged.after.shape_min >= target
+    assert (WALL not in told.held) == (PHASE in [sweep.stage for sweep in told.history])
 
 
 def test_the_nodes_stay_where_the_sweeps_did_not_end_of_themselves():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gmsnet
-from gmsnet.generate import Curve, disturb, good_mesh, recombine
+from gmsnet.generate import Curve, disturb, good_mesh, layered_mesh, recombine
 from gmsnet.methods.banded import PLAN, Kept
 from gmsnet.parallel.threads import serial
 from gmsnet.run import stop, wall_stage
@@ -186,6 +186,42 @@ def test_where_no_sweep_is_left_for_them_nodes_near_walls_are_held():
         assert ("refined near a wall" in result.held) == held
         assert result.sweeps == allowed
         assert result.history[-1].min_shape == pytest.approx(result.judged.after.shape_min) or not held
+
+
+GRIDS = ((10, 50.0, 49, "triangle"), (9, 50.0, 46, "mixed"), (4, 1000.0, 45, "quad"))
+
+
+@pytest.mark.parametrize("share", [0.02, 0.5, 0.95])
+@pytest.mark.parametrize(("rows", "aspect", "around", "cells"), GRIDS)
+def test_a_target_that_defaults_reach_near_walls_is_reached(rows, aspect, around, cells, share):
+    mesh = layered_mesh(rows, aspect, around, cells=cells, body="airfoil")
+    free = gmsnet.smooth(mesh).judged
+    target = free.before.shape_min + share * (free.after.shape_min - free.before.shape_min)
+    result = gmsnet.smooth(mesh, target_quality=target)
+    assert result.judged.after.shape_min >= target
+    released = "refined near a wall" not in result.held
+    assert released == (PHASE in [sweep.stage for sweep in result.history])
+    assert released == (share > 0.9 or cells == "quad" or (cells, share) == ("triangle", 0.5))
+
+
+def test_nodes_near_walls_stand_still_for_a_target_that_their_cells_reach():
+    mesh = plate(0.3)
+    held = first_state(mesh, None, OPTIONS.smoother(), OPTIONS, serial).protection.walls.nodes
+    least = gmsnet.quality(mesh).shape[held[Topology.of(mesh).triangles].any(axis=1)].min()
+    result = gmsnet.smooth(mesh, target_quality=0.9 * least)
+    assert "refined near a wall" in result.held
+    assert not result.moved[held].any()
+
+
+def test_nodes_near_walls_go_back_where_that_is_no_closer_to_the_target(monkeypatch):
+    mesh = layered_mesh(4, 1000.0, 45, cells="quad", body="airfoil")
+    held = first_state(mesh, None, OPTIONS.smoother(), OPTIONS, serial).protection.walls.nodes
+    closer = gmsnet.smooth(mesh, target_quality=0.76)
+    assert closer.moved[held].any()
+    monkeypatch.setattr(wall_stage, "is_closer", lambda *_: False)
+    kept = gmsnet.smooth(mesh, target_quality=0.76)
+    assert not kept.moved[held].any()
+    assert "refined near a wall" in kept.held
 
 
 @pytest.mark.parametrize("radius", [0.15, 0.5])

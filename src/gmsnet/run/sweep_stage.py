@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
 from gmsnet.kernels.star.constraint import locate
@@ -21,7 +22,10 @@ from gmsnet.run.run import Run
 from gmsnet.run.state import State
 from gmsnet.run.stop import NO_PROGRESS
 from gmsnet.run.target_run import reach_target
+from gmsnet.topology.topology import Topology
 from gmsnet.topology.volume import Volume
+
+Floats = NDArray[np.float64]
 
 # Shares of the cells, and cells: of so many that miss a target, one of η or of dihedral angles, all are smoothed.
 MANY, MANY_ANGLES, FEW = 0.15, 0.02, 100
@@ -39,7 +43,7 @@ def _to_target(state: State, options: SmoothOptions, executor: Executor) -> Stat
     large = (MANY if options.target.dihedral is None else MANY_ANGLES, FEW)
     if isinstance(state.topology, Volume) and _miss_it(state, options, executor, *large):
         first = _at_large(state, options, executor)
-        if first.stop_reason != NO_PROGRESS or _closer(first, state, options, executor):
+        if first.stop_reason != NO_PROGRESS or is_closer(first, state, options, executor):
             return first
         second = reach_target(state, options, executor)
         return _closer_one(second, first, options, executor)
@@ -72,7 +76,7 @@ def _differ(state: State, other: State, executor: Executor) -> bool:
 
 def _closer_one(state: State, other: State, options: SmoothOptions, executor: Executor) -> State:
     """The one that is closer to the target, the other one if neither is; ended from outside if the first one is."""
-    return state if _closer(state, other, options, executor) else _back_to(other, state)
+    return state if is_closer(state, other, options, executor) else _back_to(other, state)
 
 
 def _back_to(state: State, later: State) -> State:
@@ -99,7 +103,7 @@ def much_fewer(missed: int, before: int, cells: int) -> bool:
     return before - missed >= min(before / 2, SOME * cells)
 
 
-def _closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
+def is_closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
     """Is a state closer to the target than another one?"""
     return rank_to_target(state, options, executor) < rank_to_target(other, options, executor)
 
@@ -109,16 +113,16 @@ def _miss_it(state: State, options: SmoothOptions, executor: Executor, share: fl
     if not isinstance(state.smoother, Auto) or not executor.total(np.array(len(state.topology.free))):
         return False
     count = executor.cell_count(state.topology.changeable)
-    return _missing(state, options, executor) > max(share * count, few)
+    return missing_in(state.topology, state.points, options, executor) > max(share * count, few)
 
 
-def _missing(state: State, options: SmoothOptions, executor: Executor) -> int:
-    """How many of the cells that can change miss the target."""
-    cells, target = state.topology.changeable, options.target
+def missing_in(topology: Topology | Volume, points: Floats, options: SmoothOptions, executor: Executor) -> int:
+    """How many of the cells that can change miss the target. executor: for this topology."""
+    cells, target = topology.changeable, options.target
     if isinstance(cells, Tetrahedra):
-        rows, _ = target.tetrahedra_missing(state.points, cells)
+        rows, _ = target.tetrahedra_missing(points, cells)
     else:
-        rows = target.corners_missing(state.points, cells)
+        rows = target.corners_missing(points, cells)
     flags = np.zeros(len(cells.rows), dtype=bool)
     flags[rows] = True
     return executor.counted(flags)
@@ -136,7 +140,7 @@ def _at_large(state: State, options: SmoothOptions, executor: Executor) -> State
     if found.stop_reason != NO_PROGRESS or not isinstance(state.topology, Volume):
         return found
     raised = improve_mean(all_of_it, plain, executor)
-    if raised is all_of_it or not _closer(raised, found, options, executor):
+    if raised is all_of_it or not is_closer(raised, found, options, executor):
         return found if raised.interruption is None else found.interrupted(raised.interruption)
     return _closer_one(reach_target(_going_on(raised), options, executor), raised, options, executor)
 
@@ -148,7 +152,8 @@ def _going_on(state: State) -> State:
 
 def rank_to_target(state: State, options: SmoothOptions, executor: Executor) -> Nearness:
     """Of two states that of the lesser rank is closer to the target."""
-    totals, missing = totals_of(state.points, state.topology.scored, executor), _missing(state, options, executor)
+    totals = totals_of(state.points, state.topology.scored, executor)
+    missing = missing_in(state.topology, state.points, options, executor)
     inverted, worst = (0, math.inf) if totals is None else (totals.inverted, totals.shape_min)
     return Nearness.of(inverted, missing, worst, totals)
 

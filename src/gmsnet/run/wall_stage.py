@@ -1,7 +1,8 @@
 """The last stage: near walls that a mesh is refined towards, shapes get better within bands of the areas.
 
 Before it, nodes near walls stand still, and the worst cell may be one of theirs: then sweeps elsewhere end early. Where
-a cell elsewhere is as bad as the worst one there afterwards, sweeps go on, and the stage follows once more.
+a cell elsewhere is as bad as the worst one there afterwards, or any cell misses the target, sweeps go on, and the stage
+follows once more.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run
 from gmsnet.run.state import State
 from gmsnet.run.stop import NO_PROGRESS, NOTHING_TO_MOVE
-from gmsnet.run.sweep_stage import sweep
+from gmsnet.run.sweep_stage import is_closer, missing_in, sweep
 from gmsnet.topology.topology import Topology
 
 RINGS = 3  # around the nodes that were held near walls, which move with them
@@ -54,10 +55,14 @@ def in_turns(state: State, near: Step, elsewhere: Step, options: SmoothOptions, 
     for _ in range(TURNS):
         if not last.released or last.interruption is not None:
             break
-        of_all, now = _leasts(last, executor)
-        if not least + GAIN < now < of_all + AHEAD:
-            break
-        least = now
+        if options.target:
+            if not missing_in(last.planar, last.points, options, executor):
+                break
+        else:
+            of_all, now = _leasts(last, executor)
+            if not least + GAIN < now < of_all + AHEAD:
+                break
+            least = now
         again = replace(last, released=False, totals=None, stop_reason="", smoother=options.smoother())
         swept = elsewhere(again)
         last = near(swept)
@@ -79,20 +84,57 @@ def _leasts(state: State, executor: Executor) -> tuple[float, float]:
 def improve_near_walls(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Moves the nodes that were held near walls, and those around them, where the sweeps have ended of themselves.
 
-    Other nodes stay. Each cell whose corners all were held keeps its area within its band (kernels.methods.bands).
+    Other nodes stay. Each cell whose corners all were held keeps its area within its band (kernels.methods.bands). For
+    a target they move where cells of theirs miss it: those around these cells, or all, if any cell misses it then.
     """
     walls = state.protection.walls
-    if walls is None or options.target or state.stop_reason not in (NO_PROGRESS, NOTHING_TO_MOVE):
+    if walls is None or state.stop_reason not in (NO_PROGRESS, NOTHING_TO_MOVE) or _no_sweep_is_left(state, options):
         return state
-    if state.history and state.history[-1].index >= options.max_sweeps:  # else nodes would be free that none has seen
+    released = replace(state, released=True, totals=None)
+    if not options.target:
+        return _moved(released, walls.nodes, options, executor)
+    missed = _missed(released, options, executor)
+    if not executor.total(np.array(np.count_nonzero(missed))):
         return state
-    state = replace(state, released=True, totals=None)
-    zone = executor.holding(state.planar, ~with_rings(walls.nodes, state.planar, executor), ELSEWHERE)
+    best, least = state, released
+    for nodes in (missed, walls.nodes):
+        found = _moved(released, nodes, options, executor)
+        if is_closer(found, least, options, executor):
+            best = least = found
+        if found.interruption is not None:
+            return best if best is found else best.interrupted(found.interruption)
+        released = replace(released, history=found.history)
+        if not missing_in(released.planar, least.points, options, executor) or _no_sweep_is_left(released, options):
+            break
+    return best
+
+
+def _no_sweep_is_left(state: State, options: SmoothOptions) -> bool:
+    """May nobody see the nodes any more, if they were released?"""
+    return bool(state.history) and state.history[-1].index >= options.max_sweeps
+
+
+def _moved(state: State, nodes: NDArray[np.bool_], options: SmoothOptions, executor: Executor) -> State:
+    """After the sweeps over these nodes (N,) by id, and those around them."""
+    walls = state.protection.walls
+    assert walls is not None
+    zone = executor.holding(state.planar, ~with_rings(nodes, state.planar, executor), ELSEWHERE)
     smoother = Banded(state.start if state.untangled is None else state.untangled, walls.taken(zone.memory))
     smoother.phase = PHASE
     run = Run(state.run_start(options.best_by)._replace(topology=zone), smoother, options, executor.of(zone))
     stop_reason = run.to_the_end(min(run.sweeps + len(PLAN), options.max_sweeps))
     return replace(state, points=run.best, history=tuple(run.history)).ended(stop_reason, run.interruption)
+
+
+def _missed(state: State, options: SmoothOptions, executor: Executor) -> NDArray[np.bool_]:
+    """(N,) by id: the corners of the cells near walls that miss the target, as those have them who move a corner."""
+    topology, walls = state.planar, state.protection.walls
+    assert walls is not None
+    near = executor.holding(topology, ~walls.nodes, ELSEWHERE)
+    rows = near.changeable.rows[options.target.corners_missing(state.points, near.changeable)]
+    found = np.zeros_like(walls.nodes)
+    found[topology.memory[rows]] = True
+    return found
 
 
 def with_rings(nodes: NDArray[np.bool_], topology: Topology, executor: Executor) -> NDArray[np.bool_]:
