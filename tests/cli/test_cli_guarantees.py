@@ -61,7 +61,10 @@ def test_an_angle_can_be_the_target(run, square, tmp_path):
     assert done.code == 1
     assert "below 59.5°" in done.err
     assert "cannot all exceed" in done.err
-    assert run("smooth", square, out, "--target-angle", 61).code == 2
+    more, most = (run("smooth", square, out, "--target-angle", angle) for angle in (61, 90))
+    assert more.code == most.code == 2
+    assert "no triangle has a minimum angle of more than 60°" in more.err
+    assert "must lie in (0, 60], of quads alone in (0, 89]" in most.err
 
 
 @pytest.mark.parametrize(

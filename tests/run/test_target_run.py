@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gmsnet
-from gmsnet.generate import disturb, kershaw_mesh, random_mesh, random_quad_mesh, sheared_mesh
+from gmsnet.generate import disturb, kershaw_mesh, random_mesh, random_quad_mesh, sheared_mesh, structured_mesh
 from gmsnet.kernels.topology.patch import around
 from gmsnet.measure.report import measure
 from gmsnet.measure.target import Target
@@ -315,3 +315,19 @@ def test_a_callback_that_stops_all_cells_stops_the_patches_after_them(look):
     )
     assert len(looks) == look
     assert result.stop_reason == stop.CALLBACK
+
+
+@pytest.mark.parametrize("angle", [50.0, 75.0, 89.0])
+def test_quads_may_be_asked_for_more_than_the_angles_of_triangles(angle):
+    even = structured_mesh(20)
+    quads = disturb(even, Topology.of(even).free, 0.3, seed=0)
+    before = gmsnet.quality(quads)
+    result = gmsnet.smooth(quads, target_angle=angle)
+    assert before.min_angle.min() < angle <= result.after.min_angle.min()
+    assert result.stop_reason == stop.TARGET_REACHED
+
+
+def test_triangles_have_no_such_angle():
+    mesh = random_mesh(100, seed=0)
+    with pytest.raises(gmsnet.InputError, match="no triangle has a minimum angle of more than 60°"):
+        gmsnet.smooth(mesh, target_angle=75.0)

@@ -53,7 +53,10 @@ def smooth(
         ),
     ] = None,
     target_angle: Annotated[
-        float | None, typer.Option(help="The same for the minimum angle of a cell, in degrees, in (0, 60].")
+        float | None,
+        typer.Option(
+            help="The same for the minimum angle of a cell, in degrees, in (0, 60], of quads alone in (0, 89]."
+        ),
     ] = None,
     target_dihedral: Annotated[
         float | None,

@@ -69,10 +69,11 @@ def smooth(
     so many sweeps (as many again for second-order cells that have missed a target); in most, each node is visited
     once, in those of ``worst-first`` some nodes are often. threads:
     at most so many (default: the processors at hand); the result is the same bits for any number. target_quality,
-    target_angle: the minimum 1/q, in (0, 1], and the minimum angle, in (0, 60] degrees, that every cell is to have:
-    only cells that miss it and what is around them are smoothed, until none misses it. target_dihedral: the minimum
-    dihedral angle of tetrahedra, in (0, 70.5] degrees; target_quality is of their η. fixed: nodes to hold besides
-    boundary, interfaces and the like: ids, a mask, a marker's name or a list of names. preserve: "shape" holds the
+    target_angle: the minimum 1/q, in (0, 1], and the minimum angle, in (0, 60] degrees, of quads alone in (0, 89], that
+    every cell is to have: only cells that miss it and what is around them are smoothed, until none misses it.
+    target_dihedral: the minimum dihedral angle of tetrahedra, in (0, 70.5] degrees; target_quality is of their η.
+    fixed: nodes to hold besides boundary, interfaces and the like: ids, a mask, a marker's name or a list of names.
+    preserve: "shape" holds the
     nodes of stretched layers along walls, "size" besides weighs the areas of cells, without a bound, "none" neither;
     "metric" holds nothing, and moves nodes towards a smooth metric that is recovered from the cells as they are;
     "size" and "metric" are of meshes in a plane alone.

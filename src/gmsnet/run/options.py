@@ -24,6 +24,7 @@ from gmsnet.run.metric_options import check_adapting
 from gmsnet.run.sweep import MOST_SWEEPS, Sweep
 
 DEVICES = CPU, CUDA = "cpu", "cuda"
+MOST_ANGLE, MOST_OF_QUADS = 60.0, 89.0  # degrees, of a minimum angle
 MOST_DIHEDRAL = 70.5  # degrees; those of a regular tetrahedron are 70.53
 
 
@@ -72,10 +73,10 @@ class SmoothOptions:
             raise InputError(
                 f"target_quality is the minimum 1/q of a cell and must lie in (0, 1], got {self.target_quality!r}"
             )
-        if self.target_angle is not None and not _is_number(self.target_angle, 60.0):
+        if self.target_angle is not None and not _is_number(self.target_angle, MOST_OF_QUADS):
             raise InputError(
-                "target_angle is the minimum angle of a cell in degrees and must lie in (0, 60], "
-                f"got {self.target_angle!r}"
+                f"target_angle is the minimum angle of a cell in degrees and must lie in (0, {MOST_ANGLE:g}], of quads "
+                f"alone in (0, {MOST_OF_QUADS:g}], got {self.target_angle!r}"
             )
         if self.target_dihedral is not None and not _is_number(self.target_dihedral, MOST_DIHEDRAL):
             raise InputError(

@@ -28,7 +28,7 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.memory import refuse_unless_free
 from gmsnet.preserve.protection import METRIC, NONE, SIZE, Protection, protected, protected_volume
 from gmsnet.run.metric_stage import check_given
-from gmsnet.run.options import SmoothOptions
+from gmsnet.run.options import MOST_ANGLE, SmoothOptions
 from gmsnet.run.remarks import NOT_MEASURED, held_anyway, inside_out_note, repeating, without_effect
 from gmsnet.run.second_order import second_order_of
 from gmsnet.run.second_order_volumes import second_order_solids_of
@@ -227,6 +227,12 @@ def check_target(mesh: Mesh, target: Target) -> None:
     if mesh.has_volumes and target.angle is not None:
         raise InputError(
             "target_angle is of the angles of triangles and quads, and this mesh has volumes: give target_dihedral"
+        )
+    corners = {block.cell.corners for block in mesh.cells if block.dimension == 2 and len(block.nodes)}
+    if 3 in corners and target.angle is not None and target.angle > MOST_ANGLE:
+        raise InputError(
+            f"target_angle: no triangle has a minimum angle of more than {MOST_ANGLE:g}°, and this mesh has some, got "
+            f"{target.angle:g}"
         )
     if mesh.has_volumes and target.dihedral is not None and mesh.has_solids:
         raise InputError(
