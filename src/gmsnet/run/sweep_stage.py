@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.star.constraint import locate
+from gmsnet.kernels.star.constraint import Constraint, locate
 from gmsnet.kernels.star.surface import Surface, locate3
 from gmsnet.measure.target import Nearness
 from gmsnet.measure.totals import totals_of
@@ -40,12 +41,13 @@ def sweep(state: State, options: SmoothOptions, executor: Executor) -> State:
 
 def _to_target(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Patches around the cells that miss the target; before or after them all cells, where these are many."""
+    where = None if state.constraint is None else _places_of(state.constraint).copy()
     large = (MANY if options.target.dihedral is None else MANY_ANGLES, FEW)
     if isinstance(state.topology, Volume) and _miss_it(state, options, executor, *large):
         first = _at_large(state, options, executor)
         if first.stop_reason != NO_PROGRESS or is_closer(first, state, options, executor):
             return first
-        second = reach_target(state, options, executor)
+        second = reach_target(_put_back(state, where), options, executor)
         return _closer_one(second, first, options, executor)
     first = reach_target(state, options, executor)
     if first.stop_reason != NO_PROGRESS:
@@ -56,9 +58,20 @@ def _to_target(state: State, options: SmoothOptions, executor: Executor) -> Stat
     found = _all_moved(first, first, many, options, executor)
     if found.stop_reason == NO_PROGRESS and _is_small(state, executor) and _differ(state, first, executor):
         # patches may have led to where sweeps end worse: once more without them, as a method that knows of no sweep
-        again = replace(state, history=found.history, smoother=options.smoother())
-        found = _all_moved(_back_to(again, found), found, many, options, executor)
+        again = replace(state, history=found.history, smoother=options.smoother()).ended_as(found)
+        found = _all_moved(_put_back(again, where), found, many, options, executor)
     return found
+
+
+def _put_back(state: State, where: NDArray[Any] | None) -> State:
+    """The state, its nodes on the facets and curves where they were: of those between two either may be found."""
+    if where is not None and state.constraint is not None:
+        _places_of(state.constraint)[:] = where
+    return state
+
+
+def _places_of(constraint: Constraint | Surface) -> NDArray[Any]:
+    return constraint.place if isinstance(constraint, Surface) else constraint.parameter
 
 
 def _all_moved(start: State, other: State, many: bool, options: SmoothOptions, executor: Executor) -> State:
