@@ -12,6 +12,7 @@ from support.surface_meshes import ball, box, surface_mesh, wavy
 import gmsnet
 from gmsnet.constraints.shell import FEATURE
 from gmsnet.errors import InputError
+from gmsnet.generate import disturb_on, sphere_surface
 from gmsnet.run import outcome
 from gmsnet.run.account import Account
 
@@ -268,3 +269,21 @@ def test_normals_that_become_stale_are_told(suffix, tmp_path):
     found = [note for note in gmsnet.smooth(gmsnet.read(path)).notes if note.startswith("normals")]
     note = f"normals in the file ({said}) stay as they are, though nodes move: update_normals computes them anew"
     assert found == [note] * bool(said)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("nodes", [150, 400])
+def test_quads_of_a_sphere_are_not_pulled_to_the_chords_of_their_halves(nodes, seed):
+    mesh = disturb_on(sphere_surface(nodes, cells="quad"), 0.4, seed=seed).mesh
+    result = gmsnet.smooth(mesh)
+    assert result.judged.after.shape_min > 0.85
+    away = np.abs(np.linalg.norm(result.points, axis=1) / np.linalg.norm(mesh.points, axis=1).mean() - 1.0)
+    assert away.mean() < 0.003
+    halves = mesh.cells[0].nodes[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    even = np.abs(volume(sphere_surface(nodes, cells="quad").mesh.points, halves))
+    assert abs(abs(volume(result.points, halves)) / even - 1.0) < 0.01
+
+
+def volume(points, triangles):
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    return (a * np.cross(b, c)).sum() / 6.0

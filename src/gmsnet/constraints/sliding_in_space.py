@@ -65,7 +65,8 @@ class SurfaceSliding:
         nodes = np.zeros(len(points), dtype=bool)
         nodes[free] = True
         nodes &= patches.slides | patches.curves.slides
-        limit = np.maximum(_room(facets, points, mesh, tolerance), 0.0) if tolerance < math.inf else None
+        # What quadrilaterals are warped by is not taken off: nodes would go to chords then, and round bodies shrink.
+        limit = tolerance * edge_lengths(facets, points, mesh) if tolerance < math.inf else None
         bound = None
         if hausdorff is not None:
             bound = CLOSER * hausdorff * float(np.linalg.norm(np.ptp(points[facets.rows.ravel()], axis=0)))
@@ -129,8 +130,8 @@ def patches_to_slide_on(
 ) -> tuple[Facets, Patches] | None:  # fmt: skip
     """The boundary of a mesh of volumes and its patches; None where no node is to slide.
 
-    names: as ``check_slide`` gives them. held: (N,) bool. tolerance: as of SurfaceSliding. Nodes stay where it cannot
-    be kept, for quadrilaterals are warped.
+    names: as ``check_slide`` gives them. held: (N,) bool. tolerance: as of SurfaceSliding. Nodes stay where
+    quadrilaterals are warped by more: the diagonals pass each other at a greater distance.
     """
     if names == ():
         return None
@@ -138,11 +139,6 @@ def patches_to_slide_on(
     points = space_points(mesh)[:, :3].copy()
     may = may_slide(mesh, names, held)
     if facets.halves and tolerance < math.inf:
-        may &= _room(facets, points, mesh, tolerance) >= -rounding_of(points, mesh.single)
+        room = tolerance * edge_lengths(facets, points, mesh) + rounding_of(points, mesh.single)
+        may &= diagonals_apart(facets, points) <= room
     return facets, patches_of(facets, points, feature_angle, mesh.single, may)
-
-
-def _room(facets: Facets, points: Floats, mesh: Mesh, tolerance: float) -> Floats:
-    """(N,) how far nodes may go from the facets for the tolerance to be kept by either halving of quadrilaterals."""
-    room: Floats = tolerance * edge_lengths(facets, points, mesh) - diagonals_apart(facets, points)
-    return room
