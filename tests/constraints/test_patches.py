@@ -57,6 +57,17 @@ def test_a_cylinder_with_caps():
     assert counts(patches(points, rows, 95.0)) == (1, 0, len(points), 0)
 
 
+@pytest.mark.parametrize("digits", [17, 9, 7, 6])
+@pytest.mark.parametrize("seed", range(3))
+def test_edges_that_turn_by_just_the_feature_angle_are_features_with_any_digits(digits, seed):
+    """Twelve sides of a cylinder turn by 30°."""
+    points, rows = cylinder(12, 4)
+    points = points @ turned(seed).T
+    points = np.array([float(f"{value:.{digits}g}") for value in points.ravel()]).reshape(points.shape)
+    slides = patches(points, rows).slides
+    assert np.array_equal(slides, patches(*cylinder(12, 4)).slides)
+
+
 def test_a_sphere_is_one_patch():
     points, rows = sphere(400)
     assert counts(patches(points, rows)) == (1, 0, 400, 0)
