@@ -22,8 +22,8 @@ from gmsnet.topology.polygons import Ints
 Floats = NDArray[np.float64]
 
 COLLINEAR = 1e-12  # of a curve's length: nodes this near to the line through its ends are on it, besides rounding
-# Of the cosine of the feature angle: a polygon that turns by just this angle has corners, all of them, as one of twelve edges
-# does by 30°, also where coordinates have six digits. At 30° it is a thousandth of a degree.
+# Of the cosine of the feature angle: a polygon that turns by just this angle has corners, all of them, as one of twelve
+# edges by 30°, also where coordinates have six digits. At 30° it is a thousandth of a degree.
 SLACK = 1e-5
 RUN = 3  # edges: so many on a line, within a curve, are a curve of their own
 

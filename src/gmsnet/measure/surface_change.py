@@ -19,6 +19,8 @@ SAMPLES = 100_000  # of each kind of places on facets, and nodes as they were, a
 # Barycentric coordinates of the places on each facet: its middle, the middles of its edges, and between.
 PLACES = np.array([[2, 2, 2], [3, 3, 0], [0, 3, 3], [3, 0, 3], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
 
+FAR = 0.02  # of the diagonal of the box, or of the volume: of 2,237 coarse surfaces 1.6 % change by more
+
 
 @dataclass(frozen=True)
 class SurfaceChange:
@@ -39,6 +41,11 @@ class SurfaceChange:
     normal: float
     area: float
     volume: float | None
+
+    @property
+    def is_far(self) -> bool:
+        """Is the surface far from what it was, as where nodes have left tight curves, so that facets are chords?"""
+        return self.hausdorff > FAR * self.diagonal or abs(self.volume or 0.0) > FAR
 
     def summary(self) -> dict[str, Any]:
         """As plain values."""

@@ -20,6 +20,9 @@ from gmsnet.run import stop
 from gmsnet.run.result import Result, free_nodes
 from gmsnet.run.sweep import Sweep
 
+FAR = "the shape has changed by more than 2 %: where nodes leave tight curves, facets become chords"
+BOUND = "--hausdorff binds these"
+HELD_THERE = "a smaller --feature-angle, or --fix, holds nodes there"
 UNKNOWN = "not untangled, or untangling was off"
 FOLDED = "it is folded over, and where facets in space fold, their nodes are held as those of a sharp edge"
 NO_AREA = "it has no area, and facets in space are not untangled: two of its corners are at one place, or all in a line"
@@ -179,7 +182,10 @@ class Account:
     def surface(self) -> list[str]:
         """How far the surface has come from the input's, if one has changed."""
         change = self.result.surface_change
-        return [] if change is None else [change.sentence()]
+        if change is None:
+            return []
+        far = f"{FAR}; {HELD_THERE if self.mesh.has_volumes else BOUND}"
+        return [change.sentence(), *[far] * change.is_far]
 
     def reasons(self) -> str:
         """Why nodes are held, with how many of them."""
