@@ -25,6 +25,7 @@ from gmsnet.distributed.gathered import gathered as gathered_whole
 from gmsnet.errors import InputError
 from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.cell_block import CellBlock
+from gmsnet.run.bounded import NOTE
 from gmsnet.run.options import SmoothOptions
 from gmsnet.topology.held import ON_INTERFACE
 
@@ -270,3 +271,13 @@ def test_a_boundary_whose_cells_are_read_otherwise_is_seen_whole(make, seed):
     points[inside] = middle + 3.0 * (points[inside] - middle)
     tangled = mesh.with_points(points)
     same(tangled, slid(max_sweeps=5), cut(tangled, 3, "interleaved", seed), 3)
+
+
+@pytest.mark.parametrize("how", ["strips", "interleaved", "lonely"])
+def test_surfaces_that_are_smoothed_once_more_with_a_bound(how):
+    mesh = gmsnet.generate.sphere_surface(100).mesh
+    mesh = mesh.with_points(mesh.points * [2.0, 1.0, 1.0])
+    told = same(mesh, SmoothOptions(threads=1), cut(mesh, how=how), 3)
+    assert told.gathered == ""
+    assert told.bounded
+    assert NOTE in told.notes

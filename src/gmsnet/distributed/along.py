@@ -32,6 +32,7 @@ from gmsnet.measure.worst import Place, places_of, unmet
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.parallel.threads import serial
+from gmsnet.run.bounded import goes_too_far
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import bound_note, compared_of, greatest_angle, ranking
 from gmsnet.run.set_up import first_state
@@ -179,15 +180,22 @@ class Found:
         return found
 
     def note(
-        self, points: Floats, moved: Flags, where: Floats | None, hausdorff: float | None, piece: Piece, comm: Any
-    ) -> list[str]:
-        """What to say of nodes that have slid. points, moved: of the piece; where: (n,) likewise, see ``where_on``.
-        hausdorff: that was asked for. All ranks call it."""
+        self,
+        points: Floats,
+        moved: Flags,
+        where: Floats | None,
+        options: SmoothOptions,
+        stop_reason: str,
+        piece: Piece,
+        comm: Any,
+    ) -> tuple[list[str], bool]:
+        """What to say of nodes that have slid; is the mesh to be smoothed once more (run/bounded.py)? points, moved: of
+        the piece; where: (n,) likewise, see ``where_on``. stop_reason: of the run. All ranks call it."""
         chosen = np.isin(piece.ids, self.along.ids)  # no other node of the boundary moves
         on = np.zeros(len(points)) if where is None else where
-        parcels, said = comm.gather((piece.ids[chosen], points[chosen], moved[chosen], on[chosen])), None
+        parcels, told = comm.gather((piece.ids[chosen], points[chosen], moved[chosen], on[chosen])), None
         if parcels is not None and self.whole is not None and self.base is not None:
-            said = []
+            told = list[str](), False
             if isinstance(self.sliding, Sliding | SurfaceSliding):
                 before, count = self.whole.mesh.points, len(self.whole.ids)
                 after, slid, on = before.copy(), np.zeros(count, dtype=bool), np.zeros(count)
@@ -197,8 +205,10 @@ class Found:
                 if self.sliding.constraint is not None:
                     put_on(self.sliding.constraint, on[self.base.memory])
                 compared = compared_of(self.sliding, before, after)
-                said = [self.sliding.note(self.whole.mesh.with_points(after), slid), *bound_note(compared, hausdorff)]
-        found: list[str] = comm.bcast(said)
+                said = [self.sliding.note(self.whole.mesh.with_points(after), slid)]
+                said += bound_note(compared, options.hausdorff)
+                told = said, goes_too_far(options, stop_reason, self.base, compared)
+        found: tuple[list[str], bool] = comm.bcast(told)
         return found
 
 

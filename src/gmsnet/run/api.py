@@ -15,6 +15,7 @@ from gmsnet.mesh.adapters import to_mesh
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import workers
+from gmsnet.run.bounded import bounded, goes_too_far
 from gmsnet.run.call import ended
 from gmsnet.run.options import CUDA, SmoothOptions
 from gmsnet.run.outcome import result_of
@@ -124,7 +125,11 @@ def smooth_with(mesh: Any, options: SmoothOptions, fixed: Any = None) -> SmoothR
             state = carry_out(first_state(mesh, fixed, smoother, options, executor), options, executor)
             return replace(state, remarks=(*state.remarks, *executor.remarks()))
 
-    return ended(work, lambda state: result_of(state, options, began))
+    result = ended(work, lambda state: result_of(state, options, began))
+    if not goes_too_far(options, result.stop_reason, result.topology, result.compared):
+        return result
+    second = smooth_with(mesh, bounded(options), fixed)
+    return replace(second, seconds=result.seconds + second.seconds)
 
 
 def executor_for(options: SmoothOptions) -> AbstractContextManager[Executor]:
