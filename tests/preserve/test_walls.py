@@ -63,7 +63,11 @@ def test_what_becomes_of_the_nodes_near_walls_is_told(ring):
     assert moved.notes == [f"{told} {band} (preserve='shape')"]
     assert WALL not in moved.held
     least = float(moved.before.shape.min())
-    for options in ({"max_sweeps": 1}, {"target_quality": least * 1.01}, {"target_quality": least * 0.9}):
+    missed = gmsnet.smooth(ring, target_quality=least * 1.01)  # by cells near the wall
+    assert missed.notes[:1] == moved.notes
+    assert missed.after.shape.min() >= least * 1.01
+    assert 0 < missed.moved[kept(ring)].sum() < moved.moved[kept(ring)].sum()
+    for options in ({"max_sweeps": 1}, {"target_quality": least * 0.9}):
         held = gmsnet.smooth(ring, **options)
         assert held.notes[:1] == [f"{told} are held in this run (preserve='shape'); preserve='none' lets them move"]
         assert len(held.notes) <= 2

@@ -61,7 +61,7 @@ def test_usable_options_pass(given):
         ("callback", ["x", 3, [print], np.array([0, 1])]),
         ("weights", [3, b"a.safetensors", ["a.safetensors"], {"linear.bias": np.zeros(3)}, True]),
         ("target_dihedral", ["20", True, 0, -1.0, 70.6, float("nan"), [20]]),
-        ("target_angle", ["20", True, 0, -1.0, 60.5, float("nan"), [20]]),
+        ("target_angle", ["20", True, 0, -1.0, 89.5, float("nan"), [20]]),
         ("preserve", ["areas", "", None, True, ["size"]]),
         ("fix_layers", [None, 1, "yes"]),
         ("untangle", [None, 0, "no"]),

@@ -7,7 +7,7 @@ where facets are small none can go as far.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields
 
 from gmsnet.measure.surface_change import FAR, Compared, surface_change
 from gmsnet.run.options import SmoothOptions
@@ -23,6 +23,10 @@ NOTE = (
 )
 
 
+class Bounded(SmoothOptions):
+    """The options of a second run."""
+
+
 def goes_too_far(
     options: SmoothOptions, stop_reason: str, topology: Topology | Volume, compared: Compared | None
 ) -> bool:  # fmt: skip
@@ -36,6 +40,7 @@ def goes_too_far(
     return change is not None and change.hausdorff > FAR * change.diagonal
 
 
-def bounded(options: SmoothOptions) -> SmoothOptions:
+def bounded(options: SmoothOptions) -> Bounded:
     """The options of the second run."""
-    return replace(options, hausdorff=FAR, bounded=True)
+    given = {each.name: getattr(options, each.name) for each in fields(options)}
+    return Bounded(**{**given, "hausdorff": FAR})

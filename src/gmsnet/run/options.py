@@ -62,7 +62,6 @@ class SmoothOptions:
     update_normals: bool = False
     join_regions: bool = False
     device: str = CPU
-    bounded: bool = False  # of a second run, see run/bounded.py
     metric: Any = field(default=None, compare=False)
     size: Any = field(default=None, compare=False)
 
@@ -139,7 +138,6 @@ class SmoothOptions:
         and other objects what they are."""
         given = {each.name: (_told(getattr(self, each.name)), each.default) for each in fields(self)}
         given.pop("callback")
-        given.pop("bounded")
         return {name: value for name, (value, default) in given.items() if value != default}
 
     def smoother(self) -> Smoother:
