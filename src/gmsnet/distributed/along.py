@@ -9,11 +9,13 @@ which side each cell shows.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.rail import Rail, positions_on
 from gmsnet.constraints.shell import FEATURE
 from gmsnet.constraints.sliding import Sliding
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
@@ -27,6 +29,7 @@ from gmsnet.kernels.star.surface import Surface
 from gmsnet.kernels.topology.places import places_in
 from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import measure
+from gmsnet.measure.surface_change import surface_change
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.measure.worst import Place, places_of, unmet
 from gmsnet.mesh.mesh import Mesh
@@ -45,7 +48,6 @@ from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Rail = Constraint | Surface
 
 
 # The totals of a mesh, how many cells miss the target, the greatest angle where that has one, by what it was compared,
@@ -133,16 +135,14 @@ class Along:
 
 def where_on(rail: Rail) -> Floats:
     """(N,) by places in memory, where on it each node is, a parameter, facet or piece; 0 of nodes that are not."""
-    now = rail.parameter if isinstance(rail, Constraint) else rail.place
-    found: Floats = np.where(rail.row >= 0, now[rail.row], 0).astype(np.float64)
+    found: Floats = np.where(rail.row >= 0, positions_on(rail)[rail.row], 0).astype(np.float64)
     return found
 
 
 def put_on(rail: Rail, where: Floats) -> None:
     """Takes note of these (N,)."""
     on = rail.row >= 0
-    now = rail.parameter if isinstance(rail, Constraint) else rail.place
-    now[rail.row[on]] = where[on]
+    positions_on(rail)[rail.row[on]] = where[on]
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,15 +180,9 @@ class Found:
         return found
 
     def note(
-        self,
-        points: Floats,
-        moved: Flags,
-        where: Floats | None,
-        options: SmoothOptions,
-        stop_reason: str,
-        piece: Piece,
-        comm: Any,
-    ) -> tuple[list[str], bool]:
+        self, points: Floats, moved: Flags, where: Floats | None, options: SmoothOptions, stop_reason: str,
+        piece: Piece, comm: Any,
+    ) -> tuple[list[str], bool]:  # fmt: skip
         """What to say of nodes that have slid; is the mesh to be smoothed once more (run/bounded.py)? points, moved: of
         the piece; where: (n,) likewise, see ``where_on``. stop_reason: of the run. All ranks call it."""
         chosen = np.isin(piece.ids, self.along.ids)  # no other node of the boundary moves
@@ -207,7 +201,8 @@ class Found:
                 compared = compared_of(self.sliding, before, after)
                 said = [self.sliding.note(self.whole.mesh.with_points(after), slid)]
                 said += bound_note(compared, options.hausdorff)
-                told = said, goes_too_far(options, stop_reason, self.base, compared)
+                look = partial(surface_change, compared) if compared is not None else lambda: None
+                told = said, goes_too_far(options, stop_reason, self.base, look)
         found: tuple[list[str], bool] = comm.bcast(told)
         return found
 

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.distributed.along import Rail, put_on, where_on
+from gmsnet.constraints.rail import Rail
+from gmsnet.distributed.along import put_on, where_on
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.part import Known, Part, connected
 from gmsnet.distributed.patch_ranks import patch_ranks

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.distributed.along import Along, Rail
+from gmsnet.constraints.rail import Rail
+from gmsnet.distributed.along import Along
 from gmsnet.distributed.ghosts import Surrounded, owners_beside
 from gmsnet.distributed.halo import Halo
 from gmsnet.distributed.library import mpi

@@ -126,7 +126,7 @@ def smooth_with(mesh: Any, options: SmoothOptions, fixed: Any = None) -> SmoothR
             return replace(state, remarks=(*state.remarks, *executor.remarks()))
 
     result = ended(work, lambda state: result_of(state, options, began))
-    if not goes_too_far(options, result.stop_reason, result.topology, result.compared):
+    if not goes_too_far(options, result.stop_reason, result.topology, lambda: result.surface_change):
         return result
     second = smooth_with(mesh, bounded(options), fixed)
     return replace(second, seconds=result.seconds + second.seconds)

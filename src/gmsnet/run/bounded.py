@@ -7,9 +7,10 @@ where facets are small none can go as far.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
 
-from gmsnet.measure.surface_change import FAR, Compared, surface_change
+from gmsnet.measure.surface_change import FAR, SurfaceChange
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.stop import CALLBACK, INTERRUPTED
 from gmsnet.topology.shell import Shell
@@ -28,15 +29,17 @@ class Bounded(SmoothOptions):
 
 
 def goes_too_far(
-    options: SmoothOptions, stop_reason: str, topology: Topology | Volume, compared: Compared | None
+    options: SmoothOptions, stop_reason: str, topology: Topology | Volume, look: Callable[[], SurfaceChange | None]
 ) -> bool:  # fmt: skip
-    """Is the surface to be smoothed once more? stop_reason: of the run; topology: of its mesh."""
+    """Is the surface to be smoothed once more? stop_reason: of the run; topology: of its mesh. look: what has become of
+    the surface, which takes a while.
+    """
     free = options.hausdorff is None and options.geometry is None and not options.target
-    if not free or stop_reason in (CALLBACK, INTERRUPTED) or compared is None or not isinstance(topology, Shell):
+    if not free or stop_reason in (CALLBACK, INTERRUPTED):
         return False
-    if len(compared.before) > SMALL:
+    if not isinstance(topology, Shell) or len(topology.memory) > SMALL:
         return False
-    change = surface_change(compared)
+    change = look()
     return change is not None and change.hausdorff > FAR * change.diagonal
 
 

@@ -10,11 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.rail import relocate
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.star.block import MOVED
-from gmsnet.kernels.star.constraint import Constraint, locate
+from gmsnet.kernels.star.constraint import Constraint
 from gmsnet.kernels.star.guard import LEVELS, Precision
-from gmsnet.kernels.star.surface import Surface, locate3
+from gmsnet.kernels.star.surface import Surface
 from gmsnet.measure.totals import totals_of
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Field, Smoother, Tally
@@ -91,7 +92,7 @@ class Run:
         level = LEVELS.index(options.guard)
         self.field = Field(start.points.copy(), start.topology, start.precision, level, constraint=start.constraint)
         if start.constraint is not None:
-            (locate3 if isinstance(start.constraint, Surface) else locate)(start.constraint, self.field.points)
+            relocate(start.constraint, self.field.points)
         self.fewest: list[int] = []  # cells that missed the target, up to each look
         self.history: list[Sweep] = [*start.history]
         self.sweeps = self.history[-1].index if self.history else 0

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.rail import positions_on, relocate
 from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
-from gmsnet.kernels.star.constraint import Constraint, locate
-from gmsnet.kernels.star.surface import Surface, locate3
 from gmsnet.measure.target import Nearness
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods.auto import Auto
@@ -41,14 +40,14 @@ def sweep(state: State, options: SmoothOptions, executor: Executor) -> State:
 
 def _to_target(state: State, options: SmoothOptions, executor: Executor) -> State:
     """Patches around the cells that miss the target; before or after them all cells, where these are many."""
-    where = None if state.constraint is None else _places_of(state.constraint).copy()
+    where = None if state.constraint is None else positions_on(state.constraint).copy()
     large = (MANY if options.target.dihedral is None else MANY_ANGLES, FEW)
     if isinstance(state.topology, Volume) and _miss_it(state, options, executor, *large):
         first = _at_large(state, options, executor)
-        if first.stop_reason != NO_PROGRESS or is_closer(first, state, options, executor):
+        if first.stop_reason != NO_PROGRESS or _closer(first, state, options, executor):
             return first
         second = reach_target(_put_back(state, where), options, executor)
-        return _closer_one(second, first, options, executor)
+        return closer_one(second, first, options, executor)
     first = reach_target(state, options, executor)
     if first.stop_reason != NO_PROGRESS:
         return first
@@ -66,12 +65,8 @@ def _to_target(state: State, options: SmoothOptions, executor: Executor) -> Stat
 def _put_back(state: State, where: NDArray[Any] | None) -> State:
     """The state, its nodes on the facets and curves where they were: of those between two either may be found."""
     if where is not None and state.constraint is not None:
-        _places_of(state.constraint)[:] = where
+        positions_on(state.constraint)[:] = where
     return state
-
-
-def _places_of(constraint: Constraint | Surface) -> NDArray[Any]:
-    return constraint.place if isinstance(constraint, Surface) else constraint.parameter
 
 
 def _all_moved(start: State, other: State, many: bool, options: SmoothOptions, executor: Executor) -> State:
@@ -79,7 +74,7 @@ def _all_moved(start: State, other: State, many: bool, options: SmoothOptions, e
     later = _at_large(_going_on(start), options, executor)
     if not many and not _is_worth_it(later, other, options, executor):
         return _back_to(other, later)
-    return _closer_one(later, other, options, executor)
+    return closer_one(later, other, options, executor)
 
 
 def _differ(state: State, other: State, executor: Executor) -> bool:
@@ -87,15 +82,15 @@ def _differ(state: State, other: State, executor: Executor) -> bool:
     return bool(executor.total(np.array(np.count_nonzero(state.points != other.points))))
 
 
-def _closer_one(state: State, other: State, options: SmoothOptions, executor: Executor) -> State:
+def closer_one(state: State, other: State, options: SmoothOptions, executor: Executor) -> State:
     """The one that is closer to the target, the other one if neither is; ended from outside if the first one is."""
-    return state if is_closer(state, other, options, executor) else _back_to(other, state)
+    return state if _closer(state, other, options, executor) else _back_to(other, state)
 
 
 def _back_to(state: State, later: State) -> State:
     """The state, ended from outside if a later one was, which is given up."""
     if state.constraint is not None:  # it has followed the nodes of the later one
-        (locate3 if isinstance(state.constraint, Surface) else locate)(state.constraint, state.points)
+        relocate(state.constraint, state.points)
     return state.ended_as(later)
 
 
@@ -116,7 +111,7 @@ def much_fewer(missed: int, before: int, cells: int) -> bool:
     return before - missed >= min(before / 2, SOME * cells)
 
 
-def is_closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
+def _closer(state: State, other: State, options: SmoothOptions, executor: Executor) -> bool:
     """Is a state closer to the target than another one?"""
     return rank_to_target(state, options, executor) < rank_to_target(other, options, executor)
 
@@ -153,9 +148,9 @@ def _at_large(state: State, options: SmoothOptions, executor: Executor) -> State
     if found.stop_reason != NO_PROGRESS or not isinstance(state.topology, Volume):
         return found
     raised = improve_mean(all_of_it, plain, executor)
-    if raised is all_of_it or not is_closer(raised, found, options, executor):
+    if raised is all_of_it or not _closer(raised, found, options, executor):
         return found if raised.interruption is None else found.interrupted(raised.interruption)
-    return _closer_one(reach_target(_going_on(raised), options, executor), raised, options, executor)
+    return closer_one(reach_target(_going_on(raised), options, executor), raised, options, executor)
 
 
 def _going_on(state: State) -> State:

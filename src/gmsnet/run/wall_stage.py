@@ -22,7 +22,7 @@ from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run
 from gmsnet.run.state import State
 from gmsnet.run.stop import NO_PROGRESS, NOTHING_TO_MOVE
-from gmsnet.run.sweep_stage import is_closer, missing_in, sweep
+from gmsnet.run.sweep_stage import closer_one, missing_in, sweep
 from gmsnet.topology.topology import Topology
 
 RINGS = 3  # around the nodes that were held near walls, which move with them
@@ -96,21 +96,18 @@ def improve_near_walls(state: State, options: SmoothOptions, executor: Executor)
     missed = _missed(released, options, executor)
     if not executor.total(np.array(np.count_nonzero(missed))):
         return state
-    best, least = state, released
+    best = last = released
     for nodes in (missed, walls.nodes):
-        found = _moved(released, nodes, options, executor)
-        if is_closer(found, least, options, executor):
-            best = least = found
-        if found.interruption is not None:
-            return best if best is found else best.interrupted(found.interruption)
-        released = replace(released, history=found.history)
-        if not missing_in(released.planar, least.points, options, executor) or _no_sweep_is_left(released, options):
+        last = _moved(replace(released, history=last.history), nodes, options, executor)
+        best = closer_one(last, best, options, executor)
+        reached = not missing_in(best.planar, best.points, options, executor)
+        if reached or best.cut_short or _no_sweep_is_left(last, options):
             break
-    return best
+    return state.ended_as(best) if best.points is released.points else best
 
 
 def _no_sweep_is_left(state: State, options: SmoothOptions) -> bool:
-    """May nobody see the nodes any more, if they were released?"""
+    """Would released nodes be free that no sweep sees any more?"""
     return bool(state.history) and state.history[-1].index >= options.max_sweeps
 
 
