@@ -96,5 +96,7 @@ def test_features_of_parts_are_held_whatever_needles_lie_at_them(name):
 def test_volumes_and_meshes_in_a_plane_have_no_needles():
     for mesh in (generate.random_mesh(30), generate.ball_volume(50).mesh):
         for option in ({"free_needles": True}, {"hausdorff": 0.1}):
-            with pytest.raises(InputError, match="is of surfaces in space"):
+            with pytest.raises(InputError, match=r"is of surfaces in space|is of facets whose nodes move"):
                 gmsnet.smooth(mesh, **option)
+    with pytest.raises(InputError, match="is of surfaces in space"):
+        gmsnet.smooth(generate.ball_volume(50).mesh, free_needles=True, slide=True)

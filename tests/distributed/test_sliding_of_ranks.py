@@ -25,7 +25,6 @@ from gmsnet.distributed.gathered import gathered as gathered_whole
 from gmsnet.errors import InputError
 from gmsnet.measure.report import connectivity_of
 from gmsnet.mesh.cell_block import CellBlock
-from gmsnet.run.bounded import NOTE
 from gmsnet.run.options import SmoothOptions
 from gmsnet.topology.held import ON_INTERFACE
 
@@ -274,10 +273,15 @@ def test_a_boundary_whose_cells_are_read_otherwise_is_seen_whole(make, seed):
 
 
 @pytest.mark.parametrize("how", ["strips", "interleaved", "lonely"])
-def test_surfaces_that_are_smoothed_once_more_with_a_bound(how):
-    mesh = gmsnet.generate.sphere_surface(100).mesh
-    mesh = mesh.with_points(mesh.points * [2.0, 1.0, 1.0])
-    told = same(mesh, SmoothOptions(threads=1), cut(mesh, how=how), 3)
+@pytest.mark.parametrize("kind", ["surface", "volume"])
+def test_facets_at_the_ends_of_ellipsoids_are_bound(kind, how):
+    mesh = gmsnet.generate.sphere_surface(100).mesh if kind == "surface" else gmsnet.generate.ball_volume(150).mesh
+    mesh = mesh.with_points(mesh.points * [3.0, 1.0, 1.0])
+    told = same(mesh, slid(slide=None if kind == "surface" else True), cut(mesh, how=how), 3)
     assert told.gathered == ""
-    assert told.bounded
-    assert NOTE in told.notes
+
+
+def test_facets_of_volumes_are_bound_by_what_is_asked():
+    mesh = gmsnet.generate.ball_volume(150).mesh
+    mesh = mesh.with_points(mesh.points * [3.0, 1.0, 1.0])
+    same(mesh, slid(hausdorff=0.002), cut(mesh, how="interleaved"), 3)

@@ -130,8 +130,8 @@ def smooth(
         float | None,
         typer.Option(
             metavar="X",
-            help="How far facets of surfaces may go from the input's, over the diagonal of the whole: 0.001, say.",
-            show_default="no bound",
+            help="How far facets of surfaces, or of boundaries that slide, may go from the input's, over the diagonal.",
+            show_default="0.02, volumes 0.01",
         ),
     ] = None,
     free_needles: Annotated[

@@ -40,6 +40,12 @@ class Facets:
     closed: bool = True
     halves: int = 0
 
+    def diagonal(self, points: Floats) -> float:
+        """That of the box around all facets; points: (N, 3)."""
+        used = np.zeros(len(points), dtype=bool)
+        used[self.rows] = True
+        return float(np.linalg.norm(np.ptp(points[used], axis=0))) if len(self.rows) else 0.0
+
 
 def boundary_of(mesh: Mesh, wound: Wound | WoundSolids) -> Facets:
     """The boundary of the volumes of a mesh; its quadrilaterals are halved."""

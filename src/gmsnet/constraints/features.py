@@ -62,6 +62,15 @@ class Curves:
         """The nodes of one curve in order."""
         return self.nodes[self.start[curve] : self.start[curve + 1]]
 
+    def curvatures(self, points: Floats) -> Floats:
+        """(N,) those of circles through each inner node and its two neighbours, else 0. points: (N, 3)."""
+        inner, found = np.flatnonzero(np.minimum(self.before, self.after) >= 0), np.zeros(len(points))
+        a, b, c = points[self.before[inner]], points[inner], points[self.after[inner]]
+        sides = lengths_of(b - a) * lengths_of(c - b) * lengths_of(a - c)
+        double = 2.0 * lengths_of(np.cross(b - a, c - b))
+        found[inner] = np.divide(double, sides, out=np.zeros(len(inner)), where=sides > 0.0)
+        return found
+
 
 def curves_of(
     mesh: Mesh, slide: SlideChoice = True, feature_angle: float = FEATURE_ANGLE, held: Flags | None = None,

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.features import COLLINEAR, dot, rounding_of
+from gmsnet.constraints.grid import Grid, no_boxes
 from gmsnet.constraints.on_geometry import PER_EDGE, OnGeometry
 from gmsnet.constraints.outline import Flags, Longs
 from gmsnet.constraints.patches import NOTHING, Patches
 from gmsnet.constraints.smooth_patches import Skin, Vertices, handles, skin_of, summed
 from gmsnet.kernels.star.pieces import NOWHERE
-from gmsnet.kernels.star.surface import CURVE, CURVED, FLAT, LINE, Bound, Surface
+from gmsnet.kernels.star.surface import CURVE, CURVED, FLAT, LINE, Surface
 from gmsnet.kernels.whole import skin as kernels
+from gmsnet.kernels.whole.nearest import Boxes
 from gmsnet.topology.polygons import Ints
 
 Floats = NDArray[np.float64]
+
+
+SAG = 4.0  # of 8
+GROWTH = 8.0
 
 
 class Rows(NamedTuple):
@@ -32,14 +39,14 @@ class Rows(NamedTuple):
 def surface_of(
     patches: Patches, points: Floats, memory: Ints, single: bool, limit: Floats | None = None,
     geometry: OnGeometry | None = None, folds: bool = True,
-    vertices: Vertices | None = None, bound: float | None = None,
+    vertices: Vertices | None = None, bound: float = math.inf,
 ) -> Surface | None:  # fmt: skip
     """The constraint for kernels, with the nodes where they are; None where none slides.
 
     points: (N, 3) by node ids. memory: (N,) node ids in memory order. limit: (N,) how far each may go from the facets
     or edges; None: as far as the cubics are. geometry: the true shape of what is not plane or straight. folds: the
     facets around nodes are listed, so that none turns over. vertices: see ``vertices_of``, where they are known.
-    bound: how far any place on a facet may be.
+    bound: how far any place on a facet may be from them.
     """
     slides = patches.slides | patches.curves.slides
     if not slides.any():
@@ -53,10 +60,8 @@ def surface_of(
     found = [Rows(inner[level], FLAT, number[level], np.zeros(level.sum(), dtype=np.int64))]
     curved = inner[~level]
     kept = np.isin(patches.patch, patches.patch[facet[curved]])
-    sides = None if bound is None else _sides(patches)
-    if sides is not None:
-        kept[sides[sides != NOTHING]] = True
-        kept = np.isin(patches.patch, patches.patch[kept])
+    if bound < math.inf:
+        kept = np.isin(patches.patch, patches.patch[kept | patches.curves.slides[patches.rows].any(axis=1)])
     skin = skin_of(patches, points, kept, vertices) if geometry is None else geometry.skin(patches, points, kept)
     found.append(Rows(curved, CURVED, np.zeros(len(curved), dtype=np.int64), skin.at[curved]))
     lines, line_frame, pieces, before, after = _along_curves(patches, points, len(frame[0]), geometry)
@@ -67,31 +72,50 @@ def surface_of(
     row = np.full(len(points), NOWHERE, dtype=np.int32)
     row[nodes[order]] = np.arange(len(nodes))
     origin, direction, same = (np.concatenate(parts) for parts in zip(frame, line_frame, strict=True))
+    of_row = nodes[order]
+    looked = _looked_at(patches, points, skin, kept, bound)
     return Surface(
         row[memory], kind[order].astype(np.int8), of[order].astype(np.int32), place[order].astype(np.int32),
         origin, direction, same, skin.vertex, skin.facet, pieces, before, after, bool(single),
-        np.full(len(nodes), np.inf) if limit is None else limit[nodes[order]],
+        np.full(len(of_row), np.inf) if limit is None else limit[of_row],
         *_around(patches.rows if folds else patches.rows[:0], patches.unit, row, memory),
-        None if bound is None or sides is None else Bound(bound, _seeds(sides, kept, skin, nodes[order])),
+        looked.bound, looked.at_facet, np.where(kind[order] == FLAT, np.inf, looked.at_node[of_row]),
+        looked.shortest, looked.boxes,
     )  # fmt: skip
 
 
-def _sides(patches: Patches) -> Longs:
-    """(N, 2) for each node that slides along a curve a facet of each of two patches at it, else NOTHING."""
-    found = np.full((len(patches.slides), 2), NOTHING, dtype=np.int64)
-    number, corner = np.nonzero(patches.curves.slides[patches.rows])
-    node = patches.rows[number, corner]
-    found[node, 0] = number
-    other = patches.patch[found[node, 0]] != patches.patch[number]
-    found[node[other], 1] = number[other]
-    return found
+class LookedAt(NamedTuple):
+    """Beyond which squared length of edges facets are looked at: see ``Surface``; at nodes (N,) as they were."""
+
+    bound: float
+    at_facet: Floats
+    at_node: Floats
+    shortest: float
+    boxes: Boxes
 
 
-def _seeds(sides: Longs, kept: Flags, skin: Skin, nodes: Longs) -> Ints:
-    """The same by rows, numbered as the facets of the skin. nodes: (R,) of rows. kept: (F,) facets that it has."""
-    several = len(skin.facet) // max(int(kept.sum()), 1)  # for each of these
-    number = np.append(np.where(kept, several * (np.cumsum(kept) - 1), NOWHERE), NOWHERE)
-    return number[sides[nodes]].astype(np.int32)
+def _looked_at(patches: Patches, points: Floats, skin: Skin, kept: Flags, bound: float) -> LookedAt:
+    """kept: (F,) facets that the skin has, maybe in several parts. bound: how far facets may be from them.
+
+    The chord of length l of a circle of radius r is l²/8r away from it: edges of facets that are shorter are not looked
+    at, for the largest of the curvatures around, and with margin. Where all edges may become GROWTH times as long as
+    the longest of a facet, none is.
+    """
+    of_facet, of_node = np.full(len(kept), np.inf), np.full(len(points), np.inf)
+    if bound < math.inf:
+        curvature, most = patches.curves.curvatures(points), np.zeros(len(kept))
+        kernels.add_curvatures(points, patches.rows, patches.unit, patches.area, patches.beside, curvature)
+        kernels.spread(patches.rows, curvature, most)
+        kernels.spread(patches.rows, curvature, most)
+        for span, each in ((of_facet, most), (of_node, curvature)):
+            np.divide(SAG * bound, each, out=span, where=each > 0.0)
+    several, triangles = len(skin.facet) // max(int(kept.sum()), 1), skin.vertex[skin.facet[:, :3], :3]
+    if kernels.least_growth(points, patches.rows, of_facet) >= GROWTH * GROWTH or not len(triangles):
+        none = np.full(len(triangles), np.inf)
+        return LookedAt(math.inf, none, np.full(len(points), np.inf), math.inf, no_boxes())
+    at_facet = np.repeat(of_facet[kept], several)
+    shortest = float(min(at_facet.min(), of_node.min()))
+    return LookedAt(bound, at_facet, of_node, shortest, Grid(triangles).boxes)
 
 
 def _around(rows: Longs, unit: Floats, row: Ints, memory: Ints) -> tuple[Ints, Ints, Floats]:

@@ -13,6 +13,9 @@ from gmsnet.mesh.mesh import Mesh
 
 FEATURE_ANGLE = 30.0  # degrees
 TOLERANCE = 0.05  # of the edges: how far nodes may go from the facets of the input
+# Of the diagonal of the box around all: how far facets may go from the input's. Cells of round volumes are as good with
+# the lesser bound, and those of surfaces are not.
+APART_IN_VOLUMES, APART_ON_SURFACES = 0.01, 0.02
 
 SlideChoice: TypeAlias = Any  # None, True, False, "all", a marker's name or several: what users give is checked here
 ALL = "all"  # stands for True, as on the command line

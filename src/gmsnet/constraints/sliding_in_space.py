@@ -14,7 +14,7 @@ from gmsnet.constraints.features import may_slide, rounding_of
 from gmsnet.constraints.geometry import Geometry
 from gmsnet.constraints.on_geometry import OnGeometry
 from gmsnet.constraints.on_surface import surface_of
-from gmsnet.constraints.options import FEATURE_ANGLE
+from gmsnet.constraints.options import APART_IN_VOLUMES, APART_ON_SURFACES, FEATURE_ANGLE
 from gmsnet.constraints.outline import Flags
 from gmsnet.constraints.patches import Patches, patches_of
 from gmsnet.constraints.smooth_patches import Vertices
@@ -59,7 +59,7 @@ class SurfaceSliding:
 
         tolerance: how far from the facets nodes may go, over the mean length of their edges. geometry: their
         true shape, which is asked once. vertices: see ``surface_of``. hausdorff: how far facets may go from them, over
-        the diagonal of the box around all.
+        the diagonal of the box around all; None: see constraints.options, and as far as they go with a geometry.
         """
         points = space_points(mesh)[:, :3].copy()
         nodes = np.zeros(len(points), dtype=bool)
@@ -67,9 +67,11 @@ class SurfaceSliding:
         nodes &= patches.slides | patches.curves.slides
         # What quadrilaterals are warped by is not taken off: nodes would go to chords then, and round bodies shrink.
         limit = tolerance * edge_lengths(facets, points, mesh) if tolerance < math.inf else None
-        bound = None
+        bound = math.inf
+        if hausdorff is None and geometry is None:
+            hausdorff = APART_IN_VOLUMES if facets.closed else APART_ON_SURFACES
         if hausdorff is not None:
-            bound = CLOSER * hausdorff * float(np.linalg.norm(np.ptp(points[facets.rows.ravel()], axis=0)))
+            bound = CLOSER * hausdorff * facets.diagonal(points)
             limit = np.minimum(np.inf if limit is None else limit, np.full(len(points), bound))
         on = None if geometry is None else OnGeometry(geometry, facets, mesh.exponent)
         constraint = None
@@ -111,17 +113,20 @@ def enclosed(points: Floats, facets: Facets) -> float:
 
 def sliding_volume(
     mesh: Mesh, wound: Wound | WoundSolids, names: Sequence[str] | None, feature_angle: float, held: Flags | None,
-    tolerance: float, geometry: Geometry | None, threads: int = 1,
+    tolerance: float, geometry: Geometry | None, hausdorff: float | None = None, threads: int = 1,
 ) -> tuple[Volume, SurfaceSliding | None]:  # fmt: skip
     """The connectivity of a mesh of volumes, and what nodes of its boundary slide on; None where no node is to.
 
-    names, held, tolerance: see ``patches_to_slide_on``. geometry: see ``SurfaceSliding.of``.
+    names, held, tolerance: see ``patches_to_slide_on``. geometry, hausdorff: see ``SurfaceSliding.of``.
     """
     surface = patches_to_slide_on(mesh, wound, names, feature_angle, held, tolerance)
     if surface is None:
         return volume_of(wound, None, threads), None
     topology = volume_of(wound, surface[1].slides | surface[1].curves.slides, threads)
-    return topology, SurfaceSliding.of(mesh, *surface, topology.memory, topology.free, tolerance, geometry)
+    sliding = SurfaceSliding.of(
+        mesh, *surface, topology.memory, topology.free, tolerance, geometry, hausdorff=hausdorff
+    )
+    return topology, sliding
 
 
 def patches_to_slide_on(

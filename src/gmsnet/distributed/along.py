@@ -9,7 +9,6 @@ which side each cell shows.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,13 +28,11 @@ from gmsnet.kernels.star.surface import Surface
 from gmsnet.kernels.topology.places import places_in
 from gmsnet.measure.judged import Judged
 from gmsnet.measure.report import measure
-from gmsnet.measure.surface_change import surface_change
 from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.measure.worst import Place, places_of, unmet
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.methods import Smoother
 from gmsnet.parallel.threads import serial
-from gmsnet.run.bounded import goes_too_far
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import bound_note, compared_of, greatest_angle, ranking
 from gmsnet.run.set_up import first_state
@@ -180,16 +177,15 @@ class Found:
         return found
 
     def note(
-        self, points: Floats, moved: Flags, where: Floats | None, options: SmoothOptions, stop_reason: str,
-        piece: Piece, comm: Any,
-    ) -> tuple[list[str], bool]:  # fmt: skip
-        """What to say of nodes that have slid; is the mesh to be smoothed once more (run/bounded.py)? points, moved: of
-        the piece; where: (n,) likewise, see ``where_on``. stop_reason: of the run. All ranks call it."""
+        self, points: Floats, moved: Flags, where: Floats | None, options: SmoothOptions, piece: Piece, comm: Any
+    ) -> list[str]:
+        """What to say of nodes that have slid. points, moved: of the piece; where: (n,) likewise, see ``where_on``. All
+        ranks call it."""
         chosen = np.isin(piece.ids, self.along.ids)  # no other node of the boundary moves
         on = np.zeros(len(points)) if where is None else where
         parcels, told = comm.gather((piece.ids[chosen], points[chosen], moved[chosen], on[chosen])), None
         if parcels is not None and self.whole is not None and self.base is not None:
-            told = list[str](), False
+            told = list[str]()
             if isinstance(self.sliding, Sliding | SurfaceSliding):
                 before, count = self.whole.mesh.points, len(self.whole.ids)
                 after, slid, on = before.copy(), np.zeros(count, dtype=bool), np.zeros(count)
@@ -199,11 +195,9 @@ class Found:
                 if self.sliding.constraint is not None:
                     put_on(self.sliding.constraint, on[self.base.memory])
                 compared = compared_of(self.sliding, before, after)
-                said = [self.sliding.note(self.whole.mesh.with_points(after), slid)]
-                said += bound_note(compared, options.hausdorff)
-                look = partial(surface_change, compared) if compared is not None else lambda: None
-                told = said, goes_too_far(options, stop_reason, self.base, look)
-        found: tuple[list[str], bool] = comm.bcast(told)
+                told = [self.sliding.note(self.whole.mesh.with_points(after), slid)]
+                told += bound_note(compared, options.hausdorff)
+        found: list[str] = comm.bcast(told)
         return found
 
 

@@ -26,7 +26,6 @@ from gmsnet.measure.overview import Overview
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.selection import fixed_mask
 from gmsnet.parallel.threads import serial
-from gmsnet.run.bounded import bounded
 from gmsnet.run.call import ended
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.outcome import result_of, write_back
@@ -91,7 +90,6 @@ def smooth_from_first(mesh: Mesh, options: SmoothOptions, fixed: Any = None, com
         points, mended, where = zip(*comm.gather((found.points, found.mended, found.where)), strict=True)
     together = partial(_put_together, [piece.ids for piece in pieces], len(mesh.points))
     found = replace(found, mended=together(mended), where=together(where))
-    options = bounded(options) if found.bounded else options
     done = partial(_as_a_state, mesh, together(points, mesh.points), found, fixed, options)
     return ended(done, lambda state: result_of(state, options, began))
 

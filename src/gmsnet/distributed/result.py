@@ -30,7 +30,7 @@ class RankResult:
     nothing was mended. where: (n,) where on their curves or facets they are (along.where_on), if any slide. released:
     nodes near walls were let go at the end. worst: of the cells that are inverted or miss the target the worst ones, by
     their numbers in the mesh. whole: the SmoothResult of the first rank, where
-    that has one. bounded: this is of a second run; too_far: there is to be one (run/bounded.py).
+    that has one.
     """
 
     points: NDArray[np.float64]
@@ -57,8 +57,6 @@ class RankResult:
     released: bool = False
     worst: tuple[Place, ...] = ()
     whole: SmoothResult | None = field(default=None, repr=False)
-    bounded: bool = False
-    too_far: bool = False
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers, ready for JSON."""

@@ -101,7 +101,9 @@ def _sliding(
 ) -> tuple[Topology | Volume, Sliding | SurfaceSliding | None]:  # fmt: skip
     if mesh.has_volumes:
         wound = wound_of(mesh, still).bounded_at(outer)
-        return sliding_volume(mesh, wound, names, options.feature_angle, still, options.distance, options.geometry)
+        return sliding_volume(
+            mesh, wound, names, options.feature_angle, still, options.distance, options.geometry, options.hausdorff
+        )
     topology, _, sliding = sliding_in_plane(
         mesh, options.slide, options.feature_angle, still, options.geometry, bounded_at=outer
     )

@@ -37,7 +37,6 @@ from gmsnet.measure.totals import Totals, totals_of
 from gmsnet.measure.worst import Place
 from gmsnet.methods import Smoother
 from gmsnet.methods.base import CELLS
-from gmsnet.run.bounded import bounded
 from gmsnet.run.options import CPU, SmoothOptions
 from gmsnet.run.outcome import factors_of, greatest_angle, large_angles, merit_of
 from gmsnet.run.set_up import check_options, check_target
@@ -60,14 +59,6 @@ def smoothed(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | Non
 
     known: the whole mesh, if the first rank has it anyway.
     """
-    found = _smoothed_once(piece, options, comm, known)
-    if not found.too_far:
-        return found
-    second = _smoothed_once(piece, bounded(options), comm, known)
-    return replace(second, seconds=found.seconds + second.seconds, bounded=True)
-
-
-def _smoothed_once(piece: Piece, options: SmoothOptions, comm: Any, known: Whole | None) -> RankResult:
     began = time.perf_counter()
     lacking = options.update_normals and comm.rank == 0 and known is None
     raise_everywhere(comm, NO_NORMALS if lacking else "")
@@ -136,10 +127,8 @@ def _shared(
     untangling = () if done is None else (done.note,)
     notes = [*intent.notes, *intent.of_walls[state.released :][:1], *untangling]
     where = None if part.rail is None else part.halo.spread(where_on(part.rail))[part.topology.places[at]]
-    too_far = False
     if found is not None:
-        told, too_far = found.note(points[at], moved[at], where, options, state.stop_reason, piece, part.comm)
-        notes += told
+        notes += found.note(points[at], moved[at], where, options, piece, part.comm)
     notes += remarks(part, counts, options) if found is None or found.remarks is None else found.remarks
     if intent.beside is not None and part.comm.allreduce(bool(moved.any()), mpi().LOR):
         notes += intent.beside.note(part.points, state.points)
@@ -171,7 +160,6 @@ def _shared(
         where=where,
         released=state.released,
         worst=worst,
-        too_far=too_far,
     )
 
 

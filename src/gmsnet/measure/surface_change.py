@@ -8,13 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.grid import Grid
 from gmsnet.kernels.whole import extent as extent_kernels
-from gmsnet.kernels.whole import nearest as kernels
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-BOXES, ENTRIES = 16, 16  # of the grid, for each facet, at most
 SAMPLES = 100_000  # of each kind of places on facets, and nodes as they were, at which distances are taken at most
 # Barycentric coordinates of the places on each facet: its middle, the middles of its edges, and between.
 PLACES = np.array([[2, 2, 2], [3, 3, 0], [0, 3, 3], [3, 0, 3], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
@@ -68,37 +67,6 @@ class Compared(NamedTuple):
     rows: Ints
     before: Floats
     after: Floats
-
-
-class Grid:
-    """Facets, in boxes, so that the nearest ones are found. triangles: (T, 3, 3). sums: see ``measure_triangles``."""
-
-    triangles: Floats
-    sums: Any
-
-    def __init__(self, triangles: Floats) -> None:
-        self.triangles = np.ascontiguousarray(triangles)
-        self._low, high, count = np.empty(3), np.empty(3), len(triangles)
-        self.sums = extent_kernels.measure_triangles(self.triangles, self._low, high)
-        extent = high - self._low
-        self._width = max(float(self.sums[extent_kernels.SPAN]) / count, float(extent.max()) * 1e-6) or 1.0
-        while True:
-            self._shape = np.maximum(np.ceil(extent / self._width), 1.0).astype(np.int64)
-            if np.prod(self._shape.astype(float)) <= BOXES * count + 64:
-                entries = kernels.count_entries(self.triangles, self._low, self._width, self._shape)
-                if entries <= ENTRIES * count + 64:
-                    break
-            self._width *= 1.25
-        self._start = np.zeros(int(np.prod(self._shape)) + 2, dtype=np.int64)
-        self._entries = np.empty(entries, dtype=np.int32)
-        kernels.fill(self.triangles, self._low, self._width, self._shape, self._start, self._entries)
-
-    def nearest(self, points: Floats) -> tuple[Floats, Ints]:
-        """The distances of points (P, 3) from the nearest facets, and which these are."""
-        far, which = np.empty(len(points)), np.empty(len(points), dtype=np.int64)
-        grid = self._low, self._width, self._shape, self._start, self._entries
-        kernels.nearest(self.triangles, *grid, np.ascontiguousarray(points), far, which)
-        return far, which
 
 
 def surface_change(compared: Compared) -> SurfaceChange | None:

@@ -191,11 +191,9 @@ class StarSmoother(Smoother):
         return tally
 
     def _stars(self, field: Field) -> Stars:
-        """Those that a sweep visits. At the level STAR, and where facets are bound to the reference, moves are judged
-        star by star anyway."""
-        topology, surface = field.topology, field.constraint
-        bound = isinstance(surface, Surface) and surface.bound is not None
-        if self.in_lanes and isinstance(topology, Shell) and field.level != STAR and not bound:
+        """Those that a sweep visits. At the level STAR moves are judged star by star anyway."""
+        topology = field.topology
+        if self.in_lanes and isinstance(topology, Shell) and field.level != STAR:
             return topology.in_lanes or topology.stars
         return topology.stars
 

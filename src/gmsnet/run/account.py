@@ -21,8 +21,8 @@ from gmsnet.run.result import Result, free_nodes
 from gmsnet.run.sweep import Sweep
 
 FAR = "the shape has changed by more than 2 %: where nodes leave tight curves, facets become chords"
-BOUND = "--hausdorff binds these"
-HELD_THERE = "a smaller --feature-angle, or --fix, holds nodes there"
+BOUND = "a smaller --hausdorff binds these"
+HELD_THERE = ", and a smaller --feature-angle, or --fix, holds nodes there"
 UNKNOWN = "not untangled, or untangling was off"
 FOLDED = "it is folded over, and where facets in space fold, their nodes are held as those of a sharp edge"
 NO_AREA = "it has no area, and facets in space are not untangled: two of its corners are at one place, or all in a line"
@@ -184,7 +184,7 @@ class Account:
         change = self.result.surface_change
         if change is None:
             return []
-        far = f"{FAR}; {HELD_THERE if self.mesh.has_volumes else BOUND}"
+        far = f"{FAR}; {BOUND}{HELD_THERE if self.mesh.has_volumes else ''}"
         return [change.sentence(), *[far] * change.is_far]
 
     def reasons(self) -> str:

@@ -15,7 +15,6 @@ from gmsnet.mesh.adapters import to_mesh
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import workers
-from gmsnet.run.bounded import bounded, goes_too_far
 from gmsnet.run.call import ended
 from gmsnet.run.options import CUDA, SmoothOptions
 from gmsnet.run.outcome import result_of
@@ -88,10 +87,9 @@ def smooth(
     cells move along their curves, boundary nodes of volumes on their surface: None (they stay), True or "all", or names
     of markers whose nodes may. feature_angle: degrees; curves end, and edges of surfaces are sharp, where they turn by
     more. geometry: what to slide on instead of arcs through the input's nodes (docs/sliding.md). surface_tolerance: how
-    far from
-    the input's facets nodes of surfaces may go, over the mean length of their edges (default: 0.05; with a geometry
-    without a bound). hausdorff: how far their facets may go from the input's, over the diagonal of the box around it
-    (default: no bound). free_needles: edges that look sharp only because a facet of a surface is thin are no features.
+    far from the input's facets nodes of surfaces may go, over the mean length of their edges (default: 0.05; with a
+    geometry without a bound). hausdorff: how far facets of surfaces, or of boundaries that slide, may go from the
+    input's, over the diagonal of the box around it (default: 0.02, of volumes 0.01; with a geometry without a bound). free_needles: edges that look sharp only because a facet of a surface is thin are no features.
     update_normals: normals of faces and points, in the data of a surface and in the file that it was read from, are
     computed anew where nodes have moved (docs/surfaces.md).
     join_regions: regions mean nothing, so nodes of interfaces between them may move; those of markers there stay.
@@ -125,11 +123,7 @@ def smooth_with(mesh: Any, options: SmoothOptions, fixed: Any = None) -> SmoothR
             state = carry_out(first_state(mesh, fixed, smoother, options, executor), options, executor)
             return replace(state, remarks=(*state.remarks, *executor.remarks()))
 
-    result = ended(work, lambda state: result_of(state, options, began))
-    if not goes_too_far(options, result.stop_reason, result.topology, lambda: result.surface_change):
-        return result
-    second = smooth_with(mesh, bounded(options), fixed)
-    return replace(second, seconds=result.seconds + second.seconds)
+    return ended(work, lambda state: result_of(state, options, began))
 
 
 def executor_for(options: SmoothOptions) -> AbstractContextManager[Executor]:

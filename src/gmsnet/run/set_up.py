@@ -138,7 +138,7 @@ def _first_of_volume(
     threads = _threads(given, options)
     topology, sliding = sliding_volume(
         given, wound_of(given, still, threads), names, options.feature_angle, still, options.distance,
-        options.geometry, threads,
+        options.geometry, options.hausdorff, threads,
     )  # fmt: skip
     remarks = held_anyway(given, asked, matching, topology, fixed, options.slides)
     remarks += doubled_note(given, topology)
@@ -201,10 +201,13 @@ def check_options(mesh: Mesh, options: SmoothOptions, counts: Mapping[str, int] 
 
 
 def check_surface_options(mesh: Mesh, options: SmoothOptions) -> None:
-    """InputError for options of surfaces where the mesh is none."""
+    """InputError for options of surfaces where the mesh is none, or no node of its boundary slides."""
+    if mesh.has_volumes and options.hausdorff is not None and not options.slides:
+        raise InputError("hausdorff is of facets whose nodes move, and those of the boundary stay: give slide, too")
     if mesh.plane is None and not mesh.has_volumes:
         return
-    for name, given in (("hausdorff", options.hausdorff is not None), ("free_needles", options.free_needles)):
+    bounds = options.hausdorff is not None and not mesh.has_volumes
+    for name, given in (("hausdorff", bounds), ("free_needles", options.free_needles)):
         if given:
             raise InputError(f"{name} is of surfaces in space, and this mesh is none: leave it out")
 

@@ -21,7 +21,6 @@ from gmsnet.mesh.normals import fields_in, normals_in, renewed_mesh
 from gmsnet.methods import Smoother
 from gmsnet.parallel.executor import Executor
 from gmsnet.preserve.protection import Protection
-from gmsnet.run.bounded import NOTE, Bounded
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.state import State
 from gmsnet.run.unfold import unfolded
@@ -72,7 +71,7 @@ def first_of_surface(
             f"{int(torn.sum()):,} nodes of the boundary have another one in their place, to rounding: facets are not "
             "joined there, so these nodes are held. Make equal points one point first, and they can move",
         )
-    remarks += _of_normals(given, options.update_normals) + (NOTE,) * isinstance(options, Bounded)
+    remarks += _of_normals(given, options.update_normals)
     given = given.without_cells()
     before = measure(given, shell, start, executor.for_blocks(0))
     nothing = np.empty(0, dtype=np.float32)

@@ -13,13 +13,14 @@ from gmsnet.constraints.charts import Chart, across_edges, edges_of, normals_of,
 from gmsnet.constraints.facets import Facets, edge_lengths
 from gmsnet.constraints.features import dot
 from gmsnet.constraints.folds import FOLD, Folds
+from gmsnet.constraints.grid import Grid
 from gmsnet.constraints.heights import heights_at, within
 from gmsnet.constraints.options import TOLERANCE
 from gmsnet.constraints.patches import NOTHING, linked
 from gmsnet.kernels.star.chords import CLOSER
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.kernels.topology.sorted_unique import sorted_unique
-from gmsnet.measure.surface_change import Grid, places_on
+from gmsnet.measure.surface_change import places_on
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.run.flat_part import FlatPart
 from gmsnet.run.options import SmoothOptions
@@ -64,7 +65,7 @@ class CurvedParts:
         limit = tolerance * edge_lengths(facets, given, mesh)
         bound = math.inf
         if options.hausdorff is not None:
-            bound = CLOSER * options.hausdorff * float(np.linalg.norm(np.ptp(given[facets.rows.ravel()], axis=0)))
+            bound = CLOSER * options.hausdorff * facets.diagonal(given)
         limit = np.minimum(limit, bound)
         return cls(facets, given, held, uses, limit, bound, precision, options.feature_angle)
 
@@ -173,7 +174,7 @@ class CurvedParts:
         far, which = self.grid.nearest(places[own])
         room = self.limit[part.nodes[own]]
         out = np.flatnonzero(far > room)
-        places[own[out]] = within(places[own[out]], self.grid.triangles[which[out]], room[out])
+        places[own[out]] = within(places[own[out]], self.grid.boxes.triangles[which[out]], room[out])
         bad = touched & ~left & (_turned(part, places, side) | _sharp(rows, places))
         wrong = np.zeros(len(flat), dtype=bool)
         wrong[rows[bad]] = True

@@ -8,6 +8,8 @@ from support.surface_meshes import ball, wavy
 
 import gmsnet
 from gmsnet import generate
+from gmsnet.constraints.geometry import Shapes
+from gmsnet.constraints.shapes import Sphere
 from gmsnet.errors import InputError
 from gmsnet.generate import disturb_on
 
@@ -65,6 +67,53 @@ def test_the_bound_holds_for_any_number_of_threads():
     mesh = ball(6000, seed=3)
     one, two = (gmsnet.smooth(mesh, threads=threads, hausdorff=5e-4).points for threads in (1, 2))
     assert np.array_equal(one, two)
+
+
+def ellipsoid(mesh, length):
+    return mesh.with_points(mesh.points * [length, 1.0, 1.0])
+
+
+@pytest.mark.parametrize(("nodes", "length"), [(100, 2.0), (300, 3.0), (3000, 3.0)])
+def test_the_ends_of_ellipsoids_are_not_cut_off(nodes, length):
+    """Of 300 nodes, three times as long as wide, a tenth of the volume was lost."""
+    mesh = ellipsoid(generate.sphere_surface(nodes).mesh, length)
+    result, free = gmsnet.smooth(mesh), gmsnet.smooth(mesh, hausdorff=1.0)
+    change, unbound = result.surface_change, free.surface_change
+    assert change.hausdorff <= 0.02 * change.diagonal < unbound.hausdorff
+    assert abs(change.volume) < abs(unbound.volume)
+    assert result.after.shape.min() > result.before.shape.min() + 0.2
+
+
+@pytest.mark.parametrize("make", ["ball_volume", "lens"])
+def test_the_ends_of_volumes_are_not_cut_off(make):
+    mesh = (
+        ellipsoid(generate.ball_volume(150).mesh, 3.0)
+        if make == "ball_volume"
+        else ellipsoid(generate.disturb_on(generate.ball_volume(300), 0.3, seed=1).mesh, 2.0)
+    )
+    result, free = (gmsnet.smooth(mesh, slide=True, hausdorff=bound) for bound in (None, 1.0))
+    change, unbound = result.surface_change, free.surface_change
+    assert change.hausdorff <= 0.0105 * change.diagonal < unbound.hausdorff
+    assert abs(change.volume) < abs(unbound.volume)
+    assert result.after.shape.min() > result.before.shape.min()
+
+
+@pytest.mark.parametrize("asked", [0.02, 0.005, 0.002])
+def test_facets_of_volumes_stay_within_what_is_asked(asked):
+    mesh = disturb_on(generate.ball_volume(600), 0.3, seed=3).mesh
+    result = gmsnet.smooth(mesh, slide=True, hausdorff=asked)
+    assert result.moved.any()
+    assert result.surface_change.hausdorff <= 1.05 * asked * result.surface_change.diagonal
+
+
+def test_a_geometry_is_trusted_unless_a_bound_is_asked_for():
+    ball = disturb_on(generate.ball_volume(300), 0.3, seed=3).mesh
+    mesh, exact = ball, Shapes({"sphere": Sphere((0.0, 0.0, 0.0), 0.5)})
+    free, wide, bound = (
+        gmsnet.smooth(mesh, slide=True, geometry=exact, hausdorff=value) for value in (None, 1.0, 0.003)
+    )
+    assert np.array_equal(free.points, wide.points)
+    assert bound.surface_change.hausdorff < free.surface_change.hausdorff
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, 1.5, float("nan"), "0.1"])

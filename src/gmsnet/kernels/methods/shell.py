@@ -157,7 +157,7 @@ def go(points, i, stars, guard, star, n, pattern, floors, reach, dx, dy, dz, val
         after, _ = value_at(star, n, pattern, x, y, z, inverse, doublings)
         falls = after < value
         falls = falls and allowed(star, n, pattern, stars, stars.first[i], floors, guard, reach, x, y, z, was, normal)
-        if falls and near(surface.bound, surface, row, star, n, pattern, place, x, y, z):
+        if falls and near(surface, row, star, n, pattern, place, x, y, z, was):
             points[i, 0], points[i, 1], points[i, 2] = x, y, z
             surface.place[row] = place
             tally[MOVED] += 1
@@ -237,7 +237,7 @@ def go_once(points, i, stars, guard, star, n, pattern, floors, reach, dx, dy, dz
     after, _ = value_at(star, n, pattern, x, y, z, inverse, doublings)
     falls = after < value
     falls = falls and allowed(star, n, pattern, stars, stars.first[i], floors, guard, reach, x, y, z, was, normal)
-    if falls and near(surface.bound, surface, row, star, n, pattern, place, x, y, z):
+    if falls and near(surface, row, star, n, pattern, place, x, y, z, was):
         points[i, 0], points[i, 1], points[i, 2] = x, y, z
         surface.place[row] = place
         tally[MOVED] += 1

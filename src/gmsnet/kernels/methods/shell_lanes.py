@@ -18,6 +18,7 @@ from gmsnet.kernels.jit.compile import LANES, kernel, part
 from gmsnet.kernels.methods.shell import MOST, improve
 from gmsnet.kernels.star.block import MOVED
 from gmsnet.kernels.star.certificate import COARSE, WIDER
+from gmsnet.kernels.star.chords import span_of
 from gmsnet.kernels.star.landing import ask_for_facets, land, landing_place
 from gmsnet.kernels.star.shell import DATA, LEAN, TURN, crossed, square
 from gmsnet.kernels.star.surface import on_curves
@@ -177,12 +178,15 @@ def settle(points, surface, blocks, block, unit, grain, most, centre, inverse, w
         if done[lane] or row < 0 or on_curves(kinds[row]):
             continue
         tx, ty, tz = abs(step[lane]), abs(step[LANES + lane]), abs(step[2 * LANES + lane])
-        m = np.float64(max(wide[lane], max(tx, max(ty, tz))))
+        ring, moves = np.float64(wide[lane]), np.float64(max(tx, max(ty, tz)))
+        m = max(ring, moves)
         reach = max(abs(centre[lane]), max(abs(centre[LANES + lane]), abs(centre[2 * LANES + lane])))
         delta = WIDER * (unit * (reach + m / inverse[lane]) + grain) * inverse[lane]
         doubt = ROUNDING * COARSE * (m * m) + 2.0 * DATA * delta * (m + delta)  # E of spokes up to 2m
         certain = sums[MARGIN * LANES + lane] > WIDER * doubt
         value, after = sums[VALUE * LANES + lane], sums[AFTER * LANES + lane]
+        long = 3.0 * ((ring + moves) / inverse[lane]) ** 2  # the square of a spoke, at most
+        certain = certain and (long <= surface.shortest or long <= span_of(surface, row, place[lane]))
         inside = sums[LEAST * LANES + lane] > 0.0 and sums[LEANS * LANES + lane] > 0.0
         if certain and inside and value < most and after < value:
             x, y, z = target[lane], target[LANES + lane], target[2 * LANES + lane]

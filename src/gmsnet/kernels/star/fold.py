@@ -1,10 +1,11 @@
-"""Whether facets of the boundary of a volume keep their side of the surface that their nodes slide on."""
+"""Whether facets of the boundary of a volume keep their side of the surface that their nodes slide on, and near it."""
 
 from __future__ import annotations
 
 import math
 
 from gmsnet.kernels.jit.compile import inlined, part
+from gmsnet.kernels.star.chords import goes_off
 from gmsnet.kernels.star.cubics import normal_on, walk
 from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.kernels.star.surface import CURVED
@@ -58,11 +59,33 @@ def folds(surface, node, points, place, x, y, z):
 
 
 @part
-def refuse_folds(points, blocks, block, surface, workspace):
-    """Takes back what is allowed of the lanes whose target would turn a facet over."""
+def strays(surface, node, points, place, x, y, z):
+    """Would a facet lie further off the surface than it may if a node went to (x, y, z)? place: as of ``folds``."""
+    if surface is not None and surface.shortest < math.inf:
+        row = surface.row[node]
+        if row >= 0:
+            for e in range(surface.start[row], surface.start[row + 1]):
+                i, j = surface.ring[e, 0], surface.ring[e, 1]
+                if goes_off(
+                    surface, row, place, x, y, z, points[node], points[i, 0], points[i, 1], points[i, 2],
+                    points[j, 0], points[j, 1], points[j, 2],
+                ):  # fmt: skip
+                    return True
+    return False
+
+
+@inlined
+def spoils(surface, node, points, place, x, y, z):
+    """Either of these."""
+    return folds(surface, node, points, place, x, y, z) or strays(surface, node, points, place, x, y, z)
+
+
+@part
+def refuse_spoiling(points, blocks, block, surface, workspace):
+    """Takes back what is allowed of the lanes whose target would spoil the boundary."""
     if surface is not None:
         for lane in range(LANES3):
             if workspace.row[lane] >= 0 and workspace.allowed[lane]:
                 node, target = blocks.centre[block * LANES3 + lane], workspace.target
                 x, y, z = target[4 * lane], target[4 * lane + 1], target[4 * lane + 2]
-                workspace.allowed[lane] = not folds(surface, node, points, workspace.place[lane], x, y, z)
+                workspace.allowed[lane] = not spoils(surface, node, points, workspace.place[lane], x, y, z)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gmsnet.kernels.jit.compile import inlined, part
 from gmsnet.kernels.simplex.orientation3 import largest_component
 from gmsnet.kernels.star.block import DROPPED, MOVED, TRUNCATED
-from gmsnet.kernels.star.fold import folds, refuse_folds
+from gmsnet.kernels.star.fold import refuse_spoiling, spoils
 from gmsnet.kernels.star.guard import WITH_FLOORS
 from gmsnet.kernels.star.guard3 import MIXED_BOUND, WIDER, certified, floor_at, sound
 from gmsnet.kernels.star.slide3 import land3, note_places, on_surface, take_place
@@ -204,7 +204,7 @@ def store3(points, blocks, block, workspace, guard, tally):
     over blocks.
     """
     if len(guard) != WITH_FLOORS:
-        refuse_folds(points, blocks, block, guard.constraint, workspace)
+        refuse_spoiling(points, blocks, block, guard.constraint, workspace)
         look_inside(blocks.mixture, points, blocks, block, workspace, guard)
         note_places(guard.constraint, workspace)
     return commit3(points, blocks.centre, block, blocks.filled[block], workspace, guard, tally)
@@ -254,7 +254,7 @@ def truncate3(points, blocks, block, lane, dx, dy, dz, guard, tally):
             tx, ty, tz = np.float64(np.float32(tx)), np.float64(np.float32(ty)), np.float64(np.float32(tz))
         if tx == x and ty == y and tz == z:
             break
-        if allowed3(points, blocks, block, lane, tx, ty, tz, guard) and not folds(
+        if allowed3(points, blocks, block, lane, tx, ty, tz, guard) and not spoils(
             guard.constraint, i, points, place, tx, ty, tz
         ):
             points[i, 0], points[i, 1], points[i, 2] = tx, ty, tz

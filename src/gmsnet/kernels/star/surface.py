@@ -17,19 +17,10 @@ from numpy.typing import NDArray
 from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.star.cubics import normal_on, over_facet, walk, within
 from gmsnet.kernels.star.pieces import follow_curve, on_piece, piece_tangent
+from gmsnet.kernels.whole.nearest import Boxes
 
 MOST_WALKS = 8  # around a peak, until the first one is come to again
 FLAT, CURVED, LINE, CURVE = range(4)  # kinds of rows; the last two have one way to go
-
-
-class Bound(NamedTuple):
-    """How far places on facets may lie from those of the reference (kernels.star.chords).
-
-    seeds: (R, 2) int32, for each row on a line or curve a facet of each of two patches beside it, else NOWHERE.
-    """
-
-    most: float
-    seeds: NDArray[np.int32]
 
 
 class Surface(NamedTuple):
@@ -43,7 +34,10 @@ class Surface(NamedTuple):
     the rim. Of pieces (P,): piece (P, 4, 3) control points, before, after (P,) int32. single: new coordinates are
     rounded to float32. limit: (R,) how far from the facets, or edges, themselves each row may go. Of facets of a
     volume's boundary around each row (M,), in CSR form by start (R + 1,): ring (M, 2) int32, the other two nodes, seen
-    counter-clockwise from outside; own (M, 3) its unit normal at first.
+    counter-clockwise from outside; own (M, 3) its unit normal at first. bound: how far places on facets may lie from
+    those of the reference, which is looked at where squares of edges are longer than span (F,) where a node is on a
+    curved patch, or row_span (R,) of one on a line or curve (kernels.star.chords); shortest: of these. boxes: with all
+    facets of curved patches, and of patches beside curves.
     """
 
     row: NDArray[np.int32]
@@ -63,7 +57,11 @@ class Surface(NamedTuple):
     start: NDArray[np.int32]
     ring: NDArray[np.int32]
     own: NDArray[np.float64]
-    bound: Bound | None = None
+    bound: float
+    span: NDArray[np.float64]
+    row_span: NDArray[np.float64]
+    shortest: float
+    boxes: Boxes
 
 
 @part

@@ -3,10 +3,24 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
+
+
+class Boxes(NamedTuple):
+    """Triangles (T, 3, 3) in a grid of boxes: its low corner (3,), their width, and how many there are along each axis
+    (3,); the triangles of each in CSR form, with one entry of start more than is needed."""
+
+    triangles: NDArray[np.float64]
+    low: NDArray[np.float64]
+    width: float
+    shape: NDArray[np.int64]
+    start: NDArray[np.int64]
+    entries: NDArray[np.int32]
 
 
 @inlined
@@ -87,37 +101,43 @@ def fill(triangles, low, width, shape, start, entries):
                 start[box] += start[box - 1]
 
 
-@kernel
-def nearest(triangles, low, width, shape, start, entries, points, far, which):
-    """Writes the distance (P,) of points (P, 3) from the nearest triangle and its number, of several the least one.
+@part
+def nearest_one(boxes, x, y, z):
+    """The squared distance of a point from the nearest triangle, and its number, of several the least one.
 
     Boxes are searched in shells around the one of the point, until none further away can hold a nearer triangle.
     """
-    n0, n1, n2 = shape[0], shape[1], shape[2]
+    low, width, start = boxes.low, boxes.width, boxes.start
+    n0, n1, n2 = boxes.shape[0], boxes.shape[1], boxes.shape[2]
+    i0, j0, k0 = box_of(x, low[0], width, n0), box_of(y, low[1], width, n1), box_of(z, low[2], width, n2)
+    best, found, shell = np.inf, -1, 0
+    while True:
+        for i in range(max(i0 - shell, 0), min(i0 + shell, n0 - 1) + 1):
+            for j in range(max(j0 - shell, 0), min(j0 + shell, n1 - 1) + 1):
+                rim = i == i0 - shell or i == i0 + shell or j == j0 - shell or j == j0 + shell
+                for k in range(max(k0 - shell, 0), min(k0 + shell, n2 - 1) + 1):
+                    if not rim and k != k0 - shell and k != k0 + shell:
+                        continue
+                    box = (i * n1 + j) * n2 + k
+                    for e in range(start[box], start[box + 1]):
+                        t = boxes.entries[e]
+                        square = to_triangle(boxes.triangles[t], x, y, z)
+                        if square < best or (square == best and t < found):
+                            best, found = square, t
+        reach = np.inf  # what is not searched lies further away than this
+        for value, at, least, count in ((x, i0, low[0], n0), (y, j0, low[1], n1), (z, k0, low[2], n2)):
+            if at - shell > 0:
+                reach = min(reach, value - (least + (at - shell) * width))
+            if at + shell < count - 1:
+                reach = min(reach, least + (at + shell + 1) * width - value)
+        if reach == np.inf or (reach > 0.0 and best < reach * reach):
+            return best, found
+        shell += 1
+
+
+@kernel
+def nearest(boxes, points, far, which):
+    """Writes the distance (P,) of points (P, 3) from the nearest triangle and its number, of several the least one."""
     for p in range(len(points)):
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        i0, j0, k0 = box_of(x, low[0], width, n0), box_of(y, low[1], width, n1), box_of(z, low[2], width, n2)
-        best, found, shell = np.inf, -1, 0
-        while True:
-            for i in range(max(i0 - shell, 0), min(i0 + shell, n0 - 1) + 1):
-                for j in range(max(j0 - shell, 0), min(j0 + shell, n1 - 1) + 1):
-                    rim = i == i0 - shell or i == i0 + shell or j == j0 - shell or j == j0 + shell
-                    for k in range(max(k0 - shell, 0), min(k0 + shell, n2 - 1) + 1):
-                        if not rim and k != k0 - shell and k != k0 + shell:
-                            continue
-                        box = (i * n1 + j) * n2 + k
-                        for e in range(start[box], start[box + 1]):
-                            t = entries[e]
-                            square = to_triangle(triangles[t], x, y, z)
-                            if square < best or (square == best and t < found):
-                                best, found = square, t
-            reach = np.inf  # what is not searched lies further away than this
-            for value, at, least, count in ((x, i0, low[0], n0), (y, j0, low[1], n1), (z, k0, low[2], n2)):
-                if at - shell > 0:
-                    reach = min(reach, value - (least + (at - shell) * width))
-                if at + shell < count - 1:
-                    reach = min(reach, least + (at + shell + 1) * width - value)
-            if reach == np.inf or (reach > 0.0 and best < reach * reach):
-                break
-            shell += 1
-        far[p], which[p] = math.sqrt(best), found
+        best, which[p] = nearest_one(boxes, points[p, 0], points[p, 1], points[p, 2])
+        far[p] = math.sqrt(best)

@@ -5,6 +5,10 @@ Sums are taken corner after corner: first over the corners 0 of all facets, then
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from gmsnet.kernels.jit.compile import inlined, kernel
 
 
@@ -53,6 +57,56 @@ def add_normals(points, rows, unit, area, own, total):
             share = area[f] / weight if weight > 0.0 else 0.0
             for axis in range(3):
                 total[own[f, k], axis] += unit[f, axis] * share
+
+
+@kernel
+def add_curvatures(points, rows, unit, area, beside, at):
+    """Raises ``at`` (N,) to how much a surface bends near each node, at most: the inverse of a radius.
+
+    At an edge that is the sine of the angle between its facets over the distance of their middles. rows, unit: (F, 3).
+    area: (F,) twice the areas. beside: (F, 3) the facet across each edge, or −1.
+    """
+    for f in range(len(rows)):
+        for k in range(3):
+            g = beside[f, k]
+            if g < f:
+                continue
+            i, j, square = rows[f, k], rows[f, (k + 1) % 3], 0.0
+            for axis in range(3):
+                square += (points[j, axis] - points[i, axis]) ** 2
+            cosine = dot3(unit[f, 0], unit[f, 1], unit[f, 2], unit[g, 0], unit[g, 1], unit[g, 2])
+            sine = math.sqrt(max(1.0 - cosine * cosine, 0.0)) if cosine > 0.0 else 1.0
+            apart = (area[f] + area[g]) / 3.0
+            bend = sine * math.sqrt(square) / apart if apart > 0.0 else 0.0
+            for corner in range(3):
+                at[rows[f, corner]] = max(at[rows[f, corner]], bend)
+                at[rows[g, corner]] = max(at[rows[g, corner]], bend)
+
+
+@kernel
+def spread(rows, at, most):
+    """Writes the largest of ``at`` (N,) at the corners of facets (F, 3) into ``most`` (F,), and raises ``at`` to it."""
+    for f in range(len(rows)):
+        most[f] = max(at[rows[f, 0]], max(at[rows[f, 1]], at[rows[f, 2]]))
+    for f in range(len(rows)):
+        for k in range(3):
+            at[rows[f, k]] = max(at[rows[f, k]], most[f])
+
+
+@kernel
+def least_growth(points, rows, span):
+    """The least of the spans (F,) of facets (F, 3) over the squares of their longest edges."""
+    least = np.inf
+    for f in range(len(rows)):
+        longest = 0.0
+        for k in range(3):
+            i, j, square = rows[f, k], rows[f, (k + 1) % 3], 0.0
+            for axis in range(3):
+                square += (points[j, axis] - points[i, axis]) ** 2
+            longest = max(longest, square)
+        if span[f] < least * longest:
+            least = span[f] / longest
+    return least
 
 
 @kernel
