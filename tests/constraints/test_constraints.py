@@ -11,8 +11,11 @@ from hypothesis import strategies as st
 from support.naive_curves import sagittas
 from support.sliding import constraint_by_ids, push, ring_mesh
 
+import gmsnet
 from gmsnet import Mesh
+from gmsnet.constraints.constraints import OFF
 from gmsnet.constraints.features import curves_of
+from gmsnet.generate import random_quad_mesh
 from gmsnet.generate.random import random_mesh
 from gmsnet.kernels.star.constraint import limits, locate, snap, tangent_at
 from gmsnet.topology.ordering import planar_points
@@ -111,11 +114,11 @@ def test_other_straight_sides_are_met_to_rounding(single):
 
 
 def test_a_node_pushed_far_goes_nine_tenths_of_the_way_to_its_neighbour():
-    angles = 2.0 * np.pi * np.arange(16) / 16
+    angles = 2.0 * np.pi * np.arange(64) / 64
     mesh = ring_mesh(np.column_stack([np.cos(angles), np.sin(angles)]))
     constraint = constraint_by_ids(mesh, curves_of(mesh))
     # Nodes of a closed curve stand two pieces apart; the node 0 is at the parameter 0.
-    for aim, wanted in ((angles[5], 1.8), (-angles[5], 32.0 - 1.8)):
+    for aim, wanted in ((angles[5], 1.8), (-angles[5], 128.0 - 1.8)):
         x, y, u = snap(constraint, 0, np.cos(aim), np.sin(aim))
         assert u == pytest.approx(wanted)
         assert np.hypot(x, y) == pytest.approx(np.hypot(*planar_points(mesh)[0]))
@@ -124,6 +127,56 @@ def test_a_node_pushed_far_goes_nine_tenths_of_the_way_to_its_neighbour():
         constraint.parameter[constraint.row[0]] = u
         assert u < 2.0
     assert u > 2.0 - 1e-14
+
+
+@pytest.mark.parametrize("count", [13, 14, 16, 18])
+@pytest.mark.parametrize("way", [1, -1])
+def test_an_edge_leaves_out_no_more_of_its_curve_than_a_share_of_the_edges_there(count, way):
+    """On a circle the chord over an angle of a is 1 - cos(a/2) off."""
+    angles = 2.0 * np.pi * np.arange(count) / count
+    mesh = ring_mesh(np.column_stack([np.cos(angles), np.sin(angles)]))
+    constraint = constraint_by_ids(mesh, curves_of(mesh))
+    length = 2.0 * np.sin(np.pi / count)
+    for _ in range(3):
+        x, y, constraint.parameter[constraint.row[3]] = snap(
+            constraint, 3, np.cos(angles[3] + way * 0.9 * angles[1]), np.sin(angles[3] + way * 0.9 * angles[1])
+        )
+    grown = way * (np.arctan2(y, x) - angles[3]) + angles[1]
+    assert 1.0 - np.cos(grown / 2.0) == pytest.approx(OFF * length, rel=0.02)
+    assert np.hypot(x, y) == pytest.approx(np.hypot(*planar_points(mesh)[3]))
+    x, y, u = snap(constraint, 3, np.cos(angles[3]), np.sin(angles[3]))
+    assert u == pytest.approx(6.0)  # back is no matter
+
+
+def test_an_edge_that_leaves_out_more_may_become_shorter():
+    angles = np.delete(2.0 * np.pi * np.arange(16) / 16, [1, 2])
+    full = ring_mesh(np.column_stack([np.cos(angles), np.sin(angles)]))
+    constraint = constraint_by_ids(full, curves_of(full, feature_angle=100.0))
+    before = constraint.parameter[constraint.row[1]]
+    for aim, wanted in ((angles[2], before), (0.0, before - 0.2)):
+        _, _, u = snap(constraint, 1, np.cos(aim), np.sin(aim))
+        assert u == pytest.approx(before) if wanted == before else u < wanted
+
+
+def test_straight_curves_leave_nothing_out():
+    mesh = ring_mesh([(x, 0.0) for x in range(6)] + [(5.0, 2.0), (0.0, 2.0)])
+    constraint = constraint_by_ids(mesh, curves_of(mesh))
+    assert not constraint.cost.any()
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 5])
+def test_nodes_of_the_input_stay_near_the_edges_of_the_result(seed):
+    mesh = random_quad_mesh(60, "circle", cells="quad", seed=seed)
+    result = gmsnet.smooth(mesh, slide=True)
+    rim = curves_of(mesh).nodes_of(0)
+    before, after = mesh.points[rim][:-1, :2], result.points[rim][:, :2]
+    begin, way = after[:-1], np.diff(after, axis=0)
+    from_begin = before[:, None] - begin
+    share = np.clip((from_begin * way).sum(axis=2) / (way * way).sum(axis=1), 0.0, 1.0)
+    off = np.linalg.norm(from_begin - share[..., None] * way, axis=2).min(axis=1)
+    edges = np.linalg.norm(np.diff(mesh.points[rim][:, :2], axis=0), axis=1)
+    assert result.moved[rim].any()
+    assert off.max() <= 1.2 * OFF * edges.mean()
 
 
 @pytest.mark.parametrize("shape", ["circle", "square"])

@@ -6,13 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.constraints.curve import ArcSpline, arc_spline, through
-from gmsnet.constraints.features import Curves
+from gmsnet.constraints.features import Curves, lengths_of
 from gmsnet.constraints.geometry import Entity, Geometry, checked, named
 from gmsnet.errors import InputError
 from gmsnet.kernels.star.constraint import ARCS, LINE, SAME_X, SAME_Y, Constraint
 from gmsnet.topology.polygons import Ints
 
 Floats = NDArray[np.float64]
+AROUND = 2  # edges on either side, of which the lengths are averaged
+OFF = 0.15  # of the edges there: see docs/sliding.md, Edges stay near the curve
 SAMPLES = 4  # places at which a geometry is asked for each edge of a curve
 
 
@@ -55,7 +57,31 @@ def constraint_of(
         first=spline.first,
         piece=spline.piece,
         single=bool(single),
+        cost=_costs(curves, points, spline),
     )
+
+
+def _costs(curves: Curves, points: Floats, spline: ArcSpline) -> Floats:
+    """See ``Constraint``. A chord of length s of an arc of curvature κ is κs²/8 off: an edge may be so by OFF of the
+    edges there, b, which is where the integral of √(κ/8b) along the curve is 1.
+    """
+    cost = np.zeros((len(spline.piece), 2))
+    chord = lengths_of(spline.piece[:, 2:4] - spline.piece[:, :2])
+    sine, turn = abs(spline.piece[:, 5]), 2.0 * abs(np.arctan2(spline.piece[:, 5], spline.piece[:, 4]))
+    for c in range(len(curves)):
+        if curves.straight[c]:
+            continue
+        at = slice(int(spline.first[c]), int(spline.first[c + 1]))
+        edge = lengths_of(np.diff(points[curves.nodes_of(c)], axis=0))
+        padded = np.pad(edge, AROUND, mode="wrap") if curves.closed[c] else np.pad(edge, AROUND, mode="edge")
+        near = np.convolve(padded, np.full(2 * AROUND + 1, 1.0 / (2 * AROUND + 1)), "valid")
+        bound = OFF * np.repeat(near, spline.per_edge)
+        # κ = 2 sin α/|c|, and the arc is 2α/κ long.
+        bend = 2.0 * np.divide(sine[at], chord[at], out=np.zeros(len(bound)), where=chord[at] > 0.0)
+        along = np.divide(turn[at], bend, out=np.zeros(len(bound)), where=bend > 0.0)
+        cost[at, 0] = along * np.sqrt(np.divide(bend, 8.0 * bound, out=np.zeros(len(bound)), where=bound > 0.0))
+        cost[at, 1] = np.cumsum(cost[at, 0]) - cost[at, 0]
+    return cost
 
 
 def _kind(curves: Curves, c: int, points: Floats) -> int:

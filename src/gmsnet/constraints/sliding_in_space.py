@@ -67,9 +67,10 @@ class SurfaceSliding:
         nodes &= patches.slides | patches.curves.slides
         # What quadrilaterals are warped by is not taken off: nodes would go to chords then, and round bodies shrink.
         limit = tolerance * edge_lengths(facets, points, mesh) if tolerance < math.inf else None
-        bound = math.inf
-        if hausdorff is None and geometry is None:
-            hausdorff = APART_IN_VOLUMES if facets.closed else APART_ON_SURFACES
+        bound, sliding = math.inf, np.flatnonzero(nodes)
+        if hausdorff is None and geometry is None and limit is not None and len(sliding):
+            share = APART_IN_VOLUMES if facets.closed else APART_ON_SURFACES
+            bound = max(CLOSER * share * facets.diagonal(points), float(limit[sliding].max()))
         if hausdorff is not None:
             bound = CLOSER * hausdorff * facets.diagonal(points)
             limit = np.minimum(np.inf if limit is None else limit, np.full(len(points), bound))

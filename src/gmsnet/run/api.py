@@ -89,9 +89,10 @@ def smooth(
     more. geometry: what to slide on instead of arcs through the input's nodes (docs/sliding.md). surface_tolerance: how
     far from the input's facets nodes of surfaces may go, over the mean length of their edges (default: 0.05; with a
     geometry without a bound). hausdorff: how far facets of surfaces, or of boundaries that slide, may go from the
-    input's, over the diagonal of the box around it (default: 0.02, of volumes 0.01; with a geometry without a bound). free_needles: edges that look sharp only because a facet of a surface is thin are no features.
-    update_normals: normals of faces and points, in the data of a surface and in the file that it was read from, are
-    computed anew where nodes have moved (docs/surfaces.md).
+    input's, over the diagonal of the box around it (default: 0.02, of volumes 0.01, and no less than nodes may go; with
+    a geometry without a bound). free_needles: edges that look sharp only because a facet of a surface is thin are no
+    features. update_normals: normals of faces and points, in the data of a surface and in the file that it was read
+    from, are computed anew where nodes have moved (docs/surfaces.md).
     join_regions: regions mean nothing, so nodes of interfaces between them may move; those of markers there stay.
     device: "cpu", or "cuda": a GPU of NVIDIA does the sweeps that it can, with the same bits (docs/cuda.md).
     metric: the tensors of which the cells are to be unit cells, by shape and size (docs/metric.md): an array (N, 3) of

@@ -31,7 +31,8 @@ class Constraint(NamedTuple):
     after int32, the rows of its neighbours on the curve, −1 where that is an end of the curve; parameter float64, which
     changes as nodes move: what keeps points for later keeps a copy of it beside them. By curves (C,): kind int8; closed
     bool; first (C + 1,) int64, whose pieces are first[c] … first[c + 1] − 1. piece: (P, 6) float64: P, Q, cos α, sin α.
-    single: new coordinates are rounded to float32.
+    single: new coordinates are rounded to float32. cost: (P, 2) how much of what an edge may leave out is spent on each
+    piece, and on those before it on its curve: an edge is as far off its curve as it may be where that is 1.
     """
 
     row: NDArray[np.int32]
@@ -44,6 +45,7 @@ class Constraint(NamedTuple):
     first: NDArray[np.int64]
     piece: NDArray[np.float64]
     single: bool
+    cost: NDArray[np.float64]
 
 
 @inlined
@@ -145,6 +147,37 @@ def nearest(constraint, curve, u, low, high, x, y):
             return number + min(max(t, 0.0), 1.0)
 
 
+@inlined
+def spent(constraint, curve, u):
+    """What is spent from the beginning of a curve to parameter u, which may be outside of [0, n] on a closed one."""
+    k, t = piece_at(constraint, curve, u)
+    last = constraint.first[curve + 1] - 1
+    rounds = 0.0
+    if constraint.closed[curve]:
+        rounds = np.floor(u / float(last + 1 - constraint.first[curve]))
+    whole = constraint.cost[last, 0] + constraint.cost[last, 1]
+    return rounds * whole + constraint.cost[k, 1] + t * constraint.cost[k, 0]
+
+
+@inlined
+def short_of(constraint, curve, u, v, other):
+    """The parameter nearest to v, from u to v, up to which the edge to a neighbour at ``other`` is near enough to its
+    curve, or no further from it than it was."""
+    way = 1.0 if v > u else -1.0
+    begin = spent(constraint, curve, other)
+    excess = abs(spent(constraint, curve, v) - begin) - max(1.0, abs(spent(constraint, curve, u) - begin))
+    while excess > 0.0 and (v - u) * way > 0.0:
+        # Back to where this piece begins, or as far on it as is needed.
+        edge = np.ceil(v) - 1.0 if way > 0.0 else np.floor(v) + 1.0
+        k, _ = piece_at(constraint, curve, 0.5 * (edge + v))
+        on_it = abs(v - edge) * constraint.cost[k, 0]
+        if on_it >= excess:
+            v -= way * excess / constraint.cost[k, 0]
+            break
+        v, excess = edge, excess - on_it
+    return max(u, v) if way > 0.0 else min(u, v)
+
+
 @part
 def tangent_at(constraint, node):
     """The unit tangent of the curve at a node that has a row."""
@@ -159,7 +192,7 @@ def snap(constraint, node, x, y):
 
     It is the nearest place on the curve from where the node is, but no further than WAY of the way to either
     neighbour's parameter: nodes keep their order strictly, however often they move one after the other. Nodes that move
-    at the same time must be no neighbours. Nothing is stored.
+    at the same time must be no neighbours. Nor does an edge leave more of its curve out than it may. Nothing is stored.
 
     On a line, the place is P + t·(Q − P); on one along an axis, one coordinate is that of P, the other is kept.
     """
@@ -170,6 +203,10 @@ def snap(constraint, node, x, y):
     least, most = u - WAY * (u - low), u + WAY * (high - u)
     cut = v < least or v > most
     v = min(max(v, least), most)
+    if constraint.kind[curve] == ARCS and v != u:
+        wanted = v
+        v = short_of(constraint, curve, u, v, low if v > u else high)
+        cut = cut or v != wanted
     if not low < v < high:  # no float is left between the neighbours
         v, cut = u, True
     k, t = piece_at(constraint, curve, v)
