@@ -75,7 +75,7 @@ def _names_of(mesh: Mesh, slide: SlideChoice) -> tuple[str, ...] | None:
 
 def _unknown(name: str, known: list[str]) -> str:
     if not known:
-        return f"there is no marker {name!r} to slide on: the mesh has no markers; True lets all boundary nodes slide"
+        return f"there is no marker {name!r} to slide on: the mesh has no markers; True, or all, lets all slide"
     near = difflib.get_close_matches(name, known, n=3)
     hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
     return f"the mesh has no marker {name!r} to slide on; {hint}it has {', '.join(map(repr, known))}"

@@ -27,11 +27,17 @@ def raise_everywhere(comm: Any, wrong: str) -> None:
 
 
 def everywhere(comm: Any, make: Callable[[], Value]) -> Value:
-    """What each rank makes for itself. Where one cannot, all raise what the first of these says, as an InputError."""
+    """What each rank makes for itself. Where one cannot, all raise what the first of these says, as an InputError.
+
+    Errors of other kinds, as of an option that there is not, leave their own rank as they are.
+    """
     try:
         made = make()
     except GmsnetError as error:
         raise_everywhere(comm, str(error))
+        raise
+    except Exception as error:
+        comm.allgather(f"{type(error).__name__}: {error}")  # what raise_everywhere is waiting for
         raise
     raise_everywhere(comm, "")
     return made

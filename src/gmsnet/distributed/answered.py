@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from gmsnet.errors import GmsnetError
 from gmsnet.run.sweep import Sweep
 
 
@@ -20,14 +21,20 @@ class Answered:
     own: Callable[[Sweep], bool | None] | None
 
     def __call__(self, sweep: Sweep) -> bool | None:
-        """Ends the run on all ranks? Raises KeyboardInterrupt on all where the first one's does."""
+        """Ends the run on all ranks? Raises KeyboardInterrupt on all where the first one's does, and on the others a
+        GmsnetError where that raises anything else."""
         answer: Any = None
         if self.comm.rank == 0:
             try:
                 answer = self.own is not None and bool(self.own(sweep))
             except KeyboardInterrupt:
                 answer = KeyboardInterrupt
+            except BaseException as error:
+                self.comm.bcast(f"the callback of rank 0 failed: {type(error).__name__}: {error}")
+                raise
         answer = self.comm.bcast(answer)
         if answer is KeyboardInterrupt:
             raise KeyboardInterrupt
+        if isinstance(answer, str):
+            raise GmsnetError(answer)
         return bool(answer)
