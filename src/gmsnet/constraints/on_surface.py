@@ -23,8 +23,8 @@ from gmsnet.topology.polygons import Ints
 Floats = NDArray[np.float64]
 
 
-SAG = 4.0  # of 8
-GROWTH = 8.0
+SAG = 4.0  # times the bound over the curvature: of 8, with which the chord of a circle is as far off
+GROWTH = 8.0  # times its longest edge: what a facet grows to at most, where none is looked at
 
 
 class Rows(NamedTuple):

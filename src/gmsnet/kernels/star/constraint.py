@@ -204,9 +204,7 @@ def snap(constraint, node, x, y):
     cut = v < least or v > most
     v = min(max(v, least), most)
     if constraint.kind[curve] == ARCS and v != u:
-        wanted = v
         v = short_of(constraint, curve, u, v, low if v > u else high)
-        cut = cut or v != wanted
     if not low < v < high:  # no float is left between the neighbours
         v, cut = u, True
     k, t = piece_at(constraint, curve, v)
