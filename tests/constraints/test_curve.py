@@ -11,7 +11,7 @@ from support.naive_curves import sagittas
 import gmsnet
 from gmsnet.constraints.curve import ArcSpline, arc_spline, through
 from gmsnet.constraints.features import curves_of
-from gmsnet.kernels.star.constraint import piece_point, piece_tangent
+from gmsnet.kernels.star.arcs import piece_point, piece_tangent
 from gmsnet.topology.ordering import planar_points
 
 SHARES = np.linspace(0.0, 1.0, 21)

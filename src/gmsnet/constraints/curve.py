@@ -30,7 +30,7 @@ class ArcSpline:
     """Curves made of arcs and segments, numbered as those that they were made for.
 
     first: (C + 1,); curve c has the pieces piece[first[c] : first[c + 1]]. piece: (P, 6): both ends of a piece, and the
-    cosine and sine of the angle between its first tangent and its chord (kernels.star.constraint). closed: (C,) bool.
+    cosine and sine of the angle between its first tangent and its chord (kernels.star.arcs). closed: (C,) bool.
     per_edge: how many pieces stand over each edge of a curve that is no line.
     """
 

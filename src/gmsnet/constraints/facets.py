@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from gmsnet.cells.table import CELLS
 from gmsnet.constraints.features import dot, lengths_of
 from gmsnet.constraints.outline import Flags, Longs, line_cells, mark_sets
+from gmsnet.kernels.star.chords import CLOSER
 from gmsnet.kernels.whole import edges as kernels
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.topology.held import SMOOTHED
@@ -40,11 +41,12 @@ class Facets:
     closed: bool = True
     halves: int = 0
 
-    def diagonal(self, points: Floats) -> float:
-        """That of the box around all facets; points: (N, 3)."""
+    def bound(self, points: Floats, share: float) -> float:
+        """How far places that are looked at may go, so that all stay within a share of the diagonal of the box around
+        the facets. points: (N, 3)."""
         used = np.zeros(len(points), dtype=bool)
         used[self.rows] = True
-        return float(np.linalg.norm(np.ptp(points[used], axis=0))) if len(self.rows) else 0.0
+        return CLOSER * share * float(np.linalg.norm(np.ptp(points[used], axis=0))) if len(self.rows) else 0.0
 
 
 def boundary_of(mesh: Mesh, wound: Wound | WoundSolids) -> Facets:

@@ -18,7 +18,6 @@ from gmsnet.constraints.options import APART_IN_VOLUMES, APART_ON_SURFACES, FEAT
 from gmsnet.constraints.outline import Flags
 from gmsnet.constraints.patches import Patches, patches_of
 from gmsnet.constraints.smooth_patches import Vertices
-from gmsnet.kernels.star.chords import CLOSER
 from gmsnet.kernels.star.off_surface import farthest
 from gmsnet.kernels.star.surface import Surface
 from gmsnet.mesh.mesh import Mesh
@@ -67,12 +66,12 @@ class SurfaceSliding:
         nodes &= patches.slides | patches.curves.slides
         # What quadrilaterals are warped by is not taken off: nodes would go to chords then, and round bodies shrink.
         limit = tolerance * edge_lengths(facets, points, mesh) if tolerance < math.inf else None
-        bound, sliding = math.inf, np.flatnonzero(nodes)
-        if hausdorff is None and geometry is None and limit is not None and len(sliding):
+        bound = math.inf
+        if hausdorff is None and geometry is None and limit is not None:
             share = APART_IN_VOLUMES if facets.closed else APART_ON_SURFACES
-            bound = max(CLOSER * share * facets.diagonal(points), float(limit[sliding].max()))
+            bound = max(facets.bound(points, share), float(limit[nodes].max(initial=0.0)))
         if hausdorff is not None:
-            bound = CLOSER * hausdorff * facets.diagonal(points)
+            bound = facets.bound(points, hausdorff)
             limit = np.minimum(np.inf if limit is None else limit, np.full(len(points), bound))
         on = None if geometry is None else OnGeometry(geometry, facets, mesh.exponent)
         constraint = None

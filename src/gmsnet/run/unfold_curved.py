@@ -17,7 +17,6 @@ from gmsnet.constraints.grid import Grid
 from gmsnet.constraints.heights import heights_at, within
 from gmsnet.constraints.options import TOLERANCE
 from gmsnet.constraints.patches import NOTHING, linked
-from gmsnet.kernels.star.chords import CLOSER
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.measure.surface_change import places_on
@@ -65,7 +64,7 @@ class CurvedParts:
         limit = tolerance * edge_lengths(facets, given, mesh)
         bound = math.inf
         if options.hausdorff is not None:
-            bound = CLOSER * options.hausdorff * facets.diagonal(given)
+            bound = facets.bound(given, options.hausdorff)
         limit = np.minimum(limit, bound)
         return cls(facets, given, held, uses, limit, bound, precision, options.feature_angle)
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.naive_curves import naive_arc
 
-from gmsnet.kernels.star.constraint import piece_parameter, piece_point, piece_tangent
+from gmsnet.kernels.star.arcs import piece_parameter, piece_point, piece_tangent
 
 COORDINATES = st.floats(-10.0, 10.0)
 
