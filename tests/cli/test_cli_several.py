@@ -146,6 +146,7 @@ def test_a_dry_run_with_an_output_or_in_place_writes_neither(run, folder, tmp_pa
         (["{dir}", "--out-dir", "{out}", "--report", "{out}.html"], ["--report is for one file"]),
         (["{dir}", "-", "--out-dir", "{out}"], ["standard input has no name"]),
         (["{out}x*", "--out-dir", "{out}"], ["no file has such a name"]),
+        (["{empty}/none/", "--out-dir", "{out}"], ["empty/none/: there is no such folder"]),
         (["{empty}", "--out-dir", "{out}"], ["no mesh files in this folder", ".su2"]),
         (["{dir}/a.su2", "{copy}/a.su2", "--out-dir", "{out}"], ["would both be written to"]),
         (["{dir}/a.su2", "{dir}/a.vtk", "--out-dir", "{out}", "--output-format", "vtu"], ["both be written to"]),

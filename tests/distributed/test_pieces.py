@@ -125,9 +125,17 @@ def whole(rank, points, triangles, ids):
     return MESH.points, TRIANGLES, np.arange(len(MESH.points))
 
 
+def with_ghosts(rank, points, triangles, ids):
+    ghosts = own(0)[2][own(0)[1]][:3] if rank else np.empty((0, 3), dtype=int)
+    nodes = np.concatenate([ids[triangles], np.roll(ghosts, 1, axis=1)])
+    ids = np.unique(nodes)
+    return MESH.points[ids], np.searchsorted(ids, nodes), ids
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
+        (with_ghosts, "ranks 0 and 1 have given the same triangle .*, and 2 more .*: .* so leave out ghost cells"),
         (whole, "all ranks have given the same cells: each cell of the mesh belongs to one rank"),
         (in_space, "how many coordinates a node has must be the same on all ranks: rank 0 has 2, rank 1 3"),
         (doubled, "the global id 0 is given to two nodes of one piece: give each node once"),
@@ -167,6 +175,21 @@ def test_options_and_numbers_that_differ_are_told():
 
     together(2, options)
     together(2, numbers)
+
+
+def test_cells_that_are_alike_may_lie_on_two_ranks_where_they_have_numbers():
+    points, both = MESH.points, np.concatenate([TRIANGLES, TRIANGLES[:1]])
+    serial = gmsnet.smooth((points, both), "laplacian", threads=1)
+    cells = [both[:-1], both[-1:]]
+    numbers = [np.arange(len(TRIANGLES)), np.array([len(TRIANGLES)])]
+
+    def work(comm):
+        ids = np.unique(cells[comm.rank])
+        own = points[ids], np.searchsorted(ids, cells[comm.rank])
+        return ids, gmsnet.distributed.smooth(own, ids, "laplacian", numbers=numbers[comm.rank], comm=comm, threads=1)
+
+    for ids, result in together(2, work):
+        assert (result.points == serial.points[ids]).all()
 
 
 def test_a_callback_of_the_first_rank_stops_all():

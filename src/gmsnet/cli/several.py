@@ -111,6 +111,8 @@ def _expanded(name: str) -> list[str]:
         if found := sorted(glob.glob(name)):
             return found
         raise InputError(f"{name}: no file has such a name")
+    if not os.path.exists(name) and name.endswith(("/", os.sep)):
+        raise InputError(f"{name}: there is no such folder")
     return [name]
 
 

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.cells.table import CELLS
 from gmsnet.distributed.agreement import agreed, everywhere
+from gmsnet.distributed.by_rank import by_rank
 from gmsnet.distributed.library import mpi
 from gmsnet.distributed.piece import Cells, Piece
 from gmsnet.distributed.quality import measured
@@ -24,6 +26,7 @@ from gmsnet.mesh.selection import fixed_mask
 from gmsnet.run.options import SmoothOptions
 
 SAME = "all ranks have given the same cells: each cell of the mesh belongs to one rank, so give each its own part"
+ONE_RANK = "each cell of the mesh belongs to one rank, so leave out ghost cells, or give all cells numbers"
 
 
 def smooth(
@@ -65,8 +68,8 @@ def quality(mesh: Any, ids: Any, *, numbers: Any = None, threshold: float | None
 def _own_piece(mesh: Any, ids: Any, numbers: Any, fixed: Any, comm: Any) -> Piece:
     """What a rank gives, checked on all of them. Raises InputError on all alike."""
     given = everywhere(comm, lambda: _given(mesh, ids, fixed))
-    numbered = _numbered(comm, given[0], numbers)
-    return _checked(everywhere(comm, lambda: _piece(*given, numbered)), comm)
+    numbered, counted = _numbered(comm, given[0], numbers)
+    return _checked(everywhere(comm, lambda: _piece(*given, numbered)), counted, comm)
 
 
 def _given(mesh: Any, ids: Any, fixed: Any) -> tuple[Mesh, Any, Any]:
@@ -78,8 +81,11 @@ def _given(mesh: Any, ids: Any, fixed: Any) -> tuple[Mesh, Any, Any]:
 Numbered = Sequence[tuple[str, int, Any]]
 
 
-def _numbered(comm: Any, mesh: Mesh, numbers: Any) -> Numbered:
-    """The kinds of cells over all ranks, how many nodes each has, and the numbers of those that are here."""
+def _numbered(comm: Any, mesh: Mesh, numbers: Any) -> tuple[Numbered, set[str]]:
+    """The kinds of cells over all ranks, how many nodes each has, and the numbers of those that are here.
+
+    And which kinds have been given no numbers, but are counted.
+    """
     own: dict[str, int] = {}
     for block in mesh.cells:
         own[block.kind] = own.get(block.kind, 0) + len(block.nodes)
@@ -87,14 +93,15 @@ def _numbered(comm: Any, mesh: Mesh, numbers: Any) -> Numbered:
     kinds: dict[str, int] = {}
     for each in comm.allgather(width):
         kinds |= each
-    found = []
+    found, counted = [], set[str]()
     given = numbers if isinstance(numbers, Mapping) else {} if numbers is None else dict.fromkeys(own, numbers)
     for kind, nodes in kinds.items():
         count = own.get(kind, 0)
         first = comm.exscan(count) or 0
         some = comm.allreduce(kind in given and count > 0, mpi().LOR)
         found.append((kind, nodes, given.get(kind, np.empty(0, dtype=np.int64)) if some else first + np.arange(count)))
-    return found
+        counted |= set() if some else {kind}
+    return found, counted
 
 
 def _piece(mesh: Mesh, ids: Any, fixed: Any, numbered: Numbered) -> Piece:
@@ -122,19 +129,48 @@ def _threshold(given: Any) -> float | None:
     return float(given)
 
 
-def _checked(piece: Piece, comm: Any) -> Piece:
-    """Raises InputError on all ranks where all have given the same cells, as of a mesh that is not spread."""
-    told = [(len(block.nodes), _mark(block.nodes)) for block in piece.blocks]
+def _checked(piece: Piece, counted: set[str], comm: Any) -> Piece:
+    """Raises InputError on all ranks where all have given the same cells, as of a mesh that is not spread.
+
+    So it does where several have given one cell of the highest dimension. counted: the kinds without numbers.
+    """
+    told = [(len(block.nodes), int(_marks(block.nodes).sum())) for block in piece.blocks]
     every = comm.allgather(told)
     if comm.size > 1 and all(each == every[0] for each in every) and any(len(block.nodes) for block in piece.blocks):
         raise InputError(SAME)
+    highest = max((CELLS[block.kind].dimension for block in piece.blocks if block.kind in CELLS), default=0)
+    for block in piece.blocks:
+        uncertain = comm.size > 1 and block.kind in counted and block.kind in CELLS
+        if uncertain and CELLS[block.kind].dimension == highest and (wrong := _brought_twice(block, comm)):
+            raise InputError(wrong)
     return piece
 
 
-def _mark(nodes: NDArray[np.int64]) -> int:
-    """A number that cells (C, k) share with others by chance alone, in whatever order these stand."""
+def _brought_twice(block: Cells, comm: Any) -> str:
+    """What to say of cells that several ranks have given, the same on all; "" of none."""
+    nodes = np.sort(block.nodes, axis=1)
+    marks = _marks(nodes)
+    own = np.unique(marks)
+    came = comm.alltoall([own[rows] for rows in by_rank((own % np.uint64(comm.size)).astype(np.int64), comm.size)])
+    names, number = np.unique(np.concatenate(came), return_counts=True)
+    doubtful = np.concatenate(comm.allgather(names[number > 1]))
+    given = comm.allgather(np.unique(nodes[np.isin(marks, doubtful)], axis=0))  # marks may be alike by chance
+    cells, back, number = np.unique(np.concatenate(given), axis=0, return_inverse=True, return_counts=True)
+    twice = int((number > 1).sum())
+    if not twice:
+        return ""
+    first = back.ravel() == np.argmax(number > 1)
+    owner = np.repeat(np.arange(comm.size), [len(each) for each in given])
+    ranks = " and ".join(map(str, owner[first]))
+    named = ", ".join(map(str, cells[np.argmax(number > 1)]))
+    others = "" if twice == 1 else f", and {twice - 1:,} more are given twice"
+    return f"ranks {ranks} have given the same {block.kind} of the nodes {named}{others}: {ONE_RANK}"
+
+
+def _marks(nodes: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """(C,) for each cell (C, k) a number that others share by chance alone."""
     marks = np.zeros(len(nodes), dtype=np.uint64)
     for column in nodes.T:
         marks = (marks ^ column.astype(np.uint64)) * np.uint64(0x9E3779B97F4A7C15)
         marks ^= marks >> np.uint64(29)
-    return int(marks.sum())
+    return marks
