@@ -202,13 +202,14 @@ class WholeMesh(Smoother):
             )
             if not can:
                 break
-            if not taken:
-                continue
-            field.floor.forget()
-            if self.best and not test():
+            if taken:
+                field.floor.forget()
+            if taken and self.best and not test():
                 field.points[:] = before
                 continue
-            self._slide(field, executor, doublings)
+            slid = (taken or not self.best) and self._slide(field, executor, doublings)
+            if not (taken or slid):
+                continue
             moved = (field.points != before).any(axis=1) & field.topology.near_free
             tally[MOVED] = executor.total(np.array(np.count_nonzero(moved)))
             break
@@ -226,16 +227,18 @@ class WholeMesh(Smoother):
         field.points[:] = found
         return True, True
 
-    def _slide(self, field: Field, executor: Executor, doublings: int) -> None:
-        """The same once more with the nodes that slide."""
+    def _slide(self, field: Field, executor: Executor, doublings: int) -> bool:
+        """The same once more with the nodes that slide. Whether that was taken."""
         if field.constraint is None:
-            return
+            return False
         floor = max(field.guard(executor).floor, 0.0)
         whole = executor.gathered(field)  # on one process
         inner = executor if whole is field else serial
         taken = whole is not None and self._slid(whole, doublings, floor, inner)
-        if executor.returned(field, whole, taken):
+        taken = executor.returned(field, whole, taken)
+        if taken:
             field.floor.forget()
+        return taken
 
     def _slid(self, field: Field, doublings: int, floor: float, executor: Executor) -> bool:
         """Whether these nodes are where that was found to be better."""
