@@ -1,4 +1,4 @@
-"""Delaunay meshes of points on which sweeps have a hard time."""
+"""Volumes on which sweeps have a hard time."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import scipy.spatial
 
+from gmsnet.generate import block_volume
 from support import volumes
 
 
@@ -31,3 +32,11 @@ def core(nodes=1200, side=3, width=0.3, seed=0):
     hull = grid[((grid == 0.0) | (grid == 1.0)).any(axis=1)]
     inner = np.random.default_rng(seed).random((nodes, 3)) * width + 0.5 * (1.0 - width)
     return delaunay(np.concatenate([hull, inner]))
+
+
+def spiked(kind, n=6, wide=0.02):
+    """A block with a spike into its bottom, whose worst cells have to gain together."""
+    mesh = block_volume(n, kind)
+    x, y, z = ((mesh.points - mesh.points.min(axis=0)) / np.ptp(mesh.points, axis=0)).T
+    away = (x - 0.5) ** 2 + (y - 0.5) ** 2
+    return mesh.with_points(np.column_stack([x, y, z * (1.0 - 0.6 * np.exp(-away / wide))]))

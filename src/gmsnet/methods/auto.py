@@ -44,9 +44,12 @@ from gmsnet.methods.phases import (
     Phase,
     plan_for,
 )
+from gmsnet.methods.trial import Trial
+from gmsnet.methods.whole_in_space import WholeInSpace
 from gmsnet.methods.whole_mesh import CLOSEST, SETTLED, WholeMesh
 from gmsnet.methods.worst_first import WorstFirst
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
 
@@ -70,6 +73,7 @@ WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS, EARLY = "whole mesh, worst cells", (3, 2), (2, 3, 1)  # q⁸, q⁴, q²
 GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on small meshes that were moved as a whole
 FEW, FEW_QUADS = 256, 2000  # free nodes: so many have their turn in any case
+FEW_SOLID = 1500  # the same of volumes that are not of tetrahedra alone
 EXACT = 20_000  # free nodes: up to so many, all nodes of such a mesh go to the minimum of Σq, which is near
 IN_SPACE = (VOLUME_PLAN, LARGE_VOLUME_PLAN, MIXED_PLAN, SURFACE_PLAN)
 NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
@@ -80,17 +84,6 @@ class Auto(Smoother):
 
     phases: Sequence[Phase]
     at: int
-    whole: int
-    slow: bool
-    turns: int
-    ideal: bool
-    early: bool
-    doubled: bool
-    pass_gain: float
-    passes: int
-    least: float
-    least_before: float
-    again: int
     made: int
     rounds: int
     gained: float
@@ -107,13 +100,14 @@ class Auto(Smoother):
 
     def __init__(self, phases: Sequence[Phase] = ()) -> None:
         self.phases, self.at = phases, -1
-        self.at_once = self.quads = False  # may all nodes move at once? are there quads?
+        self.at_once = self.quads = self.solid = False  # may all nodes move at once? are there quads? is it in space?
         self.creep: Creep | None = None
         self.whole = 0  # how often all nodes have moved at once
         self.slow = self.ideal = self.early = self.doubled = False
         self.turns, self.least_before = 0, -math.inf  # how often all nodes had their turn for the worst cells
         self.pass_gain, self.passes = PASS_GAIN, 0  # over the worst cells
         self.least = -math.inf  # 1/q after the last of these
+        self.trial: Trial | None = None
         self.again = -1  # the phase to go back to in the end, if there is one
         self.falling: Falling | None = None
         self.lost, self.mean_of_q = 0.0, math.nan  # of the mean of η in the end, and what it was after sweeps on q
@@ -130,6 +124,9 @@ class Auto(Smoother):
             gained = self.turns == 0 or self.doubled or self.least >= self.least_before + enough
             self.converged = not gained or not (self.ideal or self._is_even(field, executor))
             self.turns, self.least_before = self.turns + 1, self.least
+            if self.trial is not None:
+                self.looks, self.trial = self.trial.ends(field, executor), None
+                self.converged |= not self.looks
             if not math.isnan(self.mean_of_q):
                 self.lost = self.mean_of_q - mean_shape(field, executor)
             return
@@ -146,6 +143,7 @@ class Auto(Smoother):
             self.at_once = not self.phases and field.level != STAR and planar
             self.quads = self.at_once and bool(executor.total(np.array(int(field.planar.near_shapes is not None))))
             self.creep = Creep.of(field, executor) if self.at_once else None
+            self.solid = not self.phases and field.level != STAR and isinstance(field.topology, MixedVolume)
             own, self.phases = self.phases, self.phases or plan_for(field.topology, self.free)
             self.repeats = self.phases in IN_SPACE or not (own or field.level == STAR)
             if self.phases in IN_SPACE and self.free > LARGE_VOLUME:
@@ -200,7 +198,11 @@ class Auto(Smoother):
     def _move_all_for_worst(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """All nodes at once, for the worst cells; then all phases have another turn for the mean."""
         self.looks, self.phase = True, WHOLE_WORST
-        tally = WholeMesh(POWERS).sweep(field, executor, test)
+        if self.solid:
+            self.trial = Trial.of(field, executor)
+            self.looks = False
+        whole = WholeInSpace(POWERS) if self.solid else WholeMesh(POWERS)
+        tally = whole.sweep(field, executor, test)
         if tally[MOVED] or self.doubled:
             self._enter(0, field, executor)
         else:
@@ -220,6 +222,8 @@ class Auto(Smoother):
 
     def _is_even(self, field: Field, executor: Executor) -> bool:
         """May the worst cell be one of many like it, which one star at a time cannot better?"""
+        if self.solid:
+            return self.free <= FEW_SOLID and self.least < GOOD_MOVED
         small, moved = self.phases is SMALL_PLAN, self.whole > 0
         fewest = small and self.free <= (FEW_QUADS if self.quads else FEW)
         if not self.at_once or self.least >= (GOOD_MOVED if small and (moved or fewest) else GOOD):
@@ -271,6 +275,7 @@ class Auto(Smoother):
             self._look_at_worst(self.smoother)
         looks = phase.looks and not (phase.late and self.again >= 0)
         self.looks = self.rounds % phase.often == 0 if goes_on else looks or target_reached
+        self.looks &= self.trial is None
         if not goes_on:
             if falling is not None:
                 self.mean_of_q = self.mean if self.rounds < phase.rounds else mean_shape(field, executor)

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.whole import multigrid, steps
+from gmsnet.kernels.whole import multigrid
 from gmsnet.methods.sliders import Sliders
 
 Floats = NDArray[np.float64]
@@ -26,11 +26,8 @@ ARMIJO, HALVINGS, INSIDE = 1e-4, 25, 0.9
 class Sum(Protocol):
     """A sum over simplices as a function of the places of some nodes.
 
-    cells: (S, 3) counter-clockwise. moved: (n,) the nodes that move. sliders: those of them that slide.
+    moved: (n,) the nodes that move. sliders: those of them that slide.
     """
-
-    @property
-    def cells(self) -> NDArray[np.int32]: ...  # noqa: D102
 
     @property
     def moved(self) -> NDArray[np.intp]: ...  # noqa: D102
@@ -39,14 +36,17 @@ class Sum(Protocol):
     def sliders(self) -> Sliders | None: ...  # noqa: D102
 
     def value(self, points: Floats, gradient: Floats) -> float:
-        """The sum at points (N, 2), and its gradient (N, 2); more than any mesh has where a cell is inverted."""
+        """The sum at points (N, D), and its gradient (N, D); more than any mesh has where a cell is inverted."""
+
+    def farthest(self, points: Floats, shifts: Floats) -> float:
+        """The share of shifts (N, D) at which a first simplex has no area left; +∞ where that is not known."""
 
     def inverse(self, points: Floats) -> Callable[[Floats], Floats]:
-        """About the inverse of its second derivative there, (n, 2) to (n, 2)."""
+        """About the inverse of its second derivative there, (n, D) to (n, D)."""
 
 
 def minimise(problem: Sum, points: Floats, settled: float) -> Floats:
-    """Where conjugate gradients lead from points (N, 2) without an inverted cell.
+    """Where conjugate gradients lead from points (N, D) without an inverted cell.
 
     settled: a smaller share of the sum, gained in an iteration, is little.
     """
@@ -65,7 +65,7 @@ def minimise(problem: Sum, points: Floats, settled: float) -> Floats:
             break
         shifts = np.zeros_like(points)
         shifts[problem.moved] = along
-        length = min(length, INSIDE * steps.largest_step(points, problem.cells, shifts))
+        length = min(length, INSIDE * problem.farthest(points, shifts))
         for _ in range(HALVINGS):
             there, promised = points + length * shifts, ARMIJO * length * slope
             if sliders is not None:

@@ -165,8 +165,11 @@ def times(matrix, x, out):
 
 @kernel
 def product(a, b):
-    """The scalar product of two arrays (n, 2)."""
-    total = 0.0
+    """The scalar product of two arrays (n, 2) or (n, 3)."""
+    total, in_space = 0.0, a.shape[1] == 3
     for i in range(len(a)):
-        total += a[i, 0] * b[i, 0] + a[i, 1] * b[i, 1]
+        value = a[i, 0] * b[i, 0] + a[i, 1] * b[i, 1]
+        if in_space:
+            value += a[i, 2] * b[i, 2]
+        total += value
     return total
