@@ -13,6 +13,7 @@ from gmsnet.kernels.topology.patch import around
 from gmsnet.measure.report import measure
 from gmsnet.measure.target import Target
 from gmsnet.run import stop
+from gmsnet.run.score import Missing
 from gmsnet.run.target_run import rows_missing
 from gmsnet.topology.ordering import near_points
 from gmsnet.topology.topology import Topology
@@ -331,3 +332,23 @@ def test_triangles_have_no_such_angle():
     mesh = random_mesh(100, seed=0)
     with pytest.raises(gmsnet.InputError, match="no triangle has a minimum angle of more than 60°"):
         gmsnet.smooth(mesh, target_angle=75.0)
+
+
+def test_cells_are_counted_and_not_their_corners():
+    """All four quads miss it wherever the node in the middle is, with more corners where the worst one is better."""
+    points = np.array([
+        (0.06, -0.3), (-0.28, 1.24), (1.09, 0.14), (0.66, 1.12), (-0.88, 0.0), (-0.87, 0.93), (-0.29, -0.84),
+        (-0.86, -0.62), (0.84, -0.74),
+    ])  # fmt: skip
+    quads = np.array([(0, 2, 3, 1), (0, 1, 5, 4), (0, 4, 7, 6), (0, 6, 8, 2)])
+    result = gmsnet.smooth((points, {"quad": quads}), target_quality=0.9855)
+    assert (result.before.shape < 0.9855).all()
+    assert (result.after.shape < 0.9855).all()
+    assert result.after.shape.min() > 0.8 > 0.5 > result.before.shape.min()
+
+
+def test_what_misses_a_target_is_counted_by_cells():
+    corners = np.zeros((5, 3), dtype=np.int32)
+    assert Missing.of(corners).cells == 5
+    assert Missing.of(corners, np.array([0, 0, 2, 2, 5])).cells == 3
+    assert Missing.of(corners[:0], np.array([], dtype=np.int32)).cells == 0

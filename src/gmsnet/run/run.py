@@ -25,7 +25,7 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import serial
 from gmsnet.run.options import SmoothOptions
-from gmsnet.run.score import NONE, Score, in_metric
+from gmsnet.run.score import NONE, Missing, Score, in_metric
 from gmsnet.run.stop import CALLBACK, INTERRUPTED, MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.run.sweep import Sweep
 from gmsnet.topology.ordering import near_points
@@ -71,7 +71,7 @@ class Run:
 
     topology: Topology | Volume
     options: SmoothOptions
-    missing: Callable[[Floats], NDArray[np.int32]] | None
+    missing: Callable[[Floats], Missing] | None
     metric: Metric | None
     smoother: Smoother | Corners
     executor: Executor
@@ -83,7 +83,7 @@ class Run:
 
     def __init__(
         self, start: Start, smoother: Smoother, options: SmoothOptions, executor: Executor = serial,
-        missing: Callable[[Floats], NDArray[np.int32]] | None = None,
+        missing: Callable[[Floats], Missing] | None = None,
     ) -> None:  # fmt: skip
         self.topology, self.options, self.missing = start.topology, options, missing
         self.metric = start.metric

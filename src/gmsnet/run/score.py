@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,23 @@ from gmsnet.metric.field import Metric
 Floats = NDArray[np.float64]
 
 ROUNDING = 1e-12  # a smaller gain in q̂ is no gain
-NONE = np.empty((0, 3), dtype=np.int32)
+
+
+class Missing(NamedTuple):
+    """What misses a target. corners: (K, 3 or 4) of the simplices that do. cells: how many cells these belong to."""
+
+    corners: NDArray[np.int32]
+    cells: int
+
+    @classmethod
+    def of(cls, corners: NDArray[np.int32], cells: NDArray[np.int32] | None = None) -> Missing:
+        """cells: (K,) the cell of each, those of one cell one after the other; None where each is a cell."""
+        if cells is None:
+            return cls(corners, len(corners))
+        return cls(corners, int(np.count_nonzero(np.diff(cells))) + (len(cells) > 0))
+
+
+NONE = Missing.of(np.empty((0, 3), dtype=np.int32))
 
 
 def in_metric(totals: Totals, points: Floats, simplices: Simplices, metric: Metric) -> Totals:
@@ -36,17 +53,17 @@ def in_metric(totals: Totals, points: Floats, simplices: Simplices, metric: Metr
 class Score:
     """Where a mesh stands in the comparison of meshes on the way.
 
-    measure: the sums over all triangles, None where there are none; asked for when they first matter. missing: the
-    corners (K, 3) of the triangles that miss the target, if there is one. positive: all triangles are known to be.
+    measure: the sums over all triangles, None where there are none; asked for when they first matter. missing: what
+    misses the target, if there is one. positive: all triangles are known to be.
     """
 
     measure: Callable[[], Totals | None]
     best_by: str
-    missing: NDArray[np.int32] = field(default_factory=lambda: NONE)
+    missing: Missing = NONE
     positive: bool = False
 
     @classmethod
-    def of(cls, totals: Totals | None, best_by: str, missing: NDArray[np.int32] = NONE) -> Score:
+    def of(cls, totals: Totals | None, best_by: str, missing: Missing = NONE) -> Score:
         """From the sums over all triangles; None where there are none."""
         return cls(lambda: totals, best_by, missing)
 
@@ -58,7 +75,7 @@ class Score:
     @property
     def missed(self) -> int:
         """How many cells miss the target."""
-        return len(self.missing)
+        return self.missing.cells
 
     @property
     def inverted(self) -> int:

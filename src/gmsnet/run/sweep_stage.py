@@ -131,6 +131,8 @@ def missing_in(topology: Topology | Volume, points: Floats, options: SmoothOptio
         rows, _ = target.tetrahedra_missing(points, cells)
     else:
         rows = target.corners_missing(points, cells)
+        if cells.cells is not None:  # one of each cell
+            rows = rows[np.diff(cells.cells[rows], prepend=-1) != 0]
     flags = np.zeros(len(cells.rows), dtype=bool)
     flags[rows] = True
     return executor.counted(flags)

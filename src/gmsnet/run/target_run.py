@@ -24,7 +24,7 @@ from gmsnet.preserve.protection import Protection
 from gmsnet.run.dihedral_stage import floor_for_angles
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.run import Run, Start
-from gmsnet.run.score import Score
+from gmsnet.run.score import Missing, Score
 from gmsnet.run.state import State
 from gmsnet.run.stop import MAX_SWEEPS, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
 from gmsnet.topology.mixed_volume import MixedVolume
@@ -153,7 +153,9 @@ def _on_patches(
     smoother = planned or options.smoother()
     missing = partial(_changeable_missing, topology=topology, patch=patch, target=target)
     measure, positive = partial(totals_of, state.points, patch.scored), not state.before.inverted
-    before = Score(measure, options.best_by, corners if left.clear else missing(state.points), positive)
+    each = isinstance(topology, Volume) or topology.near_cells is None  # of these simplices is of another cell
+    first = Missing.of(corners) if left.clear and each else missing(state.points)
+    before = Score(measure, options.best_by, first, positive)
     run = Run(
         Start(patch, state.points, state.precision, before, state.history, state.constraint, state.curved),
         smoother,
@@ -165,7 +167,7 @@ def _on_patches(
     after = run.best_score
     state = replace(state, history=tuple(run.history), totals=None)
     if after.closer_to_target(before):
-        state, left = replace(state, points=run.best), left._replace(corners=after.missing, clear=True)
+        state, left = replace(state, points=run.best), left._replace(corners=after.missing.corners, clear=True)
     if run.interruption is not None:
         state = state.interrupted(run.interruption)
     elif not after.missed:
@@ -208,16 +210,18 @@ def cells_missing(
     return topology.places[topology.triangles[target.missed_in(before)]], False
 
 
-def _changeable(corners: NDArray[np.int32], topology: Topology | Volume) -> NDArray[np.int32]:
-    """Those with a node that is free. Of a cell that has one, simplices at its other corners may be without."""
-    return corners[topology.near_free.take(corners).any(axis=1)]
-
-
 def _changeable_missing(
     points: Floats, topology: Topology | Volume, patch: Topology | Volume, target: Target
-) -> NDArray[np.int32]:
-    """The corners of the cells in the patch that miss the target and have a node that is free in the whole mesh."""
-    return _changeable(corners_missing(points, patch, target, topology.near_free), topology)
+) -> Missing:  # fmt: skip
+    """What misses the target in the patch, of the corners with a node that is free in the whole mesh.
+
+    Of a cell that has one, simplices at its other corners may be without.
+    """
+    free = topology.near_free
+    rows = _rows_missing(points, patch, target, free)
+    rows = rows[free.take(patch.near.take(rows, axis=0)).any(axis=1)]
+    cells = None if isinstance(patch, Volume) or patch.near_cells is None else patch.near_cells[rows]
+    return Missing.of(patch.near.take(rows, axis=0), cells)
 
 
 def too_large(rings: int, active: Flags, left: float, free: int) -> bool:
@@ -241,14 +245,18 @@ def rows_missing(
     return rows
 
 
-def corners_missing(
-    points: Floats, topology: Topology | Volume, target: Target, free: Flags | None = None
-) -> NDArray[np.int32]:  # fmt: skip
-    """The corners (K, 3 or 4) of these. free: (N,) the nodes that may move; those of the topology."""
+def corners_missing(points: Floats, topology: Topology | Volume, target: Target) -> NDArray[np.int32]:
+    """The corners (K, 3 or 4) of these."""
+    return topology.near.take(_rows_missing(points, topology, target, topology.near_free), axis=0)
+
+
+def _rows_missing(
+    points: Floats, topology: Topology | Volume, target: Target, free: Flags
+) -> NDArray[np.integer[Any]]:  # fmt: skip
+    """The rows of ``near``. free: (N,) the nodes that may move."""
     if isinstance(topology, Volume):
-        return topology.near.take(target.tetrahedra_missing(points, topology.simplices)[0], axis=0)
-    rows = rows_missing(points, topology, target)
-    return topology.near.take(_with_free(rows, topology, topology.near_free if free is None else free), axis=0)
+        return target.tetrahedra_missing(points, topology.simplices)[0]
+    return _with_free(rows_missing(points, topology, target), topology, free)
 
 
 def _with_free(
