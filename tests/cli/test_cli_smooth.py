@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support import curved_meshes
 
 import gmsnet
 from gmsnet.generate import random_mesh, random_volume, second_order_volume
@@ -290,3 +291,15 @@ def test_a_mesh_of_boundary_nodes_is_told_of_sliding(run, tmp_path):
     told = run("smooth", tmp_path / "a.vtu", tmp_path / "b.vtu").out
     assert "(boundary: " in told
     assert hint not in told
+
+
+def test_no_target_is_met_where_curved_cells_stay_invalid(run, tmp_path):
+    mesh = curved_meshes.known_valid(102)
+    points = mesh.points.copy()
+    line = next(block.nodes for block in mesh.cells if block.dimension == 1)[0]
+    points[line[2]] = points.mean(axis=0) + 3.0 * (points.mean(axis=0) - points[line[2]])
+    source = tmp_path / "in.vtu"
+    gmsnet.write(mesh.with_points(points), source)
+    done = run("smooth", source, tmp_path / "out.vtu", "--target-quality", 0.01, "--json")
+    told = json.loads(done.out)
+    assert (done.code, told["below_target"], told["target_met"]) == (1, 0, False)

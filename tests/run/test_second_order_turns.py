@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support import curved_meshes
+from support import curved_meshes, rings
 
 import gmsnet
 from gmsnet.generate import block_volume, disturb, lattice_volume
 from gmsnet.generate.curved_volumes import second_order_volume
-from gmsnet.run import second_order_turns, stop
+from gmsnet.run import second_order, second_order_turns, stop
 from gmsnet.run.second_order import AS_FAR
 
 
@@ -201,3 +201,24 @@ def test_room_costs_no_quality_where_a_target_is_met(seed, share):
     assert result.stop_reason == "target reached"
     assert result.judged.after.shape_min >= result.judged.before.shape_min
     assert result.judged.after.shape_mean >= result.judged.before.shape_mean
+
+
+@pytest.mark.parametrize(("around", "layers", "outer", "seed"), [(3, 3, 1.05, 1), (5, 5, 1.15, 1)])
+def test_cells_that_are_left_are_tried_again_when_corners_have_moved(around, layers, outer, seed, monkeypatch):
+    mesh = rings.thrown(around, layers, outer, 1.0, seed)
+    assert gmsnet.smooth(mesh, threads=1).invalid_curved == 0
+    monkeypatch.setattr(second_order_turns, "TURN", second_order_turns.TURN[:-1])
+    assert gmsnet.smooth(mesh, threads=1).invalid_curved > 0
+
+
+def test_what_was_tried_again_in_vain_is_not_tried_once_more(monkeypatch):
+    tried = []
+
+    def mended(*given, old=second_order._mended):
+        tried.append(given[0].second_order.invalid[1])
+        return old(*given)
+
+    monkeypatch.setattr(second_order, "_mended", mended)
+    result = gmsnet.smooth(rings.thrown(5, 5, 1.15, 0.6, 1), threads=1)
+    assert tried[-1] == result.invalid_curved > 0
+    assert len(tried) == len(set(tried))

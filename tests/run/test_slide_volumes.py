@@ -16,6 +16,8 @@ from support.surfaces import boundary, ell, sliding, solid, turned
 
 import gmsnet
 from gmsnet import METHODS
+from gmsnet.generate import block_volume
+from gmsnet.run.untangle_stage import STILL
 
 METHODS_THAT_SLIDE = [name for name, row in METHODS.items() if row.slides and row.moves("tetra", None)]
 SOLIDS = {"box": None, "part": ell}
@@ -333,3 +335,15 @@ def test_any_cells(seed):
     fans = np.bincount(on.facets.rows[touching], minlength=len(points))
     spokes = [len(np.unique(on.facets.rows[(on.facets.rows == v).any(axis=1)])) - 1 for v in np.flatnonzero(fans)]
     assert spokes == fans[fans > 0].tolist()  # one closed fan around each node inside of a patch
+
+
+def test_nodes_that_slide_are_said_to_stand_still_where_cells_stay_inverted():
+    mesh = block_volume(4, "wedge")
+    points = mesh.points.copy()
+    middle = np.flatnonzero((points[:, 2] == points[:, 2].max()) & (np.abs(points[:, :2] - 0.5).max(axis=1) < 0.1))
+    points[middle] += (0.35, 0.075, 0.0)
+    slid, still = (gmsnet.smooth(mesh.with_points(points), slide=slide, threads=1) for slide in (True, False))
+    assert slid.after.inverted
+    assert still.after.inverted
+    assert any(note.startswith("untangling") and note.endswith(STILL) for note in slid.notes)
+    assert not any(STILL in note for note in still.notes)

@@ -71,3 +71,27 @@ def test_in_single_precision_the_result_is_valid_as_the_file_keeps_it():
     points, tables, free = curved_meshes.tables(mesh)
     assert untangle_curved(PlanarCells(points, tables, free, Precision.of(single=True, exponent=0))).after == 0
     np.testing.assert_array_equal(points, np.float32(points))
+
+
+def test_guarded_moves_that_mend_nothing_are_taken_back(monkeypatch):
+    """Boundary middles that are off spoil cells of valid meshes: nothing moves where none can be mended."""
+    swept, sweep = [], PlanarCells.guarded_sweep
+
+    def guarded_sweep(self, *others):
+        swept.append(sweep(self, *others))
+        return swept[-1]
+
+    monkeypatch.setattr(PlanarCells, "guarded_sweep", guarded_sweep)
+    in_vain = 0
+    for seed in range(100, 120):
+        mesh = curved_meshes.known_valid(seed)
+        first = mesh.points.copy()
+        line = next(block.nodes for block in mesh.cells if block.dimension == 1)[0]
+        first[line[2]] += 1.5 * (first.mean(axis=0) - first[line[2]])
+        points, tables, free = curved_meshes.tables(mesh.with_points(first))
+        score = untangle_curved(PlanarCells(points, tables, free))
+        if score.after == score.before > 0:
+            in_vain += 1
+            np.testing.assert_array_equal(points, first)
+    assert in_vain
+    assert any(swept)

@@ -214,7 +214,7 @@ class Account:
             "target_quality": self.target.quality,
             "target_angle": self.target.angle,
             "target_dihedral": self.target.dihedral,
-            "target_met": self.target_met if self.target else None,
+            "target_met": self.target_met and not result.invalid_curved if self.target else None,
             "below_target": len(self.missed),
             "ceiling": result.limits.ceiling,
             "notes": result.notes,

@@ -134,12 +134,31 @@ def untangle_second_order(state: State, options: SmoothOptions, executor: Execut
     state = replace(state, second_order=known)
     if not (options.untangle and (sign != 1).any() and cells.free.any()):
         return state
+    return _mended(state, options, executor, cells)
+
+
+def mend_rest(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """Tries once more to make the cells valid that are not, from where smoothing has taken their corners."""
+    given = state.second_order
+    if given is None or not options.untangle or given.in_vain or NOT_FOUND not in given.reasons.values():
+        return state
+    done = _mended(state, options, executor, opened(state))
+    assert done.second_order is not None
+    if done.second_order.invalid[1] < given.invalid[1]:
+        return stopped(done, np.ones(1, dtype=bool))  # there may be more to gain now
+    return replace(state, second_order=replace(given, in_vain=True), interruption=done.interruption)
+
+
+def _mended(state: State, options: SmoothOptions, executor: Executor, cells: PlanarCells | SolidCells) -> State:
+    """The state with as many of its cells valid as can be. cells: as ``opened`` gives them."""
     from gmsnet.untangle.curved import untangle_curved  # untangling takes 0.15 s more to import
 
-    for_good, interruption = np.zeros(len(sign), dtype=bool), None
+    given = state.second_order
+    assert given is not None
+    for_good, interruption = np.zeros(len(given.cells), dtype=bool), None
     try:
         with interruptible():
-            for_good = untangle_curved(cells, corners_alone(known).topology, executor).for_good
+            for_good = untangle_curved(cells, corners_alone(given).topology, executor).for_good
     except KeyboardInterrupt as caught:  # whole patches are mended, or as they were
         interruption = caught
     state = judged(state, cells)

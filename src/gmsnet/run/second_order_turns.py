@@ -16,11 +16,11 @@ from gmsnet.parallel.executor import Executor
 from gmsnet.run.carry_out import carry_out_all
 from gmsnet.run.options import SmoothOptions
 from gmsnet.run.room_stage import make_room, raise_bounds
-from gmsnet.run.second_order import corners_alone, rank_at, smooth_corners
+from gmsnet.run.second_order import corners_alone, mend_rest, rank_at, smooth_corners
 from gmsnet.run.state import SecondOrder, State, with_corners
 from gmsnet.run.sweep_stage import SMALL, much_fewer, rank_to_target
 
-TURN = (smooth_corners, make_room, raise_bounds)
+TURN = (smooth_corners, make_room, raise_bounds, mend_rest)
 TURNS = 8  # at most
 MISSING = 2  # where a worth has the cells that miss a target
 GAIN, PATIENCE = 0.01, 2  # after so many turns that gain less in that by which meshes are compared, they end

@@ -61,7 +61,8 @@ class SecondOrder:
     low. linked: volumes and what follows their corners, by places in memory. None is known before the first stage.
     unable: why the method does not move corners. numbers: (C,) of each cell among all of the mesh. reasons: why cells,
     by these, could not be made valid. stopped: some corners may not have gone where the method put them. room: no bound
-    of a valid cell falls below it while corners move; −∞ before that is known. outer: the ids of nodes on facets of one
+    of a valid cell falls below it while corners move; −∞ before that is known. in_vain: what is left invalid was tried
+    once more after that. outer: the ids of nodes on facets of one
     cell alone, of a mesh that has volumes of the second order alone.
     """
 
@@ -80,6 +81,7 @@ class SecondOrder:
     reasons: Mapping[int, str] = field(default_factory=dict)
     stopped: bool = False
     room: float = -math.inf
+    in_vain: bool = False
     outer: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @property

@@ -23,6 +23,8 @@ from gmsnet.topology.volume import Volume
 if TYPE_CHECKING:  # what untangling needs of SciPy takes 0.15 s more to import
     from gmsnet.untangle.result import Untangled
 
+STILL = "; nodes that slide stand still while cells are untangled"
+
 Reasons = Mapping[int, str]  # by the index of each cell among all cells of the mesh
 
 
@@ -90,9 +92,8 @@ def _noted(state: State, done: Untangled, topology: Topology | Volume) -> State:
     """The state with what untangling has made, and what there is to say about it."""
     cells = topology.cells_of(np.array([cell.row for cell in done.unmended], dtype=np.intp)).tolist()
     reasons = {index: cell.reason for index, cell in zip(cells, done.unmended, strict=True)}
-    return replace(
-        state, points=done.points, totals=None, untangling=(*state.untangling, note_of(done)), reasons=reasons
-    )
+    note = note_of(done) + (STILL if done.after and len(topology.held.get(REASON, ())) else "")
+    return replace(state, points=done.points, totals=None, untangling=(*state.untangling, note), reasons=reasons)
 
 
 def note_of(done: Untangled) -> str:

@@ -40,6 +40,7 @@ CLOSE = tuple(row for row in TRIES if row[0] < LARGE)  # around what no try has 
 
 # Of what is given back, sweeps by guarded moves go on while they mend a cell: rounds at most, sweeps for each τ.
 ROUNDS, SWEEPS, TAUS = 8, 12, (0.3, 0.1, 0.03)
+AGAIN = 3  # times at most, all of it while it mends some
 LEAST_SHAPE = 0.3  # of a straight cell, 1/q or η, to which they may flatten it
 
 
@@ -59,16 +60,24 @@ def untangle_curved(
     straight: the connectivity of the mesh with straight cells, of whose free nodes corners are; None: straight cells
     are not untangled for themselves.
     """
-    before = int((curved.signs(_all(curved)) != 1).sum())
+    before = left = int((curved.signs(_all(curved)) != 1).sum())
+    for _ in range(AGAIN):
+        after, for_good = _untangled(curved, straight, executor)
+        if after == np.count_nonzero(for_good) or after >= left:
+            break
+        left = after
+    return CurvedScore(before, after, for_good)
+
+
+def _untangled(curved: Cells, straight: Topology | Volume | None, executor: Executor) -> tuple[int, Mask]:
+    """How many cells are not certainly valid once all has been tried, and which cannot be."""
     for give_back in (False, True):  # what is given back stays bent, so that it is the last resort
         if straight is not None:
             _untangle_straight(curved, straight, executor, give_back)
         after, for_good = _mend(curved, give_back)
         if after == np.count_nonzero(for_good):
-            break
-    else:
-        after = _guarded(curved)
-    return CurvedScore(before, after, for_good)
+            return after, for_good
+    return _guarded(curved, for_good), for_good
 
 
 def _all(curved: Cells) -> Ints:
@@ -119,22 +128,27 @@ def _mend(curved: Cells, give_back: bool) -> tuple[int, Mask]:
     return len(bad) + int(np.count_nonzero(for_good)), for_good
 
 
-def _guarded(curved: Cells) -> int:
-    """Mends more of what has been given back by moves that lose no valid cell; returns how many stay invalid."""
+def _guarded(curved: Cells, for_good: Mask) -> int:
+    """Mends more of what has been given back by moves that lose no valid cell; returns how many stay invalid.
+
+    Nodes of rounds that mend none go back.
+    """
     mesh, may = curved.mesh, curved.inner | curved.corner
     bad = np.flatnonzero(curved.signs(_all(curved)) != 1)
-    for _ in range(ROUNDS):
-        before, nodes = len(bad), sorted_unique(mesh.cells[_around(mesh, bad)])
-        nodes = nodes[nodes >= 0]
-        nodes = nodes[may[nodes]]
-        for threshold in TAUS:
-            for _ in range(SWEEPS):
-                if not curved.guarded_sweep(nodes, threshold, LEAST_SHAPE):
-                    break
-        bad = bad[curved.signs(bad) != 1]
-        if len(bad) == before or not bad.size:
-            break
-    return len(bad)
+    whole = CurvedPatch(curved, _all(curved), _nodes(curved), for_good, False)
+    with whole.at_best():
+        for _ in range(ROUNDS):
+            before, nodes = len(bad), sorted_unique(mesh.cells[_around(mesh, bad)])
+            nodes = nodes[nodes >= 0]
+            nodes = nodes[may[nodes]]
+            for threshold in TAUS:
+                for _ in range(SWEEPS):
+                    if not curved.guarded_sweep(nodes, threshold, LEAST_SHAPE):
+                        break
+            bad = bad[curved.signs(bad) != 1]
+            if whole.judge() or len(bad) == before:
+                break
+    return whole.fewest + int(np.count_nonzero(for_good))
 
 
 def _around(mesh: Any, cells: Ints) -> Ints:
