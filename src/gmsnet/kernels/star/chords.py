@@ -18,12 +18,17 @@ from gmsnet.kernels.star.surface import CURVED
 from gmsnet.kernels.whole.nearest import nearest_one
 
 # Barycentric coordinates on a facet: of the node that moves, and of the two others.
-PLACES = np.array([[3, 0, 3], [3, 3, 0], [2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
+PLACES = np.array([
+    [6, 0, 6], [6, 6, 0], [4, 4, 4], [8, 2, 2], [2, 8, 2], [2, 2, 8], [9, 3, 0], [9, 0, 3], [3, 9, 0], [3, 0, 9],
+]) / 12.0  # fmt: skip
 # The same on a facet of the reference; the first few also on those beside it.
-BACK = np.array([[6, 0, 0], [0, 6, 0], [0, 0, 6], [2, 2, 2], [3, 3, 0], [0, 3, 3], [3, 0, 3]]) / 6.0
+BACK = np.array([
+    [12, 0, 0], [0, 12, 0], [0, 0, 12], [4, 4, 4], [6, 6, 0], [0, 6, 6], [6, 0, 6],
+    [9, 3, 0], [3, 9, 0], [0, 9, 3], [0, 3, 9], [9, 0, 3], [3, 0, 9],
+]) / 12.0  # fmt: skip
 FEW = 4
 BESIDE = 0.15  # in barycentric coordinates: so far beside a facet what lies over its edge counts, too
-CLOSER = 0.85  # times what is asked for, since there are places between
+CLOSER = 0.8  # times what is asked for, since there are places between
 
 
 @inlined
