@@ -160,3 +160,11 @@ def test_grids_that_were_pressed_and_thrown_about_are_not(power):
     pressed = mesh.with_points(np.column_stack([x, 0.7 * y ** (power - 0.4 + 0.8 * x)]))
     thrown = disturb(pressed, Topology.of(pressed).free, 0.3, seed=2, edge="shortest")
     assert LAYER not in gmsnet.smooth(thrown, max_sweeps=0).held
+
+
+@pytest.mark.parametrize("cells", ["quad", "triangle"])
+@pytest.mark.parametrize(("aspect", "growth", "rows"), [(60.0, 1.08, 40), (200.0, 1.12, 40)])
+def test_layers_up_to_a_boundary_along_which_cells_are_flat_still(cells, aspect, growth, rows):
+    """As of half a channel: the cells at its middle, 2.4 to 3 times as long as high, start no rows of their own."""
+    mesh, node = plate(cells, aspect, growth, rows, 60)
+    assert are_kept(mesh, node, rows - 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support import curved_meshes
+from support import curved_meshes, rings
 
 import gmsnet
 from gmsnet.generate import layered_mesh, random_mesh, recombine
@@ -281,3 +281,14 @@ def test_the_bound_of_the_worst_cell_knows_that_corners_move():
     _, mesh = twins("triangle6")
     result = gmsnet.smooth(mesh)
     assert result.limits.ceiling >= shape(result.after)[0]
+
+
+@pytest.mark.parametrize("around", [16, 24])
+def test_worst_cells_of_a_ring_that_are_all_alike_gain_together(around):
+    mesh = rings.ring(around, 8, 4.0)
+    result = gmsnet.smooth(mesh, threads=1)
+    (block,) = mesh.cells
+    first = gmsnet.smooth((mesh.points, {"quad": block.nodes[:, :4]}), threads=1)
+    assert result.invalid_curved == 0
+    assert result.judged.after.shape_min > result.judged.before.shape_min + 0.1
+    assert result.judged.after.shape_min == pytest.approx(first.judged.after.shape_min, abs=1e-3)

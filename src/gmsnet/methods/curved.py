@@ -9,15 +9,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gmsnet.kernels.curved.commit import follow
-from gmsnet.kernels.curved.stars import CurvedMesh
+from gmsnet.kernels.curved.commit import all_allowed, all_valid, follow
+from gmsnet.kernels.curved.stars import CurvedMesh, dragged
 from gmsnet.kernels.jit.compile import LANES
 from gmsnet.kernels.star.block import MOVED, Blocks
+from gmsnet.kernels.star.guard import Guard
 from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
 
+TOGETHER = (1.0, 0.5, 0.25)  # of the way
 PASSES = 10  # at most, over the corners that are not yet there: what stops one may be a neighbour that goes later
 
 
@@ -36,7 +38,8 @@ class Corners(Smoother):
 
     They go one after the other, in the order in which a sweep visits them, so that straight cells are on the way what
     they were in the copy. Each takes its middles along, as far as the rule for second-order cells allows. Where one is
-    stopped the copy goes on from there.
+    stopped the copy goes on from there. Those that are stopped one by one are tried together in the end, as it takes
+    where all cells of a ring are the worst.
     """
 
     smoother: Smoother
@@ -75,11 +78,32 @@ class Corners(Smoother):
 
         made = self.smoother.sweep(self.straight, executor, gone)
         go()
+        tally[MOVED] += self._go_together(field.points, places, guard)
         places[:] = field.points
         self.converged, self.target_reached = self.smoother.converged, self.smoother.target_reached
         self.looks, self.phase = self.smoother.looks, self.smoother.phase
         tally[MOVED + 1 :] += made[MOVED + 1 :]
         return tally
+
+    def _go_together(self, points: NDArray[np.float64], places: NDArray[np.float64], guard: Guard) -> int:
+        """Moves all corners that are not yet there together, or part of the way; returns how many have moved."""
+        mesh, order = self.curved.mesh, self.order
+        left = order[(points[order] != places[order]).any(axis=1)]
+        if not len(left):
+            return 0
+        waits = np.zeros(len(points) + 1, dtype=bool)  # the last one is that of −1
+        waits[left] = True
+        cells = np.flatnonzero(waits[mesh.cells].any(axis=1))
+        if not all_valid(points, mesh, cells, guard):
+            return 0
+        before = points.copy()
+        for share in TOGETHER:
+            there = places[left] if share == 1.0 else before[left] + share * (places[left] - before[left])
+            dragged(points, mesh, left, there, guard.single)
+            if all_allowed(points, mesh, cells, guard, self.curved.room):
+                return len(left)
+        points[:] = before
+        return 0
 
 
 def visited(topology: Topology) -> NDArray[np.int64]:

@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
 from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex.mean_ratio3 import WEIGHTS3, Tetrahedra
@@ -86,6 +85,8 @@ class Problem:
 
     def inverse(self, points: Floats) -> Callable[[Floats], Floats]:
         """See ``conjugate.Sum``."""
+        import scipy.sparse  # it takes a tenth of a short run
+
         rows, _, shapes = self.simplices[:3]
         _, weights = self._value(points, np.empty_like(points))
         table = WEIGHTS3[np.zeros(len(rows), dtype=np.uint8) if shapes is None else shapes]

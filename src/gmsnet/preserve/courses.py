@@ -109,6 +109,7 @@ class Courses(NamedTuple):
         if (label[nothing] >= 0).any():  # what is no layer takes no rows from those that are
             label[nothing] = -1
             rows = _courses(self.graph, self.points, label)
+            made = {wall: max(layers, _layers_of(rows.get(wall, []))) for wall, layers in made.items()}
         for wall, own in rows.items():
             last = made.get(wall, 0)
             for k, row in enumerate(own):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.constraints.options import TOLERANCE
 from gmsnet.measure.target import Target
 from gmsnet.measure.worst import NAMED, named_cells, worst_cells
 from gmsnet.mesh.display import amount, miss_it, plain
@@ -23,6 +24,7 @@ from gmsnet.run.sweep import Sweep
 FAR = "the shape has changed by more than 2 %: where nodes leave tight curves, facets become chords"
 BOUND = "a smaller --hausdorff binds these"
 HELD_THERE = ", and a smaller --feature-angle, or --fix, holds nodes there"
+NEAR = f"; with a --surface-tolerance below {TOLERANCE} nodes stay near the input's chords, and round bodies shrink"
 UNKNOWN = "not untangled, or untangling was off"
 FOLDED = "it is folded over, and where facets in space fold, their nodes are held as those of a sharp edge"
 NO_AREA = "it has no area, and facets in space are not untangled: two of its corners are at one place, or all in a line"
@@ -185,6 +187,8 @@ class Account:
         if change is None:
             return []
         far = f"{FAR}; {BOUND}{HELD_THERE if self.mesh.has_volumes else ''}"
+        if (self.result.asked.get("surface_tolerance") or TOLERANCE) < TOLERANCE:
+            far += NEAR
         return [change.sentence(), *[far] * change.is_far]
 
     def reasons(self) -> str:

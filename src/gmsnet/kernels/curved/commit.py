@@ -154,23 +154,31 @@ def allowed_now(points, mesh, i, guard, room, work):
     is_corner = mesh.corner[i]  # else straight cells stay as they are
     for k in range(mesh.cell_start[i], mesh.cell_start[i + 1]):
         c, at = mesh.cell_of[k], k - mesh.cell_start[i]
-        kind = mesh.kinds[c]
-        delta = guard.unit * gather_cell(points, mesh.cells[c], kind, work.cell) + guard.grain
-        if work.straight[at] != -1 and straight_sign(kind, delta, work.cell) != 1:
-            return False
-        floor = floor_of(guard, mesh.cells[c], kind)
-        if is_corner and floor > -np.inf and not above_floor(kind, delta, floor, work.cell):
-            return False
-        bound = expand(kind, delta, work.cell)
-        least, _ = smallest(kind, work.cell.coefficients)
-        if work.sign[at] == -1 and least - bound > work.least[at]:
-            continue
-        if sign_everywhere(kind, bound, work.cell) != 1:
-            return False
-        curved = NODES[kind] > CORNERS[kind]
-        if curved and room > -np.inf and work.sign[at] == 1 and not has_room(kind, bound, room, work.cell):
+        if not cell_allowed(
+            points, mesh, c, guard, room, is_corner, work.straight[at], work.sign[at], work.least[at], work.cell
+        ):
             return False
     return True
+
+
+@inlined
+def cell_allowed(points, mesh, c, guard, room, moved, straight, sign, least_before, work):
+    """Does a cell fulfil the rule? moved: has one of its corners? straight, sign, least_before: what it was."""
+    kind = mesh.kinds[c]
+    delta = guard.unit * gather_cell(points, mesh.cells[c], kind, work) + guard.grain
+    if straight != -1 and straight_sign(kind, delta, work) != 1:
+        return False
+    floor = floor_of(guard, mesh.cells[c], kind)
+    if moved and floor > -np.inf and not above_floor(kind, delta, floor, work):
+        return False
+    bound = expand(kind, delta, work)
+    least, _ = smallest(kind, work.coefficients)
+    if sign == -1 and least - bound > least_before:
+        return True
+    if sign_everywhere(kind, bound, work) != 1:
+        return False
+    curved = NODES[kind] > CORNERS[kind]
+    return not (curved and room > -np.inf and sign == 1 and not has_room(kind, bound, room, work))
 
 
 @part
@@ -217,3 +225,24 @@ def follow(points, mesh, nodes, places, guard, room, tally):
             commit_curved(points, mesh, i, places[i, 0], places[i, 1], guard, room, work, tally)
             left += points[i, 0] != places[i, 0] or points[i, 1] != places[i, 1]
     return left
+
+
+@kernel
+def all_valid(points, mesh, cells, guard):
+    """Are all of these cells (K,) certainly valid, and their straight ones?"""
+    work = cell_workspace()
+    for c in cells:
+        kind = mesh.kinds[c]
+        delta = guard.unit * gather_cell(points, mesh.cells[c], kind, work) + guard.grain
+        if straight_sign(kind, delta, work) != 1 or sign_everywhere(kind, expand(kind, delta, work), work) != 1:
+            return False
+    return True
+
+
+@kernel
+def all_allowed(points, mesh, cells, guard, room):
+    """Do all of these cells (K,), certainly valid before, fulfil the rule where corners of theirs have moved?"""
+    work, count = cell_workspace(), 0
+    while count < len(cells) and cell_allowed(points, mesh, cells[count], guard, room, True, 1, 1, 0.0, work):
+        count += 1
+    return count == len(cells)
