@@ -10,9 +10,16 @@ from support.hard_volumes import spiked
 
 import gmsnet
 from gmsnet.kernels.simplex.mean_ratio3 import HEXAHEDRON, REGULAR, TETRAHEDRON, WEIGHTS3
+from gmsnet.kernels.star.block import MOVED
+from gmsnet.kernels.star.guard import WORST
 from gmsnet.kernels.whole.powers3 import largest, powered
+from gmsnet.methods import Field
 from gmsnet.methods.auto import WHOLE_WORST
 from gmsnet.methods.whole_in_space import WholeInSpace
+from gmsnet.parallel.threads import serial
+from gmsnet.run.run import precision_of
+from gmsnet.topology.mixed_volume import volume_of, wound_of
+from gmsnet.topology.ordering import near_points
 
 KINDS = ("pyramid", "mixed")
 
@@ -113,3 +120,16 @@ def test_the_precision_is_that_of_the_file():
     assert any(sweep.moved for sweep in turns(result))
     assert (result.points == result.points.astype(np.float32)).all()
     assert not result.after.inverted
+
+
+def test_the_room_of_nodes_that_have_moved_at_once_is_not_taken_for_known():
+    """Slack tells how far nodes may go from where they were until cells are looked at between their corners."""
+    mesh = gmsnet.smooth(spiked("mixed"), "barrier", preserve="none", threads=1).mesh
+    topology = volume_of(wound_of(mesh))
+    field = Field(near_points(mesh, topology), topology, precision_of(mesh), WORST)
+    topology.lend_slack(field)
+    topology.slack[:] = 1.0
+    tally = WholeInSpace((3, 2)).sweep(field, serial, lambda: True)
+    assert tally[MOVED]
+    topology.lend_slack(field)
+    assert not topology.slack.any()

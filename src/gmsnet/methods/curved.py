@@ -19,7 +19,7 @@ from gmsnet.methods.floor import Floor
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.topology import Topology
 
-TOGETHER = (1.0, 0.5, 0.25)  # of the way
+TOGETHER, VAIN = (1.0, 0.5, 0.25), 5  # of the way; times without success after which that is no longer tried
 PASSES = 10  # at most, over the corners that are not yet there: what stops one may be a neighbour that goes later
 
 
@@ -56,6 +56,7 @@ class Corners(Smoother):
         self.stops_when_idle = smoother.stops_when_idle
         self.straight: Field | None = None
         self.order = np.empty(0, dtype=np.int64)
+        self.in_vain = 0  # times that all together were not allowed to go
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
@@ -89,12 +90,13 @@ class Corners(Smoother):
         """Moves all corners that are not yet there together, or part of the way; returns how many have moved."""
         mesh, order = self.curved.mesh, self.order
         left = order[(points[order] != places[order]).any(axis=1)]
-        if not len(left):
+        if not len(left) or self.in_vain == VAIN:
             return 0
         waits = np.zeros(len(points) + 1, dtype=bool)  # the last one is that of −1
         waits[left] = True
         cells = np.flatnonzero(waits[mesh.cells].any(axis=1))
         if not all_valid(points, mesh, cells, guard):
+            self.in_vain += 1
             return 0
         before = points.copy()
         for share in TOGETHER:
@@ -103,6 +105,7 @@ class Corners(Smoother):
             if all_allowed(points, mesh, cells, guard, self.curved.room):
                 return len(left)
         points[:] = before
+        self.in_vain += 1
         return 0
 
 

@@ -62,7 +62,7 @@ class ToTheEnd(Smoother):
         worst = float(ratios_of(field.points, topology.changeable, executor).max(initial=-np.inf))
         gained = -executor.minimum(-worst) < (1.0 - SURE) * before
         if not gained:
-            topology.lent[0] = None
+            topology.forget_slack()
         return gained
 
 

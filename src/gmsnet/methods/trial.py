@@ -34,7 +34,7 @@ class Trial:
             field.points[:] = self.points
             field.floor.forget()
             assert isinstance(field.topology, MixedVolume)
-            field.topology.lent[0] = None
+            field.topology.forget_slack()
         return good
 
 

@@ -25,6 +25,7 @@ from gmsnet.methods.conjugate import minimise
 from gmsnet.methods.multigrid import Multigrid
 from gmsnet.methods.whole_mesh import CLOSE
 from gmsnet.parallel.executor import Executor
+from gmsnet.topology.mixed_volume import MixedVolume
 from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
@@ -135,6 +136,8 @@ class WholeInSpace(Smoother):
         whole = executor.gathered(field)  # on one process
         if executor.returned(field, whole, whole is not None and self._taken(whole)):
             field.floor.forget()
+            if isinstance(field.topology, MixedVolume):
+                field.topology.forget_slack()
             moved = (field.points != before).any(axis=1) & field.topology.near_free
             tally[MOVED] = executor.total(np.array(np.count_nonzero(moved)))
         return tally

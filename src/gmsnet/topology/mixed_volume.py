@@ -123,6 +123,10 @@ class MixedVolume(Volume):
             self.slack[:] = self.gone[:] = 0.0
             self.lent[0] = field
 
+    def forget_slack(self) -> None:
+        """All nodes may be elsewhere."""
+        self.lent[0] = None
+
     def moved_elsewhere(
         self, points: NDArray[np.float64], nodes: NDArray[np.integer[Any]], before: NDArray[np.float64]
     ) -> None:
