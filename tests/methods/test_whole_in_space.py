@@ -88,12 +88,13 @@ def test_the_worst_cells_of_a_small_volume_gain_together(kind, monkeypatch):
     assert not result.after.inverted
 
 
-def test_what_costs_too_much_of_the_mean_is_given_back(monkeypatch):
+@pytest.mark.parametrize("slide", [False, True])
+def test_what_costs_too_much_of_the_mean_is_given_back(slide, monkeypatch):
     mesh = spiked("pyramid")
-    monkeypatch.setattr("gmsnet.methods.trial.TRADE", 5.0)
-    dear = gmsnet.smooth(mesh, preserve="none", threads=1)
+    monkeypatch.setattr("gmsnet.methods.trial.TRADE", 50.0)
+    dear = gmsnet.smooth(mesh, slide=slide, preserve="none", threads=1)
     monkeypatch.setattr(WholeInSpace, "_taken", lambda self, field: False)
-    without = gmsnet.smooth(mesh, preserve="none", threads=1)
+    without = gmsnet.smooth(mesh, slide=slide, preserve="none", threads=1)
     assert (dear.points == without.points).all()
     assert dear.sweeps > without.sweeps
 

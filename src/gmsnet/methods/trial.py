@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from gmsnet.kernels.star.surface import Surface, locate3
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods.base import Field
 from gmsnet.methods.whole_mesh import LEAST_GAIN, TRADE
@@ -35,6 +36,8 @@ class Trial:
             field.floor.forget()
             assert isinstance(field.topology, MixedVolume)
             field.topology.forget_slack()
+            if isinstance(field.constraint, Surface):  # it has followed the nodes
+                locate3(field.constraint, field.points)
         return good
 
 
