@@ -21,7 +21,8 @@ def framed(comm: Any, mesh: Mesh) -> Mesh:
     points = mesh.points if plane is None else in_plane(mesh.points, plane)
     box = box_of(comm, points)
     exponent = exponent_of(box, None, mesh.single)
-    return mesh.as_part(plane, (volumes, quads, solids), exponent, np.ldexp(box, -exponent))
+    exact = not comm.allreduce(not mesh.exact, mpi().LOR)
+    return mesh.as_part(plane, (volumes, quads, solids), exponent, exact, np.ldexp(box, -exponent))
 
 
 def _plane(comm: Any, mesh: Mesh) -> tuple[int, int] | None:

@@ -173,7 +173,7 @@ def _exchanged(part: Part, field: Field, active: Mapping[int, Flags | None]) -> 
     whole = part.mesh
     assert whole.box is not None
     mesh = Mesh(places, tuple(blocks), single=whole.single).as_part(
-        whole.plane, whole.kinds_there, whole.exponent, whole.box
+        whole.plane, whole.kinds_there, whole.exponent, whole.exact, whole.box
     )
     topology = connected(mesh, ~moves, ids, np.concatenate(all_numbers), part.along)
     starred, colours = (

@@ -172,7 +172,8 @@ class Mesh:
         made = self._twin()  # all else has been checked
         if self.cells:  # without any (``without_cells``), it is the plane of those that there were
             made.__dict__.pop("plane", None)
-        made.__dict__.pop("exponent", None)
+        for name in ("exponent", "exact"):
+            made.__dict__.pop(name, None)
         object.__setattr__(made, "points", finite_points(array))
         return made
 
@@ -220,23 +221,34 @@ class Mesh:
         return None
 
     def as_part(
-        self, plane: tuple[int, int] | None, kinds: tuple[bool, bool, bool], exponent: int,
+        self, plane: tuple[int, int] | None, kinds: tuple[bool, bool, bool], exponent: int, exact: bool,
         box: NDArray[np.float64] | None,
     ) -> Mesh:  # fmt: skip
-        """The same as a part of a mesh with this plane and exponent, and of whose nodes these are.
+        """The same as a part of a mesh with this plane and exponent, exact or not, and of whose nodes these are.
 
         kinds: see ``kinds_there``. box: (2, D) the least and the greatest coordinates of all its nodes, in the plane if
         there is one, over 2 to the power of the exponent; None of a whole mesh. They are numbered in memory as in the
         whole mesh: nodes that come first come first.
         """
         made = self._twin()
-        made.__dict__.update(plane=plane, exponent=exponent, box=box)
+        made.__dict__.update(plane=plane, exponent=exponent, exact=exact, box=box)
         made.__dict__["has_volumes"], made.__dict__["has_quads"], made.__dict__["has_solids"] = kinds
         return made
 
     def in_frame_of(self, other: Mesh) -> Mesh:
         """The same in the plane and by the exponent of a mesh of the same cells, whose nodes were elsewhere."""
-        return self.as_part(other.plane, other.kinds_there, other.exponent, other.box)
+        return self.as_part(other.plane, other.kinds_there, other.exponent, other.exact, other.box)
+
+    @cached_property
+    def exact(self) -> bool:
+        """Whether coordinates are the same numbers to whoever reads the file.
+
+        Text of single precision is read as float32 by some, and as more by others.
+        """
+        if not self.single:
+            return True
+        with np.errstate(over="ignore"):
+            return bool((self.points == self.points.astype(np.float32)).all())
 
     @property
     def kinds_there(self) -> tuple[bool, bool, bool]:

@@ -73,8 +73,7 @@ class Field:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
         if isinstance(self.topology, MixedVolume):
             self.topology.lend_slack(self)
-        # New places on a surface are rounded before they are judged (kernels/star/landing.py).
-        precision = self.precision.as_stored if isinstance(self.topology, Shell) else self.precision
+        precision = self.precision
         if self.level == WORST:
             floor = self.floor.of(self.points, self.topology, precision, executor)
             return MeshGuard(*precision, floor, self.constraint)

@@ -61,7 +61,7 @@ class FlatPart:
 
     def untangled(self, held: Flags, precision: Precision) -> tuple[Untangled, Longs, Floats] | None:
         """What came of it, the places of nodes that moved, and by how much (m, 2). held: (n,) bool.
-        precision: of the points in space. None where no cell is inverted."""
+        precision: of the points in space, before they are rounded. None where no cell is inverted."""
         kinds = ("triangle", self.triangles), ("quad", self.quads)
         blocks = (CellBlock(kind, rows, np.zeros(len(rows), dtype=np.int64)) for kind, rows in kinds)
         part = Mesh(self.flat, tuple(blocks))
@@ -71,7 +71,7 @@ class FlatPart:
             return None
         from gmsnet.untangle import untangle
 
-        scaled = precision._replace(grain=np.ldexp(precision.grain, -part.exponent), single=False)
+        scaled = precision._replace(grain=np.ldexp(precision.grain, -part.exponent))
         done = untangle(start, connected, scaled)
         moved = np.flatnonzero((done.points != start).any(axis=1))
         step = np.ldexp(done.points[moved] - start[moved], part.exponent)

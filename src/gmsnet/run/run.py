@@ -199,7 +199,7 @@ def merit(sweep: Sweep) -> float:
 
 def precision_of(mesh: Mesh) -> Precision:
     """How exactly the coordinates of a mesh are known, in the units of ``planar_points``."""
-    precision = Precision.of(single=mesh.single, exponent=mesh.exponent)
+    precision = Precision.of(single=mesh.single, exact=mesh.exact, exponent=mesh.exponent)
     return (
         precision
         if mesh.rounding is None

@@ -47,7 +47,7 @@ def unfolded(mesh: Mesh, facets: Facets, patches: Patches, asked: Flags, options
         return Unfolded(mesh, (), laid)
     held = asked | facets.still
     held[facets.lines] = True
-    precision = precision_of(mesh)
+    precision = precision_of(mesh).before_rounding
     precision = precision._replace(grain=precision.grain + ROUNDING * precision.unit * float(abs(points).max()))
     notes, start, uses = list[str](), points.copy(), np.bincount(facets.rows.ravel(), minlength=len(points))
     for plane in folded_planes(facets, points):

@@ -37,7 +37,7 @@ UPWARD = np.array([[0.0, 0.0, 1.0]])
 class CurvedParts:
     """facets, given: (N, 3) of the input. held: (N,) bool. uses: (N,) how many facets have each node. limit: (N,) how
     far from the input's facets nodes may come to lie; bound: how far any place on a facet, ∞ if that was not asked for.
-    precision: of points in space. angle: by which facets turn at creases, in degrees.
+    precision: of points in space, before they are rounded. angle: by which facets turn at creases, in degrees.
     """
 
     facets: Facets

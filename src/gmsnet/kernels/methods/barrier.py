@@ -35,7 +35,7 @@ from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.block import MARGIN, PAIRS, REACH, SIZE, ask_ahead, gather, ring_row
 from gmsnet.kernels.star.certificate import COARSE, NARROWEST, WIDER, error_bound
 from gmsnet.kernels.star.constraint import along_curve, slides
-from gmsnet.kernels.star.guard import WITH_FLOORS
+from gmsnet.kernels.star.guard import WITH_FLOORS, unit_of_steps
 from gmsnet.kernels.star.pattern import pattern_at
 
 FLAT = 300.0  # mean Q of a star: D of a triangle is off by a few times 2⁻²⁴·Q in float32
@@ -66,7 +66,7 @@ def relate(star, n, guard, work, flat, local, sums):
             q[lane], q[LANES + lane] = qx, qy
             sums[WIDTH * LANES + lane] = max(sums[WIDTH * LANES + lane], max(abs(qx), abs(qy)))
     stars.take_centres(star, work)
-    unit, grain = guard.unit, guard.grain
+    unit, grain = unit_of_steps(guard), guard.grain
     for lane in range(LANES):
         reach, size = max(abs(star[2 * lane]), abs(star[2 * lane + 1])), work[SIZE * LANES + lane]
         sums[DOUBT * LANES + lane] = WIDER * (unit * reach + grain) / size
@@ -146,7 +146,7 @@ def sweep(points, blocks, first, last, guard, power, relaxation, stretch, tally)
         settle(sums, most * n, step, mean, mean_sums, stretch > 0.0)
         for k in range(2 * LANES):
             shift[k] = step[k]
-        uncertified = certify(sums, step, guard.unit, work)
+        uncertified = certify(sums, step, unit_of_steps(guard), work)
         if uncertified:
             centre = stars.centre_of(blocks, block)
             refine(star, n, pattern, centre, guard.constraint, count, work, power, sums, shift)

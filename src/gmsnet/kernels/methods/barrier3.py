@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.jit.compile import kernel, part
+from gmsnet.kernels.star.guard import unit_of_steps
 from gmsnet.kernels.star.slide3 import restrict3
 from gmsnet.kernels.star.space import GX, GY, GZ, ISO, VALUE, XX, XY, XZ, YY, YZ, ZZ
 from gmsnet.kernels.star.space_blocks import LANES3
@@ -95,7 +96,7 @@ def smooth_some(points, blocks, first, last, guard, power, relaxation, workspace
         propose3(workspace.sums, power, relaxation, workspace.step)
         for trial in range(power.trials):
             judge3(blocks, block, power, None, floor, workspace, guard.constraint, trial)
-            if settle3(workspace, guard.unit, guard.grain, trial == power.trials - 1, blocks.mixture) == 0:
+            if settle3(workspace, unit_of_steps(guard), guard.grain, trial == power.trials - 1, blocks.mixture) == 0:
                 break
         if store3(points, blocks, block, workspace, guard, tally):
             return block

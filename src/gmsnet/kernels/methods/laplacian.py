@@ -18,7 +18,7 @@ from gmsnet.kernels.star import stars
 from gmsnet.kernels.star.block import MARGIN, REACH, SIZE, ask_ahead
 from gmsnet.kernels.star.certificate import COARSE, WIDER, error_bound
 from gmsnet.kernels.star.constraint import slides
-from gmsnet.kernels.star.guard import WITH_FLOORS
+from gmsnet.kernels.star.guard import WITH_FLOORS, unit_of_steps
 from gmsnet.kernels.star.pattern import count_of, neighbour_weight, neighbours, pair_of, pattern_at, weights_of
 
 SMART, INVERSE_LENGTH, AREA = range(3)
@@ -183,7 +183,7 @@ def sweep(points, blocks, first, last, guard, variant, tally):
         propose(local, n, pattern_at(blocks.patterns, blocks.pattern, block), variant, floor, row, shift)
         if variant == SMART and len(guard) != WITH_FLOORS and not slides(guard.constraint):
             stars.aim_block(blocks, block, workspace.work, shift, guard)
-            certify_smart(row, guard.unit, guard.grain, workspace.work)
+            certify_smart(row, unit_of_steps(guard), guard.grain, workspace.work)
             stars.store(points, blocks, block, workspace, shift, guard, workspace.counts)
         else:
             stars.commit(points, blocks, block, workspace, local, shift, guard, workspace.counts)

@@ -6,6 +6,7 @@ import numpy as np
 
 from gmsnet.kernels.jit.compile import inlined, kernel, part
 from gmsnet.kernels.methods.barrier3 import TRIALS
+from gmsnet.kernels.star.guard import unit_of_steps
 from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.kernels.star.stars3 import certify3, derive3, fetch3, judge3, settle3, store3, try_alone, workspace3_for
 
@@ -45,9 +46,9 @@ def smooth_some(points, blocks, first, last, guard, power, smart, workspace, tal
         for trial in range(TRIALS):
             judge3(blocks, block, power, None, floor, workspace, guard.constraint, trial)
             if not smart:
-                certify3(workspace, guard.unit, guard.grain, blocks.mixture)
+                certify3(workspace, unit_of_steps(guard), guard.grain, blocks.mixture)
                 break
-            if settle3(workspace, guard.unit, guard.grain, trial == TRIALS - 1, blocks.mixture) == 0:
+            if settle3(workspace, unit_of_steps(guard), guard.grain, trial == TRIALS - 1, blocks.mixture) == 0:
                 break
         if store3(points, blocks, block, workspace, guard, tally):
             return block

@@ -43,14 +43,15 @@ LEVELS = ("valid", "worst", "star")
 VALID, WORST, STAR = range(3)
 ROUNDING_L = 16.0 * UNIT  # of L, relative
 LARGEST = 1.0 / (2.0 * math.sqrt(3.0))  # D/L of an equilateral triangle
+ROUNDED = 2.0**-24  # by float32, relative
 
 
 class Precision(NamedTuple):
     """How exactly the coordinates of a mesh are known once they are written.
 
-    unit: the largest relative error (2⁻⁵³ for float64 and decimal text, 2⁻²⁴ where a file keeps float32).
-    grain: the largest absolute error next to zero, where floats are evenly spaced. single: round every new coordinate
-    to float32, because the file will.
+    unit: the largest relative error (2⁻⁵³ for float64, decimal text and float32; 2⁻²⁴ for text that is read as float32
+    or as more). grain: the largest absolute error next to zero, where floats are evenly spaced. single: round every new
+    coordinate to float32, because the file will.
     """
 
     unit: float = 2.0**-53
@@ -58,17 +59,17 @@ class Precision(NamedTuple):
     single: bool = False
 
     @classmethod
-    def of(cls, *, single: bool, exponent: int) -> Precision:
-        """For coordinates that have been divided by 2 to the power of ``exponent``."""
+    def of(cls, *, single: bool, exponent: int, exact: bool = True) -> Precision:
+        """For coordinates that have been divided by 2 to the power of ``exponent``. exact: see ``Mesh.exact``."""
         if single:
-            return cls(2.0**-24, math.ldexp(1.0, -150 - exponent), single=True)
+            return cls(2.0**-53 if exact else ROUNDED, math.ldexp(1.0, -150 - exponent), single=True)
         grain = math.ldexp(1.0, -1075 - exponent)
         return cls(grain=grain if grain > 1e-290 else 0.0)  # a subnormal one would only be slow
 
     @property
-    def as_stored(self) -> Precision:
-        """Of coordinates that are rounded to float32 before anything is told of them, and so are known exactly."""
-        return self._replace(unit=self.unit - 2.0**-24 + 2.0**-53) if self.single else self
+    def before_rounding(self) -> Precision:
+        """Of new coordinates that are judged first, and rounded to float32 after that."""
+        return self._replace(unit=self.unit + ROUNDED, single=False) if self.single else self
 
     def coarser(self, unit: float, grain: float) -> Precision:
         """Of coordinates that are rounded once more, by the relative and the absolute error at most, when written."""
@@ -111,6 +112,12 @@ def plain_guard(
 ) -> MeshGuard:
     """The guard of the level VALID."""
     return MeshGuard(*precision, -math.inf, constraint)
+
+
+@inlined
+def unit_of_steps(guard):
+    """The unit of a place that is judged by the step there, and rounded after that."""
+    return guard.unit + ROUNDED if guard.single else guard.unit
 
 
 @inlined

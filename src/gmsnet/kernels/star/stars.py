@@ -27,7 +27,7 @@ from gmsnet.kernels.star.block import Blocks as Blocks
 from gmsnet.kernels.star.block import workspace_for as workspace_for
 from gmsnet.kernels.star.certificate import certify, certify_stars, gather_floors
 from gmsnet.kernels.star.constraint import follow, snap
-from gmsnet.kernels.star.guard import WITH_FLOORS
+from gmsnet.kernels.star.guard import WITH_FLOORS, unit_of_steps
 from gmsnet.kernels.star.pattern import pattern_at
 from gmsnet.kernels.star.truncation import halve_in_lanes, truncate
 
@@ -104,7 +104,8 @@ def commit(points, blocks, block, workspace, local, shift, guard, tally):
         certify_stars(workspace.star, n, pattern, 1.0, guard.unit, guard.grain, work)
         halve_in_lanes(n, pattern, centre_of(blocks, block), workspace, shift, guard)
     else:
-        certify(local, n, pattern, shift, max(guard.floor, 0.0), guard.unit, guard.grain, work, workspace.sums)
+        floor, unit = max(guard.floor, 0.0), unit_of_steps(guard)
+        certify(local, n, pattern, shift, floor, unit, guard.grain, work, workspace.sums)
     store(points, blocks, block, workspace, shift, guard, tally)
 
 
