@@ -31,7 +31,7 @@ def wound(
         piece[:], orientation[:] = -1, 1
         consistent = kernels.wind_solids(near, kind, tables, _without_links(twin, wrong), piece, orientation)
     volume, extent = np.zeros((2, count))
-    kernels.corner_volumes(points, near, kind, tables, volume, extent)
+    kernels.volumes(points, near, kind, tables, volume, extent)
     parts = len(consistent)
     signed = np.bincount(piece, orientation * volume, parts)
     orientation[signed[piece] < 0.0] *= -1

@@ -172,21 +172,36 @@ def list_simplices(nodes, kind, tables, rows, owner):
 
 
 @kernel
-def corner_volumes(points, nodes, kind, tables, mean, size):
-    """Writes the mean of the determinants of the corner simplices of each cell, (T,), and that of their magnitudes."""
+def volumes(points, nodes, kind, tables, volume, size):
+    """Writes six times the volume of each cell (T,), and the sum of the magnitudes of what that is made of.
+
+    A facet of four nodes is the bilinear patch between them, what is swept by which is the mean of both its halvings.
+    So of two cells that share it one has what the other lacks: the sum over a part of the mesh hangs on its boundary
+    alone.
+    """
     for t in range(len(kind)):
-        total, magnitude, count = 0.0, 0.0, 0
-        for simplex in tables.simplices[kind[t]]:
-            if simplex[0] == NONE:
+        total, magnitude = 0.0, 0.0
+        for f in tables.facets[kind[t]]:
+            if f[0] == NONE:
                 break
-            d, a, b, c = nodes[t, simplex[0]], nodes[t, simplex[1]], nodes[t, simplex[2]], nodes[t, simplex[3]]
-            x, y, z = points[d, 0], points[d, 1], points[d, 2]
-            double = determinant(
-                points[a, 0] - x, points[a, 1] - y, points[a, 2] - z, points[b, 0] - x, points[b, 1] - y,
-                points[b, 2] - z, points[c, 0] - x, points[c, 1] - y, points[c, 2] - z,
-            )  # fmt: skip
-            total, magnitude, count = total + double, magnitude + abs(double), count + 1
-        mean[t], size[t] = total / count, magnitude / count
+            one = _swept(points, nodes[t], f[0], f[1], f[2])
+            if f[3] != NONE:
+                one += _swept(points, nodes[t], f[0], f[2], f[3])
+                one += _swept(points, nodes[t], f[0], f[1], f[3]) + _swept(points, nodes[t], f[1], f[2], f[3])
+                one *= 0.5
+            total, magnitude = total + one, magnitude + abs(one)
+        volume[t], size[t] = total, magnitude
+
+
+@inlined
+def _swept(points, cell, i, j, k):
+    """The determinant of three corners of a cell, from its first one."""
+    d, a, b, c = cell[0], cell[i], cell[j], cell[k]
+    x, y, z = points[d, 0], points[d, 1], points[d, 2]
+    return determinant(
+        points[a, 0] - x, points[a, 1] - y, points[a, 2] - z, points[b, 0] - x, points[b, 1] - y, points[b, 2] - z,
+        points[c, 0] - x, points[c, 1] - y, points[c, 2] - z,
+    )  # fmt: skip
 
 
 @kernel
