@@ -18,6 +18,7 @@ from gmsnet.distributed.part import Part
 from gmsnet.distributed.winding import Winding
 from gmsnet.measure.report import measure
 from gmsnet.measure.signs import exact_signs
+from gmsnet.measure.volumes import look
 from gmsnet.methods.base import Field
 from gmsnet.parallel.threads import serial
 from gmsnet.run.run import precision_of
@@ -95,10 +96,8 @@ def _bad(part: Part, topology: Topology | Volume) -> Flags:
     """(T,) the rows that are to be mended: in a plane those of inverted cells, in space all uncertain ones."""
     if isinstance(topology, Topology):
         return np.asarray(exact_signs(part.points, topology.near, topology.near_orientation) <= 0)
-    from gmsnet.untangle.space import look
-
     bad, inverted = np.empty((2, len(topology.near)), dtype=bool)
-    look(part.points, topology, precision_of(part.mesh), bad, inverted, np.empty(len(topology.near)))
+    look(part.points, topology.simplices, precision_of(part.mesh), bad, inverted, np.empty(len(topology.near)))
     return bad
 
 

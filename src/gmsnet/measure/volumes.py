@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex import orientation3
 from gmsnet.kernels.simplex import tetra_measures as kernels
+from gmsnet.kernels.simplex.mean_ratio3 import Tetrahedra
+from gmsnet.kernels.star.guard import Precision
+from gmsnet.kernels.untangle.space import find_bad, find_bad_inside
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.plane import exponent_of
 from gmsnet.topology.ordering import space_points
@@ -16,6 +19,7 @@ from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 Signs = NDArray[np.int8]
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,3 +90,19 @@ def exact_signs3(points: Floats, corners: NDArray[np.int32], orientation: Signs)
             volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
             out[t] = int(orientation[t]) * ((volume > 0) - (volume < 0))
     return out
+
+
+def look(
+    points: Floats, simplices: Tetrahedra, precision: Precision, bad: Flags, inverted: Flags, ratio: Floats
+) -> int:
+    """Writes what ``find_bad`` says of simplices, those of cells that may be bad between their corners as bad, too.
+
+    points: (N, 3 or more) by places in memory. Returns how many are bad.
+    """
+    unit, grain = precision.unit, precision.grain
+    left = int(
+        find_bad(
+            points, simplices.rows, simplices.orientation, unit, grain, bad, inverted, ratio, simplices.shapes
+        )
+    )  # fmt: skip
+    return left if simplices.shapes is None else int(find_bad_inside(points, simplices, unit, grain, bad, inverted))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gmsnet.kernels.whole import multigrid
+from gmsnet.kernels.whole.steps import largest_step
 from gmsnet.methods.sliders import Sliders
 
 Floats = NDArray[np.float64]
@@ -26,7 +27,7 @@ ARMIJO, HALVINGS, INSIDE = 1e-4, 25, 0.9
 class Sum(Protocol):
     """A sum over simplices as a function of the places of some nodes.
 
-    moved: (n,) the nodes that move. sliders: those of them that slide.
+    moved: (n,) the nodes that move. sliders: those of them that slide. cells: (S, 3) the simplices, None in space.
     """
 
     @property
@@ -35,11 +36,11 @@ class Sum(Protocol):
     @property
     def sliders(self) -> Sliders | None: ...  # noqa: D102
 
+    @property
+    def cells(self) -> NDArray[np.int32] | None: ...  # noqa: D102
+
     def value(self, points: Floats, gradient: Floats) -> float:
         """The sum at points (N, D), and its gradient (N, D); more than any mesh has where a cell is inverted."""
-
-    def farthest(self, points: Floats, shifts: Floats) -> float:
-        """The share of shifts (N, D) at which a first simplex has no area left; +∞ where that is not known."""
 
     def inverse(self, points: Floats) -> Callable[[Floats], Floats]:
         """About the inverse of its second derivative there, (n, D) to (n, D)."""
@@ -65,7 +66,8 @@ def minimise(problem: Sum, points: Floats, settled: float) -> Floats:
             break
         shifts = np.zeros_like(points)
         shifts[problem.moved] = along
-        length = min(length, INSIDE * problem.farthest(points, shifts))
+        if problem.cells is not None:  # short of where a first simplex has no area left
+            length = min(length, INSIDE * float(largest_step(points, problem.cells, shifts)))
         for _ in range(HALVINGS):
             there, promised = points + length * shifts, ARMIJO * length * slope
             if sliders is not None:

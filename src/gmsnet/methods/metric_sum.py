@@ -19,7 +19,7 @@ from gmsnet.kernels.metric.nodes import Around, Term
 from gmsnet.kernels.metric.places import Background
 from gmsnet.kernels.metric.quality import energy, qualities
 from gmsnet.kernels.untangle.cells import find_bad
-from gmsnet.kernels.whole import graph, steps
+from gmsnet.kernels.whole import graph
 from gmsnet.kernels.whole.graph import Matrix
 from gmsnet.methods.base import Field
 from gmsnet.methods.multigrid import Multigrid
@@ -134,10 +134,6 @@ class Problem:
             share,
         )
         return total, share
-
-    def farthest(self, points: Floats, shifts: Floats) -> float:
-        """See ``conjugate.Sum``."""
-        return float(steps.largest_step(points, self.cells, shifts))
 
     def inverse(self, points: Floats) -> Callable[[Floats], Floats]:
         """Multigrid on the Laplacian of the mesh in the metric, each node in the frame of its own tensor."""

@@ -17,16 +17,15 @@ from numpy.typing import NDArray
 
 from gmsnet.kernels.simplex.mean_ratio3 import WEIGHTS3, Tetrahedra
 from gmsnet.kernels.star.block import MOVED
-from gmsnet.kernels.untangle.space import find_bad, find_bad_inside
 from gmsnet.kernels.whole import powers3
 from gmsnet.kernels.whole.graph import Matrix
+from gmsnet.measure.volumes import look
 from gmsnet.methods.base import Field, Smoother, Tally
 from gmsnet.methods.conjugate import minimise
 from gmsnet.methods.multigrid import Multigrid
 from gmsnet.methods.whole_mesh import CLOSE
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.mixed_volume import MixedVolume
-from gmsnet.topology.volume import Volume
 
 Floats = NDArray[np.float64]
 SMALL = 1e-12  # of the largest entry of a diagonal: no entry is smaller
@@ -46,6 +45,7 @@ class Problem:
     doublings: int
     top: float
     sliders: None = None
+    cells: None = None
 
     @classmethod
     def of(cls, field: Field, doublings: int) -> Problem | None:
@@ -79,10 +79,6 @@ class Problem:
         weights = np.empty(len(rows))
         total = powers3.powered(points, rows, orientation, shapes, self.top, self.doublings, gradient, weights)
         return float(total), weights
-
-    def farthest(self, points: Floats, shifts: Floats) -> float:
-        """See ``conjugate.Sum``."""
-        return math.inf
 
     def inverse(self, points: Floats) -> Callable[[Floats], Floats]:
         """See ``conjugate.Sum``."""
@@ -160,14 +156,8 @@ class WholeInSpace(Smoother):
 
 def _is_valid(points: Floats, field: Field) -> bool:
     """Is each cell with a free node certified to be valid everywhere?"""
-    topology, precision = field.topology, field.precision
-    assert isinstance(topology, Volume)
-    simplices = topology.changeable
-    count, (bad, inverted) = len(simplices.rows), np.empty((2, len(simplices.rows)), dtype=bool)
-    left = find_bad(
-        points, simplices.rows, simplices.orientation, precision.unit, precision.grain, bad, inverted, np.empty(count),
-        simplices.shapes,
-    )  # fmt: skip
-    if left or simplices.shapes is None:
-        return not left
-    return not find_bad_inside(points, simplices, precision.unit, precision.grain, bad, inverted)
+    simplices = field.topology.changeable
+    assert isinstance(simplices, Tetrahedra)
+    count = len(simplices.rows)
+    bad, inverted = np.empty((2, count), dtype=bool)
+    return look(points, simplices, field.precision, bad, inverted, np.empty(count)) == 0

@@ -98,10 +98,6 @@ class Problem:
         sliders = Sliders.of(field, free) if slide else None
         return cls(cells, table, moved, number, matrix, np.zeros(len(free)), doublings, top, sliders)
 
-    def farthest(self, points: Floats, shifts: Floats) -> float:
-        """See ``conjugate.Sum``."""
-        return float(steps.largest_step(points, self.cells, shifts))
-
     def inverse(self, points: Floats) -> Callable[[Floats], Floats]:
         """Of the Laplacian for the points as they are; of nodes that slide, along their curves."""
         cycle, sliders = self.cycle(points), self.sliders

@@ -18,6 +18,7 @@ from gmsnet.kernels.simplex.mean_ratio3 import REGULAR
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.kernels.whole.powers import shape_of_each
 from gmsnet.measure.signs import exact_signs
+from gmsnet.measure.volumes import look
 from gmsnet.motion.path import Flags, Floats, Path
 from gmsnet.motion.prescribed import Prescribed
 from gmsnet.motion.rails import Rails, rails_of
@@ -235,11 +236,9 @@ class Journey:
 
 def looked_at(points: Floats, topology: Volume, precision: Precision) -> tuple[Flags, Floats]:
     """(T,) which corner simplices of volumes belong to cells that may not be valid, and 1/q of each."""
-    from gmsnet.untangle.space import look
-
     bad, inverted = np.empty((2, len(topology.near)), dtype=bool)
     ratio = np.empty(len(topology.near))
-    look(points, topology, precision, bad, inverted, ratio)
+    look(points, topology.simplices, precision, bad, inverted, ratio)
     return bad, REGULAR * np.sign(ratio) * np.cbrt(ratio * ratio)
 
 

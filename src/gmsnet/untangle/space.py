@@ -16,8 +16,8 @@ from gmsnet.kernels.methods.barrier3 import Power3
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.kernels.star.space_blocks import SpaceBlocks
 from gmsnet.kernels.topology.sorted_unique import sorted_unique
-from gmsnet.kernels.untangle.space import find_bad, find_bad_inside, soften
-from gmsnet.measure.volumes import exact_signs3
+from gmsnet.kernels.untangle.space import soften
+from gmsnet.measure.volumes import exact_signs3, look
 from gmsnet.parallel.executor import Executor
 from gmsnet.topology.volume import Volume
 from gmsnet.untangle.reach import Reach
@@ -70,7 +70,7 @@ class Attempt:
 
     def look(self) -> int:
         """Measures all cells; how many are bad."""
-        self.left = look(self.points, self.topology, self.precision, self.bad, self.inverted, self.ratio)
+        self.left = look(self.points, self.topology.simplices, self.precision, self.bad, self.inverted, self.ratio)
         return self.left
 
     @property
@@ -169,22 +169,6 @@ class Attempt:
             first = first or int(np.count_nonzero(broken))
             self.points[back] = self.start[back]
             self.look()
-
-
-def look(
-    points: Floats, topology: Volume, precision: Precision, bad: Flags, inverted: Flags, ratio: NDArray[np.float64]
-) -> int:
-    """Writes what ``find_bad`` says of all simplices, those of cells that may be bad between their corners as bad, too.
-
-    points: (N, 3 or more) by places in memory. Returns how many are bad.
-    """
-    simplices, unit, grain = topology.simplices, precision.unit, precision.grain
-    left = int(
-        find_bad(
-            points, simplices.rows, simplices.orientation, unit, grain, bad, inverted, ratio, simplices.shapes
-        )
-    )  # fmt: skip
-    return left if simplices.shapes is None else int(find_bad_inside(points, simplices, unit, grain, bad, inverted))
 
 
 def rows_at(near: NDArray[np.int32], chosen: Flags) -> NDArray[np.int32]:
