@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from gmsnet.parallel.executor import Executor
 from gmsnet.parallel.interrupts import interruptible
@@ -17,17 +18,32 @@ from gmsnet.run.second_order import untangle_second_order
 from gmsnet.run.second_order_turns import take_turns
 from gmsnet.run.state import State
 from gmsnet.run.sweep_stage import sweep
-from gmsnet.run.untangle_stage import protect_untangled, untangle_all, untangle_protected
+from gmsnet.run.untangle_stage import protect_untangled, untangle_all, untangle_left, untangle_protected
 from gmsnet.run.wall_stage import improve_in_turns
-
-STAGES: tuple[Stage, ...] = (
-    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_rest, return_mean,
-    improve_dihedrals, improve_mean, improve_in_turns, untangle_second_order, take_turns,
-)  # fmt: skip
-
 
 # Of a valid mesh, without walls.
 SWEEPS: tuple[Stage, ...] = (sweep, improve_rest, return_mean, improve_dihedrals, improve_mean)
+AGAIN, MOST = 3, 0.5  # times, at most, that what is left is untangled; of the cells that were, where more are it is not
+
+
+def untangle_again(state: State, options: SmoothOptions, executor: Executor) -> State:
+    """Mends the few cells that were left, once sweeps have moved what is around them, in turns with sweeps."""
+    before = state.before.inverted
+    for _ in range(AGAIN):
+        if not 0 < len(state.reasons) <= MOST * before or state.cut_short:
+            break
+        before, tried = len(state.reasons), untangle_left(state, executor)
+        if tried is None:
+            break
+        again = replace(tried, totals=None, stop_reason="", smoother=options.smoother())
+        state = carry_out_all(again, options, executor, SWEEPS)
+    return state
+
+
+STAGES: tuple[Stage, ...] = (
+    untangle_all, untangle_protected, protect_untangled, take_metric, sweep, improve_rest, return_mean,
+    improve_dihedrals, improve_mean, untangle_again, improve_in_turns, untangle_second_order, take_turns,
+)  # fmt: skip
 
 
 def carry_out(state: State, options: SmoothOptions, executor: Executor, stages: Sequence[Stage] = STAGES) -> State:

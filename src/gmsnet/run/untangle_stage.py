@@ -39,7 +39,7 @@ def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> St
     """Moves the free nodes so that fewer cells are inverted; those of second-order cells have a stage of their own."""
     if isinstance(state.topology, Shell) or (state.second_order is not None and not len(state.topology.free)):
         return state  # of surfaces, folded parts are mended (run/unfold.py), and sweeps turn what shows the other side
-    return _untangled(state, executor) if options.untangle and state.before.inverted else state
+    return _untangled(state, executor, state.before.inverted) if options.untangle and state.before.inverted else state
 
 
 def untangle_protected(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -50,7 +50,14 @@ def untangle_protected(state: State, options: SmoothOptions, executor: Executor)
     if freed is None:
         return state
     protection, note = freed
-    return _untangled(replace(state, protection=protection, untangling=(*state.untangling, note)), executor)
+    given = replace(state, protection=protection, untangling=(*state.untangling, note))
+    return _untangled(given, executor, state.before.inverted)
+
+
+def untangle_left(state: State, executor: Executor) -> State | None:
+    """Tries once more to mend what was left, from where sweeps have taken the nodes; None where no more is mended."""
+    done, topology = _made(state, executor, None)
+    return _noted(state, done, topology) if done.after < done.before else None
 
 
 def protect_untangled(state: State, options: SmoothOptions, executor: Executor) -> State:
@@ -73,19 +80,24 @@ def protect_untangled(state: State, options: SmoothOptions, executor: Executor) 
     return replace(state, protection=found, untangled=state.points)
 
 
-def _untangled(state: State, executor: Executor) -> State:
+def _untangled(state: State, executor: Executor, before: int) -> State:
+    return _noted(state, *_made(state, executor, before))
+
+
+def _made(state: State, executor: Executor, before: int | None) -> tuple[Untangled, Topology | Volume]:
+    """What untangling makes of the points, and of which topology. before: as of ``untangle_volume``."""
     topology = state.topology
     if isinstance(state.sliding, Sliding | SurfaceSliding):
         topology = topology.holding(state.sliding.nodes, REASON)
     if isinstance(topology, Volume):
         from gmsnet.untangle.space import untangle_volume
 
-        done = untangle_volume(state.points, topology, state.precision, executor, state.before.inverted)
+        done = untangle_volume(state.points, topology, state.precision, executor, before)
     else:
         from gmsnet.untangle import untangle  # what it needs of SciPy takes 0.15 s more to import
 
         done = untangle(state.points, topology, state.precision)
-    return _noted(state, done, topology)
+    return done, topology
 
 
 def _noted(state: State, done: Untangled, topology: Topology | Volume) -> State:

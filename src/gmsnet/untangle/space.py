@@ -217,14 +217,16 @@ def _take_best(attempt: Attempt, places: list[Floats]) -> list[UntanglingStep]:
 
 
 def untangle_volume(
-    points: Floats, topology: Volume, precision: Precision, executor: Executor, before: int, reach: Reach | None = None
-) -> Untangled:
+    points: Floats, topology: Volume, precision: Precision, executor: Executor, before: int | None = None,
+    reach: Reach | None = None,
+) -> Untangled:  # fmt: skip
     """Moves free nodes until no cell is inverted, or as few as can be; held nodes and what is far off keep their bits.
 
-    points: (N, 4) by places in memory; not changed. before: how many are inverted. reach: as ``untangle`` of cells in a
-    plane.
+    points: (N, 4) by places in memory; not changed. before: how many are inverted, where that is known. reach: as
+    ``untangle`` of cells in a plane.
     """
     attempt, places = Attempt(points, topology, precision, executor, reach), list[Floats]()
+    before = _inverted(attempt, np.flatnonzero(attempt.bad)) if before is None else before
     steps: list[UntanglingStep] = []
     for rounds, (rings, most) in enumerate(zip(RINGS, SWEEPS, strict=True)):
         if not attempt.left or (rounds == EARLY and attempt.left > MANY * len(topology.near)):
