@@ -23,8 +23,11 @@ from gmsnet.distributed import loan
 from gmsnet.kernels.topology import patch
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
+from gmsnet.parallel.threads import serial
 from gmsnet.run.options import SmoothOptions
+from gmsnet.run.set_up import first_state
 from gmsnet.run.stop import CALLBACK, NO_PROGRESS, NOTHING_TO_MOVE, TARGET_REACHED
+from gmsnet.run.target_run import corners_missing
 
 MESHES = {
     "triangles": gmsnet.random_mesh(3000, seed=3),
@@ -244,3 +247,30 @@ def test_any_target_on_any_partition(seed, ranks, kind, share, how, preserve):
     fixed = rng.random(len(mesh.points)) < 0.02
     options = aim(target_quality=float(SHAPES[kind][int(share * len(SHAPES[kind]))]), preserve=preserve)
     assert same(mesh, options, parts_at_random(mesh, ranks, rng, how), ranks, fixed).gathered == ""
+
+
+def torus(seed, around=24, along=12):
+    """A torus of quads, its nodes thrown along it until some facets are folded."""
+    rng = np.random.default_rng(seed)
+    i, j = np.meshgrid(np.arange(around), np.arange(along), indexing="ij")
+    one, other = (i + 1) % around, (j + 1) % along
+    rows = np.stack([i * along + j, one * along + j, one * along + other, i * along + other], axis=-1).reshape(-1, 4)
+    u = 2.0 * np.pi * i.ravel() / around + rng.uniform(-0.12, 0.12, i.size)
+    v = 2.0 * np.pi * j.ravel() / along + rng.uniform(-0.24, 0.24, i.size)
+    width = 1.5 + 0.7 * np.cos(v)
+    points = np.column_stack([width * np.cos(u), width * np.sin(u), 0.7 * np.sin(v)])
+    return Mesh(points, (CellBlock("quad", rows, np.zeros(len(rows))),))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_misses_hangs_on_all_that_move_not_on_those_of_a_rank(seed):
+    """Of a quad on a surface each corner has its quality: one with a node that moves, anywhere, stands for it."""
+    rng, mesh, options = np.random.default_rng(seed), torus(seed), aim(target_quality=0.8)
+    moves = rng.random(len(mesh.points)) < 0.3
+    state = first_state(mesh, ~moves, options.smoother(), options, serial)
+    points, topology, free = state.points, state.topology, state.topology.near_free
+    found = corners_missing(points, topology, options.target, free)
+    assert len(found) == len(np.unique(found, axis=0)) > 0
+    for rank in range(3):
+        of_rank = replace(topology, near_free=free & (rng.integers(0, 3, len(free)) == rank))
+        assert np.array_equal(corners_missing(points, of_rank, options.target, free), found)

@@ -196,11 +196,11 @@ def cells_missing(
     """
     topology, points, before = state.topology, state.points, state.before
     if points is not state.start or before.inverted:  # the report is of other points, or of more cells
-        return corners_missing(points, topology, target), True
+        return corners_missing(points, topology, target, free), True
     if isinstance(topology, Volume):
         if state.second_order is not None or isinstance(topology, MixedVolume):
             # the report has more cells, or cells whole, where corners without a free node must be told apart
-            return corners_missing(points, topology, target), True
+            return corners_missing(points, topology, target, free), True
         return topology.places[topology.cells[target.missed_in(before)]], False
     rows = rows_missing(points, topology, target, state.shapes if len(state.shapes) else None)
     corners = topology.near.take(_with_free(rows, topology, free), axis=0)
@@ -245,9 +245,11 @@ def rows_missing(
     return rows
 
 
-def corners_missing(points: Floats, topology: Topology | Volume, target: Target) -> NDArray[np.int32]:
-    """The corners (K, 3 or 4) of these."""
-    return topology.near.take(_rows_missing(points, topology, target, topology.near_free), axis=0)
+def corners_missing(
+    points: Floats, topology: Topology | Volume, target: Target, free: Flags
+) -> NDArray[np.int32]:  # fmt: skip
+    """The corners (K, 3 or 4) of these. free: (N,) the nodes that may move, on other processes, too."""
+    return topology.near.take(_rows_missing(points, topology, target, free), axis=0)
 
 
 def _rows_missing(
@@ -262,7 +264,10 @@ def _rows_missing(
 def _with_free(
     rows: NDArray[np.integer[Any]], topology: Topology, free: Flags
 ) -> NDArray[np.integer[Any]]:  # fmt: skip
-    """The rows, of quads in space others of the same cell where these have no free node: all four give its normal."""
+    """The rows, of quads in space others of the same cell where these have no free node: all four give its normal.
+
+    Each of them once: processes count them.
+    """
     if not isinstance(topology, Shell) or topology.near_cells is None:
         return rows
     able: Flags = np.asarray(free[topology.near].any(axis=1))
@@ -270,4 +275,4 @@ def _with_free(
     one = np.full(int(topology.near_cells.max(initial=-1)) + 1, -1)
     one[topology.near_cells[some]] = some
     other = one[topology.near_cells[rows]]
-    return np.where(able[rows] | (other < 0), rows, other)
+    return np.unique(np.where(able[rows] | (other < 0), rows, other))
