@@ -99,10 +99,6 @@ def look(
 
     points: (N, 3 or more) by places in memory. Returns how many are bad.
     """
-    unit, grain = precision.unit, precision.grain
-    left = int(
-        find_bad(
-            points, simplices.rows, simplices.orientation, unit, grain, bad, inverted, ratio, simplices.shapes
-        )
-    )  # fmt: skip
-    return left if simplices.shapes is None else int(find_bad_inside(points, simplices, unit, grain, bad, inverted))
+    unit, grain, shapes = precision.unit, precision.grain, simplices.shapes
+    left = find_bad(points, simplices.rows, simplices.orientation, unit, grain, bad, inverted, ratio, shapes)
+    return int(left if shapes is None else find_bad_inside(points, simplices, unit, grain, bad, inverted))

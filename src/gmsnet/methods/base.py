@@ -73,11 +73,10 @@ class Field:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""
         if isinstance(self.topology, MixedVolume):
             self.topology.lend_slack(self)
-        precision = self.precision
         if self.level == WORST:
-            floor = self.floor.of(self.points, self.topology, precision, executor)
-            return MeshGuard(*precision, floor, self.constraint)
-        guard = plain_guard(precision, self.constraint)
+            floor = self.floor.of(self.points, self.topology, self.precision, executor)
+            return MeshGuard(*self.precision, floor, self.constraint)
+        guard = plain_guard(self.precision, self.constraint)
         if self.level == STAR:
             floors = np.empty(len(self.points))
             ringed = self.topology.near_ringed

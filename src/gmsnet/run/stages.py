@@ -23,7 +23,8 @@ from gmsnet.run.wall_stage import improve_in_turns
 
 # Of a valid mesh, without walls.
 SWEEPS: tuple[Stage, ...] = (sweep, improve_rest, return_mean, improve_dihedrals, improve_mean)
-AGAIN, MOST = 3, 0.5  # times, at most, that what is left is untangled; of the cells that were, where more are it is not
+AGAIN = 3  # times, at most, that the cells which untangling left are tried again
+MOST = 0.5  # of the inverted cells: where more were left, they are not
 
 
 def untangle_again(state: State, options: SmoothOptions, executor: Executor) -> State:

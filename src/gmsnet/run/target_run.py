@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gmsnet.constraints.sliding import Rails
 from gmsnet.kernels.star.guard import LEVELS
 from gmsnet.kernels.topology.patch import around
+from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.measure.target import Target
 from gmsnet.measure.totals import totals_of
 from gmsnet.methods.auto import Auto
@@ -275,4 +276,4 @@ def _with_free(
     one = np.full(int(topology.near_cells.max(initial=-1)) + 1, -1)
     one[topology.near_cells[some]] = some
     other = one[topology.near_cells[rows]]
-    return np.unique(np.where(able[rows] | (other < 0), rows, other))
+    return sorted_unique(np.where(able[rows] | (other < 0), rows, other))

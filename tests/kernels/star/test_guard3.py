@@ -17,7 +17,7 @@ from gmsnet.kernels.methods.barrier3 import Power3
 from gmsnet.kernels.simplex import mean_ratio3
 from gmsnet.kernels.simplex.orientation3 import count_signs, determinant_and_bound, signs
 from gmsnet.kernels.star import guard3
-from gmsnet.kernels.star.guard import Precision, plain_guard
+from gmsnet.kernels.star.guard import Precision, plain_guard, unit_of_steps
 from gmsnet.kernels.star.space import MARGIN
 from gmsnet.kernels.star.space_blocks import LANES3
 from gmsnet.kernels.star.stars3 import WIDER, allowed3
@@ -83,11 +83,15 @@ def floor_near(place, ends, share):
     return min(ratios) * share
 
 
+@pytest.mark.parametrize("exactly", [False, True])
 @pytest.mark.parametrize("landed", [False, True])
 @some_stars
 @settings(max_examples=4 * EXAMPLES)
-def test_steps_that_are_certified_in_lanes(landed, seed, flat, spiky, where, single):
-    """And the float32 margin is never off by more than its bound. landed: nodes go to places that steps only round."""
+def test_steps_that_are_certified_in_lanes(landed, exactly, seed, flat, spiky, where, single):
+    """And the float32 margin is never off by more than its bound. landed: nodes go to places that steps only round.
+
+    exactly: is the file known so?
+    """
     rng = np.random.default_rng(seed)
     size, away = where
     points, topology = stars(
@@ -95,8 +99,7 @@ def test_steps_that_are_certified_in_lanes(landed, seed, flat, spiky, where, sin
     )  # fmt: skip
     if single:
         points = np.float64(np.float32(points))
-    # A place that is told by the step there is known before it is rounded alone (guard.unit_of_steps).
-    precision = Precision.of(single=single, exponent=0, exact=False)
+    precision = Precision.of(single=single, exponent=0, exact=exactly)
     blocks = topology.stars.blocks
     step = (rng.normal(size=(3, LANES3)) * 10.0 ** rng.uniform(-6, -0.5, LANES3)).astype(np.float32)
     step[:, rng.random(LANES3) < 0.3] = 0
@@ -128,11 +131,12 @@ def see_them(rng, points, topology, blocks, step, share, precision, landed=False
         elif precision.single:
             place = np.float64(np.float32(place))
         floor = floor_near(exact(place)[0], [exact(ring[row]) for row in rows], share) if share else 0.0
-        work = see(points, blocks, 0, -1, POWER.constants, step.ravel(), floor, precision.unit, precision.grain)
+        unit = unit_of_steps(plain_guard(precision))
+        work = see(points, blocks, 0, -1, POWER.constants, step.ravel(), floor, unit, precision.grain)
         far = float(np.abs(step[:, lane]).max())
         m = max(float(work.width[lane]), far)
         reach = np.abs(first).max() + work.size[lane] * m
-        delta = WIDER * (precision.unit * reach + precision.grain) / work.size[lane]
+        delta = WIDER * (unit * reach + precision.grain) / work.size[lane]
         bound = WIDER * guard3.error_bound3(m, delta)
         margin = float(work.sums[MARGIN * LANES3 + lane])
         assert work.allowed[lane] == (margin > bound)
