@@ -21,7 +21,7 @@ from volumes import REPEATS, _blocks, cube, figures
 
 import gmsnet
 from gmsnet.mesh.mesh import Mesh
-from gmsnet.methods import auto, phases
+from gmsnet.methods import auto, passes, phases
 from gmsnet.methods.barrier import Barrier
 from gmsnet.run import dihedral_stage
 from gmsnet.topology.volume import Volume
@@ -42,8 +42,9 @@ def changed(change: Callable[[tuple[phases.Phase, ...]], list[phases.Phase]], **
     with (
         patch.object(auto, "plan_for", plan_for),
         patch.object(auto, "IN_SPACE", tuple(plans)),
-        patch.object(auto, "LARGE_VOLUME_PLAN", plans[1]),
-        patch.object(auto, "PASSES", 1 if gains.get("passes") == NEVER else auto.PASSES),
+        patch.object(passes, "IN_SPACE", tuple(plans)),
+        patch.object(passes, "LARGE_VOLUME_PLAN", plans[1]),
+        patch.object(passes, "PASSES", 1 if gains.get("passes") == NEVER else passes.PASSES),
         patch.object(dihedral_stage, "GAIN", gains.get("dihedral", dihedral_stage.GAIN)),
     ):
         yield

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from gmsnet.measure.target import MUCH, SLIVER, Nearness
+from gmsnet.measure.target import HALF, MUCH, SLIVER, Nearness, Target
 
 NEARER = [  # each is nearer than all behind it
     Nearness(0, 0, math.inf, 0.9),
@@ -39,7 +39,7 @@ def test_equal_ones_and_the_bounds():
     assert Nearness(0, 0, math.inf, 0.1) < Nearness(0, 1, 0.5, 0.5), "one that meets it is nearer"
     assert Nearness(0, 9, 0.2, SLIVER) < Nearness(0, 1, 0.2, 0.999 * SLIVER), "no sliver"
     assert Nearness(0, 9, 0.1, SLIVER / MUCH) < Nearness(0, 1, 0.1, 0.999 * SLIVER / MUCH), "a thicker one"
-    nothing = Nearness.of(0, 3, 0.1, None)
+    nothing = Nearness.of(Target(0.5), 0, 3, 0.1, None)
     assert nothing <= nothing
     assert not nothing < nothing
 
@@ -48,3 +48,12 @@ def test_of_two_that_miss_it_alike_the_one_with_the_better_mean_is_nearer():
     one, other = Nearness(0, 3, 0.2, 0.3, 0.8), Nearness(0, 3, 0.2, 0.3, 0.7)
     assert one < other
     assert Nearness(0, 0, math.inf, 0.4, 0.7) <= Nearness(0, 0, math.inf, 0.5, 0.8), "one that meets it is enough"
+
+
+def test_a_sliver_has_less_than_half_of_what_is_asked_for():
+    assert Target(0.1).sliver == SLIVER
+    assert Target(0.9).sliver == HALF * 0.9
+    assert SLIVER < Target(angle=20.0).sliver < Target(angle=40.0).sliver < HALF
+    assert SLIVER < Target(dihedral=20.0).sliver < Target(dihedral=50.0).sliver < HALF
+    assert Target(dihedral=90.0).sliver == HALF, "no tetrahedron has such angles"
+    assert Nearness(0, 9, 0.5, 0.5, sliver=0.45) < Nearness(0, 1, 0.3, 0.3, sliver=0.45)

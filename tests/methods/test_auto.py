@@ -42,7 +42,7 @@ def test_phases_come_in_their_order_and_are_told():
 def test_quads_are_measured_once_though_the_worst_cells_have_several_turns():
     """What follows a turn keeps the worst cell and ends with the better mean: looks in between would be for nothing."""
     run = runs(random_quad_mesh(SMALL + 1000, seed=1), ())  # what there is for it
-    assert run.smoother.passes > 2
+    assert run.smoother.passes.made > 2
     assert len(run.history) == 1
     assert told(run.history) == list(dict.fromkeys(phase.name for phase in QUADS_PLAN))
     assert run.best is run.field.points
@@ -159,3 +159,29 @@ def test_a_turn_that_doubles_a_tiny_least_has_another(real_meshes):
     """The far field of a C-grid without its layers kept: one turn ends at 0.0007, and the next ones at far more."""
     mesh = gmsnet.read(real_meshes / "n0012_113-33.su2")
     assert gmsnet.smooth(mesh, preserve="none").judged.after.shape_min >= 0.02
+
+
+def twisted_annulus(around, rows, far, turn, power):
+    """Triangles between circles of radius 1 and ``far``, turned by ``turn`` from one to the other; x to a power."""
+    angle, share = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False), np.linspace(0.0, 1.0, rows + 1)[:, None]
+    turned, radius = angle + turn * share, 1.0 + (far - 1.0) * share
+    points = np.stack([radius * np.cos(turned), radius * np.sin(turned)], axis=-1).reshape(-1, 2)
+    points = (points - points.min(axis=0)) / np.ptp(points, axis=0)
+    points[:, 0] **= power
+    row, column = np.divmod(np.arange(rows * around), around)
+    after = (column + 1) % around
+    a, b, c, d = (k * around + j for k, j in ((row, column), (row + 1, column), (row + 1, after), (row, after)))
+    triangles = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return points, {"triangle": triangles}
+
+
+RINGS = [((20, 14, 3.0, 0.5, 2.0), 0.19, 0.32), ((20, 14, 6.0, 1.2, 3.0), 0.16, 0.34)]
+
+
+@pytest.mark.parametrize(("rings", "least", "mean"), RINGS)
+def test_what_the_worst_cells_took_from_the_mean_comes_back(rings, least, mean):
+    # After all nodes had moved for the worst cells, single stars brought the mean to no more than 0.275 and 0.295.
+    done = gmsnet.smooth(twisted_annulus(*rings), threads=1)
+    assert done.after.inverted == 0
+    assert done.after.shape.min() > least
+    assert done.after.shape.mean() > mean

@@ -205,8 +205,8 @@ def _written(
         last = measure(written, topology, near)
         missed, least = missing(part, last, options)
         missed_before, least_before = missing(part, first, options)
-        now_near = Nearness.of(inverted, missed, least, of_free.after)
-        better = now_near <= Nearness.of(inverted_before, missed_before, least_before, of_free.before)
+        now_near = Nearness.of(target, inverted, missed, least, of_free.after)
+        better = now_near <= Nearness.of(target, inverted_before, missed_before, least_before, of_free.before)
         angles = [greatest_angle(report, options) for report in (first, last)]
         greatest = [float(part.comm.allreduce(angle, mpi().MAX)) for angle in angles]
         final = last if better else first

@@ -26,7 +26,8 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Rows = NDArray[np.int32]
 
-SLIVER, MUCH, THINNEST = 0.125, 4.0, 40  # the largest 1/q of a sliver; between bounds, and how many there are
+# The largest 1/q of a sliver, or its share of that of cells that miss a target; between bounds; how many there are.
+SLIVER, HALF, MUCH, THINNEST = 0.125, 0.5, 4.0, 40
 SURE = 1.0 + 1e-12  # times the target: what is above it is so however it is measured
 
 
@@ -37,8 +38,8 @@ class Nearness:
     In space, of two that miss it alike the one with the greater mean of 1/q or η is nearer.
 
     But of two that miss it, a mesh without slivers is nearer than one with any, and one of thick slivers than one of
-    thin ones: else a few cells that miss it by little would outweigh them. Slivers are cells with a free node of a 1/q
-    or η below SLIVER; those are as thick that lie between the same two bounds, each MUCH times the one below.
+    thin ones: else cells that miss it by little would outweigh them. Slivers are cells with a free node of a 1/q or η
+    below that of ``sliver``; those are as thick that lie between the same two bounds, each MUCH times the one below.
     """
 
     inverted: int
@@ -46,13 +47,15 @@ class Nearness:
     worst: float
     least: float
     mean: float = 0.0
+    sliver: float = SLIVER
 
     @classmethod
-    def of(cls, inverted: int, missed: int, worst: float, totals: Totals | None) -> Nearness:
+    def of(cls, target: Target, inverted: int, missed: int, worst: float, totals: Totals | None) -> Nearness:
         """worst: of the cells that miss it. totals: of the cells with a free node."""
         if totals is None:
             return cls(inverted, missed, worst, math.inf)
-        return cls(inverted, missed, worst, totals.shape_min, 0.0 if totals.in_plane else totals.shape_mean)
+        mean = 0.0 if totals.in_plane else totals.shape_mean
+        return cls(inverted, missed, worst, totals.shape_min, mean, target.sliver)
 
     def __lt__(self, other: Nearness) -> bool:
         """Nearer."""
@@ -70,7 +73,7 @@ class Nearness:
     @property
     def _key(self) -> tuple[int, bool, int, int, float, float]:
         inverted, missed, worst = self.counts
-        thin, bound = 0, SLIVER
+        thin, bound = 0, self.sliver
         while missed and not inverted and self.least < bound and thin < THINNEST:
             thin, bound = thin + 1, bound / MUCH
         return inverted, missed > 0, thin, missed, worst, -self.mean if missed else 0.0
@@ -200,7 +203,7 @@ class Target:
     def rank(self, report: QualityReport, totals: Totals | None) -> Nearness:
         """How near a mesh is. totals: of the cells with a node that may move."""
         rows, shape = self.missed_with_shapes(report)
-        return Nearness.of(report.inverted, len(rows), float(shape.min(initial=np.inf)), totals)
+        return Nearness.of(self, report.inverted, len(rows), float(shape.min(initial=np.inf)), totals)
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -208,6 +211,14 @@ class Target:
         none."""
         tangent = 0.0 if self.angle is None else math.tan(math.radians(self.angle))
         return (self.quality or 0.0) * SURE, tangent * SURE
+
+    @property
+    def sliver(self) -> float:
+        """The 1/q or η below which a cell is a sliver: it has less than HALF of what one may have that misses it."""
+        most = self.max_shape
+        if self.dihedral is not None:
+            most = max(most, min(1.0, most_shape_below(self.dihedral, 0.0)))
+        return max(SLIVER, HALF * most)
 
     @property
     def max_shape(self) -> float:

@@ -34,16 +34,8 @@ from gmsnet.methods.barrier import Barrier
 from gmsnet.methods.base import ALL_CELLS, Field, Method, Smoother, Tally
 from gmsnet.methods.creep import Creep
 from gmsnet.methods.gains import Falling, mean_shape, to_come
-from gmsnet.methods.phases import (
-    LARGE_VOLUME,
-    LARGE_VOLUME_PLAN,
-    MIXED_PLAN,
-    SMALL_PLAN,
-    SURFACE_PLAN,
-    VOLUME_PLAN,
-    Phase,
-    plan_for,
-)
+from gmsnet.methods.passes import Passes
+from gmsnet.methods.phases import IN_SPACE, SMALL_PLAN, Phase, plan_for
 from gmsnet.methods.trial import Trial
 from gmsnet.methods.whole_in_space import WholeInSpace
 from gmsnet.methods.whole_mesh import CLOSEST, SETTLED, WholeMesh
@@ -57,17 +49,12 @@ SLOW = 0.02  # in the mean of 1/q: so much to come, by the last two gains, is mo
 POOR = 0.5  # a mean of 1/q below this is not left to sweeps alone
 FAIR = 0.8  # nor is one below this where they end
 STILL_POOR = 0.85  # a mean of 1/q where a small mesh ends: its worst cells are among many like them
+LOST = 0.02  # in the mean of 1/q: so much less than after sweeps on q is brought back where it can be
 AHEAD = 50  # times the last gain are at most expected to come
 # In the least 1/q, what a turn of all nodes for the worst cells must have gained for another, and for one after TURNS.
 TURNS, TURN_GAIN, LATE_TURN_GAIN = 3, 0.01, 0.05
 VERY_POOR, HOPELESS = 0.1, 1e-5  # between these a turn that doubled the least 1/q has another
 COARSER = 10.0  # times what a phase must gain to go on, once these have been moved
-PASSES, LATE_PASSES = 8, 24  # over the worst cells and what follows them, at most; of volumes that gain LATE_GAIN still
-LATE_GAIN = 0.005
-# In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
-PASS_GAIN, LAST_GAIN = 0.002, 0.003
-LARGE_GAIN = 0.008  # of meshes in space of more than LARGE_VOLUME free nodes
-LARGE_VOLUME_GAIN = 0.02  # of those of tetrahedra alone: with two turns they are at 98 % of what many reach
 MOST_ROUNDS = 100  # of a phase in which the sum of q falls
 WHOLE, MOST_WHOLE = "whole mesh", 3  # times at most
 WHOLE_WORST, POWERS, EARLY = "whole mesh, worst cells", (3, 2), (2, 3, 1)  # q⁸, q⁴, q²
@@ -75,7 +62,6 @@ GOOD, GOOD_MOVED = 0.75, 0.9  # a least 1/q that needs no more; the same on smal
 FEW, FEW_QUADS = 256, 2000  # free nodes: so many have their turn in any case
 FEW_SOLID = 1500  # the same of volumes that are not of tetrahedra alone
 EXACT = 20_000  # free nodes: up to so many, all nodes of such a mesh go to the minimum of Σq, which is near
-IN_SPACE = (VOLUME_PLAN, LARGE_VOLUME_PLAN, MIXED_PLAN, SURFACE_PLAN)
 NEAR_MEAN = 0.06  # in 1/q: so little less than the mean is the least of a mesh of like cells
 
 
@@ -93,7 +79,7 @@ class Auto(Smoother):
     mean: float
     phase: str
     looks: bool
-    repeats: bool
+    passes: Passes | None
 
     stops_when_idle = False
     shared_out = True
@@ -105,12 +91,12 @@ class Auto(Smoother):
         self.whole = 0  # how often all nodes have moved at once
         self.slow = self.ideal = self.early = self.doubled = False
         self.turns, self.least_before = 0, -math.inf  # how often all nodes had their turn for the worst cells
-        self.pass_gain, self.passes = PASS_GAIN, 0  # over the worst cells
-        self.least = -math.inf  # 1/q after the last of these
+        self.least = -math.inf  # 1/q after the last pass over the worst cells
         self.trial: Trial | None = None
         self.again = -1  # the phase to go back to in the end, if there is one
         self.falling: Falling | None = None
-        self.lost, self.mean_of_q = 0.0, math.nan  # of the mean of η in the end, and what it was after sweeps on q
+        self.lost, self.mean_of_q = 0.0, math.nan  # of the mean of 1/q in the end, and what it was after sweeps on q
+        self.restored = False
 
     def _enter(self, phase: int, field: Field, executor: Executor) -> None:
         if self.again >= 0 and (phase == len(self.phases) or (phase and self.phases[phase - 1].between)):
@@ -122,18 +108,27 @@ class Auto(Smoother):
             enough = TURN_GAIN if self.turns < TURNS else LATE_TURN_GAIN
             self.doubled = self.least < VERY_POOR and self.least > max(2.0 * self.least_before, HOPELESS)
             gained = self.turns == 0 or self.doubled or self.least >= self.least_before + enough
-            self.converged = not gained or not (self.ideal or self._is_even(field, executor))
+            ends = not gained or not (self.ideal or self._is_even(field, executor))
             self.turns, self.least_before = self.turns + 1, self.least
             if self.trial is not None:
                 self.looks, self.trial = self.trial.ends(field, executor), None
-                self.converged |= not self.looks
-            if not math.isnan(self.mean_of_q):
-                self.lost = self.mean_of_q - mean_shape(field, executor)
+                ends |= not self.looks
+            if ends:
+                self._end(field, executor)
             return
         self.smoother = self.phases[phase].create()
         self.falling = Falling(self.phases[phase].falling) if self.phases[phase].falling else None
         if self.phases[phase].rounds > 1 and not self.phases[phase].first:  # what those gain at first does not count
             self.mean = mean_shape(field, executor)
+
+    def _end(self, field: Field, executor: Executor) -> None:
+        """Ends, if the mean has not lost more than the phases bring back to planar meshes when they begin anew."""
+        if not math.isnan(self.mean_of_q):
+            self.lost = self.mean_of_q - mean_shape(field, executor)
+        self.converged = self.restored or not self.at_once or self.lost < LOST
+        if not self.converged:
+            self.restored, self.whole = True, 0
+            self._enter(0, field, executor)
 
     def sweep(self, field: Field, executor: Executor, test: Callable[[], bool]) -> Tally:
         """See Smoother."""
@@ -145,9 +140,8 @@ class Auto(Smoother):
             self.creep = Creep.of(field, executor) if self.at_once else None
             self.solid = not self.phases and field.level != STAR and isinstance(field.topology, MixedVolume)
             own, self.phases = self.phases, self.phases or plan_for(field.topology, self.free)
-            self.repeats = self.phases in IN_SPACE or not (own or field.level == STAR)
-            if self.phases in IN_SPACE and self.free > LARGE_VOLUME:
-                self.pass_gain = LARGE_VOLUME_GAIN if self.phases is LARGE_VOLUME_PLAN else LARGE_GAIN
+            repeats = self.phases in IN_SPACE or not (own or field.level == STAR)
+            self.passes = Passes(self.phases, self.free) if repeats else None
             self._enter(0, field, executor)
         if self.at == len(self.phases):
             return (self._move_all if self.ideal else self._move_all_for_worst)(field, executor, test)
@@ -206,19 +200,8 @@ class Auto(Smoother):
         if tally[MOVED] or self.doubled:
             self._enter(0, field, executor)
         else:
-            self.converged = True
+            self._end(field, executor)
         return tally
-
-    def _look_at_worst(self, smoother: WorstFirst) -> None:
-        """Is the worst cell to have another turn, once others have made room for it?"""
-        self.passes += 1
-        late = self.passes >= PASSES
-        gains = smoother.least >= self.least + (max(self.pass_gain, LATE_GAIN) if late else self.pass_gain)
-        if self.passes == 1 and self.phases is not SMALL_PLAN and self.phases not in IN_SPACE:
-            gains = smoother.gained >= LAST_GAIN
-        most = LATE_PASSES if self.phases in IN_SPACE and self.phases is not SURFACE_PLAN else PASSES
-        self.again = self.at if gains and self.passes < most else -1
-        self.least = smoother.least
 
     def _is_even(self, field: Field, executor: Executor) -> bool:
         """May the worst cell be one of many like it, which one star at a time cannot better?"""
@@ -271,14 +254,16 @@ class Auto(Smoother):
                 self.smoother.hasten()
                 falling.long = True
         target_reached = self.smoother.target_reached
-        if isinstance(self.smoother, WorstFirst) and self.repeats:
-            self._look_at_worst(self.smoother)
+        if isinstance(self.smoother, WorstFirst) and self.passes is not None:
+            self.again = self.at if self.passes.go_on(self.smoother) else -1
+            self.least = self.smoother.least
         looks = phase.looks and not (phase.late and self.again >= 0)
         self.looks = self.rounds % phase.often == 0 if goes_on else looks or target_reached
         self.looks &= self.trial is None
         if not goes_on:
-            if falling is not None:
-                self.mean_of_q = self.mean if self.rounds < phase.rounds else mean_shape(field, executor)
+            if falling is not None or (self.at_once and not self.at):
+                mean = self.mean if self.rounds < phase.rounds else mean_shape(field, executor)
+                self.mean_of_q = float(np.fmax(self.mean_of_q, mean))
             is_ideal = isinstance(self.smoother, WorstFirst) and self.smoother.least >= self.smoother.enough
             few = self.creep is not None and not self.whole and self.free <= EXACT
             self.ideal = is_ideal and few

@@ -124,6 +124,7 @@ MIXED_PLAN = (
     Phase("Newton on q, worst kept", lambda: Barrier("q", 1.0, ALWAYS), 1, rounds=10, gain=0.0005),
     Phase("Newton on q, in float64", ToTheEnd, 1),
 )
+IN_SPACE = (VOLUME_PLAN, LARGE_VOLUME_PLAN, MIXED_PLAN, SURFACE_PLAN)
 
 
 def plan_for(topology: Topology | Volume, free: int) -> Sequence[Phase]:

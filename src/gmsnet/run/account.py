@@ -173,7 +173,8 @@ class Account:
         if not result.moved.any():
             if result.stop_reason == stop.TARGET_REACHED and self.target_met:
                 return "nothing was moved: the target is met already"
-            return f"no gain: no mesh on the way was better than the input ({run})"
+            better = "closer to the target" if self.target else "better"
+            return f"no gain: no mesh on the way was {better} than the input ({run})"
         return f"{int(result.moved.sum()):,} of {amount(self.free, 'free node')} moved ({run})"
 
     @property

@@ -165,7 +165,7 @@ def rank_to_target(state: State, options: SmoothOptions, executor: Executor) -> 
     totals = totals_of(state.points, state.topology.scored, executor)
     missing = missing_in(state.topology, state.points, options, executor)
     inverted, worst = (0, math.inf) if totals is None else (totals.inverted, totals.shape_min)
-    return Nearness.of(inverted, missing, worst, totals)
+    return Nearness.of(options.target, inverted, missing, worst, totals)
 
 
 def _sweep_all(state: State, options: SmoothOptions, executor: Executor) -> State:
