@@ -58,6 +58,14 @@ def test_sections_may_come_in_any_order_among_others(variant: str) -> None:
     check_splice(gmsh, other)
 
 
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_comments_may_come_first(variant: str) -> None:
+    data = VARIANTS[variant]
+    other = b"$Comments\nof $MeshFormat 2.2\n$EndComments\n$Comments\n$EndComments\n" + data
+    assert facts(read(gmsh, other)) == facts(read(gmsh, data))
+    check_splice(gmsh, other)
+
+
 def test_meshio_reads_moved_points_back(tmp_path: Path) -> None:
     for order in ("", "<"):  # meshio wants nodes to be numbered 1, 2, 3, … in a binary file
         data = gmsh_variants.old(order, tags=range(1, 7), follow=True)

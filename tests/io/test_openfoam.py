@@ -63,6 +63,21 @@ def test_cells_are_made_of_faces(form: str) -> None:
     check(files)
 
 
+REMARKS = (b" // (9 9 9) 8", b" /* (1 2)\n 3 */")
+
+
+@pytest.mark.parametrize("remark", REMARKS)
+@pytest.mark.parametrize("name", ["points", "faces", "owner", "neighbour"])
+def test_comments_may_stand_in_lists(name: str, remark: bytes) -> None:
+    files = in_text(VOLUMES)
+    data = files[name]
+    begin = data.index(b"\n(\n") + 2
+    told = data[:begin] + data[begin:].replace(b"\n", remark + b"\n")
+    assert told.count(remark) > 4
+    assert facts(openfoam.read({**files, name: told})) == facts(openfoam.read(files))
+    check({**files, name: told})
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_one_layer_is_a_plane(form: str, tmp_path: Path) -> None:
     case = save(FORMS[form](layer()), tmp_path / "case")

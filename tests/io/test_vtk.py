@@ -122,7 +122,8 @@ def test_any_spelling_of_the_numbers(data: st.DataObject) -> None:
     assert np.isnan(parsed.cell_data["v"][0][0, 1])
 
 
-def test_metadata_fields_strings_and_tables_are_passed() -> None:
+@pytest.mark.parametrize("line_end", ["\n", "\r\n"])
+def test_metadata_fields_strings_and_tables_are_passed(line_end: str) -> None:
     more = (
         "METADATA\nINFORMATION 1\nNAME L2 LOCATION vtkDataArray\nDATA 2 0 1\n\nCELL_DATA 2\n"
         "FIELD FieldData 3\nmaterial%20id 1 2 int\n8 9\nMETADATA\nCOMPONENT_NAMES\na\n\n"
@@ -131,7 +132,8 @@ def test_metadata_fields_strings_and_tables_are_passed() -> None:
         "POINT_DATA 4\nNORMALS n float\n0 0 1 0 0 1 0 0 1 0 0 1\nTEXTURE_COORDINATES t 2 float\n0 0 0 0 0 0 0 0\n"
         "TENSORS k double\n" + "0 " * 36 + "\nGLOBAL_IDS g vtkIdType\n5 6 7 8\n"
     )
-    parsed = read(vtk_format, mesh_with("CELLS 2 8\n3 0 1 2 3 0 2 3\nCELL_TYPES 2\n5 5\n", more))
+    data = mesh_with("CELLS 2 8\n3 0 1 2 3 0 2 3\nCELL_TYPES 2\n5 5\n", more)
+    parsed = read(vtk_format, data.replace(b"\n", line_end.encode()))
     assert set(parsed.cell_data) == {"material id", "bits", "c"}
     assert parsed.point_data["g"].tolist() == [5, 6, 7, 8]
     assert parsed.point_data["k"].shape == (4, 9)

@@ -55,7 +55,7 @@ def remarks(part: Part, counts: Mapping[str, int], options: SmoothOptions) -> li
             said += inside_out_note(comm.allreduce(topology.inside_out(own)))
         left_out = ", ".join(filter(None, others))
         said += [NOT_MEASURED + left_out] if left_out else []
-    return [*said, *without_effect(options)]
+    return [*said, *without_effect(options, isinstance(topology, Volume))]
 
 
 def worst_of(part: Part, report: QualityReport, options: SmoothOptions) -> tuple[Place, ...]:

@@ -17,7 +17,8 @@ from gmsnet.io.text import Starts, Text, fail
 Ints = NDArray[np.int64]
 _HEADER = re.compile(rb"FoamFile\s*\{([^{}]*)\}")
 _ENTRY = re.compile(rb"(\w+)\s+(\"[^\"]*\"|[^;]*);")
-_REMARKS = re.compile(rb"(?:\s+|//[^\r\n]*|/\*.*?\*/)*", re.DOTALL)
+REMARK = re.compile(rb"//[^\r\n]*|/\*.*?\*/", re.DOTALL)
+_REMARKS = re.compile(rb"(?:\s+|" + REMARK.pattern + rb")*", re.DOTALL)
 _LIST = re.compile(rb"(\d{1,18})\s*([({])")
 _END = re.compile(rb"\s*\)")
 _SIZES = {b"32": 4, b"64": 8}
@@ -60,6 +61,15 @@ def list_at(data: Data, at: int, name: str) -> tuple[int, bool, int]:
     return int(found[1]), found[2] == b"{", found.end()
 
 
+def lists_of(data: Data, head: Head) -> Data:
+    """The file with blanks for the comments that stand in its lists; itself if it is binary, or has none there."""
+    first = -1 if head.binary else data.find(b"/", head.body)
+    if first < 0:
+        return data
+    rest = REMARK.sub(lambda found: b" " * len(found[0]), data[first:])
+    return bytes(data[:first]) + rest if rest.strip() else data  # most files end with a comment
+
+
 def _raw(data: Data, begin: int, count: int, size: int, name: str) -> int:
     """The end of so many binary numbers. Raises FormatError where the file, or the list, ends before."""
     end = begin + count * size
@@ -80,7 +90,7 @@ def _tokens(data: Data, begin: int, count: int, name: str) -> tuple[Starts, int]
 
 
 def labels(data: Data, head: Head, at: int, name: str) -> tuple[Ints, int]:
-    """A list of whole numbers behind a byte, and the byte behind it."""
+    """A list of whole numbers behind a byte, and the byte behind it. data: as ``lists_of`` gives it."""
     count, uniform, begin = list_at(data, at, name)
     if uniform:
         text = Text(data, ends=b"{}")
@@ -101,6 +111,7 @@ MOST_ALIKE = 1000  # entries that a list of one value has in a file of no length
 
 def coordinates(data: Data, head: Head, name: str) -> tuple[NDArray[np.float64], Slots, bool]:
     """The points (n × 3), where they stand, and whether they are in single precision."""
+    data = lists_of(data, head)
     count, uniform, begin = list_at(data, head.body, name)
     if uniform:
         fail(data, begin, f"{name}: all points are the same")
@@ -123,6 +134,7 @@ def coordinates(data: Data, head: Head, name: str) -> tuple[NDArray[np.float64],
 
 def faces(data: Data, head: Head, name: str) -> tuple[Ints, Ints]:
     """How many points each face has, and those of all faces one after another."""
+    data = lists_of(data, head)
     if head.kind == "faceCompactList":
         offsets, end = labels(data, head, head.body, name)
         points, _ = labels(data, head, end, name)

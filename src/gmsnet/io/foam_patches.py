@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from gmsnet.errors import FormatError
 from gmsnet.io.contents import Data
-from gmsnet.io.foam_lists import head_of, labels, list_at
+from gmsnet.io.foam_lists import REMARK, head_of, labels, list_at, lists_of
 
 Ints = NDArray[np.int64]
-_REMARK = re.compile(rb"//[^\r\n]*|/\*.*?\*/", re.DOTALL)
 _WORD = re.compile(rb"\"[^\"]*\"|[{};]|[^\s{};\"]+")
 LABELS = re.compile(rb"(?:cell|face|point)Labels\s+List<label>\s*")
 NAMED = re.compile(rb"([^\s{};\"()]+)\s*\{\s*type\s+(cellZone|faceZone|pointZone)\s*;")
@@ -45,7 +44,7 @@ def patches(data: Data, faces: int, internal: int) -> list[Patch]:
     head = head_of(data, "boundary")
     count, uniform, begin = list_at(data, head.body, "boundary")
     words = [word.decode("utf-8", "backslashreplace") for word in
-             _WORD.findall(_REMARK.sub(b" ", bytes(data[begin:])))]  # fmt: skip
+             _WORD.findall(REMARK.sub(b" ", bytes(data[begin:])))]  # fmt: skip
     found, at = list[Patch](), 0
     while at + 1 < len(words) and words[at] != ")" and len(found) < min(count, MOST):
         name, entries, depth, key = words[at].strip('"'), dict[str, str](), 0, ""
@@ -85,6 +84,7 @@ def _number(entries: dict[str, str], name: str, key: str) -> int:
 def zones(data: Data, name: str, most: int) -> list[tuple[str, Ints]]:
     """The name and the numbers of each zone. Raises FormatError for one that is not below ``most``."""
     head, found = head_of(data, name), list[tuple[str, Ints]]()
+    data = lists_of(data, head)
     for named in NAMED.finditer(data, head.body):
         where = LABELS.search(data, named.end())
         numbers = np.empty(0, dtype=np.int64)

@@ -10,7 +10,8 @@ from gmsnet.io.contents import Data
 from gmsnet.io.text import Text, fail, quoted
 from gmsnet.io.words import ByteWords, TextWords, Words, fail_at
 
-_HEAD = re.compile(rb"\s*\$MeshFormat\s+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*(?:\r\n?|\n)")
+_REMARKS = rb"\s*(?:\$Comments\b.*?\$EndComments\s*)*"
+_HEAD = re.compile(_REMARKS + rb"\$MeshFormat\s+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*(?:\r\n?|\n)", re.DOTALL)
 SECOND = ("2.2", "2", "2.0", "2.1")  # alike in what is read of them
 BEGIN = 4096  # bytes, in which a file begins
 

@@ -74,11 +74,14 @@ class RangeCursor(Cursor):
 
 
 def plan(file: Ranges) -> Plan | None:
-    """How the numbers of a file lie; None for texts, ghost cells, and very many blocks.
+    """How the numbers of a file lie; None for texts, ghost cells, very many blocks, and comments in front.
 
     Raises FormatError for a file that is damaged.
     """
-    source, old = opened(bytes(file.read(0, min(file.size, BEGIN))))
+    begin = bytes(file.read(0, min(file.size, BEGIN)))
+    if begin.lstrip().startswith(b"$Comments"):
+        return None
+    source, old = opened(begin)
     order = source.order
     if not order:
         return None

@@ -17,7 +17,7 @@ from gmsnet.io.cells import distinct, sealed
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written
 from gmsnet.io.foam_cells import Faces, Ints, Sides, volumes, walls
-from gmsnet.io.foam_lists import coordinates, faces, head_of, labels, list_at
+from gmsnet.io.foam_lists import coordinates, faces, head_of, labels, list_at, lists_of
 from gmsnet.io.foam_patches import ZONES, Patch, patches, zones
 from gmsnet.io.foam_plane import Plane, cells_in, plane_of
 from gmsnet.io.foam_ranges import plan as plan
@@ -89,7 +89,7 @@ def is_empty(files: Mapping[str, Data]) -> bool:
 def _faces(files: Mapping[str, Data], points: int) -> Faces:
     """The faces with their cells. Raises FormatError where the lists do not fit each other."""
     sizes, corners = faces(files["faces"], head_of(files["faces"], "faces"), "faces")
-    owner, neighbour = (labels(files[key], head, head.body, key)[0] for key in ("owner", "neighbour")
+    owner, neighbour = (labels(lists_of(files[key], head), head, head.body, key)[0] for key in ("owner", "neighbour")
                         for head in [head_of(files[key], key)])  # fmt: skip
     if len(owner) == len(neighbour) and (neighbour < 0).any():  # of old versions: −1 for faces of the boundary
         neighbour = neighbour[: int(np.argmax(neighbour < 0))]

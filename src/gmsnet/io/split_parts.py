@@ -10,7 +10,7 @@ from gmsnet.errors import FormatError, InputError
 from gmsnet.io import gmsh, openfoam
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
-from gmsnet.io.foam_lists import head_of, labels
+from gmsnet.io.foam_lists import head_of, labels, lists_of
 from gmsnet.io.merge import Part, one_mesh
 from gmsnet.io.splice import Untouched
 from gmsnet.io.split_files import DECOMPOSED, SPLIT
@@ -94,7 +94,8 @@ def _of_processor(key: str, files: Mapping[str, Data]) -> tuple[Part, Told] | No
         return None
     found, ids = openfoam.facts(files, whole=False), None
     if IDS in files:
-        numbers, _ = labels(files[IDS], head := head_of(files[IDS], IDS), head.body, IDS)
+        head = head_of(files[IDS], IDS)
+        numbers, _ = labels(lists_of(files[IDS], head), head, head.body, IDS)
         ids = numbers[found.rows] if len(numbers) > found.rows.max(initial=-1) else None  # else of another mesh
     return Part(found.parsed, ids), Told(key, found.parsed.points.shape[1], -1, found.names)
 

@@ -32,7 +32,7 @@ _HEAD = re.compile(
 
 
 _LINE = re.compile(rb"\s*([^\r\n]*)(?:\r\n?|\n)?")
-_BLANK_LINE = re.compile(rb"(?:\r\n?|\n)[ \t]*(?:\r\n?|\n)")
+_BLANK_LINE = re.compile(rb"(?:\r\n|\r(?!\n)|\n)[ \t]*[\r\n]")
 
 
 @dataclass(frozen=True)

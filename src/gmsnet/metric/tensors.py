@@ -77,7 +77,8 @@ def checked_sizes(values: Any, count: int, where: str) -> Floats:
     good = (sizes > 0.0) & np.isfinite(sizes)
     if not good.all():
         row = int(np.flatnonzero(~good)[0])
-        raise InputError(f"the size at {where} {row} (counted from 0) must be a positive number, got {sizes[row]!r}")
+        got = float(sizes[row])
+        raise InputError(f"the size at {where} {row} (counted from 0) must be a positive number, got {got!r}")
     logs = np.zeros((count, 3))
     logs[:, 0] = -2.0 * np.log(sizes)
     return logs

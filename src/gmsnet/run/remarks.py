@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -22,13 +23,18 @@ from gmsnet.topology.volume import Volume
 NOT_MEASURED = "not measured, and their nodes are held: "
 
 
-def without_effect(options: SmoothOptions, second: SecondOrder | None = None) -> list[str]:
-    """What of the options of sliding, and of surfaces, has no effect on a mesh in a plane, or of volumes."""
+def without_effect(options: SmoothOptions, in_space: bool, second: SecondOrder | None = None) -> list[str]:
+    """What of the options of sliding, and of surfaces, has no effect on volumes (``in_space``), or in a plane."""
     said = ["update_normals: this mesh is no surface in space, so normals stay"] if options.update_normals else []
     if options.slides and second is not None:
         said.append("slide: boundary nodes of second-order cells stay where they are")
     if not options.slides and options.feature_angle != FEATURE_ANGLE:
         said.append("feature angle: it has no effect, as no node is to slide: ask for that by slide")
+    if options.surface_tolerance is not None and math.isfinite(options.surface_tolerance):
+        if not in_space:
+            said.append("surface tolerance: it has no effect, as this mesh is planar: leave it out")
+        elif not options.slides:
+            said.append("surface tolerance: it has no effect, as no node is to slide: ask for that by slide")
     return said
 
 

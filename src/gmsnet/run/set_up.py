@@ -82,7 +82,7 @@ def first_state(
     )
     second = second_order_of(given, topology, options)
     remarks += held_anyway(given, asked, matching, topology, fixed, options.slides)
-    remarks += without_effect(options, second)
+    remarks += without_effect(options, False, second)
     if options.adapts and second is not None:
         raise InputError("a metric for second-order cells cannot be had so far: leave out metric, size and preserve")
     values = check_given(options, len(given.points))
@@ -151,7 +151,7 @@ def _first_of_volume(
     if isinstance(topology, MixedVolume):
         remarks += inside_out_note(topology.inside_out())
     start = taken(space_points(given), topology.memory)
-    remarks += without_effect(options, second)
+    remarks += without_effect(options, True, second)
     bare, nothing = given.without_cells(), np.empty(0, dtype=np.float32)
 
     def looked_at() -> Looked:
