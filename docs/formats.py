@@ -186,9 +186,9 @@ What else these formats have:
 - Nastran: nodes in another coordinate system (CP), INCLUDE and superelements are refused. Nodes of loads, supports,
   rigid elements, springs, masses and unknown elements are held. Regions are properties.
 - VTK, VTU: polyhedra are read, with their nodes held, and stay in the file with their faces. No conversion holds them.
-- What some programs read is refused, with the line: of VTK structured grids, triangle strips and Lagrange cells, several pieces in one
-  VTU file, Nastran fields that tabs separate, lines of OBJ that go on with a backslash, a Medit section that comes twice, OFF without
-  the word, and in SU2 a byte order mark.
+- What some programs read is refused, with the line: of VTK structured grids, triangle strips and Lagrange cells;
+  several pieces in one VTU file; Nastran fields that tabs separate; lines of OBJ that go on with a backslash; a Medit
+  section that comes twice; OFF without the word; a byte order mark of SU2.
 - UGRID: the form is part of the name (`.b8.ugrid`, `.lb8.ugrid`, `.r8.ugrid`, …; `.ugrid` is text).
 
 ## Smoothing: the same file with other coordinates
