@@ -370,3 +370,18 @@ def test_a_wing_on_a_symmetry_plane_moves_with_its_root():
     assert without.fraction < 1.0
     others = np.setdiff1d(np.arange(len(x)), mesh.markers["bottom"])
     assert not with_slide.moved[np.intersect1d(others, np.flatnonzero(held_nodes(mesh)))].any()
+
+
+def test_a_metric_is_not_carried_along(plate):
+    with pytest.raises(InputError, match="preserve must be 'shape', 'size' or 'none'"):
+        gmsnet.deform(plate, (0.2, 0.0), "hole", preserve="metric")
+
+
+def test_reasons_count_the_nodes_that_stay(plate):
+    result = gmsnet.deform(plate, (0.2, 0.0), "hole")
+    still = np.zeros(len(result.points), dtype=bool)
+    for ids in result.held.values():
+        still[ids] = True
+    told = result._account(plate).reasons()
+    assert told == f"boundary: {np.count_nonzero(still & ~result.moved):,}"
+    assert np.count_nonzero(still & result.moved) == len(plate.markers["hole"])

@@ -51,8 +51,8 @@ class Outcome(Account):
             console.print(note)
         if len(result.after.cell) and self.free:
             console.print(self.nearness())
-        if result.held and self.free:
-            held = len(self.mesh.points) - self.free
+        held = len(self.mesh.points) - self.free
+        if held and self.free:
             console.print(f"held: {held:,} of {amount(len(self.mesh.points), 'node')} ({self.reasons()})")
             may_slide = not _has_second_order(self.mesh) and not any("slide:" in note for note in result.notes)
             if may_slide and len(result.held.get(ON_BOUNDARY, ())) > self.free:

@@ -8,6 +8,7 @@ Russell: Adaptive moving mesh methods, Springer 2011).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -114,7 +115,7 @@ class Problem:
     def value(self, points: Floats, gradient: Floats) -> float:
         """See ``conjugate.Sum``."""
         total = self._value(points, gradient)[0]
-        if self.sliders is not None:
+        if self.sliders is not None and total < math.inf:  # else there is no gradient
             self.sliders.along(gradient, self.sliders.nodes)
         return total
 

@@ -119,7 +119,7 @@ class Problem:
                 energy(points, self.cells, weights, self.nothing, 0.0, gradient)
         else:
             total = energy(points, self.cells, self.table, self.nothing, 0.0, gradient)
-        if self.sliders is not None:
+        if self.sliders is not None and total < math.inf:  # else there is no gradient
             self.sliders.along(gradient, self.sliders.nodes)
         return float(total)
 

@@ -173,8 +173,10 @@ class Account:
         if not result.moved.any():
             if result.stop_reason == stop.TARGET_REACHED and self.target_met:
                 return "nothing was moved: the target is met already"
-            better = "closer to the target" if self.target else "better"
-            return f"no gain: no mesh on the way was {better} than the input ({run})"
+            if self.target:
+                other = "without a target the worst cell would count first"
+                return f"no gain: no mesh on the way was closer to the target than the input; {other} ({run})"
+            return f"no gain: no mesh on the way was better than the input ({run})"
         return f"{int(result.moved.sum()):,} of {amount(self.free, 'free node')} moved ({run})"
 
     @property
@@ -193,8 +195,9 @@ class Account:
         return [change.sentence(), *[far] * change.is_far]
 
     def reasons(self) -> str:
-        """Why nodes are held, with how many of them."""
-        return ", ".join(f"{reason}: {len(ids):,}" for reason, ids in self.result.held.items())
+        """Why nodes are held, with how many of them; without those that were moved for all that, or before."""
+        still = {reason: int(np.count_nonzero(~self.result.moved[ids])) for reason, ids in self.result.held.items()}
+        return ", ".join(f"{reason}: {count:,}" for reason, count in still.items() if count)
 
     def document(self) -> dict[str, Any]:
         """The whole outcome as plain values."""

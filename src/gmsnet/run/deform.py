@@ -17,6 +17,7 @@ from gmsnet.mesh.selection import chosen_nodes
 from gmsnet.motion.prescribed import Prescribed
 from gmsnet.parallel.interrupts import interruptible
 from gmsnet.parallel.threads import workers
+from gmsnet.preserve.protection import METRIC
 from gmsnet.run.call import ended
 from gmsnet.run.deform_result import DeformResult
 from gmsnet.run.deform_stage import move_boundary
@@ -78,6 +79,9 @@ def deform(
 def deform_with(mesh: Any, options: SmoothOptions, prescribed: Prescribed, fixed: Any = None) -> DeformResult:
     """``deform`` with a mesh, options and places that have been checked already. The rest: see there."""
     began = time.perf_counter()
+
+    if options.preserve == METRIC:
+        raise InputError("a metric is not carried along with boundaries: preserve must be 'shape', 'size' or 'none'")
 
     def work() -> State:
         smoother = options.smoother()

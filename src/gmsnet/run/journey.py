@@ -181,12 +181,11 @@ class Journey:
     def _why(self, state: State, topology: Topology | Volume, rest: Flags, done: Untangled) -> str:
         row = int(first_rows(topology, rest)[0])
         told = {each.row: each for each in done.unmended}.get(row)
-        where = ""
+        place, reason = self.places_of(done.points)[topology.near[row]].mean(axis=0), ""
         if told is not None:
-            corners = self.places_of(done.points)[topology.near[row]]
-            place = corners.mean(axis=0) if self.dimension == 3 else np.array(told.place)
-            where = f": {told.reason}, at {_place(place, state.mesh.exponent)}"
-        return f"{self._counted(topology, rest)}{where}"
+            reason = f": {told.reason},"
+            place = place if self.dimension == 3 else np.array(told.place)
+        return f"{self._counted(topology, rest)}{reason} at {_place(place, state.mesh.exponent)}"
 
     def _counted(self, topology: Topology | Volume, wrong: Flags) -> str:
         rows = first_rows(topology, wrong)
