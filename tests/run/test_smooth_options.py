@@ -144,3 +144,11 @@ def test_a_target_of_angles_that_is_met_says_that_a_quad_has_a_large_one():
         assert not told or said == [
             "target: it is of small angles alone, and the greatest one is 178.85°: a target of 1/q is of both"
         ]
+
+
+def test_a_surface_tolerance_without_effect_is_told():
+    plane, volume = random_mesh(30, seed=1), lattice_volume(3)
+    told = [gmsnet.smooth(mesh, surface_tolerance=0.1, max_sweeps=1).notes for mesh in (plane, volume)]
+    assert "surface tolerance: it has no effect, as this mesh is planar: leave it out" in told[0]
+    assert "surface tolerance: it has no effect, as no node is to slide: ask for that by slide" in told[1]
+    assert not any("surface tolerance" in note for note in gmsnet.smooth(plane, max_sweeps=1).notes)

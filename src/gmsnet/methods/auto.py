@@ -79,7 +79,6 @@ class Auto(Smoother):
     mean: float
     phase: str
     looks: bool
-    passes: Passes | None
 
     stops_when_idle = False
     shared_out = True
@@ -91,7 +90,7 @@ class Auto(Smoother):
         self.whole = 0  # how often all nodes have moved at once
         self.slow = self.ideal = self.early = self.doubled = False
         self.turns, self.least_before = 0, -math.inf  # how often all nodes had their turn for the worst cells
-        self.least = -math.inf  # 1/q after the last pass over the worst cells
+        self.passes: Passes | None = None
         self.trial: Trial | None = None
         self.again = -1  # the phase to go back to in the end, if there is one
         self.falling: Falling | None = None
@@ -160,6 +159,11 @@ class Auto(Smoother):
         if self.made == self._wanted or self.smoother.converged or not tally[MOVED]:
             self._end_round(field, executor)
         return tally
+
+    @property
+    def least(self) -> float:
+        """The least 1/q after the last pass over the worst cells."""
+        return -math.inf if self.passes is None else self.passes.least
 
     @property
     def _wanted(self) -> int:
@@ -256,7 +260,6 @@ class Auto(Smoother):
         target_reached = self.smoother.target_reached
         if isinstance(self.smoother, WorstFirst) and self.passes is not None:
             self.again = self.at if self.passes.go_on(self.smoother) else -1
-            self.least = self.smoother.least
         looks = phase.looks and not (phase.late and self.again >= 0)
         self.looks = self.rounds % phase.often == 0 if goes_on else looks or target_reached
         self.looks &= self.trial is None
