@@ -259,7 +259,7 @@ class Auto(Smoother):
                 falling.long = True
         target_reached = self.smoother.target_reached
         if isinstance(self.smoother, WorstFirst) and self.passes is not None:
-            self.again = self.at if self.passes.go_on(self.smoother) else -1
+            self.again = self.at if self.passes.go_on(self.smoother, self.mean_of_q) else -1
         looks = phase.looks and not (phase.late and self.again >= 0)
         self.looks = self.rounds % phase.often == 0 if goes_on else looks or target_reached
         self.looks &= self.trial is None

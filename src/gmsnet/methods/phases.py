@@ -77,12 +77,13 @@ LARGE_PLAN = (NEWTON._replace(looks=False), WORST._replace(looks=False), MEAN)
 MEAN_OF_QUADS = MEAN._replace(
     create=lambda: newton(LONGER), gain=0.0003, least=0.0002, lasting=math.inf, rounds=20, often=20, late=True
 )
-# Quads gain for longer, and what the mean takes back from the worst of them is worth another turn.
+# Quads gain for longer, and what the mean takes back from the worst of them is worth another turn. Cells beside the
+# worst ones become the worst more often than triangles do, so that these are looked for anew.
 QUADS_PLAN = (
     NEWTON._replace(gain=0.0008, least=0.0008, lasting=0.8, looks=False, often=10),
-    WORST._replace(create=lambda: worst_first(3, IDEAL), looks=False),
+    WORST._replace(create=lambda: worst_first(3, IDEAL), sweeps=3, looks=False),
     MEAN_OF_QUADS._replace(looks=False),
-    WORST._replace(create=lambda: worst_first(6, IDEAL), looks=False),
+    WORST._replace(create=lambda: worst_first(6, IDEAL), sweeps=3, looks=False),
     MEAN_OF_QUADS._replace(gain=0.0002, least=0.0001),
 )
 SMALL_PLAN = (LONG, ABOVE, SHORT, POLISH)
