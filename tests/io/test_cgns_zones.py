@@ -189,3 +189,70 @@ def test_vtk_reads_what_is_written(key: str, tmp_path: Path) -> None:
     new = np.zeros((len(mesh.points), 3))
     new[:, : mesh.points.shape[1]] = mesh.points * 1.5
     assert found == set(map(tuple, new.tolist()))
+
+
+GRID = {
+    "vertices": ([[1, 1, 1], [4, 1, 4]], "", lambda at: at[:, 1] == 0),
+    "three": ([[2, 3, 4], [2, 2, 2], [1, 1, 1]], "Vertex", lambda at: np.isin(at @ [1, 10, 100], [321, 111, 0])),
+    "faces of i": ([[4, 1, 1], [4, 3, 3]], "IFaceCenter", lambda at: at[:, 0] == 3),
+    "a face of j": ([[2, 1, 2]], "JFaceCenter", lambda at: (at[:, 1] == 0) & np.all((at[:, ::2] % 3) > 0, axis=1)),
+    "faces": ([[1, 1, 4], [3, 2, 4]], "FaceCenter", lambda at: (at[:, 2] == 3) & (at[:, 1] < 3)),
+    "cells": ([[1, 1, 1], [3, 3, 3]], "CellCenter", lambda at: at[:, 0] >= 0),
+    "outside": ([[1, 1, 1], [5, 1, 4]], "", lambda at: at[:, 0] < 0),
+    "unclear": ([[1, 1, 1], [3, 3, 3]], "FaceCenter", lambda at: at[:, 0] < 0),
+}
+
+
+@pytest.mark.parametrize("key", GRID)
+def test_boundary_conditions_of_a_grid_are_node_sets(key: str) -> None:
+    points, where, chosen = GRID[key]
+    data = made.with_conditions(made.cgns_structured(), {"inflow": [(key, points, where, "Base/family")]})
+    parsed = read(cgns, data)
+    # Points of the grid have their index along i in their first coordinate, but for those inside, which are thrown.
+    at = np.rint(3.0 * parsed.points).astype(np.int64)
+    wanted = np.flatnonzero(chosen(at) & (at[:, 2] <= 3))
+    if not len(wanted):
+        assert not parsed.node_sets
+        return
+    assert {name: nodes.tolist() for name, nodes in parsed.node_sets.items()} == {
+        key: wanted.tolist(), "family": wanted.tolist()
+    }  # fmt: skip
+
+
+def test_one_name_in_two_zones_is_one_set() -> None:
+    wall = ("wall", [[1, 1, 1], [4, 4, 1]])
+    parsed = read(cgns, made.with_conditions(made.cgns_structured(), {"inflow": [wall], "outflow": [wall]}))
+    assert {name: len(nodes) for name, nodes in parsed.node_sets.items()} == {"wall": 32}
+    assert set(parsed.points[parsed.node_sets["wall"], 2].tolist()) == {0.0, 1.0}
+
+
+ELEMENTS = {
+    "quads": ([[7], [7]], "CellCenter", made.QUADS),
+    "lines": ([[8], [9]], "EdgeCenter", made.LINES),
+    "some triangles": ([[2], [4], [2]], "CellCenter", made.TRIANGLES[[1, 3]]),
+    "a range of points": ([[2], [5]], "Vertex", np.arange(1, 5)),
+}
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+@pytest.mark.parametrize("key", ELEMENTS)
+def test_boundary_conditions_of_elements_are_node_sets(key: str, mixed: bool) -> None:
+    points, where, wanted = ELEMENTS[key]
+    parsed = read(cgns, made.with_conditions(made.cgns(mixed=mixed), {"blk-1": [(key, points, where)]}))
+    # A section of several types does not tell which of its elements are the second to the fourth.
+    told = not (mixed and where == "CellCenter")
+    assert {name: nodes.tolist() for name, nodes in parsed.node_sets.items()} == (
+        {"held": [6]} | ({key: np.unique(wanted).tolist()} if told else {})
+    )
+
+
+def test_a_name_of_a_boundary_condition_holds_its_nodes(tmp_path: Path) -> None:
+    inside = [[2, 2, 2], [3, 3, 3], [2, 3, 2]]
+    data = made.with_conditions(made.cgns_structured(), {"inflow": [("probe", inside)]})
+    (tmp_path / "a.cgns").write_bytes(data)
+    mesh = gmsnet.read(tmp_path / "a.cgns")
+    moved = np.any(gmsnet.smooth(mesh).points != mesh.points, axis=1)
+    held = np.any(gmsnet.smooth(mesh, fixed=mesh.markers["probe"]).points != mesh.points, axis=1)
+    assert len(mesh.markers["probe"]) == 3
+    assert moved[mesh.markers["probe"]].all()
+    assert not held[mesh.markers["probe"]].any()

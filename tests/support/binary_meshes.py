@@ -126,6 +126,28 @@ def grid(size: int, left_handed: bool = False) -> np.ndarray:
     return places[..., [1, 0, 2]] if left_handed else places
 
 
+def condition(zone: h5py.Group, called: str, points: list[list[int]], where: str = "", family: str = "") -> None:
+    """A boundary condition of a list of points, or of a range of two. where: in the grid they are. family: its name."""
+    group = zone["ZoneBC"] if "ZoneBC" in zone else _node(zone, "ZoneBC", "ZoneBC_t")
+    made = _node(group, called, "BC_t", _letters("FamilySpecified" if family else "BCWall"))
+    kind = "Range" if len(points) == 2 else "List"
+    _node(made, f"Point{kind}", f"Index{'Range' if len(points) == 2 else 'Array'}_t", np.array(points, np.int32))
+    if where:
+        _node(made, "GridLocation", "GridLocation_t", _letters(where))
+    if family:
+        _node(made, "FamilyName", "FamilyName_t", _letters(family))
+
+
+def with_conditions(data: bytes, told: dict[str, list[tuple[Any, ...]]]) -> bytes:
+    """A CGNS file with boundary conditions. told: the name of a zone → name, points and what ``condition`` takes."""
+    memory = io.BytesIO(data)
+    with h5py.File(memory, "r+") as file:
+        for zone, each in told.items():
+            for some in each:
+                condition(file["Base"][zone], *some)
+    return memory.getvalue()
+
+
 def cgns_structured(packed: bool = False, left_handed: bool = False) -> bytes:
     """Two blocks of a grid side by side."""
     places = grid(4, left_handed)

@@ -1,14 +1,14 @@
 """CGNS meshes in HDF5 (needs h5py). Only the coordinates are written again.
 
 Sections of elements are regions and markers by name, as are structured zones; those of several types that one boundary
-condition joins are one. Boundary conditions that list nodes are node sets. Of several zones, points at one place are
-one node.
+condition joins are one. Boundary conditions and their families are node sets (cgns_conditions). Of several zones,
+points at one place are one node.
 Source: CGNS Standard Interface Data Structures, and its SIDS-to-HDF5 mapping.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS
 from gmsnet.errors import FormatError
+from gmsnet.io.cgns_conditions import has_sets, labelled, node_sets, ranges
 from gmsnet.io.cgns_elements import DATA, grid, section, structured, tables_of, title
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
@@ -43,7 +44,7 @@ Ints = NDArray[np.int64]
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
     data = files[".cgns"]
-    zones = [zone for base in _labelled(File(data).root, "CGNSBase_t") for zone in _labelled(base, "Zone_t")]
+    zones = [zone for base in labelled(File(data).root, "CGNSBase_t") for zone in labelled(base, "Zone_t")]
     if not zones:
         raise FormatError("the file has no zones: there is nothing to smooth")
     parts, at = list[Parsed](), 1
@@ -61,8 +62,11 @@ def _one(parts: list[Parsed]) -> Parsed:
         raise FormatError("no zone has cells: there is nothing to smooth")
     whole = merged([Part(part) for part in parts])
     slots = shared([Share(part.slots, node) for part, node in zip(parts, whole.nodes, strict=True)])
-    sets = {name: sorted_unique(node[nodes]) for part, node in zip(parts, whole.nodes, strict=True)
-            for name, nodes in part.node_sets.items()}  # fmt: skip
+    found = dict[str, list[Ints]]()
+    for part, node in zip(parts, whole.nodes, strict=True):
+        for name, nodes in part.node_sets.items():
+            found.setdefault(name, []).append(node[nodes])
+    sets = {name: sorted_unique(np.concatenate(some)) for name, some in found.items()}
     unread = [f"the division into {len(parts)} zones", *dict.fromkeys(whole.parsed.unread)]
     parsed = replace(whole.parsed, slots=slots, node_sets=sets, unread=unread)
     return with_vertices(parsed, whole.held, "coincident points")
@@ -70,17 +74,19 @@ def _one(parts: list[Parsed]) -> Parsed:
 
 def _zone(zone: Node, data: Data, number: int, prefix: str) -> Parsed:
     """A zone by itself. number: of its first region. prefix: of the names of regions and sets."""
-    grids = _labelled(zone, "GridCoordinates_t")
+    grids = labelled(zone, "GridCoordinates_t")
     if len(grids) != 1:
         raise FormatError(f"{shown(zone.path)}: {len(grids)} sets of coordinates: a grid that moves is not smoothed")
     axes = [found for axis in "XYZ" if (found := grids[0].get(f"Coordinate{axis}/{DATA}")) is not None]
     if len(axes) < 2:
         raise FormatError(f"{shown(grids[0].path)}: CoordinateX and CoordinateY are missing")
     points, slots, single = coordinates([Axis(node, (k,)) for k, node in enumerate(axes)], data)
+    sizes: tuple[int, ...] = (len(points),)
     if _is_grid(zone):
         sections, prefix = [structured(zone, points)], ""
+        sizes = tuple(zone.need(DATA).integers()[0].tolist())
     else:
-        sections = [section(node, len(points)) for node in _labelled(zone, "Elements_t")]
+        sections = [section(node, len(points)) for node in labelled(zone, "Elements_t")]
     cells, names = list[CellBlock](), dict[tuple[int, int], str]()
     sections.sort(key=lambda each: each.first)
     told = _regions(zone, [(each.first, each.name, [of for of, _ in each.blocks]) for each in sections], number)
@@ -88,15 +94,11 @@ def _zone(zone: Node, data: Data, number: int, prefix: str) -> Parsed:
         for of, nodes in each.blocks:
             cells.append(CellBlock(of, nodes, np.full(len(nodes), region)))
             names[CELLS[of].dimension, region] = prefix + called
-    sets = {prefix + name: nodes for name, nodes in _conditions(zone, len(points))}
+    sets = node_sets(zone, sizes, sections, {called for _, called in told})
+    sets = {prefix + name: nodes for name, nodes in sets.items()}
     unread = [what for label, what in (("FlowSolution_t", "solutions"), ("ZoneGridConnectivity_t", "interfaces"),
-              ("ZoneBC_t", "boundary conditions")) if _labelled(zone, label)]  # fmt: skip
+              ("ZoneBC_t", "boundary conditions")) if labelled(zone, label)]  # fmt: skip
     return Parsed(points, cells, slots, names, single=single, unread=unread, node_sets=sets)
-
-
-def _labelled(node: Node, label: str) -> list[Node]:
-    """The children of one CGNS type."""
-    return [child for child in node.members() if not child.is_data and child.attribute("label") == label]
 
 
 def _is_grid(zone: Node) -> bool:
@@ -110,8 +112,8 @@ def _regions(zone: Node, sections: Sequence[tuple[int, str, list[str]]], number:
     sections: the first element, the name and the types of cells of each, ascending. Those of different types that one
     boundary condition has as a range are one region, by its name: a writer can give a section one type alone.
     """
-    ranges, kinds = list(_ranges(zone)), dict[str, list[str]]()
-    group = [next((name for low, high, name in ranges if low <= first <= high), "") for first, _, _ in sections]
+    spans, kinds = list(ranges(zone)), dict[str, list[str]]()
+    group = [next((name for low, high, name in spans if low <= first <= high), "") for first, _, _ in sections]
     for of, (_, _, types) in zip(group, sections, strict=True):
         kinds.setdefault(of, []).extend({*types})
     found, known = list[tuple[int, str]](), dict[str, int]()
@@ -123,36 +125,12 @@ def _regions(zone: Node, sections: Sequence[tuple[int, str, list[str]]], number:
     return found
 
 
-def _ranges(zone: Node) -> Iterator[tuple[int, int, str]]:
-    """The first and the last element and the name of boundary conditions that have a range of elements."""
-    for group in _labelled(zone, "ZoneBC_t"):
-        for condition in _labelled(group, "BC_t"):
-            place, span = condition.get(f"GridLocation/{DATA}"), condition.get(f"PointRange/{DATA}")
-            if span is None or place is None or place.text() == "Vertex":
-                continue
-            ends = span.integers().reshape(-1)
-            if len(ends) == 2:
-                yield int(ends[0]), int(ends[1]), title(condition)
-
-
-def _conditions(zone: Node, count: int) -> Iterator[tuple[str, Ints]]:
-    """The nodes of boundary conditions that list nodes."""
-    for group in _labelled(zone, "ZoneBC_t"):
-        for condition in _labelled(group, "BC_t"):
-            place, listed = condition.get(f"GridLocation/{DATA}"), condition.get(f"PointList/{DATA}")
-            if listed is None or (place is not None and place.text() != "Vertex"):
-                continue
-            nodes = listed.integers().reshape(-1) - 1
-            if len(nodes) and 0 <= nodes.min() <= nodes.max() < count:
-                yield title(condition), sorted_unique(nodes)
-
-
 def plan(file: Ranges) -> Plan | None:
     """How the numbers of all zones lie; None where some have polyhedra."""
     columns, tables, nodes, region = list[dict[str, Column]](), list[Table](), [0], 1
     names: dict[tuple[int, int], str] | None = {}
     with File.opened(file.path) as opened:
-        several = [zone for base in _labelled(opened.root, "CGNSBase_t") for zone in _labelled(base, "Zone_t")]
+        several = [zone for base in labelled(opened.root, "CGNSBase_t") for zone in labelled(base, "Zone_t")]
         for zone in several:
             found = _planned(zone, file, nodes[-1], region, f"{title(zone)}/" if len(several) > 1 else "")
             if found is None:
@@ -161,7 +139,7 @@ def plan(file: Ranges) -> Plan | None:
             tables += found.tables
             count = next(iter(found.columns.values())).rows.rows
             nodes.append(nodes[-1] + count)
-            names = None if names is None or any(_conditions(zone, count)) else names | found.names
+            names = None if names is None or found.has_sets else names | found.names
             region = 1 + max([region - 1, *(table.region for table in found.tables)])
     points = [column for of in columns for column in of.values()]
     if not tables or len({len(of) for of in columns}) > 1 or not _are_apart(points):
@@ -182,16 +160,17 @@ def _are_apart(points: Sequence[Column]) -> bool:
 
 
 class _Zone(NamedTuple):
-    """The coordinates of a zone by their paths, its cells, and the names of its regions."""
+    """The coordinates of a zone by their paths, its cells, the names of its regions, and whether nodes have others."""
 
     columns: dict[str, Column]
     tables: list[Table]
     names: dict[tuple[int, int], str]
+    has_sets: bool
 
 
 def _planned(zone: Node, file: Ranges, first: int, region: int, prefix: str) -> _Zone | None:
     """first: of all nodes the first of the zone. region: the number of its first one. prefix: of names."""
-    grids = _labelled(zone, "GridCoordinates_t")
+    grids = labelled(zone, "GridCoordinates_t")
     if len(grids) != 1:
         return None
     columns, axes = dict[str, Column](), [grids[0].get(f"Coordinate{axis}/{DATA}") for axis in "XYZ"]
@@ -208,7 +187,7 @@ def _planned(zone: Node, file: Ranges, first: int, region: int, prefix: str) -> 
         cells = grid(zone, (counts[0], len(columns)), partial(points.places, file))
         sections, prefix = [(title(zone), (1, [Table(cells.kind, cells, 0)]))], ""
     else:
-        found = [(title(node), tables_of(node, file)) for node in _labelled(zone, "Elements_t")]
+        found = [(title(node), tables_of(node, file)) for node in labelled(zone, "Elements_t")]
         sections = [(name, each) for name, each in found if each is not None]
         if len(sections) < len(found):
             return None
@@ -220,7 +199,7 @@ def _planned(zone: Node, file: Ranges, first: int, region: int, prefix: str) -> 
             if table.nodes.rows:
                 tables.append(table._replace(region=number, zone=(first, counts[0])))
                 names[CELLS[table.kind].dimension, number] = prefix + called
-    return _Zone(columns, tables, names)
+    return _Zone(columns, tables, names, has_sets(zone, {called for _, called in told}))
 
 
 def write(mesh: Mesh) -> Written:
