@@ -41,7 +41,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     """A table with its first column to the left and the others, figures, to the right."""
     made = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold")
     for index, name in enumerate(columns):
-        made.add_column(name, justify="left" if index == 0 else "right", no_wrap=True)
+        made.add_column(name, justify="left" if index == 0 else "right", no_wrap=index > 0)
     for row in rows:
         made.add_row(*row)
     return made

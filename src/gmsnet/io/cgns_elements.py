@@ -181,7 +181,8 @@ def grid(zone: Node, shape: tuple[int, ...], places: Places) -> GridCells:
     axes = tuple(sizes[0].tolist()) if sizes.ndim == 2 and len(sizes) == 3 else ()
     if len(axes) not in (2, 3) or min(axes) < 2 or math.prod(axes) != shape[0]:
         raise FormatError(
-            f"{shown(zone.path)}: {shape[0]} points are no grid of two or three axes, each of two or more points"
+            f"{shown(zone.path)}: {shape[0]} points are no grid of two or three axes, each of two or more points; "
+            "rows of points beside it (Rind) are not read"
         )
     around = (0, 1, 1 + axes[0], axes[0])
     if len(axes) == 2:

@@ -55,7 +55,10 @@ def check_kinds(mesh: Mesh, title: str, kinds: Collection[str]) -> None:
                 f"{title} cannot be written with polyhedra: only the format of the input keeps their faces"
             )
         if block.kind not in kinds and len(block.nodes):
-            raise FormatError(f"{title} cannot hold cells of type {block.kind!r}: write another format, such as .vtu")
+            raise FormatError(
+                f"{title} cannot hold cells of type {block.kind!r}: write another format, such as "
+                f"{'.msh of Gmsh' if title == 'VTU' else '.vtu'}"
+            )
 
 
 def lost_data(mesh: Mesh, title: str, kept: Collection[str] = (), regions: bool = False) -> list[str]:

@@ -19,6 +19,7 @@ from gmsnet.errors import FormatError, InputError, MissingExtraError
 from gmsnet.io.contents import Data
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
+ADF = b"@(#)ADF"
 NEEDED = "pip install 'gmsnet[hdf5]'"
 # Numbers that a file may hold, whatever its length, and for each of its bytes: data may be compressed, or empty.
 ANYWAY, PER_BYTE = 1 << 22, 32
@@ -67,7 +68,9 @@ class File:
     def __init__(self, data: Data) -> None:
         self.h5py, self.data = library(), data
         if bytes(data[: len(MAGIC)]) != MAGIC:
-            raise FormatError("byte 0: this is no HDF5 file")
+            adf = bytes(data[: len(ADF)]) == ADF
+            more = ": it is of ADF, the older form of CGNS; adf2hdf makes it HDF5" if adf else ""
+            raise FormatError(f"byte 0: this is no HDF5 file{more}")
         self.budget = ANYWAY + PER_BYTE * len(data)
         with said_of(""):
             self.root = Node(self, "", self.h5py.File(io.BytesIO(data[:]), "r"))

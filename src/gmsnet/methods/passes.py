@@ -12,7 +12,7 @@ PASSES, LATE_PASSES = 8, 24  # at most; of volumes that gain LATE_GAIN still
 LATE_GAIN = 0.005
 # In the least 1/q: what a pass must gain for another one to follow; the last cycle of the first pass, on large meshes.
 PASS_GAIN, LAST_GAIN = 0.002, 0.003
-# A mean of 1/q below this, after sweeps on q, have meshes that are deformed as a whole: their worst cells find room late.
+# Of meshes that are deformed as a whole the mean of 1/q is below this after sweeps on q: worst cells find room late.
 DEFORMED = 0.89
 LARGE_GAIN = 0.008  # of meshes in space of more than LARGE_VOLUME free nodes
 LARGE_VOLUME_GAIN = 0.02  # of those of tetrahedra alone: with two turns they are at 98 % of what many reach
@@ -32,7 +32,7 @@ class Passes:
         self.made, self.least = 0, -math.inf
 
     def go_on(self, smoother: WorstFirst, mean: float) -> bool:
-        """Is there another one? smoother: has just made one. mean: of 1/q after sweeps on q, not a number if unknown."""
+        """Is there another one? smoother: has just made one. mean: of 1/q after sweeps on q, NaN if unknown."""
         self.made += 1
         late = self.made >= PASSES
         gains = smoother.least >= self.least + (max(self.gain, LATE_GAIN) if late else self.gain)

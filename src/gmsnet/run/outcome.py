@@ -162,13 +162,15 @@ def _notes(state: State, options: SmoothOptions) -> list[str]:
         of_order.extend(note for note in given.protection.notes if note not in protection.notes)
         if given.protection.walls is not None:
             of_order.append(_wall_note(given.protection, moved=False))
-    held = []
+    held, untangling = [], [*state.untangling]
     if state.final is not None:
         _, _, after, compared = state.final
+        if untangling and state.reasons and not after.inverted:
+            untangling[-1] += "; in the end none is inverted"
         held = compared.note(state.before.totals, after.totals, after.symbol)
         other = state.motion is not None or state.metric is not None or (given is not None and given.invalid[0])
         held += [] if options.target or other else compared.price(after.symbol)
-    return [*protection.notes, *near_walls, *state.untangling, *slid, *state.remarks, *held, *of_order]
+    return [*protection.notes, *near_walls, *untangling, *slid, *state.remarks, *held, *of_order]
 
 
 def _of_angles(after: QualityReport, options: SmoothOptions) -> list[str]:

@@ -115,7 +115,7 @@ class SecondOrder:
         """What was done. moved: (N,) by id."""
         before, after = (f"{count:,} invalid cell{'' if count == 1 else 's'}" for count in self.invalid)
         least = self.least if moved.any() else self.least[:1] * 2
-        corners, free = self.corners, self.free
+        corners, free = self.corners, self.free | moved  # nodes that slide move, too
         return (
             f"second order: {before} before, {after} after; the least bound of a determinant over that of the straight "
             f"cell {least[0]:.3g} before, {least[1]:.3g} after; {(moved & corners).sum():,} of "

@@ -39,7 +39,12 @@ def untangle_all(state: State, options: SmoothOptions, executor: Executor) -> St
     """Moves the free nodes so that fewer cells are inverted; those of second-order cells have a stage of their own."""
     if isinstance(state.topology, Shell) or (state.second_order is not None and not len(state.topology.free)):
         return state  # of surfaces, folded parts are mended (run/unfold.py), and sweeps turn what shows the other side
-    return _untangled(state, executor, state.before.inverted) if options.untangle and state.before.inverted else state
+    if not options.untangle or not state.before.inverted:
+        return state
+    if state.second_order is None:
+        return _untangled(state, executor, state.before.inverted)
+    done, topology = _made(state, executor, None)  # of those that are invalid, curved ones are left to their own stage
+    return _noted(state, done, topology) if done.before else state
 
 
 def untangle_protected(state: State, options: SmoothOptions, executor: Executor) -> State:
