@@ -10,7 +10,7 @@ import pytest
 
 import gmsnet
 from gmsnet.cli.signals import Deferral
-from gmsnet.io import write
+from gmsnet.io import read, write
 from gmsnet.run import stop
 from gmsnet.run.progress import Progress
 
@@ -93,6 +93,36 @@ def test_ctrl_c_while_drawing_says_that_the_mesh_is_written(run, square, tmp_pat
     done = run("smooth", square, out, "--plot", tmp_path / "p.png")
     assert (done.code, done.err) == (130, f"gmsnet: interrupted; the mesh is written to {out}\n")
     assert gmsnet.quality(gmsnet.read(out)).qhat > gmsnet.quality(gmsnet.read(square)).qhat
+
+
+def test_ctrl_c_that_is_lost_ends_the_next_sweep(run, square, tmp_path, monkeypatch):
+    swept = gmsnet.smooth(gmsnet.read(square), "gmsnet", max_sweeps=1)
+    check = Deferral.begin
+
+    def lost(self):
+        if not self.caught:  # as in a function that LLVM calls, before the first sweep has ended
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+        check(self)
+
+    monkeypatch.setattr(Deferral, "begin", lost)
+    out = tmp_path / "out.su2"
+    document = json.loads(run("smooth", square, out, "--method", "gmsnet", "--json").out)
+    assert (document["sweeps"], document["stop_reason"]) == (1, stop.INTERRUPTED)
+    assert gmsnet.read(out).points.tolist() == swept.points.tolist()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_ctrl_c_that_is_lost_while_reading_ends_the_command(run, square, tmp_path, monkeypatch):
+    def lost(*given):
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        return read(*given)
+
+    monkeypatch.setattr("gmsnet.io.read", lost)
+    done = run("smooth", square, tmp_path / "out.su2")
+    assert (done.code, done.err) == (130, "gmsnet: interrupted; nothing was written\n")
+    assert listing(tmp_path) == ["square.su2"]
 
 
 def test_signals_that_the_caller_ignores_stay_ignored():

@@ -130,6 +130,8 @@ class FileWork:
         if destination is not None and self.in_place and mesh.source is not None:
             destination = replace(destination, format=mesh.source.format)
         work = make(mesh)
+        if self.interruption.caught:
+            raise KeyboardInterrupt  # it was lost where it was raised
         if destination is not None:
             _check_conversion(mesh, destination)
         self.progress.begin("preparing")
