@@ -54,6 +54,11 @@ class CurvedParts:
         """To find the nearest facets of the input."""
         return Grid(self.given[self.facets.rows])
 
+    @cached_property
+    def least(self) -> float:
+        """The least 1/q of a facet of the input: none that is moved gets less."""
+        return float(_shapes(self.given[self.facets.rows]).min(initial=1.0))
+
     @classmethod
     def of(
         cls, mesh: Mesh, facets: Facets, given: Floats, held: Flags, uses: Longs, precision: Precision,
@@ -174,7 +179,8 @@ class CurvedParts:
         room = self.limit[part.nodes[own]]
         out = np.flatnonzero(far > room)
         places[own[out]] = within(places[own[out]], self.grid.boxes.triangles[which[out]], room[out])
-        bad = touched & ~left & (_turned(part, places, side) | _sharp(rows, places))
+        worse = _shapes(places[rows]) < self.least
+        bad = touched & ~left & (_turned(part, places, side) | _sharp(rows, places) | worse)
         wrong = np.zeros(len(flat), dtype=bool)
         wrong[rows[bad]] = True
         wrong[at] |= surface.off > self.limit[part.nodes[at]]
@@ -201,6 +207,15 @@ def _sharp(rows: Longs, places: Floats) -> Flags:
     over = (count == 2) & (dot(unit[one // 3], unit[other // 3]) < FOLD)
     found = np.zeros(len(rows), dtype=bool)
     found[one[over] // 3] = found[other[over] // 3] = True
+    return found
+
+
+def _shapes(triangles: Floats) -> Floats:
+    """(k,) 1/q of triangles in space (k, 3, 3), 0 where all corners are at one place."""
+    sides = np.roll(triangles, -1, axis=1) - triangles
+    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    squares = np.einsum("ijk,ijk->i", sides, sides)
+    found: Floats = 2.0 * math.sqrt(3.0) * area / np.where(squares > 0.0, squares, 1.0)
     return found
 
 
