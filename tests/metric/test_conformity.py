@@ -31,6 +31,16 @@ def test_lengths_are_integrals_where_sizes_change_by_one_factor_per_way():
     np.testing.assert_allclose(length, np.sqrt(9 * 9 + 2 * 12 + 4 * 16), rtol=1e-12)
 
 
+@pytest.mark.parametrize("turn", [0.3, 1.0, 2.5])
+def test_lengths_across_a_very_flat_metric_are_those_of_its_small_axis(turn):
+    # log M has the eigenvalues ±18.4 along (cos, sin) and across it; its entries are 10⁸, which cancel across it.
+    large = np.log(1e8)
+    logs = np.array([[0.0, large * np.cos(2.0 * turn), large * np.sin(2.0 * turn)]] * 2)
+    points = np.array([[0.0, 0.0], [-np.sin(turn), np.cos(turn)]])
+    length = edge_lengths(points, logs, np.array([[0, 1]], dtype=np.int32))
+    np.testing.assert_allclose(length, 1e-4, rtol=1e-6)
+
+
 def test_every_edge_counts_once():
     mesh = structured_mesh(4, 3)
     edges = edges_of(Topology.of(mesh))

@@ -115,10 +115,9 @@ def edge_lengths(points: Floats, logs: Floats, edges: Ints) -> Floats:
     Source: F. Alauzet, "Size gradation control of anisotropic meshes", Finite Elements in Analysis and Design 46, 2010.
     """
     x, y = (points[edges[:, 1]] - points[edges[:, 0]]).T
-    tensors = tensors_of(logs)
+    roots = tensors_of(0.5 * logs)  # of the tensors: the squares of very flat ones cancel
     one, other = (
-        np.sqrt(m[:, 0] * x * x + 2.0 * m[:, 1] * x * y + m[:, 2] * y * y)
-        for m in (tensors[edges[:, 0]], tensors[edges[:, 1]])
+        np.hypot(m[:, 0] * x + m[:, 1] * y, m[:, 1] * x + m[:, 2] * y) for m in (roots[edges[:, 0]], roots[edges[:, 1]])
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.log(other / one)

@@ -13,7 +13,7 @@ import numpy as np
 
 from gmsnet.constraints.sliding import REASON, Sliding
 from gmsnet.constraints.sliding_in_space import SurfaceSliding
-from gmsnet.kernels.simplex.mean_ratio2 import WEIGHTS
+from gmsnet.kernels.simplex.mean_ratio2 import EQUILATERAL, WEIGHTS
 from gmsnet.kernels.simplex.mean_ratio3 import REGULAR
 from gmsnet.kernels.star.guard import Precision
 from gmsnet.kernels.whole.powers import shape_of_each
@@ -193,16 +193,34 @@ class Journey:
         return f"{count} would be inverted, first cell {topology.cells_of(rows[:1])[0]}"
 
     def crossing(self, state: State, places: Floats) -> str:
-        """Where boundaries cross that did not at first, in words; "" if they do not, and for those of volumes, of which
-        inverted cells tell."""
-        if self.dimension == 3:
+        """Where boundaries cross, or lie on themselves, that did not at first, in words; "" if they do not, and for
+        those of volumes, of which inverted cells tell."""
+        if isinstance(self.held, Volume):
             return ""
         from gmsnet.untangle.crossings import crossings_of
 
         found = crossings_of(places, self.path.edges)
-        if not len(found) or len(crossings_of(self.path.start, self.path.edges)):
-            return ""
-        return f"boundaries would cross each other at {_place(found[0], state.mesh.exponent)}"
+        if len(found) and not len(crossings_of(self.path.start, self.path.edges)):
+            return f"boundaries would cross each other at {_place(found[0], state.mesh.exponent)}"
+        found = self._doubled_back(self.held, places)
+        return f"the boundary would lie on itself at {_place(found[0], state.mesh.exponent)}" if len(found) else ""
+
+    def _doubled_back(self, topology: Topology, places: Floats) -> Floats:
+        """(k, 2) where the boundary goes back along itself, with no angle left for the cells between.
+
+        At the tip of a slit cells have all of the angle.
+        """
+        from gmsnet.untangle.crossings import angle_sums, doubled_back
+
+        edges = self.path.edges
+        back = np.setdiff1d(doubled_back(places, edges), doubled_back(self.path.start, edges))
+        if not len(back):
+            return places[back]
+        shapes, rows = topology.near_shapes, topology.near
+        rows = np.where(topology.near_orientation[:, None] > 0, rows, rows[:, [0, 2, 1]])
+        whole = rows if shapes is None else rows[shapes == EQUILATERAL]  # of a quad each corner has a row of its own
+        corners = np.concatenate([rows, whole[:, [1, 2, 0]], whole[:, [2, 0, 1]]])
+        return places[back[angle_sums(places, *corners.T)[back] < np.pi]]
 
     def crushed(self, state: State, places: Floats) -> str:
         """Which cells would be inverted whose nodes are all held, in words; "" if none."""

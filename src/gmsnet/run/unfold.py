@@ -21,6 +21,7 @@ from gmsnet.run.run import precision_of
 from gmsnet.run.unfold_curved import CurvedParts
 from gmsnet.run.untangle_stage import note_of
 from gmsnet.topology.ordering import space_points
+from gmsnet.untangle.crossings import angle_sums
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -89,6 +90,4 @@ def _rim_turns_back(flat: Floats, tables: tuple[NDArray[np.int64], NDArray[np.in
     back = there[np.einsum("ij,ij->i", way[here], way[there]) < OPPOSITE * lengths]
     if not back.size:
         return False
-    one, other = flat[ahead] - flat[at], flat[behind] - flat[at]
-    angle = np.arctan2(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0], np.einsum("ij,ij->i", one, other))
-    return bool((np.bincount(at, angle, minlength=size)[back] < math.pi).any())
+    return bool((angle_sums(flat, at, ahead, behind)[back] < math.pi).any())

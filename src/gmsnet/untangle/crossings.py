@@ -12,6 +12,7 @@ from gmsnet.measure.signs import exact_signs
 from gmsnet.untangle.patch import Floats, Ints
 
 MOST = 3_000_000  # pairs of boxes
+BACK = 1e-9  # the sine of an angle: two edges with less between them lie on each other
 FLAT = 1e-9  # of the largest box: smaller ones count as that large where boxes are sorted by size
 
 
@@ -45,6 +46,25 @@ def crossings_of(points: Floats, edges: Ints) -> Floats:
     low, high = points[edges].min(axis=1), points[edges].max(axis=1)
     pairs = meeting(low, high, low, high)
     return np.empty((0, 2)) if pairs is None else crossings(points, apart(edges, pairs))
+
+
+def doubled_back(points: Floats, edges: Ints) -> NDArray[np.intp]:
+    """(k,) the nodes of exactly two of some edges (e, 2) that lie on each other, ascending."""
+    at, other = np.concatenate([edges, edges[:, ::-1]]).T
+    order = np.argsort(at, kind="stable")
+    nodes = np.flatnonzero(np.bincount(at) == 2)
+    first = np.searchsorted(at[order], nodes)
+    u, v = (points[other[order][first + k]] - points[nodes] for k in (0, 1))
+    along, across = np.einsum("ij,ij->i", u, v), times(u, v)
+    return np.asarray(nodes[(along > 0.0) & (np.abs(across) <= BACK * along)])
+
+
+def angle_sums(points: Floats, at: Ints, ahead: Ints, behind: Ints) -> Floats:
+    """(N,) the sum of the angles of cells at their corners, from the next corner to the one before."""
+    one, other = points[ahead] - points[at], points[behind] - points[at]
+    angle = np.arctan2(times(one, other), np.einsum("ij,ij->i", one, other))
+    found: Floats = np.bincount(at, angle, minlength=len(points)).astype(np.float64)
+    return found
 
 
 def apart(edges: Ints, pairs: NDArray[np.intp]) -> Ints:
