@@ -95,13 +95,14 @@ def _of_points(condition: Condition, sizes: tuple[int, ...]) -> Ints:
     at = listed.reshape(-1, axes)
     low, high = at.min(axis=0), at.max(axis=0)
     across = _extent(condition.location, low == high)
-    if across is None or low.min() < 0 or np.any(high + across >= sizes):
+    if across is None or low.min() < 0 or np.any(high >= np.array(sizes) - across):
         return NONE
     if condition.is_range:
-        spans = [np.arange(first, last + 1) for first, last in zip(low.tolist(), high.tolist(), strict=True)]
+        spans = [np.arange(first, last + 1) for first, last in zip(low.tolist(), (high + across).tolist(), strict=True)]
         at = np.stack(np.meshgrid(*spans, indexing="ij"), axis=-1).reshape(-1, axes)
-    for axis in np.flatnonzero(across):
-        at = np.concatenate([at, at + (np.arange(axes) == axis)])
+    else:
+        for axis in np.flatnonzero(across):
+            at = np.concatenate([at, at + (np.arange(axes) == axis)])
     return sorted_unique(at @ np.cumprod([1, *sizes[:-1]]))
 
 
