@@ -219,6 +219,18 @@ def test_boundary_conditions_of_a_grid_are_node_sets(key: str) -> None:
     }  # fmt: skip
 
 
+def test_a_family_is_of_all_zones() -> None:
+    told = {
+        "left": [("seal", [[1], [2]], "Vertex", "WALL")],
+        "right": [("WALL", [[1], [3], [2]], "Vertex", "WALL")],
+    }
+    parsed = read(cgns, made.with_conditions(made.cgns_zones(), told))
+    sets = {name: set(map(tuple, parsed.points[nodes].tolist())) for name, nodes in parsed.node_sets.items()}
+    assert {*sets} == {"left/held", "left/seal", "right/WALL", "WALL"}
+    assert sets["WALL"] == sets["left/seal"] | sets["right/WALL"]
+    assert [len(sets[name]) for name in ("left/seal", "right/WALL")] == [2, 3]
+
+
 def test_one_name_in_two_zones_is_one_set() -> None:
     wall = ("wall", [[1, 1, 1], [4, 4, 1]])
     parsed = read(cgns, made.with_conditions(made.cgns_structured(), {"inflow": [wall], "outflow": [wall]}))

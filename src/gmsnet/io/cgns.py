@@ -94,8 +94,7 @@ def _zone(zone: Node, data: Data, number: int, prefix: str) -> Parsed:
         for of, nodes in each.blocks:
             cells.append(CellBlock(of, nodes, np.full(len(nodes), region)))
             names[CELLS[of].dimension, region] = prefix + called
-    sets = node_sets(zone, sizes, sections, {called for _, called in told})
-    sets = {prefix + name: nodes for name, nodes in sets.items()}
+    sets = node_sets(zone, sizes, sections, {prefix + called for _, called in told}, prefix)
     unread = [what for label, what in (("FlowSolution_t", "solutions"), ("ZoneGridConnectivity_t", "interfaces"),
               ("ZoneBC_t", "boundary conditions")) if labelled(zone, label)]  # fmt: skip
     return Parsed(points, cells, slots, names, single=single, unread=unread, node_sets=sets)
@@ -199,7 +198,7 @@ def _planned(zone: Node, file: Ranges, first: int, region: int, prefix: str) -> 
             if table.nodes.rows:
                 tables.append(table._replace(region=number, zone=(first, counts[0])))
                 names[CELLS[table.kind].dimension, number] = prefix + called
-    return _Zone(columns, tables, names, has_sets(zone, {called for _, called in told}))
+    return _Zone(columns, tables, names, has_sets(zone, {prefix + called for _, called in told}, prefix))
 
 
 def write(mesh: Mesh) -> Written:

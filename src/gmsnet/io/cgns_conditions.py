@@ -58,22 +58,22 @@ def ranges(zone: Node) -> Iterator[tuple[int, int, str]]:
             yield int(ends[0]), int(ends[1]), each.name
 
 
-def has_sets(zone: Node, names: Collection[str]) -> bool:
-    """Whether some nodes go by another name than these."""
-    return any(name not in names for each in conditions(zone) for name in _names(each))
+def has_sets(zone: Node, names: Collection[str], prefix: str) -> bool:
+    """Whether some nodes go by another name than these. prefix: of the names of conditions."""
+    return any(name not in names for each in conditions(zone) for name in _names(each, prefix))
 
 
 def node_sets(
-    zone: Node, sizes: tuple[int, ...], sections: Sequence[Section], names: Collection[str]
+    zone: Node, sizes: tuple[int, ...], sections: Sequence[Section], names: Collection[str], prefix: str
 ) -> dict[str, Ints]:
     """The nodes of each name but some, ascending.
 
     sizes: how many points a grid has along each axis, or how many an unstructured zone has. sections: of the latter.
-    names: of its regions, which have these nodes.
+    names: of its regions, which have these nodes. prefix: of the names of conditions; families are of all zones.
     """
     found = dict[str, list[Ints]]()
     for each in conditions(zone):
-        wanted = [name for name in _names(each) if name not in names]
+        wanted = [name for name in _names(each, prefix) if name not in names]
         if wanted:
             of_elements = len(sizes) == 1 and each.location != VERTEX
             nodes = _of_elements(each, sections) if of_elements else _of_points(each, sizes)
@@ -83,8 +83,8 @@ def node_sets(
     return {name: nodes for name, nodes in joined.items() if len(nodes)}
 
 
-def _names(condition: Condition) -> list[str]:
-    return [name for name in dict.fromkeys((condition.name, condition.family)) if name]
+def _names(condition: Condition, prefix: str) -> list[str]:
+    return [name for name in dict.fromkeys((prefix + condition.name, condition.family)) if name]
 
 
 def _of_points(condition: Condition, sizes: tuple[int, ...]) -> Ints:
