@@ -21,7 +21,6 @@ from gmsnet.run.run import precision_of
 from gmsnet.run.unfold_curved import CurvedParts
 from gmsnet.run.untangle_stage import note_of
 from gmsnet.topology.ordering import space_points
-from gmsnet.untangle.crossings import angle_sums
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -80,6 +79,8 @@ def _rim_turns_back(flat: Floats, tables: tuple[NDArray[np.int64], NDArray[np.in
     sheet is folded on purpose: no places of the nodes inside are good. At the tip of a slit the angle is 360°.
     """
     at, ahead, behind = (np.concatenate([np.roll(table, -k, axis=1).ravel() for table in tables]) for k in (0, 1, -1))
+    from gmsnet.untangle.crossings import angle_sums  # what it needs of SciPy takes 0.15 s more to import
+
     size = len(flat)
     rim = ~np.isin(at * size + ahead, ahead * size + at)
     way = np.zeros_like(flat)
