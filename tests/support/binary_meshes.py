@@ -81,13 +81,9 @@ def cgns(
             parts = ("first", 5, TRIANGLES[:split], split), ("tri", 5, TRIANGLES[split:], 6 - split)
             sections[:1] = parts
         _elements(zone, sections)
-        conditions = _node(zone, "ZoneBC", "ZoneBC_t")
-        held = _node(conditions, "held", "BC_t", _letters("BCWall"))
-        _node(held, "PointList", "IndexArray_t", np.array([[7]], np.int32))
+        condition(zone, "held", [[7]])
         if joined:
-            body = _node(conditions, "body", "BC_t", _letters("FamilySpecified"))
-            _node(body, "PointRange", "IndexRange_t", np.array([[1], [7]], np.int32))
-            _node(body, "GridLocation", "GridLocation_t", _letters(joined))
+            condition(zone, "body", [[1], [7]], joined)
         _node(zone, "FlowSolution", "FlowSolution_t")
 
     return _file(fill)
@@ -112,8 +108,7 @@ def cgns_zones(packed: bool = False, mixed: bool = False) -> bytes:
         _node(zone, "ZoneGridConnectivity", "ZoneGridConnectivity_t")
         zone = _zone(base, "left", POINTS[left], "Unstructured", [[5], [4], [0]], **({} if mixed else how))
         _elements(zone, [("tri", 5, np.searchsorted(left, TRIANGLES[:4]), 4)])
-        held = _node(_node(zone, "ZoneBC", "ZoneBC_t"), "held", "BC_t", _letters("BCWall"))
-        _node(held, "PointList", "IndexArray_t", np.array([[5]], np.int32))
+        condition(zone, "held", [[5]])
 
     return _file(fill)
 
@@ -130,8 +125,8 @@ def condition(zone: h5py.Group, called: str, points: list[list[int]], where: str
     """A boundary condition of a list of points, or of a range of two. where: in the grid they are. family: its name."""
     group = zone["ZoneBC"] if "ZoneBC" in zone else _node(zone, "ZoneBC", "ZoneBC_t")
     made = _node(group, called, "BC_t", _letters("FamilySpecified" if family else "BCWall"))
-    kind = "Range" if len(points) == 2 else "List"
-    _node(made, f"Point{kind}", f"Index{'Range' if len(points) == 2 else 'Array'}_t", np.array(points, np.int32))
+    name, label = ("PointRange", "IndexRange_t") if len(points) == 2 else ("PointList", "IndexArray_t")
+    _node(made, name, label, np.array(points, np.int32))
     if where:
         _node(made, "GridLocation", "GridLocation_t", _letters(where))
     if family:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gmsnet.cells.table import CELLS
 from gmsnet.errors import FormatError
-from gmsnet.io.cgns_conditions import has_sets, labelled, node_sets, ranges
+from gmsnet.io.cgns_conditions import has_sets, labelled, node_sets, ranges, united
 from gmsnet.io.cgns_elements import DATA, grid, section, structured, tables_of, title
 from gmsnet.io.contents import Data
 from gmsnet.io.document import Parsed, Written, own_files_only
@@ -31,7 +31,6 @@ from gmsnet.io.splice import Share
 from gmsnet.io.stored import Part as Axis
 from gmsnet.io.stored import coordinates, shared
 from gmsnet.io.vtk_ghosts import with_vertices
-from gmsnet.kernels.topology.sorted_unique import sorted_unique
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 
@@ -62,11 +61,8 @@ def _one(parts: list[Parsed]) -> Parsed:
         raise FormatError("no zone has cells: there is nothing to smooth")
     whole = merged([Part(part) for part in parts])
     slots = shared([Share(part.slots, node) for part, node in zip(parts, whole.nodes, strict=True)])
-    found = dict[str, list[Ints]]()
-    for part, node in zip(parts, whole.nodes, strict=True):
-        for name, nodes in part.node_sets.items():
-            found.setdefault(name, []).append(node[nodes])
-    sets = {name: sorted_unique(np.concatenate(some)) for name, some in found.items()}
+    told = zip(parts, whole.nodes, strict=True)
+    sets = united((name, node[nodes]) for part, node in told for name, nodes in part.node_sets.items())
     unread = [f"the division into {len(parts)} zones", *dict.fromkeys(whole.parsed.unread)]
     parsed = replace(whole.parsed, slots=slots, node_sets=sets, unread=unread)
     return with_vertices(parsed, whole.held, "coincident points")

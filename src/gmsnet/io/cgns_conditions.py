@@ -5,7 +5,7 @@ Source: CGNS Standard Interface Data Structures, "Boundary Condition Structure D
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -71,16 +71,23 @@ def node_sets(
     sizes: how many points a grid has along each axis, or how many an unstructured zone has. sections: of the latter.
     names: of its regions, which have these nodes. prefix: of the names of conditions; families are of all zones.
     """
-    found = dict[str, list[Ints]]()
+    told = list[tuple[str, Ints]]()
     for each in conditions(zone):
         wanted = [name for name in _names(each, prefix) if name not in names]
         if wanted:
             of_elements = len(sizes) == 1 and each.location != VERTEX
             nodes = _of_elements(each, sections) if of_elements else _of_points(each, sizes)
-            for name in wanted:
-                found.setdefault(name, []).append(nodes)
-    joined = {name: sorted_unique(np.concatenate(some)) for name, some in found.items()}
-    return {name: nodes for name, nodes in joined.items() if len(nodes)}
+            told += [(name, nodes) for name in wanted]
+    return united(told)
+
+
+def united(told: Iterable[tuple[str, Ints]]) -> dict[str, Ints]:
+    """The nodes of each name, ascending, from all that are told of it; names without nodes are left out."""
+    found = dict[str, list[Ints]]()
+    for name, nodes in told:
+        found.setdefault(name, []).append(nodes)
+    sets = {name: sorted_unique(np.concatenate(some)) for name, some in found.items()}
+    return {name: nodes for name, nodes in sets.items() if len(nodes)}
 
 
 def _names(condition: Condition, prefix: str) -> list[str]:

@@ -78,9 +78,9 @@ def _rim_turns_back(flat: Floats, tables: tuple[NDArray[np.int64], NDArray[np.in
     """Does the rim of some faces in a plane (n, 2) go back along itself, with an angle of 0 between? So it does where a
     sheet is folded on purpose: no places of the nodes inside are good. At the tip of a slit the angle is 360°.
     """
-    at, ahead, behind = (np.concatenate([np.roll(table, -k, axis=1).ravel() for table in tables]) for k in (0, 1, -1))
     from gmsnet.untangle.crossings import angle_sums  # what it needs of SciPy takes 0.15 s more to import
 
+    at, ahead, behind = (np.concatenate([np.roll(table, -k, axis=1).ravel() for table in tables]) for k in (0, 1, -1))
     size = len(flat)
     rim = ~np.isin(at * size + ahead, ahead * size + at)
     way = np.zeros_like(flat)
