@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+import scipy.sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -16,7 +17,7 @@ from gmsnet.cells.table import CELLS
 from gmsnet.generate import block_volume, layered_mesh, random_mesh, random_volume, structured_mesh
 from gmsnet.motion.path import Path
 from gmsnet.motion.prescribed import Prescribed
-from gmsnet.motion.rigid import Follower
+from gmsnet.motion.rigid import ACCURATE, Follower, System
 from gmsnet.motion.rotations import SPACE
 from gmsnet.topology.mixed_volume import volume_of, wound_of
 from gmsnet.topology.ordering import near_points
@@ -86,6 +87,35 @@ def test_a_step_is_the_least_squares_solution_of_a_slow_twin(mesh):
     found = np.linalg.lstsq(system[:, free], right - system[:, held] @ points[held], rcond=None)[0]
     # The last rotations were fitted after the places were found: by less than what counts as settled.
     assert np.abs(points[free] - found).max() <= 2e-3 * np.abs(path.end - path.start).max()
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.05, 1.2])
+def test_nodes_that_slide_in_a_plane_are_solved_for_as_by_a_dense_twin(turned):
+    random = np.random.default_rng(7)
+    count, rows = 150, np.sort(random.choice(150, 40, replace=False))
+    joins = scipy.sparse.random_array((count, count), density=0.05, rng=random, format="csr")
+    joins = (joins + joins.T).tocsr()
+    diagonal = joins.sum(axis=1) + 1e-3
+    system, along = System(joins, diagonal), random.uniform(0.0, 2.0 * math.pi, len(rows))
+    for angles in (along, along + turned, along + 2.0 * turned):
+        tangents = np.column_stack([np.cos(angles), np.sin(angles)])
+        ways = tangents[:, :, None] * tangents[:, None, :]
+        right = random.normal(size=(count, 2))
+        found = system.solve(right, rows, ways)
+        spread = np.zeros((2 * count, 2 * count - len(rows)))
+        inner = np.setdiff1d(np.arange(count), rows)
+        for k, node in enumerate(inner):
+            spread[2 * node, 2 * k] = spread[2 * node + 1, 2 * k + 1] = 1.0
+        for k, (node, tangent) in enumerate(zip(rows, tangents, strict=True)):
+            spread[2 * node : 2 * node + 2, 2 * len(inner) + k] = tangent
+        matrix = spread.T @ np.kron(np.diag(diagonal) - joins.toarray(), np.eye(2)) @ spread
+        wanted = (spread @ np.linalg.solve(matrix, spread.T @ right.ravel())).reshape(-1, 2)
+        rest = spread.T @ (right - diagonal[:, None] * found + joins @ found).ravel()
+        assert np.linalg.norm(rest) <= 2.0 * ACCURATE * np.linalg.norm(right)
+        assert np.abs(found - wanted).max() <= 1e-2 * np.abs(wanted).max()
+        np.testing.assert_allclose(found[rows], np.einsum("nij,nj->ni", ways, found[rows]), atol=1e-12)
+        if turned == 0.0:
+            np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
 
 
 def halfway(one, other):

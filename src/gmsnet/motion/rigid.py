@@ -10,13 +10,15 @@ Alexa: As-rigid-as-possible surface modeling, Symposium on Geometry Processing, 
 body are reproduced but for rounding, in space to ``ACCURATE``.
 
 The systems are solved by factors in the plane. In space these would be too large, and conjugate gradients with
-multigrid take their place.
+multigrid take their place. Where nodes of a plane slide, factors of the first system serve the later ones: of straight
+lines they are the same, along curved ones conjugate gradients make up for the turning of the tangents.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -43,6 +45,7 @@ IN_LAYERS, SHORT = 10.0, 100.0  # times as stiff; times as much again, at most, 
 REACH = 0.5  # of the extent of what moves: at this distance from it edges are 1/√2 times as stiff
 NOBODY, NOWHERE = np.empty(0, dtype=np.intp), np.empty((0, 0, 0))
 ACCURATE, MOST = 1e-6, 60  # of the residual, where systems are solved step by step, and steps
+STALE = 8  # steps: factors that need more are made anew
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,10 +136,11 @@ class System:
     """
 
     def __init__(self, joins: scipy.sparse.csr_array, diagonal: Floats) -> None:
-        joins = joins.tocsr()
+        self.joins = joins = joins.tocsr()
         joins.sort_indices()
         self.matrix = Matrix(joins.indptr.astype(np.int64), joins.indices.astype(np.int32), joins.data, diagonal)
         self.cycle = Multigrid(self.matrix)
+        self.factors: Factors | None = None
 
     def solve(self, right: Floats, rows: NDArray[np.intp] = NOBODY, ways: Floats = NOWHERE) -> Floats:
         """For right-hand sides (n, k). In some rows (K,) the solution is along ways (K, k, k), each a projection."""
@@ -159,18 +163,70 @@ class System:
                 multigrid.times(self.matrix, part, image)
             projected(out)
 
-        def inverse(values: Floats) -> Floats:
+        def cycles(values: Floats) -> Floats:
             return projected(np.concatenate([self.cycle(part) for part in parts(values)]))
 
+        # what is held across and free along is not what cycles know
+        inverse = self.along(rows, ways) if len(rows) and columns == 2 else cycles
         rest = np.zeros((count, 2 * pairs))
         rest[:, :columns] = right
         rest = projected(np.concatenate([rest[:, 2 * k : 2 * k + 2] for k in range(pairs)]))
-        found = np.zeros_like(rest)
+        found, steps = np.zeros_like(rest), 0
         for x, left, all_of_it in islice(approach(times, inverse, rest), MOST):
-            found = x
+            found, steps = x, steps + 1
             if left <= ACCURATE * ACCURATE * all_of_it:
                 break
+        if steps > STALE:
+            self.factors = None
         return np.column_stack(parts(found))[:, :columns]
+
+    def along(self, rows: NDArray[np.intp], ways: Floats) -> Callable[[Floats], Floats]:
+        """About the inverse for right-hand sides (n, 2) in a plane that are along ways; exact for the first ones."""
+        if self.factors is None:
+            self.factors = Factors(self.joins, self.matrix.diagonal, rows, ways)
+        return partial(self.factors.solve, self.factors.tangents(ways))
+
+
+class Factors:
+    """Of a Laplacian of n nodes in a plane, of which some, in ``rows`` (K,), go along lines.
+
+    Their unknown is how far they go, so that there are 2 n − K.
+    """
+
+    def __init__(self, joins: scipy.sparse.csr_array, diagonal: Floats, rows: NDArray[np.intp], ways: Floats) -> None:
+        count, self.rows = len(diagonal), rows
+        slides = np.zeros(count, dtype=bool)
+        slides[rows] = True
+        ends = np.cumsum(np.where(slides, 1, 2))
+        self.inner, self.last = np.flatnonzero(~slides), ends - 1
+        longer = np.where((ways[:, 0, 0] > ways[:, 1, 1])[:, None], ways[:, :, 0], ways[:, :, 1])
+        self.first_tangents = longer / np.linalg.norm(longer, axis=1, keepdims=True)
+        nodes = np.concatenate([self.inner, self.inner, rows, rows])
+        axes = np.repeat([0, 1, 0, 1], [len(self.inner)] * 2 + [len(rows)] * 2)
+        unknowns = np.concatenate([self.last[self.inner] - 1, self.last[self.inner], self.last[rows], self.last[rows]])
+        parts = np.concatenate([np.ones(2 * len(self.inner)), self.first_tangents.T.ravel()])
+        spread = scipy.sparse.csr_array((parts, (2 * nodes + axes, unknowns)), shape=(2 * count, ends[-1]))
+        both = scipy.sparse.kron(scipy.sparse.diags_array(diagonal) - joins, scipy.sparse.eye_array(2), format="csr")
+        matrix = (spread.T @ both @ spread).tocsc()
+        matrix.eliminate_zeros()
+        self.solve_reduced = solver_of(matrix)
+
+    def tangents(self, ways: Floats) -> Floats:
+        """(K, 2) unit vectors along ways (K, 2, 2), forward as the first ones were."""
+        found = np.einsum("nij,nj->ni", ways, self.first_tangents)
+        size = np.linalg.norm(found, axis=1, keepdims=True)
+        return np.where(size > 0.0, found / np.maximum(size, TINY), 0.0)
+
+    def solve(self, tangents: Floats, values: Floats) -> Floats:
+        """(n, 2) to (n, 2), whose rows are along tangents (K, 2) where nodes slide."""
+        right = np.empty(self.last[-1] + 1)
+        right[self.last] = values[:, 1]
+        right[self.last[self.inner] - 1] = values[self.inner, 0]
+        right[self.last[self.rows]] = (tangents * values[self.rows]).sum(axis=1)
+        solved = self.solve_reduced(right)
+        out = np.column_stack([solved[self.last - 1], solved[self.last]])
+        out[self.rows] = tangents * solved[self.last[self.rows], None]
+        return out
 
 
 def _solver(joins: scipy.sparse.csr_array, diagonal: Floats, dimension: int, rails: Rails | None) -> Solve:

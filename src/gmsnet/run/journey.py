@@ -37,7 +37,7 @@ SLIGHTLY = 0.98  # the same of cells that are worse than the worst one of the in
 RINGS = 6  # around such cells
 FARTHEST = 2.0**100  # from the origin, in units of the run: products of coordinates must not overflow
 FARTHER = 100.0  # times as far from the origin as any node was or is to be: systems were solved without an exact digit
-BYTES_PER_NODE = {2: 2500, 3: 4700}  # of factors and edges, measured
+BYTES_PER_NODE, ALONG = {2: 2500, 3: 4700}, 2000  # of factors and edges, measured; and where nodes of a plane slide
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class Journey:
         self.slides = state.sliding.nodes if isinstance(state.sliding, Sliding | SurfaceSliding) else None
         self.held = base if self.slides is None else base.holding(self.slides, REASON)
         self.precision = state.precision
-        bytes_per_node = BYTES_PER_NODE[self.dimension]
+        bytes_per_node = BYTES_PER_NODE[self.dimension] + ALONG * (self.dimension == 2 and self.rails is not None)
         refuse_unless_free(bytes_per_node * len(base.free), f"moving the nodes around {len(base.free):,}")
         self.start = self.places_of(state.points)
         still = self.held.near_free | ~base.near_free
