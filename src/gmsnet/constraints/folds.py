@@ -49,8 +49,9 @@ class Folds:
     cluster: Longs
     torn: Flags
 
-    def __init__(self, facets: Facets, points: Floats, feature_angle: float) -> None:
-        """points: (N, 3). feature_angle: degrees, by which facets turn at a crease; no chart goes across one."""
+    def __init__(self, facets: Facets, points: Floats, feature_angle: float, near: Longs | None = None) -> None:
+        """points: (N, 3). feature_angle: degrees, by which facets turn at a crease; no chart goes across one. near:
+        facets to look at, where others around them were folded."""
         rows, begin, half = facets.rows, len(facets.rows) - facets.halves, facets.halves // 2
         twin = np.arange(len(rows))
         twin[begin : begin + half] += half
@@ -67,6 +68,8 @@ class Folds:
         around = np.zeros(len(rows), dtype=bool)
         around[f[over]] = around[g[over]] = True
         around = _grown(around, rows, PASSES + RINGS)
+        if near is not None:
+            around[near] = True
         self.near = np.flatnonzero(around | around[twin])
         self._rows, self._twin = rows[self.near], _among(self.near, twin[self.near])
         self._beside = _among(self.near, across_edges(len(rows), *edges[2:, joined])[self.near])
@@ -102,15 +105,14 @@ class Folds:
 
     def _upright(self, unit: Floats, area: Floats, points: Floats) -> Flags:
         """(n,) the facets of steps, upright to the surface. Thin ones do not count, nor halves of quads of which one is
-        turned over: their normals tell nothing."""
-        longest = np.max(
-            [lengths_of(points[self._rows[:, k]] - points[self._rows[:, k - 1]]) for k in range(3)], axis=0
-        )
+        turned over: their normals tell nothing. Nor does one alone, as a thrown node makes it."""
         slope = dot(unit, self._normal)
         crossed = (slope < 0.0) | (slope[self._twin] < 0.0)
         crossed &= self._twin != np.arange(len(slope))
-        upright: Flags = (abs(slope) < UPRIGHT) & (area > THIN * longest**2) & self._normal.any(axis=1) & ~crossed
-        return upright
+        upright = (abs(slope) < UPRIGHT) & ~thin(points[self._rows], area) & self._normal.any(axis=1) & ~crossed
+        others = (self._beside != NOTHING) & (self._beside != self._twin[:, None])
+        steps: Flags = upright & (others & upright[self._beside]).any(axis=1)
+        return steps
 
     def chart(self, number: int, points: Floats) -> Chart | None:
         """The chart around the first facet of a cluster, with what else is turned over nearby; None where that is half
@@ -131,6 +133,12 @@ class Folds:
     def clusters_in(self, chart: Chart) -> Longs:
         """(k,) the number of the cluster of each facet of a chart, else NOTHING."""
         return self.cluster[np.searchsorted(self.near, chart.facets)]
+
+
+def thin(triangles: Floats, area: Floats) -> Flags:
+    """(k,) the triangles (k, 3, 3) whose normals tell nothing. area: twice that of each."""
+    longest = np.max([lengths_of(triangles[:, k] - triangles[:, k - 1]) for k in range(3)], axis=0)
+    return np.asarray(area <= THIN * longest**2)
 
 
 def _among(ids: Longs, values: Longs) -> Longs:

@@ -37,6 +37,8 @@ KINDS = {
     "H20": "hexahedron20", "H27": "hexahedron27",
 }  # fmt: skip
 
+ORDERS = {"hexahedron27": (*range(20), 24, 22, 21, 23, 20, 25, 26)}  # of Mesh's nodes, the places in a cell's list
+
 
 def read(files: Mapping[str, Data]) -> Parsed:
     """See Format."""
@@ -65,7 +67,7 @@ def plan(file: Ranges) -> Plan | None:
     """See ``med_ranges.planned``."""
     with File.opened(file.path) as opened:
         mesh, step, dimension = _only(opened.root)
-        return planned(file, step, dimension, KINDS, _groups(opened.root.get(f"FAS/{mesh.name}")))
+        return planned(file, step, dimension, KINDS, ORDERS, _groups(opened.root.get(f"FAS/{mesh.name}")))
 
 
 def _only(root: Node) -> tuple[Node, Node, int]:
@@ -96,7 +98,7 @@ def _block(node: Node, kind: str, count: int) -> CellBlock:
     regions = family.integers().reshape(-1) if family is not None else np.zeros(len(nodes), dtype=np.int64)
     if len(regions) != len(nodes):
         raise FormatError(f"{shown(node.path)}: {len(regions)} families of {len(nodes)} cells")
-    return CellBlock(kind, nodes, regions)
+    return CellBlock(kind, nodes if kind not in ORDERS else nodes[:, ORDERS[kind]], regions)
 
 
 def _groups(families: Node | None) -> dict[int, str]:

@@ -45,11 +45,13 @@ class Apart:
 
 
 def planned(
-    file: Ranges, step: Node, dimension: int, kinds: Mapping[str, str], groups: Mapping[int, str]
-) -> Plan | None:
+    file: Ranges, step: Node, dimension: int, kinds: Mapping[str, str], orders: Mapping[str, tuple[int, ...]],
+    groups: Mapping[int, str],
+) -> Plan | None:  # fmt: skip
     """How the numbers of a mesh lie; None where only a reader of the whole can say what is wrong.
 
-    step: with its coordinates and cells. kinds: type → kind. groups: names of families.
+    step: with its coordinates and cells. kinds: type → kind. orders: kind → order of its nodes, see
+    Table. groups: names of families.
     """
     points = step.need("NOE/COO")
     columns = [*_columns(numbers_of(points), dimension)]
@@ -57,7 +59,7 @@ def planned(
     if not columns or listed is None:
         return None
     for node in listed.members():
-        table = _table(node, kinds.get(node.name, ""))
+        table = _table(node, kinds.get(node.name, ""), orders)
         if table is None:
             return None
         blocks.append([table])
@@ -83,7 +85,7 @@ def _columns(listed: Listed | None, dimension: int) -> Iterator[Column]:
             yield Column(listed.cut(axis * nodes, nodes, 1, 1), axis=axis)
 
 
-def _table(node: Node, kind: str) -> Table | None:
+def _table(node: Node, kind: str, orders: Mapping[str, tuple[int, ...]]) -> Table | None:
     """The cells of a type, and their families."""
     listed, family = numbers_of(node.need("NOD")), node.get("FAM")
     own = None if family is None else numbers_of(family)
@@ -92,4 +94,4 @@ def _table(node: Node, kind: str) -> Table | None:
     cells = Apart(listed, nodes_of(kind))
     if family is not None and (own is None or own.dtype[1] not in "iu" or own.rows != cells.rows):
         return None
-    return Table(kind, cells, 1, regions=own)
+    return Table(kind, cells, 1, orders.get(kind), regions=own)

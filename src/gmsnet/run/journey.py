@@ -141,7 +141,7 @@ class Journey:
                 now, attitude, ways, places, turns, since, self.path.sure, self.rails
             )  # fmt: skip
         points = np.zeros_like(state.points)
-        points[:, : self.dimension] = _rounded(found, places, follower.free, single=state.precision.single)
+        points[:, : self.dimension] = np.where(follower.free[:, None], state.precision.rounded(found), places)
         reach = FARTHER * max(float(np.abs(self.path.start).max()), float(np.abs(places).max()))
         if not (np.abs(points) < min(reach, FARTHEST)).all():
             return Step(state.points, attitude, "places would be too far away for their digits")
@@ -257,12 +257,6 @@ def looked_at(points: Floats, topology: Volume, precision: Precision) -> tuple[F
     ratio = np.empty(len(topology.near))
     look(points, topology.simplices, precision, bad, inverted, ratio)
     return bad, REGULAR * np.sign(ratio) * np.cbrt(ratio * ratio)
-
-
-def _rounded(found: Floats, places: Floats, free: Flags, *, single: bool) -> Floats:
-    """(N, D) as they will be kept; held nodes have their very places."""
-    points = np.where(free[:, None], found, places)
-    return points.astype(np.float32).astype(np.float64) if single else points
 
 
 def _place(place: Floats, exponent: int) -> str:

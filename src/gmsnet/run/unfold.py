@@ -47,12 +47,13 @@ def unfolded(mesh: Mesh, facets: Facets, patches: Patches, asked: Flags, options
         return Unfolded(mesh, (), laid)
     held = asked | facets.still
     held[facets.lines] = True
-    precision = precision_of(mesh).before_rounding
+    written = precision_of(mesh)
+    precision = written.before_rounding
     precision = precision._replace(grain=precision.grain + ROUNDING * precision.unit * float(abs(points).max()))
     notes, start, uses = list[str](), points.copy(), np.bincount(facets.rows.ravel(), minlength=len(points))
     for plane in folded_planes(facets, points):
         part = FlatPart.of(facets, plane, points, held, uses)
-        notes += _mended_plane(part, plane, points, precision)
+        notes += _mended_plane(part, plane, points, precision, written)
     notes += CurvedParts.of(mesh, facets, start, held, uses, precision, options).mend(points, laid)
     moved = (points != start).any(axis=1)
     if not moved.any():
@@ -62,15 +63,18 @@ def unfolded(mesh: Mesh, facets: Facets, patches: Patches, asked: Flags, options
     return Unfolded(mesh.with_points(full).in_frame_of(mesh), tuple(notes), laid)
 
 
-def _mended_plane(part: FlatPart, plane: Chart, points: Floats, precision: Precision) -> list[str]:
-    """Untangles a plane part of the points (N, 3), in place, if it is mended in full; what to say."""
+def _mended_plane(
+    part: FlatPart, plane: Chart, points: Floats, precision: Precision, written: Precision
+) -> list[str]:  # fmt: skip
+    """Untangles a plane part of the points (N, 3), in place, if it is mended in full; what to say. precision: of points
+    before they are rounded; written: after that."""
     if _rim_turns_back(part.flat, (part.triangles, part.quads)):
         return []
     found = part.untangled(part.held, precision)
     if found is None or found[0].after:
         return []
     done, own, step = found
-    points[part.nodes[own]] += step @ plane.axes
+    points[part.nodes[own]] = written.rounded(points[part.nodes[own]] + step @ plane.axes)
     return [f"in a plane of the surface, {note_of(done)}"]
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from gmsnet.constraints.charts import Chart, across_edges, edges_of, normals_of, turned_corners
 from gmsnet.constraints.facets import Facets, edge_lengths
-from gmsnet.constraints.features import dot
-from gmsnet.constraints.folds import FOLD, Folds
+from gmsnet.constraints.features import dot, lengths_of
+from gmsnet.constraints.folds import FOLD, UPRIGHT, Folds, thin
 from gmsnet.constraints.grid import Grid
 from gmsnet.constraints.heights import heights_at, within
 from gmsnet.constraints.options import TOLERANCE
@@ -23,6 +23,7 @@ from gmsnet.measure.surface_change import places_on
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.run.flat_part import FlatPart
 from gmsnet.run.options import SmoothOptions
+from gmsnet.run.run import precision_of
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -37,7 +38,8 @@ UPWARD = np.array([[0.0, 0.0, 1.0]])
 class CurvedParts:
     """facets, given: (N, 3) of the input. held: (N,) bool. uses: (N,) how many facets have each node. limit: (N,) how
     far from the input's facets nodes may come to lie; bound: how far any place on a facet, ∞ if that was not asked for.
-    precision: of points in space, before they are rounded. angle: by which facets turn at creases, in degrees.
+    precision: of points in space, before they are rounded; written: after that. angle: by which facets turn at creases,
+    in degrees.
     """
 
     facets: Facets
@@ -47,6 +49,7 @@ class CurvedParts:
     limit: Floats
     bound: float
     precision: Precision
+    written: Precision
     angle: float
 
     @cached_property
@@ -71,7 +74,7 @@ class CurvedParts:
         if options.hausdorff is not None:
             bound = facets.bound(given, options.hausdorff)
         limit = np.minimum(limit, bound)
-        return cls(facets, given, held, uses, limit, bound, precision, options.feature_angle)
+        return cls(facets, given, held, uses, limit, bound, precision, precision_of(mesh), options.feature_angle)
 
     def mend(self, points: Floats, laid: Flags) -> list[str]:
         """Mends what can be of the points (N, 3), in place, and says so. laid: (F,) bool, where charts are flagged."""
@@ -94,7 +97,7 @@ class CurvedParts:
                 done |= set(looked_at.tolist())
             if charts == before:
                 break
-            folds = Folds(self.facets, points, self.angle)
+            folds = Folds(self.facets, points, self.angle, folds.near)
         if not charts:
             return []
         left = self._count(folds)
@@ -159,7 +162,7 @@ class CurvedParts:
         self, chart: Chart, part: FlatPart, flat: Floats, own: Longs, points: Floats, left: Flags
     ) -> tuple[Floats, Flags]:
         """The nodes of a part in space (n, 3), those that have moved on the surface that the input's nodes tell; and
-        which of these nodes (n,) are none of a smooth surface, or of facets that would be folded there.
+        which of these nodes (n,) are none of a smooth surface, or of facets that would be folded or upright there.
 
         flat: (n, 2) where they lie on the chart now. own: of those that have moved. left: (k,) facets that are no
         matter.
@@ -179,8 +182,10 @@ class CurvedParts:
         room = self.limit[part.nodes[own]]
         out = np.flatnonzero(far > room)
         places[own[out]] = within(places[own[out]], self.grid.boxes.triangles[which[out]], room[out])
+        places[own] = self.written.rounded(places[own])
         worse = _shapes(places[rows]) < self.least
-        bad = touched & ~left & (_turned(part, places, side) | _sharp(rows, places) | worse)
+        steep = _steep(rows, places, side)
+        bad = touched & ~left & (_turned(part, places, side) | steep | _sharp(rows, places) | worse)
         wrong = np.zeros(len(flat), dtype=bool)
         wrong[rows[bad]] = True
         wrong[at] |= surface.off > self.limit[part.nodes[at]]
@@ -198,6 +203,13 @@ def _turned(part: FlatPart, places: Floats, side: Floats) -> Flags:
     """(k,) the facets of cells with a corner turned against the surface, whose normals at nodes are ``side`` (n, 3)."""
     cells = part.triangles, part.quads
     return part.of_cells(*(turned_corners(places[rows], side[rows].sum(axis=1)) for rows in cells))
+
+
+def _steep(rows: Longs, places: Floats, side: Floats) -> Flags:
+    """(k,) the facets (k, 3) about upright to the surface: their edges would look sharp, and hold nodes there. Not thin
+    ones."""
+    across, (_, unit, area) = side[rows].sum(axis=1), normals_of(places, rows)
+    return np.asarray((dot(unit, across) < UPRIGHT * lengths_of(across)) & ~thin(places[rows], area))
 
 
 def _sharp(rows: Longs, places: Floats) -> Flags:

@@ -114,7 +114,7 @@ class UntanglingState:
 
     def rounded(self, points: Floats) -> Floats:
         """As they will be kept."""
-        return points.astype(np.float32).astype(np.float64) if self.precision.single else points
+        return self.precision.rounded(points)
 
     def uncertified(self, points: Floats, patch: Patch) -> int:
         """How many cells of a patch are not certified, its points (m, 2) rounded."""

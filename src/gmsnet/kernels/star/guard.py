@@ -71,6 +71,10 @@ class Precision(NamedTuple):
         """Of new coordinates that are judged first, and rounded to float32 after that."""
         return self._replace(unit=self.unit + ROUNDED, single=False) if self.single else self
 
+    def rounded(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """New points as the mesh will keep them."""
+        return points.astype(np.float32).astype(np.float64) if self.single else points
+
     def coarser(self, unit: float, grain: float) -> Precision:
         """Of coordinates that are rounded once more, by the relative and the absolute error at most, when written."""
         return self._replace(unit=self.unit + unit, grain=self.grain + grain)
