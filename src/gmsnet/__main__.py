@@ -2,6 +2,6 @@
 
 import sys
 
-from gmsnet.cli import main
+from gmsnet.cli import program
 
-sys.exit(main())
+sys.exit(program())

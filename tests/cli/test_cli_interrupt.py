@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 import gmsnet
+from gmsnet.cli import program
 from gmsnet.cli.signals import Deferral
 from gmsnet.io import read, write
 from gmsnet.run import stop
@@ -123,6 +124,16 @@ def test_ctrl_c_that_is_lost_while_reading_ends_the_command(run, square, tmp_pat
     done = run("smooth", square, tmp_path / "out.su2")
     assert (done.code, done.err) == (130, "gmsnet: interrupted; nothing was written\n")
     assert listing(tmp_path) == ["square.su2"]
+
+
+def test_a_program_that_has_done_its_work_is_not_interrupted(monkeypatch):
+    monkeypatch.setattr("gmsnet.cli.main", lambda: 1)
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        assert program() == 1
+        signal.raise_signal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_signals_that_the_caller_ignores_stay_ignored():

@@ -18,6 +18,7 @@ from support.contracts import check_splice, moved_points, read, spliced
 from support.damage import cells_of, damaged, read_or_refuse, regions_of
 
 import gmsnet
+from gmsnet.cells.table import CELLS
 from gmsnet.errors import FormatError, InputError
 from gmsnet.io import cgns, exodus, hdf5, med, vtkhdf
 from gmsnet.io.netcdf3 import Header
@@ -48,6 +49,18 @@ def test_the_mesh_is_read(key: str) -> None:
     if "vtkhdf" not in key:
         assert cells_of(parsed, "line") == made.LINES.tolist()
         assert [nodes.tolist() for nodes in parsed.node_sets.values()] == [[6]]
+
+
+def test_middles_of_faces_in_med_are_where_a_mesh_has_them() -> None:
+    parsed = read(med, made.med27())
+    (block,) = parsed.cells
+    assert block.kind == "hexahedron27"
+    at, kind = parsed.points[block.nodes[0]], CELLS[block.kind]
+    for *ends, middle in kind.edges:
+        assert at[middle].tolist() == at[ends].mean(axis=0).tolist()
+    for facet in kind.facets:
+        assert at[facet[-1]].tolist() == at[list(facet[:4])].mean(axis=0).tolist()
+    assert at[26].tolist() == [1.0, 1.0, 1.0]
 
 
 def test_names_and_regions() -> None:

@@ -144,7 +144,9 @@ FACET = "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 1 1 0 en
     ("data", "match"),
     [
         (b"", "neither a text STL file, .* nor a whole binary one: it has 0 bytes"),
-        (bytes(84), "with the 0 triangles that it announces it would have 84"),
+        (bytes(84), "the file has no triangles"),
+        (binary_stl(np.ones((2, 3, 3)), b"solid x") + b"more", "with the 2 triangles .* would have 184"),
+        (b"solid x\n" + FACET.replace("\n", " ").encode() + b"endsolid x\n", "line 2: 'endsolid' does not begin"),
         (bytes(80) + b"\xff\xff\xff\xff" + bytes(100), "with the 4294967295 triangles .* would have 214748364834"),
         (b"solid x\nendsolid x\n", "no triangles"),
         (b"solid x\n" + FACET.encode(), "line 3: 'endsolid' is missing"),

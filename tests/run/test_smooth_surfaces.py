@@ -267,7 +267,7 @@ def test_normals_that_become_stale_are_told(suffix, tmp_path):
     if suffix == "obj":
         path.write_text(path.read_text() + "vn 0 0 1\n")
     found = [note for note in gmsnet.smooth(gmsnet.read(path)).notes if note.startswith("normals")]
-    note = f"normals in the file ({said}) stay as they are, though nodes move: update_normals computes them anew"
+    note = f"normals in the file ({said}) stay as they are where nodes move: update_normals computes them anew"
     assert found == [note] * bool(said)
 
 

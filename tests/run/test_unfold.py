@@ -34,6 +34,7 @@ def test_a_plane_mesh_that_is_turned_becomes_what_it_does_in_the_plane(kind, sin
     there = gmsnet.smooth(flat)
     result = gmsnet.smooth(replace(turned, points=turned.points.astype(np.float32).astype(float), single=single))
     assert (there.after.inverted, result.after.inverted) == (0, 0)
+    assert not single or np.array_equal(result.points, result.points.astype(np.float32))
     assert FEATURE not in result.held
     assert result.after.shape.min() > there.after.shape.min() - 0.01
     back = result.mesh.with_points(np.column_stack([(result.points @ WAY.T)[:, :2], np.zeros(len(result.points))]))

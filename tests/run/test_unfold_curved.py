@@ -75,6 +75,24 @@ def test_nodes_that_were_thrown_along_a_surface_find_back(name, amount):
     assert len(result.held.get(FEATURE, ())) < 0.05 * len(mesh.points)
 
 
+@pytest.mark.parametrize("seed", [0, 1, 3, 4])
+def test_a_facet_that_is_upright_alone_is_no_step(seed):
+    shaped = torus_surface(450)
+    mesh, shape = thrown(shaped, 0.7, seed), *shaped.faces.values()
+    result = gmsnet.smooth(mesh)
+    assert turned(mesh, mesh.points, shape) > 50
+    assert turned(mesh, result.points, shape) == 0
+    assert result.judged.after.shape_min > 0.1
+
+
+def test_folds_that_are_left_are_told_though_no_other_is_near_any_more():
+    shaped = torus_surface(450)
+    mesh, shape = thrown(shaped, 0.7, seed=5), *shaped.faces.values()
+    result = gmsnet.smooth(mesh)
+    assert turned(mesh, result.points, shape) == 1
+    assert any("untangling: 1 of 55 cells that are folded over are left" in note for note in result.notes)
+
+
 def test_folds_stay_where_untangling_is_off():
     mesh, shape = thrown(SHAPES["sphere of quads"], 0.9), *SHAPES["sphere of quads"].faces.values()
     result = gmsnet.smooth(mesh, untangle=False)
@@ -107,6 +125,8 @@ def test_a_bound_of_facets_is_kept(single):
     mesh = replace(mesh, points=mesh.points.astype(np.float32).astype(float), single=single)
     for bound in (0.02, 0.001):
         result = gmsnet.smooth(mesh, hausdorff=bound)
+        if single:
+            assert np.array_equal(result.points, result.points.astype(np.float32))
         share = result.surface_change.hausdorff / result.surface_change.diagonal
         untangled, told = (any(word in note for note in result.notes) for word in ("untangling", "is not kept"))
         assert untangled == (bound > 0.01)

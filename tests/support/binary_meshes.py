@@ -185,6 +185,24 @@ def med(packed: bool = False) -> bytes:
     return _file(fill)
 
 
+def med27() -> bytes:
+    """The cube of side 2 as one hexahedron of 27 nodes, which MED lists from the bottom to the top."""
+    corners = np.array([(x, y, z) for z in (0, 2) for x, y in ((0, 0), (2, 0), (2, 2), (0, 2))], dtype=float)
+    edges = [(k, (k + 1) % 4) for k in range(4)]
+    edges += [(a + 4, b + 4) for a, b in edges] + [(k, k + 4) for k in range(4)]
+    faces = [(0, 1, 2, 3), *((k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4) for k in range(4)), (4, 5, 6, 7), tuple(range(8))]
+    points = np.concatenate([corners, *(corners[list(each)].mean(axis=0)[None] for each in (*edges, *faces))])
+
+    def fill(file: h5py.File) -> None:
+        mesh = file.create_group("ENS_MAA/cube")
+        mesh.attrs["ESP"], mesh.attrs["DIM"] = 3, 3
+        step = mesh.create_group("-0000000000000000001-0000000000000000001")
+        step.create_dataset("NOE/COO", data=points.T.ravel())
+        step.create_dataset("MAI/H27/NOD", data=np.arange(27) + 1)
+
+    return _file(fill)
+
+
 def vtkhdf(packed: bool = False, kind: type = np.float64) -> bytes:
     """An unstructured grid of one piece."""
     how = GZIP if packed else {}

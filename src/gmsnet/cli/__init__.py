@@ -9,6 +9,7 @@ import contextlib
 import gc
 import io
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -77,6 +78,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return on_all_ranks(lambda: _run(arguments))
     finally:
         gc.set_threshold(*before)
+
+
+def program() -> int:
+    """``main`` as a program: once its work is done, Ctrl-C no longer ends it with a traceback."""
+    code = main()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return code
 
 
 def _run(arguments: Sequence[str] | None) -> int:

@@ -100,7 +100,9 @@ def quality(
         for remark in found.remarks:
             console.print(remark)
         if not (found.planar or found.volumes):
-            console.print("the mesh is a surface in space: its cells have no sign, none counts as inverted")
+            console.print(
+                "the mesh is a surface in space: its cells have no sign, and only those without area count as inverted"
+            )
         if found.gathered and found.cells:
             console.print(f"ranks: the first one measured all {amount(found.nodes, 'node')}, for {found.gathered}")
         if plot is not None:

@@ -36,7 +36,7 @@ def _verdict(mesh: Mesh, found: QualityReport) -> str:
     if not len(found.cell):
         return "there are no cells whose quality is known"
     if mesh.plane is None and not mesh.has_volumes:
-        inverted = "the cells of a surface in space have no sign, so none counts as inverted"
+        inverted = "the cells of a surface in space have no sign: only those without area count as inverted"
     else:
         inverted = f"{amount(found.inverted, 'cell')} {'is' if found.inverted == 1 else 'are'} inverted"
     return f"{inverted}; the least {found.symbol} is {found.shape.min():.4f}"

@@ -17,6 +17,7 @@ from gmsnet.kernels.text.decimals import WIDEST
 from gmsnet.mesh.cell_block import CellBlock
 from gmsnet.mesh.mesh import Mesh
 from gmsnet.mesh.plane import exponent_of
+from gmsnet.mesh.vtk_types import VTK_KINDS
 
 _PIECE = 1 << 20  # bytes that are made at once
 
@@ -57,7 +58,7 @@ def check_kinds(mesh: Mesh, title: str, kinds: Collection[str]) -> None:
         if block.kind not in kinds and len(block.nodes):
             raise FormatError(
                 f"{title} cannot hold cells of type {block.kind!r}: write another format, such as "
-                f"{'.msh of Gmsh' if title == 'VTU' else '.vtu'}"
+                f"{'.msh of Gmsh' if block.kind not in VTK_KINDS.values() else '.vtu'}"
             )
 
 

@@ -42,6 +42,7 @@ _CORNERS = [8, 9, 10, 12, 13, 14, 16, 17, 18]  # where the coordinates are among
 _NORMAL = [2, 3, 4]  # and those of its normal
 _SOLID = re.compile(rb"(?i)(end)?solid\b([^\r\n]*)")
 _LONG_EXPONENT = re.compile(rb"[eE][+-]?\d{7}")
+EMPTY = "the file has no triangles: there is nothing to smooth"
 _TOGETHER = 1 << 17  # corners that are welded at once
 
 
@@ -51,7 +52,9 @@ def read(files: Mapping[str, Data]) -> Parsed:
     count = int.from_bytes(data[80:HEAD], "little")
     if len(data) > HEAD and len(data) == HEAD + RECORD * count:
         return _binary(data, count)
-    if re.match(rb"(?i)\s*solid", data):
+    if len(data) == HEAD and not count:
+        raise FormatError(EMPTY)
+    if re.match(rb"(?i)\s*solid", data) and b"\0" not in data[:HEAD]:
         return _text(data)
     message = f"neither a text STL file, which starts with 'solid', nor a whole binary one: it has {len(data)} bytes"
     if len(data) >= HEAD:
@@ -98,7 +101,7 @@ def _text(data: Data) -> Parsed:
     starts = joined(found).reshape(-1, 3)
     del found
     if not len(starts):
-        raise FormatError("the file has no triangles: there is nothing to smooth")
+        raise FormatError(EMPTY)
     ends, weld = np.empty_like(starts), Weld(len(starts))
     for k in range(0, len(starts), _TOGETHER):
         corners, ends[k : k + _TOGETHER] = text.spans(starts[k : k + _TOGETHER])
@@ -126,6 +129,9 @@ def _solids_in(text: Text, columns: list[int]) -> tuple[list[Starts], dict[tuple
                 names[2, len(found) + 1] = title
             body = stop
     if body >= 0:
+        where = re.search(rb"(?i)\bendsolid\b", text.data[body:])
+        if where is not None:
+            text.fail(body + where.start(), "'endsolid' does not begin a line")
         text.fail(len(text.data), "'endsolid' is missing: the file is cut off")
     return found, names, last
 

@@ -93,9 +93,7 @@ def _of_normals(mesh: Mesh, update: bool) -> tuple[str, ...]:
         )
     source = "" if mesh.source is None else mesh.source.normals
     if stale := ", ".join(filter(None, [*fields_in(mesh.point_data, mesh.cell_data), source])):
-        return (
-            f"normals in the file ({stale}) stay as they are, though nodes move: update_normals computes them anew",
-        )
+        return (f"normals in the file ({stale}) stay as they are where nodes move: update_normals computes them anew",)
     return ()
 
 
