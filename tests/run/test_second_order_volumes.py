@@ -303,6 +303,12 @@ def test_nodes_of_the_boundary_are_told_as_such(regions):
     held = gmsnet.smooth(marked).held
     assert held["boundary"].tolist() == np.flatnonzero(outside).tolist()
     assert held["node of a face cell"].tolist() == sorted(shown[-1])
+    facets, which = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
+    seen = np.zeros((len(facets), 2), dtype=bool)
+    seen[which.ravel(), np.tile(halves, len(CELLS["tetra10"].facets))] = True
+    between = np.setdiff1d(facets[seen.all(axis=1)], [*np.flatnonzero(outside), *shown[-1]])
+    assert (len(between) > 0) == (regions == 2)
+    assert held.get("interface between regions", between[:0]).tolist() == between.tolist()
     assert len(np.unique(np.concatenate(list(held.values())))) == sum(map(len, held.values()))
     assert gmsnet.smooth(mesh).held["boundary"].tolist() == np.flatnonzero(outside).tolist()
 

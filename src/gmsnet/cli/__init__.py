@@ -81,9 +81,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def program() -> int:
-    """``main`` as a program: once its work is done, Ctrl-C no longer ends it with a traceback."""
+    """``main`` as a program: once its work is done, Ctrl-C ends it without a traceback."""
     code = main()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     return code
 
 

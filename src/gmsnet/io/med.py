@@ -98,7 +98,9 @@ def _block(node: Node, kind: str, count: int) -> CellBlock:
     regions = family.integers().reshape(-1) if family is not None else np.zeros(len(nodes), dtype=np.int64)
     if len(regions) != len(nodes):
         raise FormatError(f"{shown(node.path)}: {len(regions)} families of {len(nodes)} cells")
-    return CellBlock(kind, nodes if kind not in ORDERS else nodes[:, ORDERS[kind]], regions)
+    if kind in ORDERS:
+        nodes = np.ascontiguousarray(nodes[:, ORDERS[kind]])
+    return CellBlock(kind, nodes, regions)
 
 
 def _groups(families: Node | None) -> dict[int, str]:

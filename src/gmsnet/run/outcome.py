@@ -29,7 +29,7 @@ from gmsnet.run.smooth_result import SmoothResult
 from gmsnet.run.state import Final, State, with_corners
 from gmsnet.run.stop import by_target
 from gmsnet.run.untangle_stage import still_inverted
-from gmsnet.topology.held import OF_FACE, OF_LINE, OF_SECOND_ORDER, ON_BOUNDARY
+from gmsnet.topology.held import OF_FACE, OF_LINE, OF_SECOND_ORDER, ON_BOUNDARY, ON_INTERFACE
 from gmsnet.topology.ordering import near_points
 from gmsnet.topology.shell import Shell
 from gmsnet.topology.topology import Topology
@@ -125,7 +125,7 @@ def bound_note(compared: Compared | None, asked: float | None) -> list[str]:
 def _held(state: State) -> dict[str, NDArray[np.int64]]:
     """Reason → ids; nodes of second-order cells that could move in their stages are not among them.
 
-    Nodes of their boundary are told as such, whatever faces and lines the file has there.
+    Nodes of their boundary are told as such, whatever faces and lines the file has there; and those between regions.
     """
     held, given = dict(state.topology.held), state.second_order
     if given is None:
@@ -137,13 +137,14 @@ def _held(state: State) -> dict[str, NDArray[np.int64]]:
             held[OF_SECOND_ORDER] = still
         on_purpose = given.protection.topology.held
         held |= {reason: on_purpose[reason] for reason in (LAYER, WALL) if reason in on_purpose}
-    for reason in (OF_LINE, OF_FACE, OF_SECOND_ORDER):
-        outside = np.isin(held.get(reason, given.outer[:0]), given.outer)
-        if outside.any():
+    outside = [(reason, ON_BOUNDARY, given.outer) for reason in (OF_LINE, OF_FACE, OF_SECOND_ORDER)]
+    for reason, where, nodes in (*outside, (OF_SECOND_ORDER, ON_INTERFACE, given.between)):
+        there = np.isin(held.get(reason, nodes[:0]), nodes)
+        if there.any():
             ids = held.pop(reason)
-            held[ON_BOUNDARY] = np.union1d(held.get(ON_BOUNDARY, given.outer[:0]), ids[outside])
-            if not outside.all():
-                held[reason] = ids[~outside]
+            held[where] = np.union1d(held.get(where, nodes[:0]), ids[there])
+            if not there.all():
+                held[reason] = ids[~there]
     return held
 
 

@@ -56,8 +56,9 @@ def second_order_solids_of(mesh: Mesh, topology: Volume, options: SmoothOptions)
     may &= corner | ~at_corners
     corners, near = whole.holding(first, FIRST_ORDER), taken(space_points(mesh), whole.memory)
     protection = protected_volume(corners, options.preserved, options.fix_layers, near, firm=False)
-    outer = _outer(mesh, rim if (regions == regions[0]).all() else on_rim(table, kinds, 0 * regions, nodes))
-    return SecondOrder(table, kinds, may, whole, protection, number, outer=outer)
+    outside = rim if (regions == regions[0]).all() else on_rim(table, kinds, 0 * regions, nodes)
+    between = np.flatnonzero(rim & ~outside)
+    return SecondOrder(table, kinds, may, whole, protection, number, outer=_outer(mesh, outside), between=between)
 
 
 def _outer(mesh: Mesh, rim: NDArray[np.bool_]) -> NDArray[np.int64]:

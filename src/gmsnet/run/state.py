@@ -63,7 +63,7 @@ class SecondOrder:
     by these, could not be made valid. stopped: some corners may not have gone where the method put them. room: no bound
     of a valid cell falls below it while corners move; −∞ before that is known. in_vain: what is left invalid was tried
     once more after that. outer: the ids of nodes on facets of one
-    cell alone, of a mesh that has volumes of the second order alone.
+    cell alone, of a mesh that has volumes of the second order alone; between: of those between regions of such cells.
     """
 
     cells: NDArray[np.int32]
@@ -83,6 +83,7 @@ class SecondOrder:
     room: float = -math.inf
     in_vain: bool = False
     outer: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    between: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @property
     def solid(self) -> bool:
@@ -118,10 +119,14 @@ class SecondOrder:
         corners, free = self.corners, self.free | moved  # nodes that slide move, too
         return (
             f"second order: {before} before, {after} after; the least bound of a determinant over that of the straight "
-            f"cell {least[0]:.3g} before, {least[1]:.3g} after; {(moved & corners).sum():,} of "
+            f"cell {_bound(least[0])} before, {_bound(least[1])} after; {(moved & corners).sum():,} of "
             f"{(free & corners).sum():,} free corners and {(moved & free & ~corners).sum():,} of "
             f"{(free & ~corners).sum():,} free middle nodes moved{self.unable}"
         )
+
+
+def _bound(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "unknown, for one is inverted,"
 
 
 @dataclass(frozen=True)
