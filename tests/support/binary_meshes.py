@@ -161,9 +161,7 @@ def med(packed: bool = False) -> bytes:
     how = GZIP if packed else {}
 
     def fill(file: h5py.File) -> None:
-        mesh = file.create_group("ENS_MAA/plate")
-        mesh.attrs["ESP"], mesh.attrs["DIM"] = 2, 2
-        step = mesh.create_group("-0000000000000000001-0000000000000000001")
+        step = _med_step(file, "plate", 2)
         step.create_dataset("NOE/COO", data=POINTS.T.ravel(), **how)
         step.create_dataset("NOE/FAM", data=np.array([0, 0, 0, 0, 0, 0, 3, 0]))
         cells = (("TR3", TRIANGLES, [-1] * 4 + [-2] * 2), ("QU4", QUADS, [-2]), ("SE2", LINES, [-5, -5]))
@@ -185,6 +183,13 @@ def med(packed: bool = False) -> bytes:
     return _file(fill)
 
 
+def _med_step(file: h5py.File, name: str, dimension: int) -> h5py.Group:
+    """What holds the nodes and cells of a mesh in MED."""
+    mesh = file.create_group(f"ENS_MAA/{name}")
+    mesh.attrs["ESP"], mesh.attrs["DIM"] = dimension, dimension
+    return mesh.create_group("-0000000000000000001-0000000000000000001")
+
+
 def med27() -> bytes:
     """The cube of side 2 as one hexahedron of 27 nodes, which MED lists from the bottom to the top."""
     corners = np.array([(x, y, z) for z in (0, 2) for x, y in ((0, 0), (2, 0), (2, 2), (0, 2))], dtype=float)
@@ -194,9 +199,7 @@ def med27() -> bytes:
     points = np.concatenate([corners, *(corners[list(each)].mean(axis=0)[None] for each in (*edges, *faces))])
 
     def fill(file: h5py.File) -> None:
-        mesh = file.create_group("ENS_MAA/cube")
-        mesh.attrs["ESP"], mesh.attrs["DIM"] = 3, 3
-        step = mesh.create_group("-0000000000000000001-0000000000000000001")
+        step = _med_step(file, "cube", 3)
         step.create_dataset("NOE/COO", data=points.T.ravel())
         step.create_dataset("MAI/H27/NOD", data=np.arange(27) + 1)
 

@@ -67,7 +67,7 @@ class Field:
         """Points (N, 2) as the file will keep them, where they are others than those of the field."""
         if not self.precision.single:
             return points
-        return np.where(points == self.points, points, points.astype(np.float32).astype(np.float64))
+        return np.where(points == self.points, points, self.precision.rounded(points))
 
     def guard(self, executor: Executor) -> Guard:
         """What must be kept from now on, with the floors of the level as the points are. To be asked for per sweep."""

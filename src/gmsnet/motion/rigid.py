@@ -200,6 +200,7 @@ class Factors:
         ends = np.cumsum(np.where(slides, 1, 2))
         self.inner, self.last = np.flatnonzero(~slides), ends - 1
         longer = np.where((ways[:, 0, 0] > ways[:, 1, 1])[:, None], ways[:, :, 0], ways[:, :, 1])
+        longer[~longer.any(axis=1)] = 1.0, 0.0  # a node that can go nowhere: ``tangents`` keeps it where it is
         self.first_tangents = longer / np.linalg.norm(longer, axis=1, keepdims=True)
         nodes = np.concatenate([self.inner, self.inner, rows, rows])
         axes = np.repeat([0, 1, 0, 1], [len(self.inner)] * 2 + [len(rows)] * 2)

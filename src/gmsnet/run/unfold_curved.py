@@ -184,8 +184,9 @@ class CurvedParts:
         places[own[out]] = within(places[own[out]], self.grid.boxes.triangles[which[out]], room[out])
         places[own] = self.written.rounded(places[own])
         worse = _shapes(places[rows]) < self.least
-        steep = _steep(rows, places, side)
-        bad = touched & ~left & (_turned(part, places, side) | steep | _sharp(rows, places) | worse)
+        _, unit, area = normals_of(places, rows)
+        steep = _steep(unit, side[rows].sum(axis=1)) & ~thin(places[rows], area)
+        bad = touched & ~left & (_turned(part, places, side) | steep | _sharp(rows, unit, len(flat)) | worse)
         wrong = np.zeros(len(flat), dtype=bool)
         wrong[rows[bad]] = True
         wrong[at] |= surface.off > self.limit[part.nodes[at]]
@@ -205,17 +206,17 @@ def _turned(part: FlatPart, places: Floats, side: Floats) -> Flags:
     return part.of_cells(*(turned_corners(places[rows], side[rows].sum(axis=1)) for rows in cells))
 
 
-def _steep(rows: Longs, places: Floats, side: Floats) -> Flags:
-    """(k,) the facets (k, 3) about upright to the surface: their edges would look sharp, and hold nodes there. Not thin
-    ones."""
-    across, (_, unit, area) = side[rows].sum(axis=1), normals_of(places, rows)
-    return np.asarray((dot(unit, across) < UPRIGHT * lengths_of(across)) & ~thin(places[rows], area))
+def _steep(unit: Floats, across: Floats) -> Flags:
+    """(k,) the facets with normals (k, 3) about upright to a surface, whose own there are along ``across`` (k, 3).
+
+    Their edges would look sharp, and hold nodes there.
+    """
+    return np.asarray(dot(unit, across) < UPRIGHT * lengths_of(across))
 
 
-def _sharp(rows: Longs, places: Floats) -> Flags:
-    """(k,) the facets (k, 3) with a neighbour that is folded over them."""
-    _, count, one, other = edges_of(len(places), rows)
-    _, unit, _ = normals_of(places, rows)
+def _sharp(rows: Longs, unit: Floats, nodes: int) -> Flags:
+    """(k,) the facets (k, 3) of so many nodes, with normals (k, 3), that have a neighbour which is folded over them."""
+    _, count, one, other = edges_of(nodes, rows)
     over = (count == 2) & (dot(unit[one // 3], unit[other // 3]) < FOLD)
     found = np.zeros(len(rows), dtype=bool)
     found[one[over] // 3] = found[other[over] // 3] = True
